@@ -1,0 +1,30 @@
+"""camviz: one virtual camera, taken apart piece by piece.
+
+The names below are imported when they are first used, so that `import camviz` costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Calibration": "camviz.files",
+    "Camera": "camviz.cameras",
+    "Intrinsics": "camviz.cameras",
+    "Rig": "camviz.cameras",
+    "load": "camviz.files",
+    "look_at": "camviz.cameras",
+}
+
+__all__ = ["Calibration", "Camera", "Intrinsics", "Rig", "__version__", "load", "look_at"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'camviz' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
