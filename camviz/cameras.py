@@ -46,7 +46,7 @@ class Intrinsics:
     def from_fov(cls, width: int, height: int, hfov_deg: float) -> Intrinsics:
         """Square pixels and a centred principal point, seeing `hfov_deg` from the left edge to the right one.
 
-        FOV = 2 atan(width / 2f), so this is the field of a perspective lens. Raises ValueError outside (0, 180) degrees.
+        FOV = 2 atan(width / 2f): the field of a perspective lens. Raises ValueError outside (0, 180) degrees.
         """
         if not 0 < hfov_deg < 180:
             raise ValueError(f"hfov_deg must lie between 0 and 180 degrees, got {hfov_deg}")
@@ -141,12 +141,12 @@ class Camera:
         return self.world_from_cam.inv()
 
     def project(self, points_world: ArrayLike) -> Array:
-        """Pixels (..., 2) of world points (..., 3) in metres: K ∘ lens ∘ cam_from_world. NaN where there is no image."""
+        """Pixels (..., 2) of world points (..., 3) in metres: K ∘ lens ∘ cam_from_world. NaN where none."""
         points_cam = transform(self.cam_from_world, points_world)
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
     def unproject(self, uv: ArrayLike) -> Array:
-        """Unit rays (..., 3) in the world, from the camera's centre through pixels (..., 2). NaN where there is no ray."""
+        """Unit rays (..., 3) in the world, from the camera's centre through pixels (..., 2). NaN where none."""
         rays_cam = self.lens.unproject(self.intrinsics.from_pixels(uv))
         return rotate(self.world_from_cam.rotation, rays_cam)
 
@@ -159,7 +159,7 @@ class Camera:
         return self.intrinsics.contains(self.project(points_world))
 
     def frustum(self, near: float, far: float, samples: int = 16) -> tuple[Array, Array]:
-        """The rims of the viewed volume at distances `near` and `far` in metres: two closed outlines (n, 3) in the world.
+        """The rims of the viewed volume at `near` and `far` metres: two closed outlines (n, 3) in the world.
 
         Points of the image's border at equal distance *along the ray*, so the rims bend with the lens.
         """

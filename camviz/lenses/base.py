@@ -17,7 +17,7 @@ class Lens(Protocol):
     """
 
     def project(self, points_cam: ArrayLike) -> Array:
-        """Image points (..., 2) in focal lengths of camera-frame points (..., 3) in any unit; NaN where there is none."""
+        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where none."""
         ...
 
     def unproject(self, xy: ArrayLike) -> Array:

@@ -1,0 +1,1 @@
+"""Widgets: what a reader touches. They hold no mathematics and no drawing."""
