@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Perspective
-from camviz.lenses.base import Array, as_points
+from camviz.lenses.base import Array, as_points, unit
 
 
 def to_homogeneous(uv: ArrayLike) -> Array:
@@ -74,20 +74,14 @@ def epipoles(F: ArrayLike) -> tuple[Array, Array]:
     """The left and the right epipole as homogeneous unit vectors (3,): F e_left = 0 and Fᵀ e_right = 0.
 
     Each is the image of the other camera's centre. The last coordinate is 0 when that lies parallel to the image, as
-    in a rectified pair; `from_homogeneous` gives the pixel, or NaN.
+    in a rectified pair; `from_homogeneous` gives the pixel, or NaN. Raises ValueError for an F of rank below 2.
     """
-    F = np.asarray(F, dtype=float)
-    return _null_vector(F), _null_vector(F.T)
-
-
-def _null_vector(A: Array) -> Array:
-    # A null vector of a rank-2 matrix is across every row. Unlike an SVD, a cross product keeps small entries exact.
-    rows = A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), np.finfo(float).tiny)
-    candidates = np.cross(rows[[1, 2, 0]], rows[[2, 0, 1]])
-    lengths = np.linalg.norm(candidates, axis=1)
-    if not lengths.max() > 0:
-        raise ValueError(f"F must have rank 2, got {A.tolist()}")
-    return candidates[lengths.argmax()] / lengths.max()
+    # Counting in thousands of pixels makes the entries of F alike in size, which spares the epipoles rounding error.
+    D = np.diag([1000.0, 1000.0, 1.0])
+    U, s, Vt = np.linalg.svd(D @ np.asarray(F, dtype=float) @ D)
+    if not s[1] > 1e-14 * s[0]:
+        raise ValueError(f"F must have rank 2, got {np.asarray(F).tolist()}")
+    return unit(D @ Vt[2]), unit(D @ U[:, 2])
 
 
 def epipolar_lines(F: ArrayLike, uv_left: ArrayLike) -> Array:
@@ -109,7 +103,7 @@ def clip_lines(lines: ArrayLike, intrinsics: Intrinsics) -> Array:
     low, high = np.array([-0.5, -0.5]), np.array([intrinsics.width, intrinsics.height]) - 0.5
     middle = (low + high) / 2
     foot = middle - ((normal @ middle + c) / (a**2 + b**2))[..., None] * normal
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         s, t = (low - foot) / along, (high - foot) / along
     # 0/0: the line runs along the border itself, which is part of the image.
     s, t = np.where((along == 0) & np.isnan(s), -np.inf, s), np.where((along == 0) & np.isnan(t), np.inf, t)

@@ -82,14 +82,15 @@ def rectify(left: Camera, right: Camera, intrinsics: Intrinsics | None = None) -
     Each camera takes half of the rotation between them, then both turn by the least angle that lays their x axis along
     the baseline: Bouguet's method, as cv2.stereoRectify for a horizontal pair. `intrinsics` serves both pictures;
     without it they keep the left one's size and the smallest focal length, and look where the originals look.
-    Raises ValueError without a baseline, when `right` does not stand to the right, and when the originals look along
-    the baseline.
+    Raises ValueError when `right` does not stand to the right, and when the originals look along the baseline.
     """
     to_right = right_from_left(left, right)
     half = Rotation.from_rotvec(to_right.rotation.as_rotvec() / 2)
-    x, y, z = baseline = -half.inv().apply(to_right.translation)
+    x, y, z = -half.inv().apply(to_right.translation)
     if not x > 0:
-        raise ValueError(f"the right camera must stand to the right of the left one, it stands at {baseline.tolist()}")
+        raise ValueError(
+            f"the right camera must stand to the right of the left one, it is {x + 0.0:.3g} m from it along x"
+        )
     # The least turn from the baseline b to x̂ is about b × x̂ = (0, z, −y).
     sine = np.hypot(y, z)
     turn = Rotation.from_rotvec(np.array([0, z, -y]) * (atan2(sine, x) / sine if sine > 0 else 0))
