@@ -10,13 +10,16 @@ from typing import ClassVar
 import cv2
 import numpy as np
 from contourpy import contour_generator
+from scipy.spatial.transform import RigidTransform
 
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
 from camviz.lenses import BrownConrady, Lens
+from camviz.lenses.base import unit
 from camviz.scenes import Scene, render, textured_scene, to_display
 from camviz.views.base import View, choice, slider, switch
 
@@ -53,6 +56,7 @@ class DistortionView(View):
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 90))
     lens: Lens | None = None
     photograph: np.ndarray | None = field(default=None, compare=False, repr=False)
+    eye: Eye = Eye(target=(0.0, 0.0, 0.45), distance=2.5, yaw_deg=-35, pitch_deg=25)
 
     @classmethod
     def of(cls, camera: Camera, photograph: np.ndarray | None = None) -> DistortionView:
@@ -114,7 +118,9 @@ class DistortionView(View):
     def _name(self) -> str:
         if self.lens:
             return type(self.lens).__name__
-        return ", ".join(f"{name} = {value:g}" for name, value in self._coefficients().items() if value) or "no distortion"
+        return (
+            ", ".join(f"{name} = {value:g}" for name, value in self._coefficients().items() if value) or "no distortion"
+        )
 
     def _coefficients(self) -> dict[str, float]:
         return {name: getattr(self, name) for name in type(self).controls() if hasattr(BrownConrady, name)}
@@ -123,11 +129,15 @@ class DistortionView(View):
 
     def _image(self, draft: bool) -> np.ndarray:
         width = 320 if draft else 480
-        small = Camera(self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens)
+        small = Camera(
+            self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
+        )
         if self.photograph is None:
             picture = to_display(render(_scene(), small))
         else:
-            picture = cv2.resize(self.photograph, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA)
+            picture = cv2.resize(
+                self.photograph, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA
+            )
         return picture if self.show == "distorted" else self._straightened(picture, small)
 
     def _straightened(self, picture: np.ndarray, camera: Camera) -> np.ndarray:
@@ -149,16 +159,16 @@ class DistortionView(View):
         lines = self._bend(straight) if self.show == "distorted" else straight
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "yellow thin")
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
-        return panel.show(photograph(panel, "camera", width, height) + drawn + self._fold_circle(panel), title=title)
+        return panel.show(photograph(panel, "camera", width, height) + drawn + self._fold_circle(panel, bent=self.show == "distorted"), title=title)
 
-    def _fold_circle(self, panel: Panel) -> str:
-        """The rim beyond which no ray arrives (distorted) or no pixel is left to read (undistorted)."""
+    def _fold_circle(self, panel: Panel, *, bent: bool) -> str:
+        """Where the radial curve turns back, among ideal points or, `bent`, where the lens puts them."""
         fold = distortion.fold_radius(self.camera.lens)
         if not isfinite(fold):
             return ""
         turn = np.linspace(0, 2 * np.pi, 90)
         rim = fold * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-        if self.show == "distorted" and isinstance(self.camera.lens, BrownConrady):
+        if bent and isinstance(self.camera.lens, BrownConrady):
             rim = self.camera.lens.distort(rim)
         return svg.line(panel.place(self.intrinsics.to_pixels(rim)), "red dashed")
 
@@ -176,7 +186,7 @@ class DistortionView(View):
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
-        content = self._folded_area(panel) + self._contours(panel) + arrows
+        content = self._folded_area(panel) + self._contours(panel) + arrows + self._fold_circle(panel, bent=False)
         return panel.show(content, title="Where each point goes", note="contours: shift in px")
 
     def _contours(self, panel: Panel) -> str:
@@ -214,7 +224,9 @@ class DistortionView(View):
             + plot.upright(panel, corner, "green dashed")
         )
         return plot.axes(panel, "r, ideal (tangent of the ray's angle)", "r, distorted") + panel.show(
-            lines + self._fold_mark(panel, fold) + svg.text(panel.place((corner, 0)) + (-6, -8), "image corner", "green end halo"),
+            lines
+            + self._fold_mark(panel, fold)
+            + svg.text(panel.place((corner, 0)) + (-6, -8), "image corner", "green end halo"),
             title="The radial curve",
             note=self.equation(),
         )
@@ -236,8 +248,32 @@ class DistortionView(View):
     # The frustum -----------------------------------------------------------------------------------------------------
 
     def _frustum_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = Panel("frustum", 545, 382, 255, 168, 0, 1, 0, 1)
-        return panel.show("", title="The bent frustum"), {}
+        panel = space_panel("frustum", 545, 382, 255, 168)
+        content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
+        label = "The rays of the image in space; drag or press the arrow keys to walk around"
+        return panel.show(
+            content, title="Its rays in space", note="drag to turn", drag="orbit", label=label
+        ), photographs
+
+    def _bent_frustum(self) -> list[Item]:
+        """The rays of a grid of pixels, a metre long, beside those of a pinhole with the same intrinsics."""
+        pinhole = self.camera.intrinsics.from_pixels(self.intrinsics.border(8))
+        rim = unit(np.concatenate([pinhole, np.ones_like(pinhole[:, :1])], axis=-1))
+        reach = self.camera.unproject(_pixel_grid(self.intrinsics, 25))
+        mesh = [*reach[::3], *np.swapaxes(reach[:, ::4], 0, 1)]
+        spokes = [np.stack([np.zeros(3), corner]) for corner in reach[[0, 0, -1, -1], [0, -1, -1, 0]]]
+        return [
+            Line(np.vstack([rim, rim[:1]]), "muted dashed", 1.3),
+            *(Line(line, "blue", 1.3) for line in mesh),
+            *(Line(spoke, "blue", 1.6) for spoke in spokes),
+            *axes_triad(RigidTransform.identity(), 0.4),
+        ]
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> DistortionView:
+        return self.but(eye=self.eye.orbited(dx, dy))
+
+    def pressed(self, handle: str, key: str) -> DistortionView:
+        return self.but(eye=self.eye.key(key))
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
