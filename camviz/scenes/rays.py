@@ -60,7 +60,9 @@ class Runs:
         sine = np.sqrt(1 - cosine * cosine)
         centre = origins_in_runs.mean(axis=2)
         slack = np.sqrt(((origins_in_runs - centre[..., None]) ** 2).sum(axis=0).max(axis=1))
-        return cls(origins_in_runs, directions_in_runs, axis, cosine, sine, centre.astype(np.float32), slack.astype(np.float32))
+        return cls(
+            origins_in_runs, directions_in_runs, axis, cosine, sine, centre.astype(np.float32), slack.astype(np.float32)
+        )
 
     def pick(self, runs: NDArray[np.intp]) -> tuple[Array, Floats]:
         """Origins (3, 1) or (3, n) and directions (3, n) of the rays in some runs."""

@@ -364,9 +364,7 @@ def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.i
     return s.ravel(), r.ravel(), np.stack([s.ravel(), 1 - r.ravel()], axis=-1), quads
 
 
-def _mesh(
-    name: str, vertices: Array, quads: NDArray[np.intp], uv: Array, texture: Texture, shade: float = 1.0
-) -> Mesh:
+def _mesh(name: str, vertices: Array, quads: NDArray[np.intp], uv: Array, texture: Texture, shade: float = 1.0) -> Mesh:
     picture = to_display(to_linear(np.arange(256) / 255) * shade)[texture.photograph]
     red, green, blue = to_display(texture.mean * shade).tolist()
     return Mesh(name, np.asarray(vertices, dtype=float), quads, uv, picture, (red, green, blue))
