@@ -8,6 +8,8 @@ from camviz.lenses.base import Array
 from camviz.photographs import photograph
 from camviz.scenes.light import sunlight, to_linear
 
+HILLS = (0.50, 0.62, 0.58)  # the nearer hills, and the colour that distance gives the lawn
+
 
 def noise(height: int, width: int, cell: int, seed: int, octaves: int = 4) -> Array:
     """Smooth noise (height, width) around 0, of standard deviation 1, that tiles; its largest blots are `cell` wide."""
@@ -38,18 +40,30 @@ def lit_round(picture: Array, upright: bool = False) -> Array:
     return to_linear(picture) * sunlight(normals)[..., None]
 
 
-def bricks() -> Array:
-    """A brick wall from the grey photograph: the mortar is its light part."""
-    grey = photograph("brick")[..., 0] / 255
-    grey = (grey - grey.min()) / np.ptp(grey)
-    return tinted(grey, [(0.22, 0.10, 0.08), (0.50, 0.25, 0.19), (0.70, 0.42, 0.33), (0.83, 0.70, 0.60)])
+def bricks(columns: int = 8, courses: int = 24) -> Array:
+    """A wall in running bond that tiles: dead level, so that whatever bends it is the lens."""
+    high, wide, joint = 22, 64, 3
+    rng = np.random.default_rng(7)
+    height, width = courses * high, columns * wide
+    v, u = np.mgrid[0:height, 0:width]
+    course = v // high
+    across = (u + course % 2 * wide // 2) % width
+    tone = 0.45 + rng.normal(0, 0.13, (courses, columns))[course, across // wide]
+    tone += 0.05 * noise(height, width, 16, seed=6) + 0.04 * rng.standard_normal((height, width))
+    clay = tinted(np.clip(tone, 0, 1), [(0.36, 0.17, 0.13), (0.64, 0.34, 0.25), (0.84, 0.55, 0.42)])
+    mortar = (across % wide < joint) | (v % high < joint)
+    return np.where(
+        mortar[..., None], np.array([0.80, 0.75, 0.67]) * (1 + 0.02 * noise(height, width, 8, 9))[..., None], clay
+    )
 
 
 def lawn() -> Array:
     """Grass that tiles: the grey photograph beside its mirror images, tinted."""
     grey = cv2.resize(photograph("grass")[..., 0], (256, 256), interpolation=cv2.INTER_AREA) / 255
     grey = np.block([[grey, grey[:, ::-1]], [grey[::-1], grey[::-1, ::-1]]])
-    return tinted(np.clip(0.5 + 1.1 * (grey - grey.mean()), 0, 1), [(0.12, 0.20, 0.07), (0.36, 0.47, 0.19), (0.62, 0.68, 0.36)])
+    return tinted(
+        np.clip(0.5 + 1.1 * (grey - grey.mean()), 0, 1), [(0.16, 0.27, 0.08), (0.42, 0.56, 0.20), (0.68, 0.76, 0.38)]
+    )
 
 
 def paving(columns: int, rows: int, texels: int = 80) -> Array:
@@ -59,7 +73,7 @@ def paving(columns: int, rows: int, texels: int = 80) -> Array:
     tone = np.kron(rng.normal(0, 0.035, (rows, columns)), np.ones((texels, texels)))
     chequer = np.kron((np.add.outer(np.arange(rows), np.arange(columns)) % 2) * 0.16, np.ones((texels, texels)))
     grain = 0.018 * noise(height, width, 32, seed=5) + 0.012 * rng.standard_normal((height, width))
-    stone = tinted(np.clip(0.42 + tone + chequer + grain, 0, 1), [(0.28, 0.25, 0.22), (0.98, 0.93, 0.85)])
+    stone = tinted(np.clip(0.46 + tone + chequer + grain, 0, 1), [(0.30, 0.26, 0.22), (1.0, 0.95, 0.86)])
     edge = np.minimum(np.arange(texels), np.arange(texels)[::-1])
     joint = np.clip(np.minimum.outer(edge, edge) / 1.5, 0, 1)
     return stone * (0.55 + 0.45 * np.tile(joint, (rows, columns)))[..., None]
@@ -96,7 +110,9 @@ def globe(height: int = 256) -> Array:
     latitude = np.abs(np.linspace(-90, 90, height))[:, None] + 5 * noise(height, width, 16, seed=8)
     shore = np.clip(0.5 + 0.25 * land, 0, 1)
     sea = tinted(shore, [(0.03, 0.16, 0.40), (0.10, 0.42, 0.66), (0.45, 0.76, 0.82)])
-    earth = tinted(np.clip(land / 2.2, 0, 1), [(0.78, 0.74, 0.48), (0.36, 0.56, 0.24), (0.47, 0.38, 0.22), (0.9, 0.88, 0.85)])
+    earth = tinted(
+        np.clip(land / 2.2, 0, 1), [(0.78, 0.74, 0.48), (0.36, 0.56, 0.24), (0.47, 0.38, 0.22), (0.9, 0.88, 0.85)]
+    )
     planet = np.where((land > 0.15)[..., None], earth, sea)
     planet = np.where((latitude > 74)[..., None], (0.95, 0.97, 0.99), planet)
     step = height / 6
@@ -126,18 +142,23 @@ def framed(picture: Array, border: float = 0.07) -> Array:
 
 
 def sky(height: int = 512) -> Array:
-    """Equirectangular sky: deep blue overhead, pale at the horizon, fair-weather clouds, two ridges of hills."""
+    """Equirectangular sky: pale at the horizon, deep blue above, fair-weather clouds, two ridges of hills."""
     width = 2 * height
-    elevation = 90 - 180 * (np.arange(height) + 0.5) / height
-    blue = tinted(np.clip(elevation / 60, 0, 1) ** 0.7, [(0.87, 0.92, 0.94), (0.62, 0.80, 0.93), (0.38, 0.62, 0.86), (0.25, 0.48, 0.78)])
-    picture = np.repeat(blue[:, None], width, axis=1)
-    clouds = noise(height, width, 96, seed=21, octaves=6)
-    clouds = cv2.resize(clouds[: height // 2], (width, height), interpolation=cv2.INTER_CUBIC)[::-1]
-    cover = np.clip((clouds - 0.35) * 0.8, 0, 0.92) * np.clip((elevation[:, None] - 3) / 12, 0, 1)
+    elevation = 90 - 180 * (np.arange(height)[:, None] + 0.5) / height
+    blues = [(0.89, 0.93, 0.93), (0.70, 0.85, 0.94), (0.45, 0.69, 0.89), (0.30, 0.55, 0.82), (0.22, 0.45, 0.74)]
+    picture = tinted(np.clip(elevation / 55, 0, 1) ** 0.75 + np.zeros(width), blues)
+    puffs = cv2.resize(noise(2 * height, width, 64, seed=21, octaves=6), (width, height), interpolation=cv2.INTER_AREA)
+    cover = np.clip(puffs - 0.7, 0, 0.85) * np.clip((elevation - 5) / 8, 0, 1)
     picture += cover[..., None] * (np.array([1.0, 0.99, 0.97]) - picture)
     ridges = noise(8, width, 128, seed=2, octaves=5)
-    for row, (rise, swing, colour) in enumerate([(4.6, 1.5, (0.60, 0.70, 0.78)), (2.6, 0.9, (0.47, 0.59, 0.58))]):
+    for row, (rise, swing, colour) in enumerate([(3.6, 1.2, (0.62, 0.73, 0.80)), (1.9, 0.7, HILLS)]):
         ridge = rise + swing * ridges[4 * row]
-        cover = np.clip((ridge - elevation[:, None]) / (180 / height) + 0.5, 0, 1)
+        cover = np.clip((ridge - elevation) / (180 / height) + 0.5, 0, 1)
         picture += cover[..., None] * (np.array(colour) - picture)
     return picture
+
+
+def leaves(size: int = 128) -> Array:
+    """Clipped box leaves, for something round."""
+    tone = 0.5 + 0.16 * noise(size, 2 * size, 8, seed=41, octaves=3)
+    return tinted(np.clip(tone, 0, 1), [(0.06, 0.14, 0.05), (0.22, 0.38, 0.14), (0.52, 0.64, 0.30)])

@@ -60,12 +60,14 @@ class Runs:
         sine = np.sqrt(1 - cosine * cosine)
         centre = origins_in_runs.mean(axis=2)
         slack = np.sqrt(((origins_in_runs - centre[..., None]) ** 2).sum(axis=0).max(axis=1))
-        return cls(origins_in_runs, directions_in_runs, axis, cosine, sine, centre.astype(np.float32), slack.astype(np.float32))
+        return cls(
+            origins_in_runs, directions_in_runs, axis, cosine, sine, centre.astype(np.float32), slack.astype(np.float32)
+        )
 
     def pick(self, runs: NDArray[np.intp]) -> tuple[Array, Floats]:
         """Origins (3, 1) or (3, n) and directions (3, n) of the rays in some runs."""
-        origins = self.origins[:, runs] if self.origins.shape[1] > 1 else self.origins
-        return origins.reshape(3, -1), self.directions[:, runs].reshape(3, -1)
+        origins = self.origins.take(runs, axis=1) if self.origins.shape[1] > 1 else self.origins
+        return origins.reshape(3, -1), self.directions.take(runs, axis=1).reshape(3, -1)
 
     def may_meet(self, bounds: Bounds) -> NDArray[np.bool_]:
         """False (surfaces, runs) where no ray of the run can meet the surface.

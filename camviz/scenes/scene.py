@@ -8,16 +8,16 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera
 from camviz.lenses.base import Array, as_points
 from camviz.scenes.rays import RUN, Bounds, Floats, Runs
-from camviz.scenes.surfaces import Meeting, Mesh, Surface
+from camviz.scenes.surfaces import Meeting, Mesh, Surface, on_sphere
 from camviz.scenes.texture import Texture
 from camviz.scenes.wireframe import Wireframe
 
-BLOCK = 1 << 19  # rays traced together: few enough to stay in the processor's cache
+BLOCK = 1 << 15  # rays traced together: few enough to stay in the processor's cache
 NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be mistaken for a hole in the scene
 
 
@@ -66,12 +66,15 @@ class Scene:
             self._paint_sky(runs, depth, light, spread)
         return light[:count], depth[:count]
 
-    def _meet(self, surface, runs, near, depth, light, spread):
+    def _meet(
+        self, surface: Surface, runs: Runs, near: NDArray[np.intp], depth: Floats, light: Floats, spread: float
+    ) -> None:
+        """Let the rays of the runs `near` meet one surface, and where it is the nearest so far, see it."""
         at = surface.meet(*runs.pick(near))
-        hit = np.flatnonzero(at.depth < depth.reshape(-1, RUN)[near].ravel())
+        hit = np.flatnonzero(at.depth < depth.reshape(-1, RUN).take(near, axis=0).ravel())
         if hit.size:
             rays = near[hit // RUN] * RUN + hit % RUN
-            seen = Meeting(*(values[hit] for values in at))
+            seen = Meeting(at.depth[hit], at.place.take(hit, axis=1))
             depth[rays] = seen.depth
             light[rays] = surface.radiance(seen, spread)
 
@@ -80,10 +83,8 @@ class Scene:
         if missed.size == 0:
             return
         x, y, z = runs.directions.reshape(3, -1)[:, missed]
-        s = np.arctan2(x, z) * np.float32(0.5 / np.pi) + np.float32(0.5)
-        r = np.arccos(np.clip(-y, -1, 1)) * np.float32(1 / np.pi)
         depth[missed] = np.nan
-        light[missed] = self.sky.sample(s, r, spread * self.sky.height / np.pi)
+        light[missed] = self.sky.sample(*on_sphere(x, y, -z), spread * self.sky.height / np.pi)
         light[missed[(x == 0) & (y == 0) & (z == 0)]] = NEUTRAL
 
     def outlines(self) -> Wireframe:

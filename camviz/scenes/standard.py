@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array
 from camviz.photographs import photograph
@@ -35,10 +36,11 @@ def board_corners() -> Array:
 
 @lru_cache(maxsize=1)
 def textured_scene() -> Scene:
-    """The garden: a calibration board, a crate with a globe, a ball, a brick wall, and columns into the distance."""
+    """The garden: a calibration board, a crate with a globe, a ball, a brick wall, and lamps into the distance."""
     sky = Texture(to_linear(paint.sky()), repeat=True)
-    things = [*_board(), *_still_life(), *_colonnade(), *_wall()]
-    lawn = Ground(FLOOR + 0.005, Texture(to_linear(paint.lawn()) * float(sunlight((0, -1, 0))), repeat=True), tile=3.2)
+    things = [*_board(), *_still_life(), *_lamps(), *_wall()]
+    grass = Texture(to_linear(paint.lawn()) * sunlight((0, -1, 0)), repeat=True)
+    lawn = Ground(FLOOR + 0.005, grass, tile=3.2, haze=to_linear(paint.HILLS), sight=90)
     return Scene([*things, _terrace(things), lawn], sky)
 
 
@@ -59,17 +61,20 @@ def _still_life() -> list[Surface]:
     wood = Texture(to_linear(paint.planks()))
     crate = box([0.68, FLOOR, 3.3], [0.62, 0.62, 0.62], wood, yaw=0.5, name="crate")
     globe = Sphere([0.68, FLOOR - 0.62 - 0.27, 3.3], 0.27, Texture(paint.lit_round(paint.globe())), "globe")
-    ball = Sphere([0.08, FLOOR - 0.15, 2.65], 0.15, Texture(paint.lit_round(paint.beach_ball())), "ball")
-    return [ball, globe, *crate]
+    ball = Sphere([0.13, FLOOR - 0.16, 3.0], 0.16, Texture(paint.lit_round(paint.beach_ball())), "ball")
+    clay = Texture(paint.lit_round(np.full((1, 32, 3), (0.74, 0.42, 0.28)), upright=True))
+    pot = Column([1.42, FLOOR, 4.7], 0.36, 0.2, clay, "pot")
+    bush = Sphere([1.42, FLOOR - 0.58, 4.7], 0.33, Texture(paint.lit_round(paint.leaves())), "bush")
+    return [ball, globe, *crate, bush, pot]
 
 
-def _colonnade() -> list[Surface]:
-    stone = np.clip(0.86 + 0.03 * paint.noise(64, 64, 16, seed=4), 0, 1)[..., None] * [1.0, 0.97, 0.91]
-    shaft, finial = Texture(paint.lit_round(stone, upright=True)), Texture(paint.lit_round(stone))
+def _lamps() -> list[Surface]:
+    iron = Texture(paint.lit_round(np.full((1, 32, 3), (0.20, 0.25, 0.27)), upright=True))
+    glass = Texture(paint.lit_round(np.full((32, 64, 3), (0.98, 0.96, 0.90))))
     surfaces: list[Surface] = []
-    for z in 3.4 + 1.9 * np.arange(9):
-        surfaces.append(Column([1.95, FLOOR, z], 1.7, 0.1, shaft))
-        surfaces.append(Sphere([1.95, FLOOR - 1.7 - 0.11, z], 0.15, finial, "column"))
+    for z in 3.5 + 1.9 * np.arange(9):
+        surfaces.append(Sphere([2.05, FLOOR - 1.95, z], 0.17, glass, "lamp"))
+        surfaces.append(Column([2.05, FLOOR, z], 1.80, 0.045, iron, "lamp"))
     return surfaces
 
 
@@ -77,7 +82,8 @@ def _wall() -> list[Surface]:
     bricks = Texture(to_linear(paint.bricks()), repeat=True)
     cat = paint.framed(photograph("chelsea") / 255)
     picture = Rectangle([-0.75, -0.65, 6.47], [1.35, 0, 0], [0, 0.95, 0], Texture(to_linear(cat)), name="picture")
-    return [picture, *box([-1.5, FLOOR, 6.65], [5.2, 2.5, 0.3], bricks, tile=1.7, name="wall")]
+    coping = box([-1.5, FLOOR - 2.5, 6.65], [5.3, 0.09, 0.4], Texture.plain((0.86, 0.82, 0.75)), name="wall")
+    return [picture, *coping, *box([-1.5, FLOOR, 6.65], [5.2, 2.5, 0.3], bricks, tile=2.4, name="wall")]
 
 
 def _terrace(things: list[Surface]) -> Rectangle:
@@ -93,9 +99,42 @@ def _terrace(things: list[Surface]) -> Rectangle:
     return Rectangle(corner, across, down, Texture(light * share[..., None]), name="terrace")
 
 
+@lru_cache(maxsize=1)
 def wireframe_scene() -> Wireframe:
-    """A house, a grid on the ground every metre, a board and the world's axes of one metre, as named lines.
+    """A house on a ground grid of one metre, the same board as in the garden, and the world's axes, one metre each.
 
-    Names: "ground", "house", "board", and "axis x", "axis y", "axis z".
+    Names: "ground", "house", "board", "axis x", "axis y", "axis z". Every line is straight between its points.
     """
-    raise NotImplementedError
+    return _grid() + _house() + _board_lines() + _axes()
+
+
+def _grid(x_reach: float = 4.0, z_reach: float = 10.0) -> Wireframe:
+    along = [[[x, FLOOR, 0], [x, FLOOR, z_reach]] for x in np.arange(-x_reach, x_reach + 1)]
+    across = [[[-x_reach, FLOOR, z], [x_reach, FLOOR, z]] for z in np.arange(z_reach + 1)]
+    return _named("ground", *along, *across)
+
+
+def _house(width: float = 2.0, wall: float = 1.3, ridge: float = 2.1, depth: float = 2.4) -> Wireframe:
+    """Two gables, the eaves and the ridge that join them, a door and a window; its door stands at (0.9, FLOOR, 4.5)."""
+    middle, front = 0.9, 4.5
+    outline = np.array([[-1, 0], [-1, wall], [0, ridge], [1, wall], [1, 0], [-1, 0]]) * [width / 2, 1]
+    gables = [[[middle + x, FLOOR - y, z] for x, y in outline] for z in (front, front + depth)]
+    beams = [[near, far] for near, far in zip(*gables, strict=True)][:-1]
+    door = [[middle + x, FLOOR - y, front] for x, y in [(-0.7, 0), (-0.7, 0.95), (-0.2, 0.95), (-0.2, 0)]]
+    frame = [(0.15, 0.45), (0.15, 0.95), (0.7, 0.95), (0.7, 0.45), (0.15, 0.45)]
+    return _named("house", *gables, *beams, door, [[middle + x, FLOOR - y, front] for x, y in frame])
+
+
+def _board_lines() -> Wireframe:
+    columns, rows = BOARD_COLUMNS + 1, BOARD_ROWS + 1
+    ends = [((0, r), (columns, r)) for r in range(rows + 1)] + [((s, 0), (s, rows)) for s in range(columns + 1)]
+    return _named("board", *(SQUARE * (np.array(e) @ [_BOARD_ACROSS, _BOARD_DOWN]) + _BOARD_CORNER for e in ends))
+
+
+def _axes() -> Wireframe:
+    x, y, z = (_named(f"axis {name}", [[0, 0, 0], tip]) for name, tip in zip("xyz", np.eye(3), strict=True))
+    return x + y + z
+
+
+def _named(name: str, *lines: ArrayLike) -> Wireframe:
+    return Wireframe(tuple(np.asarray(line, dtype=float) for line in lines), (name,) * len(lines))

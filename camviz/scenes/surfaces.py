@@ -14,7 +14,7 @@ from camviz.scenes.light import sunlight, to_display, to_linear
 from camviz.scenes.rays import Floats
 from camviz.scenes.texture import Texture
 
-_FAR = np.float32(np.inf)
+_FAR, _HALF = np.float32(np.inf), np.float32(0.5)
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,10 @@ class Mesh:
 
 
 class Meeting(NamedTuple):
-    """Where rays meet a surface: distance (n,) along each, inf on a miss; the place s, r (n,) on its texture; and the
-    cosine (n,) of the angle between ray and normal, to which a grazing look stretches a pixel."""
+    """Where n rays meet a surface: the distance (n,) along each, inf on a miss, and `place` (3, n) in its own frame."""
 
     depth: Floats
-    s: Floats
-    r: Floats
-    cosine: Floats
+    place: Floats
 
 
 class Surface(Protocol):
@@ -111,14 +108,16 @@ class Rectangle:
 
     def meet(self, origins: Array, directions: Floats) -> Meeting:
         at = _meet_plane(self._local_from_world, self.corner, origins, directions)
-        inside = (at.s >= 0) & (at.s <= 1) & (at.r >= 0) & (at.r <= 1) & (at.depth > 0)
+        s, r, _ = at.place
+        inside = (np.abs(s - _HALF) <= _HALF) & (np.abs(r - _HALF) <= _HALF) & (at.depth > 0)
         return at._replace(depth=np.where(inside, at.depth, _FAR))
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
         columns, rows = (np.float32(n) for n in self.repeats)
         wide = self.texture.width * columns / np.linalg.norm(self.across)
         high = self.texture.height * rows / np.linalg.norm(self.down)
-        light = self.texture.sample(at.s * columns, at.r * rows, _texels(at, spread * max(wide, high)))
+        s, r, cosine = at.place
+        light = self.texture.sample(s * columns, r * rows, _texels(at.depth, cosine, spread * max(wide, high)))
         return light if self.shade == 1 else light * np.float32(self.shade)
 
     def outline(self) -> tuple[Array, ...]:
@@ -165,7 +164,8 @@ class Ground:
         return at._replace(depth=np.where(at.depth > 0, at.depth, _FAR))
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
-        light = self.texture.sample(at.s, at.r, _texels(at, spread * self.texture.width / self.tile))
+        s, r, cosine = at.place
+        light = self.texture.sample(s, r, _texels(at.depth, cosine, spread * self.texture.width / self.tile))
         clear = np.exp(at.depth * np.float32(-1 / self.sight))[:, None]
         haze = np.asarray(self.haze, dtype=np.float32)
         return haze + (light - haze) * clear
@@ -205,13 +205,11 @@ class Sphere:
         step = directions / np.float32(self.radius)
         first, second = _meet_circle(start, step)
         depth = np.where(first > 0, first, second)
-        x, y, z = start + depth * step
-        s = np.arctan2(x, -z) * np.float32(0.5 / np.pi) + np.float32(0.5)
-        r = np.arccos(np.clip(-y, -1, 1)) * np.float32(1 / np.pi)
-        return Meeting(np.where(depth > 0, depth, _FAR), s, r, np.ones_like(depth))
+        return Meeting(np.where(depth > 0, depth, _FAR), start + depth * step)
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
-        return self.texture.sample(at.s, at.r, _texels(at, spread * self.texture.height / (np.pi * self.radius)))
+        density = self.texture.height / (np.pi * self.radius)
+        return self.texture.sample(*on_sphere(*at.place), at.depth * np.float32(spread * density))
 
     def outline(self) -> tuple[Array, ...]:
         turn = np.linspace(0, 2 * np.pi, 49)
@@ -257,14 +255,15 @@ class Column:
         start = ((origins - self._top[:, None]) / scale).astype(np.float32)
         step = directions / scale.astype(np.float32)
         first, second = _meet_circle(start[::2], step[::2])
-        outside = (first > 0) & (np.abs(start[1] + first * step[1] - np.float32(0.5)) <= 0.5)
+        outside = (first > 0) & (np.abs(start[1] + first * step[1] - _HALF) <= _HALF)
         depth = np.where(outside, first, second)
-        x, r, z = start + depth * step
-        s = np.arctan2(x, -z) * np.float32(0.5 / np.pi) + np.float32(0.5)
-        return Meeting(np.where((depth > 0) & (r >= 0) & (r <= 1), depth, _FAR), s, r, np.ones_like(depth))
+        place = start + depth * step
+        return Meeting(np.where((depth > 0) & (np.abs(place[1] - _HALF) <= _HALF), depth, _FAR), place)
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
-        return self.texture.sample(at.s, at.r, _texels(at, spread * self.texture.height / self.height))
+        x, r, z = at.place
+        density = self.texture.height / self.height
+        return self.texture.sample(around(x, -z), r, at.depth * np.float32(spread * density))
 
     def outline(self) -> tuple[Array, ...]:
         turn = np.linspace(0, 2 * np.pi, 25)
@@ -314,12 +313,28 @@ def _vector(values: ArrayLike, name: str) -> Array:
     return vector
 
 
+def around(x: Floats, z: Floats) -> Floats:
+    """How far round (n,) a direction points, 0…1: 0.5 along +z, more to the right."""
+    return np.arctan2(x, z) * np.float32(0.5 / np.pi) + _HALF
+
+
+def on_sphere(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
+    """Equirectangular s, r (n,) of unit normals, seen from outside: the middle faces -z, the first row is up."""
+    return around(x, -z), np.arccos(np.clip(-y, -1, 1)) * np.float32(1 / np.pi)
+
+
 def _meet_plane(local_from_world: Array, point: Array, origins: Array, directions: Floats) -> Meeting:
-    """Where rays meet the plane z = 0 of a frame at `point` whose third axis is a unit normal: t = -z₀ / ż."""
+    """Where rays meet the plane z = 0 of a frame at `point` whose third axis is a unit normal: t = -z₀ / ż.
+
+    The third row of `place` is not z, which is 0, but the cosine of the angle between ray and normal.
+    """
     start = (local_from_world @ (origins - point[:, None])).astype(np.float32)
-    ds, dr, approach = local_from_world.astype(np.float32) @ directions
-    depth = -start[2] / approach
-    return Meeting(depth, start[0] + depth * ds, start[1] + depth * dr, np.abs(approach))
+    place = local_from_world.astype(np.float32) @ directions
+    depth = -start[2] / place[2]
+    place[:2] *= depth
+    place[:2] += start[:2]
+    np.abs(place[2], out=place[2])
+    return Meeting(depth, place)
 
 
 def _meet_circle(start: Floats, step: Floats) -> tuple[Floats, Floats]:
@@ -335,10 +350,10 @@ def _meet_circle(start: Floats, step: Floats) -> tuple[Floats, Floats]:
     return middle - half, middle + half
 
 
-def _texels(at: Meeting, density: float) -> Floats | float:
+def _texels(depth: Floats, cosine: Floats, density: float) -> Floats | float:
     """Texels between neighbouring rays; a slanted look stretches them by 1 / cos, of which the square root is taken as
     a compromise between too sharp along the slope and too soft across it."""
-    return at.depth * np.float32(density) / np.sqrt(at.cosine) if density > 0 else 0.0
+    return depth * np.float32(density) / np.sqrt(cosine) if density > 0 else 0.0
 
 
 def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.intp]]:
@@ -349,9 +364,7 @@ def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.i
     return s.ravel(), r.ravel(), np.stack([s.ravel(), 1 - r.ravel()], axis=-1), quads
 
 
-def _mesh(
-    name: str, vertices: Array, quads: NDArray[np.intp], uv: Array, texture: Texture, shade: float = 1.0
-) -> Mesh:
+def _mesh(name: str, vertices: Array, quads: NDArray[np.intp], uv: Array, texture: Texture, shade: float = 1.0) -> Mesh:
     picture = to_display(to_linear(np.arange(256) / 255) * shade)[texture.photograph]
     red, green, blue = to_display(texture.mean * shade).tolist()
     return Mesh(name, np.asarray(vertices, dtype=float), quads, uv, picture, (red, green, blue))

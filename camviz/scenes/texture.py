@@ -46,19 +46,19 @@ class Texture:
 
     def sample(self, s: Floats, r: Floats, texels: Floats | float = 0.0) -> Floats:
         """Linear light (n, 3) at s, r (n,), for rays that lie `texels` of the finest copy apart."""
-        level = np.minimum(np.log2(np.maximum(texels, np.float32(1))), np.float32(len(self._places) - 1))
+        level = np.minimum(np.log2(np.maximum(texels, np.float32(1))), np.float32(self._places.shape[1] - 1))
         if not np.any(level):
             return self._look_up(s, r, np.zeros((), dtype=np.intp))
         fine = np.broadcast_to(level, s.shape).astype(np.intp)
         near = self._look_up(s, r, fine)
-        far = self._look_up(s, r, np.minimum(fine + 1, len(self._places) - 1))
+        far = self._look_up(s, r, np.minimum(fine + 1, self._places.shape[1] - 1))
         far -= near
         far *= (level - fine).astype(np.float32)[..., None]
         near += far
         return near
 
     def _look_up(self, s: Floats, r: Floats, level: NDArray[np.intp]) -> Floats:
-        left, top, width, height = self._places[level].T
+        left, top, width, height = self._places.take(level, axis=1)
         x = _texel(s, width, self.repeat)
         y = _texel(r, height, self.repeat)
         return _remap(self._mosaic, x + left, y + top)
@@ -72,7 +72,7 @@ def _texel(s: Floats, size: Floats, repeat: bool) -> Floats:
 
 
 def _pyramid(picture: Floats, repeat: bool) -> tuple[NDArray[np.uint16], Floats]:
-    """All halved copies in one mosaic, and where they lie: (levels, 4) as left, top, width, height."""
+    """All halved copies in one mosaic, and where they lie: (4, levels) as left, top, width, height."""
     copies = [picture]
     while max(copies[-1].shape[:2]) > 1:
         height, width = (max(size // 2, 1) for size in copies[-1].shape[:2])
@@ -81,12 +81,12 @@ def _pyramid(picture: Floats, repeat: bool) -> tuple[NDArray[np.uint16], Floats]
     height = max(picture.shape[0] + 1, tops[-1])
     width = picture.shape[1] + 1 + (copies[1].shape[1] + 1 if len(copies) > 1 else 0)
     mosaic = np.zeros((height, width, 3), dtype=np.uint16)
-    places = np.zeros((len(copies), 4), dtype=np.float32)
+    places = np.zeros((4, len(copies)), dtype=np.float32)
     for level, copy in enumerate(copies):
         left, top = (picture.shape[1] + 1) * (level > 0), tops[level]
         padded = np.pad(copy, ((0, 1), (0, 1), (0, 0)), mode="wrap" if repeat else "edge")
         mosaic[top : top + padded.shape[0], left : left + padded.shape[1]] = np.rint(np.clip(padded, 0, 1) * _FULL)
-        places[level] = left, top, copy.shape[1], copy.shape[0]
+        places[:, level] = left, top, copy.shape[1], copy.shape[0]
     return mosaic, places
 
 
