@@ -149,7 +149,7 @@ class DistortionView(View):
     def _bend(self, xy: np.ndarray) -> np.ndarray:
         """Distorted lens coordinates (..., 2) of ideal ones: the lens, or its bare polynomial where folds are shown."""
         if self.hide_fold or not isinstance(self.camera.lens, BrownConrady):
-            return self.camera.lens.project(np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1))
+            return self.camera.lens.project(_on_plane(xy))
         return self.camera.lens.distort(xy)
 
     def _picture_panel(self) -> str:
@@ -159,7 +159,8 @@ class DistortionView(View):
         lines = self._bend(straight) if self.show == "distorted" else straight
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "yellow thin")
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
-        return panel.show(photograph(panel, "camera", width, height) + drawn + self._fold_circle(panel, bent=self.show == "distorted"), title=title)
+        seen = photograph(panel, "camera", width, height)
+        return panel.show(seen + drawn + self._fold_circle(panel, bent=self.show == "distorted"), title=title)
 
     def _fold_circle(self, panel: Panel, *, bent: bool) -> str:
         """Where the radial curve turns back, among ideal points or, `bent`, where the lens puts them."""
@@ -202,7 +203,8 @@ class DistortionView(View):
 
     def _folded_area(self, panel: Panel) -> str:
         uv = _pixel_grid(self.intrinsics, 97)
-        folded = ~distortion.valid_region(self.camera, uv)
+        xy = self.intrinsics.from_pixels(uv)
+        folded = ~np.isfinite(self.camera.lens.project(_on_plane(xy))[..., 0])
         outlines = contour_generator(uv[..., 0], uv[..., 1], folded.astype(float)).filled(0.5, 1.5)
         return "".join(svg.polygon(panel.place(outline), "wash fill-red") for outline in outlines[0])
 
@@ -258,7 +260,7 @@ class DistortionView(View):
     def _bent_frustum(self) -> list[Item]:
         """The rays of a grid of pixels, a metre long, beside those of a pinhole with the same intrinsics."""
         pinhole = self.camera.intrinsics.from_pixels(self.intrinsics.border(8))
-        rim = unit(np.concatenate([pinhole, np.ones_like(pinhole[:, :1])], axis=-1))
+        rim = unit(_on_plane(pinhole))
         reach = self.camera.unproject(_pixel_grid(self.intrinsics, 25))
         mesh = [*reach[::3], *np.swapaxes(reach[:, ::4], 0, 1)]
         spokes = [np.stack([np.zeros(3), corner]) for corner in reach[[0, 0, -1, -1], [0, -1, -1, 0]]]
@@ -302,6 +304,10 @@ def _grid_lines(intrinsics: Intrinsics) -> np.ndarray:
 def _polynomial(*coefficients: float) -> str:
     terms = [f"{c:+.3g} r{power}" for c, power in zip(coefficients, "²⁴⁶", strict=True) if c]
     return "1" + "".join(f" {term[0]} {term[1:]}" for term in terms).replace("-", "−")
+
+
+def _on_plane(xy: np.ndarray) -> np.ndarray:
+    return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
 
 
 def _with_angle(r: float) -> str:
