@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, transform
+from camviz.lenses import Perspective
 from camviz.lenses.base import Array, as_points
 
 
@@ -123,7 +124,8 @@ def camera_body(
     if near > 0:
         items.append(Line(_closed(camera.centre + near * reach), colour, 1.2))
     if image is not None:
-        items.append(Sheet(camera.centre + depth * _reach(camera, _mesh(camera, 9, 13)), image))
+        mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 7, 9)
+        items.append(Sheet(camera.centre + depth * _reach(camera, mesh), image))
     items += _up_marker(rim[0], rim[12], rim[6], rim[30], colour)
     return [*items, Label(camera.centre, name, f"label {colour}")] if name else items
 

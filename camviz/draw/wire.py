@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from camviz.cameras import Camera, transform
+from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet
 from camviz.draw.picture import png
@@ -19,6 +20,7 @@ from camviz.lenses.base import Array
 
 NEAR = 0.02  # metres before the eye, where everything is cut
 LEVELS = 5  # of strength, from far to near
+_YES = np.ones(1, dtype=bool)
 
 Hidden = Callable[[Array, Array], np.ndarray]
 
@@ -35,8 +37,14 @@ class Sight:
     camera: Camera
     distance: float
 
+    @cached_property
+    def _extrinsics(self) -> tuple[Array, Array]:
+        cam_from_world = self.camera.cam_from_world
+        return cam_from_world.rotation.as_matrix(), cam_from_world.translation
+
     def points_cam(self, points_world: Array) -> Array:
-        return transform(self.camera.cam_from_world, points_world)
+        R, t = self._extrinsics
+        return points_world @ R.T + t
 
     def place(self, points_cam: Array) -> Array:
         """Picture units (..., 2), which count from the corner of the first pixel rather than from its centre."""
@@ -98,9 +106,11 @@ def draw_marks(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hid
     for item in items:
         if isinstance(item, Dots):
             points_cam = sight.points_cam(item.points)
-            px, behind = sight.place(points_cam), hidden(sight.place(points_cam), points_cam[:, 2])
-            parts.append(svg.dots(px[~behind], item.class_, item.diameter))
-            parts.append(svg.dots(px[behind], f"{item.class_} faint", item.diameter))
+            px = sight.place(points_cam)
+            behind = hidden(px, points_cam[:, 2])
+            style = f"stroke-width:{item.diameter:g}"
+            parts.append(svg.dots(px[~behind], item.class_, style=style))
+            parts.append(svg.dots(px[behind], f"{item.class_} faint", style=style))
     for item in items:
         if isinstance(item, Label):
             px = sight.place(sight.points_cam(item.point))
@@ -172,10 +182,11 @@ def _stroke(pieces: Pieces, chosen: np.ndarray, class_: str, width: float, level
 
 def _data(pieces: Pieces, chosen: np.ndarray) -> str:
     """Path data: consecutive pieces of one segment become one stroke, strokes that touch become one line."""
-    broken = (np.diff(chosen) != 1) | (np.diff(pieces.segment[chosen]) != 0)
-    firsts, lasts = chosen[np.r_[True, broken]], chosen[np.r_[broken, True]]
-    strokes = np.column_stack([pieces.ends[firsts, 0], pieces.ends[lasts, 1]]).round(1)
-    touches = np.r_[False, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1)]
+    segment = pieces.segment[chosen]
+    broken = (chosen[1:] != chosen[:-1] + 1) | (segment[1:] != segment[:-1])
+    firsts, lasts = chosen[np.concatenate([_YES, broken])], chosen[np.concatenate([broken, _YES])]
+    strokes = np.concatenate([pieces.ends[firsts, 0], pieces.ends[lasts, 1]], axis=-1).round(1)
+    touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1)])
     return "".join(
         ("L%g,%g" % (c, d)) if touch else ("M%g,%gL%g,%g" % (a, b, c, d))
         for (a, b, c, d), touch in zip(strokes.tolist(), touches.tolist(), strict=True)
