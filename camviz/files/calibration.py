@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Rig
 from camviz.lenses.base import Array
-
-_NOTHING: Mapping = MappingProxyType({})
 
 
 class CalibrationError(ValueError):
@@ -21,7 +18,7 @@ class CalibrationError(ValueError):
 
 @dataclass(frozen=True)
 class Board:
-    """A chessboard: its inner corners by columns and rows, and the side of a square in the file's unit (metres here)."""
+    """A chessboard: its inner corners by columns and rows, and the side of a square in metres, if the file is."""
 
     columns: int
     rows: int
@@ -47,9 +44,9 @@ class Calibration:
     source: Path
     format: str
     board: Board | None = None
-    detections: Mapping[str, Array] = field(default=_NOTHING, repr=False)  # name → pixels (views, corners, 2)
-    cam_from_board: Mapping[str, RigidTransform] = field(default=_NOTHING, repr=False)  # name → one pose per view
-    per_view_errors: Mapping[str, Array] = field(default=_NOTHING, repr=False)  # name → RMS (views,) in pixels
+    detections: Mapping[str, Array] = field(default_factory=dict, repr=False)  # name → pixels (views, corners, 2)
+    cam_from_board: Mapping[str, RigidTransform] = field(default_factory=dict, repr=False)  # name → one pose per view
+    per_view_errors: Mapping[str, Array] = field(default_factory=dict, repr=False)  # name → RMS (views,) in pixels
     world_from_imu: RigidTransform | None = None
     notes: tuple[str, ...] = ()
 

@@ -22,7 +22,12 @@ from camviz.lenses import (
     UnifiedSphere,
 )
 
-PROJECTIONS = {"pinhole": "fu fv pu pv", "omni": "xi fu fv pu pv", "eucm": "alpha beta fu fv pu pv", "ds": "xi alpha fu fv pu pv"}
+PROJECTIONS = {
+    "pinhole": "fu fv pu pv",
+    "omni": "xi fu fv pu pv",
+    "eucm": "alpha beta fu fv pu pv",
+    "ds": "xi alpha fu fv pu pv",
+}
 DISTORTIONS = {"radtan": "k1 k2 p1 p2", "equidistant": "k1 k2 k3 k4", "fov": "w", "none": ""}
 SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
 LENSES = {

@@ -41,7 +41,9 @@ def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None) -> C
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
     if len(size) != 2 or not all(isinstance(side, int) and 1 <= side <= LARGEST_SIDE for side in size):
-        raise CalibrationError(f"size: expected (width, height), each from 1 to {LARGEST_SIDE} pixels, got {shown(size)}")
+        raise CalibrationError(
+            f"size: expected (width, height), each from 1 to {LARGEST_SIDE} pixels, got {shown(size)}"
+        )
     return size
 
 

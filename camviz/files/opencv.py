@@ -51,7 +51,7 @@ def _read_one(section: Section, path: Path, size: tuple[int, int] | None, tag: s
     if key := _find(section, ROTATION):
         section.rotation(key)
         notes.append("R and T are not used: the file holds one camera, and it stands at the origin.")
-    views = {field: {name: value} for field, value in _views(section).items()}
+    views: dict[str, Any] = {field: {name: value} for field, value in _views(section).items()}
     return Calibration({name: camera}, path, "OpenCV FileStorage", _board(section), notes=tuple(notes), **views)
 
 
@@ -82,8 +82,8 @@ def image_size(section: Section, given: tuple[int, int] | None) -> tuple[int, in
     if size := held or given:
         return size
     raise CalibrationError(
-        "the file holds no image size (image_width, image_height): add it as --size WIDTHxHEIGHT, such as --size 640x480 "
-        "(in Python: size=(640, 480))"
+        "the file holds no image size (image_width, image_height): add --size WIDTHxHEIGHT, such as --size 640x480 "
+        "(in Python size=(640, 480))"
     )
 
 
@@ -95,8 +95,8 @@ def _held_size(section: Section) -> tuple[int, int] | None:
     keys = _find(section, WIDTH), _find(section, HEIGHT)
     if keys == (None, None):
         return None
-    width, height = keys[0] or "image_width", keys[1] or "image_height"
-    return section.whole(width, LARGEST_SIDE), section.whole(height, LARGEST_SIDE)
+    wide, high = keys[0] or "image_width", keys[1] or "image_height"
+    return section.whole(wide, LARGEST_SIDE), section.whole(high, LARGEST_SIDE)
 
 
 def intrinsics(section: Section, key: str, width: int, height: int) -> Intrinsics:
@@ -187,7 +187,7 @@ def _board_poses(section: Section, key: str) -> RigidTransform:
 
 
 def _find(section: Section, spellings: str, tag: str = "") -> str | None:
-    """The one key of the file that is a spelling of a name, with its camera's tag; two of them contradict each other."""
+    """The one key that is a spelling of a name with its camera's tag; CalibrationError where two are."""
     found = [key for key in section.values if key in section and _tag(key, spellings) == tag]
     if len(found) > 1:
         raise CalibrationError(f"expected one of the keys {' and '.join(found)}, got both")

@@ -1,4 +1,4 @@
-"""ROS CameraInfo: the file of camera_calibration (camera_matrix …) and the message itself (K D R P; k d r p in ROS 2)."""
+"""ROS CameraInfo: the file (camera_matrix …) and the message itself (K D R P, in ROS 2 k d r p)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens
 
 COUNTS = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}  # sensor_msgs/distortion_models.hpp
-MEANINGS = {"plumb_bob": "k1 k2 p1 p2 k3", "rational_polynomial": "k1 k2 p1 p2 k3 k4 k5 k6", "equidistant": "k1 k2 k3 k4"}
+MEANINGS = {
+    "plumb_bob": "k1 k2 p1 p2 k3",
+    "rational_polynomial": "k1 k2 p1 p2 k3 k4 k5 k6",
+    "equidistant": "k1 k2 k3 k4",
+}
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
 RECTIFICATION, PROJECTION = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
 

@@ -98,7 +98,9 @@ class Section:
         """A rigid transform [R t; 0 1], 4×4."""
         matrix = self.matrix(key, 4, 4)
         if not np.allclose(matrix[3], [0, 0, 0, 1], rtol=0, atol=ROTATION_TOLERANCE):
-            raise self.error(key, "0 0 0 1 in the bottom row of a rigid transform", " ".join(f"{x:g}" for x in matrix[3]))
+            raise self.error(
+                key, "0 0 0 1 in the bottom row of a rigid transform", " ".join(f"{x:g}" for x in matrix[3])
+            )
         return RigidTransform.from_components(matrix[:3, 3], as_rotation(matrix[:3, :3], self.where(key)))
 
 
@@ -124,7 +126,7 @@ def as_rotation(matrix: Array, where: str) -> Rotation:
 
 
 def _as_matrix(section: Section) -> Array:
-    """OpenCV's and ROS's matrices: rows, cols, data, and in OpenCV `dt` with the number of channels before its letter."""
+    """The matrices of OpenCV and ROS: rows, cols, data, and in OpenCV `dt`, its channels before its letter."""
     rows, columns = (section.whole(key, 10**6) if section.values.get(key) != 0 else 0 for key in ("rows", "cols"))
     dt = section.text("dt") if "dt" in section else "d"
     if not (match := re.fullmatch(r"([1-9]?)([a-zA-Z])", dt)):
@@ -139,7 +141,9 @@ def _as_matrix(section: Section) -> Array:
 
 def _as_array(value: Any, where: str) -> Array:
     if isinstance(value, list):
-        rows = [_as_array(item, f"{where}[{index}]") if isinstance(item, list) else item for index, item in enumerate(value)]
+        rows = [
+            _as_array(item, f"{where}[{index}]") if isinstance(item, list) else item for index, item in enumerate(value)
+        ]
         if any(isinstance(row, np.ndarray) for row in rows):
             return _stacked(rows, where)
     numbers = value if isinstance(value, list) else [value]

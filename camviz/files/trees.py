@@ -115,7 +115,7 @@ def parse_yaml(text: str) -> Any:
     tree, line = _Tree(), 0
     try:
         for event in yaml.parse(text, Loader=_Loader):
-            line = event.start_mark.line
+            line = event.start_mark.line if event.start_mark else line
             _grow(tree, event)
     except CalibrationError as error:
         raise CalibrationError(f"line {line + 1}: {error}") from None
@@ -130,12 +130,14 @@ def parse_yaml(text: str) -> Any:
 def _grow(tree: _Tree, event: yaml.Event) -> None:
     tag = getattr(event, "tag", None)
     if tag not in _PLAIN_TAGS and not (tag in _OPENCV_TAGS and isinstance(event, yaml.MappingStartEvent)):
-        raise CalibrationError(f"the tag {shown(tag)} is refused: a calibration holds numbers, words, lists and mappings")
+        raise CalibrationError(
+            f"the tag {shown(tag)} is refused: a calibration holds numbers, words, lists and mappings"
+        )
     match event:
         case yaml.ScalarEvent() if tree.wants_key:
             tree.key(event.value)
         case yaml.ScalarEvent():
-            plain = event.style is None and tag != _YAML_TAG + "str"
+            plain = not event.style and tag != _YAML_TAG + "str"
             tree.leaf(scalar(event.value) if plain else event.value, event.anchor)
         case yaml.SequenceStartEvent():
             tree.begin([], event.anchor)
@@ -144,7 +146,7 @@ def _grow(tree: _Tree, event: yaml.Event) -> None:
         case yaml.CollectionEndEvent():
             tree.end()
         case yaml.AliasEvent():
-            tree.alias(event.anchor)
+            tree.alias(str(event.anchor))
 
 
 def _yaml_problem(error: yaml.YAMLError) -> str:
