@@ -86,6 +86,7 @@ class DistortionView(View):
             "image corner": f"r = {_with_angle(corner)}",
             "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
             "fold": f"r = {_with_angle(fold)}" if isfinite(fold) else "none",
+            "largest r that any ray reaches": f"{self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
         }
 
     def equation(self) -> str:
@@ -223,7 +224,7 @@ class DistortionView(View):
             + plot.curve(panel, r, r, "muted dashed")
             + plot.curve(panel, r, curve, "blue thick")
             + plot.curve(panel, r, beyond, "red thick dotted")
-            + plot.upright(panel, corner, "green dashed")
+            + svg.line(panel.place([(corner, 0), (corner, corner), (0, corner)]), "green dashed")
         )
         return plot.axes(panel, "r, ideal (tangent of the ray's angle)", "r, distorted") + panel.show(
             lines
@@ -311,7 +312,7 @@ def _on_plane(xy: np.ndarray) -> np.ndarray:
 
 
 def _with_angle(r: float) -> str:
-    return f"{r:.3f} ({degrees(atan(r)):.1f}°)"
+    return f"{r:.4f} ({degrees(atan(r)):.1f}°)"
 
 
 def _pixel_grid(intrinsics: Intrinsics, columns: int) -> np.ndarray:
