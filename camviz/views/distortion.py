@@ -86,7 +86,7 @@ class DistortionView(View):
             "image corner": f"r = {_with_angle(corner)}",
             "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
             "fold": f"r = {_with_angle(fold)}" if isfinite(fold) else "none",
-            "largest r that any ray reaches": f"{self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
+            "rays reach r =": f"{self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
         }
 
     def equation(self) -> str:
