@@ -32,7 +32,7 @@ class Texture:
     @classmethod
     def of_photograph(cls, picture: ArrayLike, repeat: bool = False) -> Texture:
         """From sRGB bytes (height, width, 3)."""
-        return cls(to_linear(np.arange(256) / 255)[np.asarray(picture)], repeat)
+        return cls(to_linear(np.arange(256) / 255).astype(np.float32)[np.asarray(picture)], repeat)
 
     @classmethod
     def plain(cls, rgb: ArrayLike) -> Texture:
@@ -76,7 +76,8 @@ def _pyramid(picture: Floats, repeat: bool) -> tuple[NDArray[np.uint16], Floats]
     copies = [picture]
     while max(copies[-1].shape[:2]) > 1:
         height, width = (max(size // 2, 1) for size in copies[-1].shape[:2])
-        copies.append(cv2.resize(copies[-1], (width, height), interpolation=cv2.INTER_AREA))
+        smaller = cv2.resize(copies[-1], (width, height), interpolation=cv2.INTER_AREA)
+        copies.append(np.asarray(smaller, dtype=np.float32))
     tops = [0, 0, *np.cumsum([copy.shape[0] + 1 for copy in copies[1:]]).tolist()]
     height = max(picture.shape[0] + 1, tops[-1])
     width = picture.shape[1] + 1 + (copies[1].shape[1] + 1 if len(copies) > 1 else 0)
@@ -95,5 +96,6 @@ def _remap(picture: NDArray[np.uint16], x: Floats, y: Floats, row: int = 1024) -
     rows = -(-x.size // row)
     maps = np.zeros((2, rows * row), dtype=np.float32)
     maps[0, : x.size], maps[1, : x.size] = x, y
-    seen = cv2.remap(picture, *maps.reshape(2, rows, row), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return seen.reshape(-1, 3)[: x.size] * np.float32(1 / _FULL)
+    across, down = maps.reshape(2, rows, row)
+    seen = cv2.remap(picture, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.multiply(seen.reshape(-1, 3)[: x.size], 1 / _FULL, dtype=np.float32)
