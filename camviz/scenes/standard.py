@@ -6,10 +6,10 @@ Metres, x right, y down, z forward: a camera with an identity pose stands 1.25 m
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array
 from camviz.photographs import photograph
@@ -38,7 +38,7 @@ def board_corners() -> Array:
 @lru_cache(maxsize=1)
 def textured_scene() -> Scene:
     """The garden: a calibration board, a crate with a globe, a ball, a brick wall, and lamps into the distance."""
-    sky = Texture.of_photograph(np.rint(255 * paint.sky()).astype(np.uint8), repeat=True)
+    sky = Texture(to_linear(paint.sky()), repeat=True)
     things = [*_board(), *_still_life(), *_lamps(), *_wall()]
     grass = Texture(to_linear(paint.lawn()) * sunlight((0, -1, 0)), repeat=True)
     lawn = Ground(FLOOR + 0.005, grass, tile=3.2, haze=to_linear(paint.HILLS), sight=90)
@@ -51,7 +51,7 @@ def _board() -> list[Surface]:
     across = (SQUARE * (BOARD_COLUMNS + 1) + 2 * margin) * _BOARD_ACROSS
     down = (SQUARE * (BOARD_ROWS + 1) + 2 * margin) * _BOARD_DOWN
     picture = Texture(to_linear(paint.checkerboard(BOARD_COLUMNS + 1, BOARD_ROWS + 1)))
-    wood = Texture(paint.lit_round(np.full((1, 32, 3), (0.55, 0.36, 0.20)), upright=True))
+    wood = Texture(paint.lit_round(paint.plain(1, 32, (0.55, 0.36, 0.20)), upright=True))
     back = 0.03 * np.cross(_BOARD_ACROSS, _BOARD_DOWN)
     legs = [corner + down * 0.2 + across * s + back for s in (0.12, 0.88)]
     easel = [Column(np.array([x, FLOOR, z]), FLOOR - y, 0.018, wood, "easel") for x, y, z in legs]
@@ -63,15 +63,15 @@ def _still_life() -> list[Surface]:
     crate = box([0.68, FLOOR, 3.3], [0.62, 0.62, 0.62], wood, yaw=0.5, name="crate")
     globe = Sphere(np.array([0.68, FLOOR - 0.62 - 0.27, 3.3]), 0.27, Texture(paint.lit_round(paint.globe())), "globe")
     ball = Sphere(np.array([0.13, FLOOR - 0.16, 3.0]), 0.16, Texture(paint.lit_round(paint.beach_ball())), "ball")
-    clay = Texture(paint.lit_round(np.full((1, 32, 3), (0.74, 0.42, 0.28)), upright=True))
+    clay = Texture(paint.lit_round(paint.plain(1, 32, (0.74, 0.42, 0.28)), upright=True))
     pot = Column(np.array([1.42, FLOOR, 4.7]), 0.36, 0.2, clay, "pot")
     bush = Sphere(np.array([1.42, FLOOR - 0.58, 4.7]), 0.33, Texture(paint.lit_round(paint.leaves())), "bush")
     return [ball, globe, *crate, bush, pot]
 
 
 def _lamps() -> list[Surface]:
-    iron = Texture(paint.lit_round(np.full((1, 32, 3), (0.20, 0.25, 0.27)), upright=True))
-    glass = Texture(paint.lit_round(np.full((32, 64, 3), (0.98, 0.96, 0.90))))
+    iron = Texture(paint.lit_round(paint.plain(1, 32, (0.20, 0.25, 0.27)), upright=True))
+    glass = Texture(paint.lit_round(paint.plain(32, 64, (0.98, 0.96, 0.90))))
     surfaces: list[Surface] = []
     for z in 3.5 + 1.9 * np.arange(9):
         surfaces.append(Sphere(np.array([2.05, FLOOR - 1.95, z]), 0.17, glass, "lamp"))
@@ -81,7 +81,7 @@ def _lamps() -> list[Surface]:
 
 def _wall() -> list[Surface]:
     bricks = Texture(to_linear(paint.bricks()), repeat=True)
-    cat = paint.framed(photograph("chelsea") / 255)
+    cat = paint.framed(photograph("chelsea"))
     corner, across, down = np.array([[-0.75, -0.65, 6.47], [1.35, 0, 0], [0, 0.95, 0]])
     picture = Rectangle(corner, across, down, Texture(to_linear(cat)), name="picture")
     coping = box([-1.5, FLOOR - 2.5, 6.65], [5.3, 0.09, 0.4], Texture.plain((0.86, 0.82, 0.75)), name="wall")
@@ -97,8 +97,8 @@ def _terrace(things: list[Surface]) -> Rectangle:
     points = corner + s[None, :, None] * across + r[:, None, None] * down
     _, depth = Scene(things).trace(points, SUN / np.linalg.norm(SUN))
     lit = cv2.resize(np.isnan(depth).astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
-    share = SKYLIGHT + (float(sunlight((0, -1, 0))) - SKYLIGHT) * lit
-    return Rectangle(corner, across, down, Texture(light * share[..., None]), name="terrace")
+    light *= (SKYLIGHT + (sunlight((0, -1, 0)) - SKYLIGHT) * lit)[..., None]
+    return Rectangle(corner, across, down, Texture(light), name="terrace")
 
 
 @lru_cache(maxsize=1)
@@ -139,5 +139,5 @@ def _axes() -> Wireframe:
     return x + y + z
 
 
-def _named(name: str, *lines: ArrayLike) -> Wireframe:
+def _named(name: str, *lines: Any) -> Wireframe:
     return Wireframe(tuple(np.asarray(line, dtype=float) for line in lines), (name,) * len(lines))
