@@ -113,7 +113,7 @@ def _in_words(lessons: tuple[str, ...]) -> str:
 
 
 def _term(entry: dict[str, Any]) -> Term:
-    lists = {key: tuple(entry[key]) for key in ("lessons", "also") if key in entry}
+    lists: dict[str, Any] = {key: tuple(entry[key]) for key in ("lessons", "also") if key in entry}
     return Term(**{**entry, **lists})
 
 
