@@ -8,7 +8,8 @@
 A lesson's cells carry tags: `setup`, `build` (what exercises may rely on), `stub`, `check`, `solution`, `glossary`
 (filled by `refresh`), `nbval-check-output`. A stub's metadata names its exercise, {"camviz": {"exercise":
 "05.distort"}}; notes for the teacher are Markdown in the metadata of the cell they belong to, {"camviz": {"teacher":
-"10 minutes. Ask …"}}. A stub is followed, before the next one, by its check and its solution, a fenced block in <details>.
+"10 minutes. Ask …"}}. A stub is followed, before the next one, by its check and its solution, a fenced block in
+<details>.
 """
 
 from __future__ import annotations
