@@ -49,7 +49,15 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
 
 def _mapping(tree: Any) -> Section:
     if not isinstance(tree, dict):
-        what = "a list" if isinstance(tree, list) else "plain text" if isinstance(tree, str) else shown(tree)
+        what = (
+            "a list"
+            if isinstance(tree, list)
+            else "plain text"
+            if isinstance(tree, str)
+            else "empty of values"
+            if tree is None
+            else shown(tree)
+        )
         raise CalibrationError(f"expected a calibration, this is {what}; looked for {LOOKED_FOR}")
     return Section(tree)
 
