@@ -1,0 +1,66 @@
+"""Panels: rectangles of a picture with coordinates of their own."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.draw import svg
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A rectangle of the picture (x, y, width, height) that shows the data rectangle left … right × top … bottom."""
+
+    name: str
+    x: float
+    y: float
+    width: float
+    height: float
+    left: float
+    right: float
+    top: float
+    bottom: float
+
+    def place(self, points: ArrayLike) -> np.ndarray:
+        """Panel coordinates (..., 2) of data points (..., 2)."""
+        return (np.asarray(points, dtype=float) - (self.left, self.top)) * self.scale
+
+    def data(self, points: ArrayLike) -> np.ndarray:
+        """Data points (..., 2) of panel coordinates (..., 2)."""
+        return np.asarray(points, dtype=float) / self.scale + (self.left, self.top)
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Picture units per unit of data, (2,)."""
+        return np.array([self.width / (self.right - self.left), self.height / (self.bottom - self.top)])
+
+    def show(self, content: str, *, title: str = "", note: str = "", drag: str | None = None, label: str = "") -> str:
+        """The content clipped to the panel, with its title above; with `drag`, a handle for pointer and arrow keys.
+
+        A handle covers the whole panel; `label` tells a screen reader what dragging it does.
+        """
+        heading = svg.text((self.x, self.y - 8), title, "title") if title else ""
+        heading += svg.text((self.x + self.width, self.y - 8), note, "note end") if note else ""
+        handle = {"data_drag": drag, "tabindex": 0, "role": "group", "aria_label": label or drag} if drag else {}
+        backdrop = svg.rectangle(0, 0, self.width, self.height, "card")
+        inner = svg.element(
+            "svg", backdrop + content, x=self.x, y=self.y, width=self.width, height=self.height,
+            viewBox=f"0 0 {self.width:g} {self.height:g}", data_panel=self.name, overflow="hidden", **handle,
+        )  # fmt: skip
+        return heading + inner + svg.rectangle(self.x, self.y, self.width, self.height, "frame")
+
+
+def image_panel(
+    name: str, x: float, y: float, width: float, image_width: int, image_height: int, margin: float = 0
+) -> Panel:
+    """A panel `width` wide in the aspect of an image, in its pixel coordinates, with `margin` pixels around it."""
+    left, right = -0.5 - margin, image_width - 0.5 + margin
+    top, bottom = -0.5 - margin, image_height - 0.5 + margin
+    return Panel(name, x, y, width, width * (bottom - top) / (right - left), left, right, top, bottom)
+
+
+def photograph(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: object) -> str:
+    """The attached photograph where its pixels belong in an image panel."""
+    (x0, y0), (x1, y1) = panel.place([(-0.5, -0.5), (image_width - 0.5, image_height - 0.5)])
+    return svg.image(attached, x0, y0, x1 - x0, y1 - y0, **attributes)

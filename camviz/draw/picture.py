@@ -1,0 +1,89 @@
+"""A finished picture: SVG text with photographs attached, that can show itself anywhere."""
+
+from base64 import b64encode
+from dataclasses import dataclass, field
+from functools import cache
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a view looks like now. `description` states the present state in words and numbers (the alternative text).
+
+    The body refers to photographs as `attached:name`; a live pane receives them as bytes, a file carries them inside.
+    """
+
+    body: str
+    width: float
+    height: float
+    title: str
+    description: str
+    photographs: dict[str, bytes] = field(default_factory=dict)
+
+    def svg(self) -> str:
+        """The body as an `<svg>` element whose photographs are still `attached:name`."""
+        words = f"<title>{escape(self.title)}</title><desc>{escape(self.description)}</desc>"
+        return (
+            f'<svg xmlns="http://www.w3.org/2000/svg" class="camviz-svg" role="img" '
+            f'aria-label="{escape(self.title)}. {escape(self.description)}" '
+            f'viewBox="0 0 {self.width:g} {self.height:g}">{words}{self.body}</svg>'
+        )
+
+    def standalone(self) -> str:
+        """One SVG document with style and photographs inside, that opens anywhere and needs nothing."""
+        svg = self.svg().replace("viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1)
+        svg = svg.replace("<title>", f"<style>{style()}</style><title>", 1)
+        for name, data in self.photographs.items():
+            svg = svg.replace(f'"attached:{name}"', f'"data:{_mime(data)};base64,{b64encode(data).decode()}"')
+        return svg
+
+    def figure(self) -> str:
+        """An HTML figure with alternative text."""
+        source = b64encode(self.standalone().encode()).decode()
+        alternative = escape(f"{self.title}. {self.description}")
+        return (
+            f'<figure style="margin:0"><img alt="{alternative}" style="width:100%;max-width:{self.width:g}px" '
+            f'src="data:image/svg+xml;base64,{source}"></figure>'
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the standalone SVG to `path`."""
+        Path(path).write_text(self.standalone(), encoding="utf-8")
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        return {"text/html": self.figure(), "text/plain": f"{self.title}. {self.description}"}
+
+
+def jpeg(image: np.ndarray, quality: int = 85) -> bytes:
+    """A uint8 image, RGB (height, width, 3) or grey (height, width), as JPEG."""
+    return _encode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+
+
+def png(image: np.ndarray) -> bytes:
+    """A uint8 image, RGB, RGBA or grey, as PNG: for masks, maps and few colours."""
+    return _encode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+
+
+@cache
+def style() -> str:
+    """The style sheet that every picture shares."""
+    return (files("camviz.draw") / "style.css").read_text(encoding="utf-8")
+
+
+def _encode(extension: str, image: np.ndarray, options: list[int]) -> bytes:
+    swap = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
+    pixels = cv2.cvtColor(image, swap[image.shape[2]]) if image.ndim == 3 else image
+    done, data = cv2.imencode(extension, pixels, options)
+    if not done:
+        raise ValueError(f"cannot encode an image of shape {image.shape} and type {image.dtype} as {extension}")
+    return data.tobytes()
+
+
+def _mime(data: bytes) -> str:
+    return "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
