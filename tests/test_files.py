@@ -184,7 +184,7 @@ def test_a_ros_file_projects_as_opencv_does():
 def test_a_ros_projection_matrix_tells_the_baseline():
     """P[0, 3] = -fx B: 26.507895 / 295.53402 = 0.0897 m."""
     (note,) = camviz.load(DATA / "ros_file.yaml").notes
-    assert "0.08969 m" in note
+    assert "pair, 0.08969 m to the right" in note
 
 
 def test_a_ros_2_message_projects_as_opencv_does():
