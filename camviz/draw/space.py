@@ -81,16 +81,20 @@ def draw_space(
     CAMVIZ_RENDERER says "wire". Both show the same points at the same places. Raises ValueError for another renderer.
     """
     sight = Sight(eye.camera(round(panel.width), round(panel.height)), eye.distance)
-    if chosen_renderer(renderer, draft) == "solid":
+    if chosen_renderer(renderer) == "solid":
         from camviz.draw.solid import draw_solid
 
         return draw_solid(sight, items, panel.name, draft)
     return draw_wire(sight, items, panel.name, scale=1 if draft else 2)
 
 
-def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
+def chosen_renderer(renderer: str | None = None) -> str:
     """ "solid" or "wire": what was asked for, as far as this machine can do it."""
     renderer = renderer or os.environ.get("CAMVIZ_RENDERER") or "solid"
     if renderer not in ("solid", "wire"):
         raise ValueError(f"renderer must be 'solid' or 'wire', got {renderer!r}")
-    return "wire"
+    if renderer == "wire":
+        return "wire"
+    from camviz.draw.opengl import opengl_works
+
+    return "solid" if opengl_works()[0] else "wire"
