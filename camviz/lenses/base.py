@@ -1,11 +1,17 @@
 """What every lens is: a map between directions in front of the camera and points on its image, at focal length 1."""
 
-from typing import Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import fields
+from math import isfinite
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+BLOCK = 16384  # points worked on at a time, so that the temporaries stay in the processor's cache
 
 
 class Lens(Protocol):
@@ -17,12 +23,68 @@ class Lens(Protocol):
     """
 
     def project(self, points_cam: ArrayLike) -> Array:
-        """Image points (..., 2) in focal lengths of camera-frame points (..., 3) in any unit; NaN where there is none."""
+        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where there is none."""
         ...
 
     def unproject(self, xy: ArrayLike) -> Array:
         """Unit rays (..., 3) of image points (..., 2) in focal lengths; NaN where no ray arrives."""
         ...
+
+    def __hash__(self) -> int: ...
+
+
+class RayLens(ABC):
+    """A lens written as its two equations, on coordinates (n,): `image` and `ray`. The shapes are seen to here."""
+
+    def project(self, points_cam: ArrayLike) -> Array:
+        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where there is none."""
+        return blockwise(self.image, as_points(points_cam, 3, "points_cam"), 2)
+
+    def unproject(self, xy: ArrayLike) -> Array:
+        """Unit rays (..., 3) of image points (..., 2) in focal lengths; NaN where no ray arrives."""
+        return blockwise(self._unit_ray, as_points(xy, 2, "xy"), 3)
+
+    @abstractmethod
+    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+        """The image coordinates of camera-frame points."""
+
+    @abstractmethod
+    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """A ray, of any length, of image coordinates."""
+
+    def _unit_ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        x, y, z = self.ray(x, y)
+        scale = 1 / np.sqrt(x * x + y * y + z * z)
+        return x * scale, y * scale, z * scale
+
+
+def blockwise(function: Callable[..., tuple[Array, ...]], points: Array, size: int) -> Array:
+    """`function` of the coordinates of points (..., n), whose results become the coordinates of points (..., size).
+
+    What has no answer is NaN without a warning: that is its meaning here.
+    """
+    flat = points.reshape(-1, points.shape[-1])
+    result = np.empty((len(flat), size))
+    with np.errstate(all="ignore"):
+        for start in range(0, len(flat), BLOCK):
+            block = slice(start, start + BLOCK)
+            for i, coordinate in enumerate(function(*flat[block].T.copy())):
+                result[block, i] = coordinate
+    return result.reshape(*points.shape[:-1], size)
+
+
+def check_parameters(lens: Any, limit: float = 1e15) -> None:
+    """Raises ValueError naming the first parameter of a lens that is not a number of sensible size."""
+    for field in fields(lens):
+        value = getattr(lens, field.name)
+        if not (isfinite(value) and abs(value) <= limit):
+            raise ValueError(f"{field.name} must be a finite number, at most {limit:g} in size, got {value}")
+
+
+def check_range(name: str, value: float, inside: bool, takes: str) -> None:
+    """Raises ValueError saying what the parameter `name` takes, unless its value is `inside`."""
+    if not inside:
+        raise ValueError(f"{name} must be {takes}, got {value}")
 
 
 def as_points(values: ArrayLike, size: int, name: str) -> Array:

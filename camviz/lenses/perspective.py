@@ -3,20 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, as_points, unit
+from camviz.lenses.base import Array, RayLens
 
 
 @dataclass(frozen=True)
-class Perspective:
+class Perspective(RayLens):
     """x = X/Z, y = Y/Z for everything in front of the camera (Hartley & Zisserman 2004, eq. 6.1)."""
 
-    def project(self, points_cam: ArrayLike) -> Array:
-        points = as_points(points_cam, 3, "points_cam")
-        depth = np.where(points[..., 2:] > 0, points[..., 2:], np.nan)
-        return points[..., :2] / depth
+    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+        z = np.where(z > 0, z, np.nan)
+        return x / z, y / z
 
-    def unproject(self, xy: ArrayLike) -> Array:
-        xy = as_points(xy, 2, "xy")
-        return unit(np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1))
+    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        return x, y, np.ones_like(x)

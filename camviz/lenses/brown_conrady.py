@@ -1,0 +1,313 @@
+"""The polynomial that most calibrations hold: radial, tangential, rational, thin prism and tilt, as OpenCV has them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from math import atan, cos, inf, pi, sin, sqrt
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike
+
+from camviz.lenses.base import Array, RayLens, as_points, blockwise, check_parameters, check_range
+from camviz.lenses.roots import first_positive_root
+
+STEEPEST = np.deg2rad(89.5)  # the tables end here where the polynomial itself has no end
+CLOSE = 1e-13  # focal lengths, relative beyond 1: how well an inverse must return
+
+
+@dataclass(frozen=True)
+class BrownConrady(RayLens):
+    """From the ideal (x, y) = (X/Z, Y/Z), with r² = x² + y², to the distorted
+
+    x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²) + s1 r² + s2 r⁴
+    y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + p1 (r² + 2 y²) + 2 p2 x y + s3 r² + s4 r⁴
+
+    and from there onto a sensor tilted by τx and τy radians (OpenCV's calib3d; Brown 1971). A polynomial folds: only
+    rays in front of the camera have an image, and only if the way to them from the axis meets neither the fold of the
+    radial part, nor its pole, nor a Jacobian determinant of 0 (`valid`).
+    """
+
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
+    s1: float = 0.0
+    s2: float = 0.0
+    s3: float = 0.0
+    s4: float = 0.0
+    tau_x: float = 0.0
+    tau_y: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+        for name in ("tau_x", "tau_y"):
+            value = getattr(self, name)
+            check_range(name, value, abs(value) < pi / 2, "an angle between -π/2 and π/2 radians")
+
+    @classmethod
+    def from_coefficients(cls, coefficients: Iterable[float]) -> "BrownConrady":
+        """From 4, 5, 8, 12 or 14 coefficients in OpenCV's order; ValueError for any other number of them."""
+        values = [float(value) for value in np.ravel(np.asarray(coefficients, dtype=float))]
+        if len(values) not in (4, 5, 8, 12, 14):
+            raise ValueError(f"coefficients must be 4, 5, 8, 12 or 14 numbers, got {len(values)}")
+        return cls(*values)
+
+    # The polynomial itself, without regard to its domain: how it folds can be looked at.
+
+    def radial(self, r: ArrayLike) -> Array:
+        """g(r) = r N(r²)/D(r²), the distorted radius of an ideal one."""
+        r = np.asarray(r, dtype=float)
+        with np.errstate(all="ignore"):
+            return r * self._ratio(r * r)
+
+    def distort(self, xy: ArrayLike) -> Array:
+        """Distorted points (..., 2) of ideal points (..., 2), beyond the fold as well."""
+        return blockwise(self._distort, as_points(xy, 2, "xy"), 2)
+
+    def jacobian(self, xy: ArrayLike) -> Array:
+        """The derivative (..., 2, 2) of `distort` at ideal points (..., 2)."""
+        xy = as_points(xy, 2, "xy")
+        bent = blockwise(lambda x, y: self._bend_and_slopes(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
+        return self._tilt_jacobian(blockwise(self._polynomial, xy, 2)) @ bent
+
+    # Its domain.
+
+    @cached_property
+    def numerator(self) -> Polynomial:
+        """N(s), s = r²."""
+        return Polynomial([1, self.k1, self.k2, self.k3])
+
+    @cached_property
+    def denominator(self) -> Polynomial:
+        """D(s), s = r²."""
+        return Polynomial([1, self.k4, self.k5, self.k6])
+
+    @cached_property
+    def fold_radius(self) -> float:
+        """The smallest positive root of g'(r), where the radial part turns back; infinity if it never does."""
+        N, D = self.numerator, self.denominator
+        # g' = (N D + 2 s (N' D - N D')) / D²
+        rising = N * D + Polynomial([0, 2]) * (N.deriv() * D - N * D.deriv())
+        return sqrt(first_positive_root(rising.coef))
+
+    @cached_property
+    def pole_radius(self) -> float:
+        """The smallest positive root of D(r²), where the radial part is infinite; infinity if there is none."""
+        return sqrt(first_positive_root(self.denominator.coef))
+
+    def valid(self, xy: ArrayLike) -> np.ndarray:
+        """True where an ideal point (..., 2) has an image that it shares with no other point of the domain."""
+        xy = as_points(xy, 2, "xy")
+        return blockwise(lambda x, y: (self._valid(x, y),), xy, 1)[..., 0] > 0
+
+    # The lens.
+
+    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+        depth = np.where(z > 0, z, np.nan)
+        return self.bend(x / depth, y / depth)
+
+    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        x, y = self.straighten(x, y)
+        return x, y, np.ones_like(x)
+
+    def bend(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Distorted coordinates (n,) of ideal ones (n,); NaN outside the domain."""
+        valid = self._valid(x, y)
+        x, y = self._distort(x, y)
+        if not valid.all():
+            x[~valid] = y[~valid] = np.nan
+        return x, y
+
+    def straighten(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Ideal coordinates (n,) of distorted ones (n,), by Newton's method; NaN where there are none."""
+        x, y = self._invert(*self._untilt(x, y))
+        valid = self._valid(x, y)
+        if not valid.all():
+            x[~valid] = y[~valid] = np.nan
+        return x, y
+
+    # Forwards. With m = N/D + 2 (p1 y + p2 x): x' = x m + (p2 + s1) r² + s2 r⁴, y' = y m + (p1 + s3) r² + s4 r⁴.
+
+    def _ratio(self, s: Array) -> Array:
+        numerator = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
+        if not (self.k4 or self.k5 or self.k6):
+            return numerator
+        return numerator / (1 + s * (self.k4 + s * (self.k5 + s * self.k6)))
+
+    def _ratio_slope(self, s: Array, ratio: Array) -> Array:
+        slope = self.k1 + s * (2 * self.k2 + s * (3 * self.k3))
+        if not (self.k4 or self.k5 or self.k6):
+            return slope
+        # (N/D)' = (N' - D' N/D) / D
+        falling = self.k4 + s * (2 * self.k5 + s * (3 * self.k6))
+        return (slope - falling * ratio) / (1 + s * (self.k4 + s * (self.k5 + s * self.k6)))
+
+    def _polynomial(self, x: Array, y: Array) -> tuple[Array, Array]:
+        s = x * x + y * y
+        m = self._ratio(s)
+        if self._symmetric:
+            return x * m, y * m
+        m += 2 * self.p2 * x + 2 * self.p1 * y
+        return (
+            x * m + s * (self.p2 + self.s1 + s * self.s2),
+            y * m + s * (self.p1 + self.s3 + s * self.s4),
+        )
+
+    def _bend_and_slopes(self, x: Array, y: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+        """x', y' and ∂x'/∂x, ∂x'/∂y, ∂y'/∂x, ∂y'/∂y, before the tilt."""
+        s = x * x + y * y
+        ratio = self._ratio(s)
+        slope = 2 * self._ratio_slope(s, ratio)
+        if self._symmetric:
+            x_slope, y_slope = x * slope, y * slope
+            mixed = x * y_slope
+            return x * ratio, y * ratio, ratio + x * x_slope, mixed, mixed, ratio + y * y_slope
+        m = ratio + 2 * self.p2 * x + 2 * self.p1 * y
+        m_x, m_y = x * slope + 2 * self.p2, y * slope + 2 * self.p1
+        a, b = self.p2 + self.s1 + s * self.s2, self.p1 + self.s3 + s * self.s4
+        a_slope, b_slope = 2 * (a + s * self.s2), 2 * (b + s * self.s4)
+        return (
+            x * m + s * a,
+            y * m + s * b,
+            m + x * (m_x + a_slope),
+            x * m_y + y * a_slope,
+            y * m_x + x * b_slope,
+            m + y * (m_y + b_slope),
+        )
+
+    def _distort(self, x: Array, y: Array) -> tuple[Array, Array]:
+        x, y = self._polynomial(x, y)
+        if self._tilt is None:
+            return x, y
+        x, y, w = _homography(self._tilt, x, y)
+        return x / w, y / w
+
+    # The tilt: a homography between the sensor as it should be and as it is.
+
+    @cached_property
+    def _tilt(self) -> Array | None:
+        if not (self.tau_x or self.tau_y):
+            return None
+        cx, sx, cy, sy = cos(self.tau_x), sin(self.tau_x), cos(self.tau_y), sin(self.tau_y)
+        R = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+        return np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]]) @ R
+
+    def _untilt(self, x: Array, y: Array) -> tuple[Array, Array]:
+        if self._tilt is None:
+            return x, y
+        x, y, w = _homography(np.linalg.inv(self._tilt), x, y)
+        w = np.where(w > 0, w, np.nan)
+        return x / w, y / w
+
+    def _tilt_jacobian(self, xy: Array) -> Array:
+        if self._tilt is None:
+            return np.eye(2)
+        x, y, w = _homography(self._tilt, xy[..., 0], xy[..., 1])
+        image = np.stack([x / w, y / w], axis=-1)
+        return (self._tilt[:2, :2] - image[..., None] * self._tilt[2, :2]) / w[..., None, None]
+
+    # Where it does not fold.
+
+    @cached_property
+    def _symmetric(self) -> bool:
+        return not any((self.p1, self.p2, self.s1, self.s2, self.s3, self.s4))
+
+    def _upright(self, x: Array, y: Array) -> np.ndarray:
+        """True where the map keeps its orientation and the tilted sensor is in front."""
+        u, v, u_x, u_y, v_x, v_y = self._bend_and_slopes(x, y)
+        upright = u_x * v_y - u_y * v_x > 0
+        return upright if self._tilt is None else upright & (_homography(self._tilt, u, v)[2] > 0)
+
+    @cached_property
+    def _limits(self) -> tuple[float, float, float]:
+        """Radii: ideal points below the first are valid, beyond the second are not; no image lies beyond the third."""
+        outer = min(self.fold_radius, self.pole_radius)
+        if self._symmetric and self._tilt is None:
+            return outer, outer, inf if self.pole_radius <= self.fold_radius else float(self.radial(outer))
+        azimuth = np.linspace(0, 2 * pi, 65)[1:]
+        r = np.tan(np.linspace(0, min(atan(outer), STEEPEST), 129)[1:, None])
+        x, y = r * np.cos(azimuth), r * np.sin(azimuth)
+        with np.errstate(all="ignore"):
+            upright = np.logical_and.accumulate(self._upright(x, y))
+            images = np.hypot(*self._polynomial(x, y))
+        endless = (outer == inf and upright[-1].any()) or not upright[0].all()
+        farthest = inf if endless else 1.1 * float(images[upright].max())
+        return 0.99 * float(np.where(upright, r, 0).max(axis=0).min()), outer, farthest
+
+    def _valid(self, x: Array, y: Array) -> np.ndarray:
+        inner, outer, _ = self._limits
+        s = x * x + y * y
+        valid = s <= inner * inner
+        doubtful = ~valid & (s < outer * outer)
+        if doubtful.any():
+            valid[doubtful] = self._upright_all_the_way(x[doubtful], y[doubtful])
+        return valid
+
+    def _upright_all_the_way(self, x: Array, y: Array) -> np.ndarray:
+        """True where the map keeps its orientation all along the line from the axis to (x, y)."""
+        r = np.hypot(x, y)
+        steps = np.tan(np.linspace(0, 1, 33)[1:, None] * np.arctan(r)) / r
+        steps[-1] = 1
+        return np.all(self._upright(steps * x, steps * y), axis=0)
+
+    # Backwards.
+
+    @cached_property
+    def _inverse_table(self) -> tuple[Array, Array]:
+        """r² and the ratio of the ideal to the distorted radius, against the square of the distorted radius."""
+        end = min(atan(min(self.fold_radius, self.pole_radius * (1 - 1e-6))), STEEPEST)
+        r = np.tan(end * np.sin(np.linspace(0, pi / 2, 1025)))
+        s = r * r
+        return np.maximum.accumulate(np.square(self.radial(r))), 1 / self._ratio(s)
+
+    def _guess(self, u: Array, v: Array) -> tuple[Array, Array]:
+        """The ideal point of an image point, for the radial part alone."""
+        scale = np.interp(u * u + v * v, *self._inverse_table)
+        return u * scale, v * scale
+
+    def _step(self, x: Array, y: Array, u: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Newton's step from (x, y) towards the ideal point of (u, v), and how far its image still is from there."""
+        bent_x, bent_y, u_x, u_y, v_x, v_y = self._bend_and_slopes(x, y)
+        du, dv = u - bent_x, v - bent_y
+        scale = 1 / (u_x * v_y - u_y * v_x)
+        return (v_y * du - u_y * dv) * scale, (u_x * dv - v_x * du) * scale, np.maximum(np.abs(du), np.abs(dv))
+
+    def _invert(self, u: Array, v: Array) -> tuple[Array, Array]:
+        _, _, farthest = self._limits
+        x, y = self._guess(np.where(u * u + v * v <= farthest * farthest, u, np.nan), v)
+        close = CLOSE * (1 + np.abs(u) + np.abs(v))
+        for _ in range(4):
+            dx, dy, error = self._step(x, y, u, v)
+            if not (error > close).any():
+                return x, y
+            x, y = x + dx, y + dy
+        stuck = np.flatnonzero(self._step(x, y, u, v)[2] > close)
+        x[stuck], y[stuck] = self._invert_carefully(u[stuck], v[stuck], close[stuck])
+        return x, y
+
+    def _invert_carefully(self, u: Array, v: Array, close: Array) -> tuple[Array, Array]:
+        """Newton's method that halves a step which comes no closer or leaves the domain; NaN where it gets nowhere."""
+        x, y = (0.999 * guess for guess in self._guess(u, v))
+        dx, dy, error = self._step(x, y, u, v)
+        factor = np.ones_like(x)
+        for _ in range(60):
+            if not (error > close).any():
+                break
+            new_x, new_y = x + factor * dx, y + factor * dy
+            new_dx, new_dy, new_error = self._step(new_x, new_y, u, v)
+            better = (new_error < error) & self._valid(new_x, new_y)
+            for old, new in ((x, new_x), (y, new_y), (dx, new_dx), (dy, new_dy), (error, new_error)):
+                old[better] = new[better]
+            factor = np.where(better, np.minimum(1, 2 * factor), factor / 2)
+        return np.where(error <= close, x, np.nan), np.where(error <= close, y, np.nan)
+
+
+def _homography(H: np.ndarray, x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """H (x, y, 1) as three coordinates."""
+    u, v, w = (row[0] * x + row[1] * y + row[2] for row in H)
+    return u, v, w

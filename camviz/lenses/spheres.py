@@ -1,0 +1,136 @@
+"""Lenses by way of a sphere: one formula from the pinhole to mirrors and fisheyes that look behind themselves."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, sqrt
+
+import numpy as np
+
+from camviz.lenses.base import Array, RayLens, check_parameters, check_range
+from camviz.lenses.brown_conrady import BrownConrady
+
+
+@dataclass(frozen=True)
+class UnifiedSphere(RayLens):
+    """(x, y) = (X, Y) / (Z + ξ D) with D = |(X, Y, Z)|, then distorted by k1 k2 p1 p2 (Mei & Rives 2007, sec. II.B).
+
+    The point goes to the unit sphere and is seen from ξ behind its centre: ξ = 0 is a pinhole, ξ = 1 the stereographic
+    projection at half its focal length and the parabolic mirror. The same lens written with α (Usenko et al. 2018,
+    sec. 3.1) has ξ = α/(1 - α) and the focal length f = γ (1 - α): see `from_alpha`.
+    """
+
+    xi: float
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+        check_range("xi", self.xi, self.xi >= 0, "at least 0")
+
+    @classmethod
+    def from_alpha(cls, alpha: float) -> "UnifiedSphere":
+        """ξ = α/(1 - α) for 0 ≤ α < 1. Its focal lengths are γ = f/(1 - α): the intrinsics must be divided as well."""
+        check_range("alpha", alpha, 0 <= alpha < 1, "at least 0 and below 1")
+        return cls(alpha / (1 - alpha))
+
+    @cached_property
+    def distortion(self) -> BrownConrady | None:
+        """The polynomial that acts on (x, y) afterwards; None where it does nothing."""
+        coefficients = (self.k1, self.k2, self.p1, self.p2)
+        return BrownConrady(*coefficients) if any(coefficients) else None
+
+    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+        distance = np.sqrt(x * x + y * y + z * z)
+        seen = z > -_widest(self.xi) * distance
+        depth = np.where(seen, z + self.xi * distance, np.nan)
+        x, y = x / depth, y / depth
+        return self.distortion.bend(x, y) if self.distortion else (x, y)
+
+    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        if self.distortion:
+            x, y = self.distortion.straighten(x, y)
+        r2 = x * x + y * y
+        # η (x, y, 1) - (0, 0, ξ) lies on the sphere
+        eta = (self.xi + np.sqrt(1 + (1 - self.xi**2) * r2)) / (1 + r2)
+        return eta * x, eta * y, eta - self.xi
+
+
+@dataclass(frozen=True)
+class ExtendedUnified(RayLens):
+    """(x, y) = (X, Y) / (α D + (1 - α) Z) with D² = β (X² + Y²) + Z² (Khomutenko et al. 2016, eq. 11).
+
+    0 ≤ α ≤ 1 and β > 0: an ellipsoid in place of the sphere.
+    """
+
+    alpha: float
+    beta: float
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+        check_range("alpha", self.alpha, 0 <= self.alpha <= 1, "between 0 and 1")
+        check_range("beta", self.beta, self.beta > 0, "positive")
+
+    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+        distance = np.sqrt(self.beta * (x * x + y * y) + z * z)
+        seen = z > -_widest(_xi(self.alpha)) * distance
+        depth = np.where(seen, self.alpha * distance + (1 - self.alpha) * z, np.nan)
+        return x / depth, y / depth
+
+    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        return x, y, _depth(self.alpha, self.beta * (x * x + y * y))
+
+
+@dataclass(frozen=True)
+class DoubleSphere(RayLens):
+    """(x, y) = (X, Y) / (α D₂ + (1 - α) (ξ D₁ + Z)) (Usenko et al. 2018, eq. 40-45), -1 < ξ ≤ 1 and 0 ≤ α ≤ 1.
+
+    D₁ = |(X, Y, Z)| and D₂ = |(X, Y, ξ D₁ + Z)|: onto one sphere, then onto another, ξ further on.
+    """
+
+    xi: float
+    alpha: float
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+        check_range("xi", self.xi, -1 < self.xi <= 1, "above -1 and at most 1")
+        check_range("alpha", self.alpha, 0 <= self.alpha <= 1, "between 0 and 1")
+
+    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+        r2 = x * x + y * y
+        first = np.sqrt(r2 + z * z)
+        shifted = self.xi * first + z
+        second = np.sqrt(r2 + shifted * shifted)
+        depth = np.where(
+            self._seen(z, first, shifted, second), self.alpha * second + (1 - self.alpha) * shifted, np.nan
+        )
+        return x / depth, y / depth
+
+    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        r2 = x * x + y * y
+        shifted = _depth(self.alpha, r2)
+        scale = (shifted * self.xi + np.sqrt(shifted**2 + (1 - self.xi**2) * r2)) / (shifted**2 + r2)
+        z = scale * shifted - self.xi
+        seen = self._seen(z, 1.0, scale * shifted, scale * np.sqrt(r2 + shifted**2))
+        return scale * x, scale * y, np.where(seen, z, np.nan)
+
+    def _seen(self, z: Array, first: Array | float, shifted: Array, second: Array) -> np.ndarray:
+        """The published half-space (eq. 43); for ξ < 0 it holds rays that have no image, so that is asked as well."""
+        w1 = _widest(_xi(self.alpha))
+        w2 = (w1 + self.xi) / sqrt(2 * w1 * self.xi + self.xi**2 + 1)
+        return (z > -w2 * first) & (shifted > -w1 * second)
+
+
+def _xi(alpha: float) -> float:
+    return alpha / (1 - alpha) if alpha < 1 else inf
+
+
+def _widest(xi: float) -> float:
+    """w, with Z > -w D the half-space that a sphere seen from ξ behind its centre shows once: min(ξ, 1/ξ)."""
+    return min(xi, 1 / xi) if xi > 0 else 0.0
+
+
+def _depth(alpha: float, r2: Array) -> Array:
+    """Z of the point (x, y, Z) whose image is (x, y); NaN beyond the outline of the sphere (Usenko 2018, eq. 18)."""
+    return (1 - alpha**2 * r2) / (alpha * np.sqrt(1 - (2 * alpha - 1) * r2) + (1 - alpha))

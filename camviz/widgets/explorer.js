@@ -1,0 +1,197 @@
+// The pane of every visualizer: controls and a picture. It draws nothing itself and knows no mathematics:
+// it tells the kernel what the reader wants and shows the picture that comes back.
+
+const SETTLE_MS = 60;   // idle time after which a draft is replaced by the fine picture
+
+function render({ model, el }) {
+  const root = build(`<div class="camviz-explorer" data-lm-suppress-shortcuts="true" data-busy="false" data-rendered="0">
+    <div class="camviz-controls"></div><div class="camviz-error" role="alert" hidden></div><div class="camviz-picture"></div></div>`);
+  const [controls, error, picture] = root.children;
+  el.replaceChildren(root);
+
+  const ask = asker(model, root);
+  const inputs = model.get("controls").map((control) => makeControl(control, (value, draft) => {
+    ask({ values: { [control.name]: value } }, draft);
+  }));
+  inputs.forEach((input) => controls.append(input.element));
+  const reset = build(`<button type="button" data-action="reset">Reset</button>`);
+  reset.addEventListener("click", () => ask({ reset: true }, false));
+  controls.append(reset);
+
+  const showValues = () => {
+    const values = model.get("values");
+    inputs.forEach((input) => { if (!ask.pending(input.name)) input.show(values[input.name]); });
+  };
+  const showFrame = async () => {
+    const frame = model.get("frame");
+    ask.answered(frame);
+    error.hidden = !frame.error;
+    error.textContent = frame.error ? `This state could not be drawn. ${frame.error}` : "";
+    await swap(picture, frame);
+    root.dataset.rendered = String(Number(root.dataset.rendered) + 1);
+  };
+  const stopHands = hands(picture, ask);
+  model.on("change:values", showValues);
+  model.on("change:frame", showFrame);
+  showValues();
+  showFrame();
+  return () => {
+    stopHands();
+    model.off("change:values", showValues);
+    model.off("change:frame", showFrame);
+    picture.urls?.forEach(URL.revokeObjectURL);
+  };
+}
+
+// At most one request is under way; wishes that come meanwhile merge into the next one, so the latest wins.
+function asker(model, root) {
+  let id = Date.now() % 1e9, flying = null, wish = null, settle = null;
+  const send = () => {
+    flying = wish; wish = null;
+    flying.id = ++id;
+    root.dataset.busy = "true";
+    model.send(flying);
+  };
+  const ask = (part, draft) => {
+    clearTimeout(settle);
+    if (part.reset) wish = null;
+    wish ??= { values: {}, drags: [], keys: [], draft };
+    wish.draft = draft;
+    wish.reset ||= part.reset;
+    Object.assign(wish.values, part.values);
+    for (const [handle, x, y, dx, dy] of part.drags ?? []) {
+      const last = wish.drags.at(-1);
+      if (last && last[0] === handle) wish.drags[wish.drags.length - 1] = [handle, x, y, last[3] + dx, last[4] + dy];
+      else wish.drags.push([handle, x, y, dx, dy]);
+    }
+    wish.keys.push(...(part.keys ?? []));
+    if (!flying) send();
+  };
+  ask.answered = (frame) => {
+    if (flying && frame.answers !== flying.id) return;
+    flying = null;
+    if (wish) return send();
+    root.dataset.busy = String(frame.draft);
+    if (frame.draft) settle = setTimeout(() => ask({}, false), SETTLE_MS);
+  };
+  ask.pending = (name) => Boolean(wish && name in wish.values);
+  return ask;
+}
+
+// Photographs are decoded before the picture is replaced: no flash, no half-drawn state.
+async function swap(picture, frame) {
+  const turn = (picture.turn = (picture.turn ?? 0) + 1);
+  let svg = frame.svg;
+  const urls = [];
+  await Promise.all(Object.entries(frame.photographs ?? {}).map(async ([name, data]) => {
+    const url = URL.createObjectURL(new Blob([data]));
+    urls.push(url);
+    svg = svg.replaceAll(`"attached:${name}"`, `"${url}"`);
+    const image = new Image();
+    image.src = url;
+    await image.decode().catch(() => {});
+  }));
+  if (turn !== picture.turn) return urls.forEach(URL.revokeObjectURL);
+  const focused = picture.contains(document.activeElement) ? document.activeElement.dataset.drag : null;
+  picture.innerHTML = svg;
+  if (focused) picture.querySelector(`[data-drag="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+  picture.urls?.forEach(URL.revokeObjectURL);
+  picture.urls = urls;
+}
+
+// Pointer and keys on the picture's handles, in the picture's own units.
+function hands(picture, ask) {
+  let held = null;
+  const at = (event) => {
+    const svg = picture.querySelector("svg");
+    const box = svg.getBoundingClientRect(), view = svg.viewBox.baseVal;
+    return [(event.clientX - box.left) * view.width / box.width, (event.clientY - box.top) * view.height / box.height];
+  };
+  const down = (event) => {
+    const handle = event.target.closest("[data-drag]")?.dataset.drag;
+    if (!handle || event.button) return;
+    const [x, y] = at(event);
+    held = { handle, x, y };
+    picture.setPointerCapture(event.pointerId);
+    picture.querySelector(`[data-drag="${CSS.escape(handle)}"]`).focus({ preventScroll: true });
+    event.preventDefault();
+  };
+  const move = (event) => {
+    if (!held) return;
+    const [x, y] = at(event);
+    ask({ drags: [[held.handle, x, y, x - held.x, y - held.y]] }, true);
+    Object.assign(held, { x, y });
+  };
+  const up = () => { held = null; };
+  const key = (event) => {
+    const handle = event.target.closest?.("[data-drag]")?.dataset.drag;
+    if (!handle || !/^(Arrow(Left|Right|Up|Down)|[+=-])$/.test(event.key)) return;
+    ask({ keys: [[handle, event.key === "=" ? "+" : event.key]] }, true);
+    event.preventDefault();
+  };
+  const wheel = (event) => {
+    const handle = event.target.closest?.("[data-drag]")?.dataset.drag;
+    if (!handle || !event.ctrlKey) return;      // plain scrolling belongs to the notebook
+    ask({ keys: [[handle, event.deltaY < 0 ? "+" : "-"]] }, true);
+    event.preventDefault();
+  };
+  const all = { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, keydown: key, wheel };
+  for (const [type, listener] of Object.entries(all)) picture.addEventListener(type, listener, { passive: false });
+  return () => { for (const [type, listener] of Object.entries(all)) picture.removeEventListener(type, listener); };
+}
+
+let count = 0;
+
+function makeControl(control, changed) {
+  const id = `camviz-${++count}`;
+  const make = control.choices.length ? makeChoice : control.low === null ? makeSwitch : makeSlider;
+  const element = build(`<div class="camviz-control"><label for="${id}"></label></div>`);
+  element.dataset.control = control.name;
+  element.title = control.help;
+  const label = element.firstElementChild;
+  label.textContent = control.label;
+  if (control.unit) label.append(" ", build(`<span class="unit"></span>`)), (label.lastChild.textContent = `[${control.unit}]`);
+  const show = make(control, id, element, changed);
+  return { name: control.name, element, show };
+}
+
+function makeSlider({ label, low, high, step }, id, element, changed) {
+  const range = build(`<input type="range" id="${id}" min="${low}" max="${high}" step="${step}">`);
+  const number = build(`<input type="number" step="${step}" aria-label="number">`);
+  number.setAttribute("aria-label", `${label}, as a number`);
+  range.addEventListener("input", () => { number.value = range.value; changed(range.valueAsNumber, true); });
+  number.addEventListener("change", () => {
+    if (Number.isNaN(number.valueAsNumber)) return;
+    range.value = number.value;
+    changed(number.valueAsNumber, false);
+  });
+  element.append(range, number);
+  const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+  return (value) => {
+    range.value = value;
+    if (document.activeElement !== number) number.value = Number(value.toFixed(decimals + 2));
+  };
+}
+
+function makeChoice({ choices }, id, element, changed) {
+  const select = build(`<select id="${id}"></select>`);
+  select.append(...choices.map((words) => new Option(words, words)));
+  select.addEventListener("change", () => changed(select.value, false));
+  element.append(select);
+  return (value) => { select.value = value; };
+}
+
+function makeSwitch(_control, id, element, changed) {
+  const box = build(`<input type="checkbox" id="${id}">`);
+  box.addEventListener("change", () => changed(box.checked, false));
+  element.append(box);
+  return (value) => { box.checked = value; };
+}
+
+function build(html) {
+  const template = document.createElement("template");
+  template.innerHTML = html.trim();
+  return template.content.firstElementChild;
+}
+
+export default { render };
