@@ -141,20 +141,12 @@ class Camera:
         return self.world_from_cam.inv()
 
     def project(self, points_world: ArrayLike) -> Array:
-<<<<<<< HEAD
-        """Pixels (..., 2) of world points (..., 3) in metres: K ∘ lens ∘ cam_from_world. NaN where none."""
-=======
         """Pixels (..., 2) of world points (..., 3) in metres, K ∘ lens ∘ cam_from_world; NaN where there is none."""
->>>>>>> lenses
         points_cam = transform(self.cam_from_world, points_world)
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
     def unproject(self, uv: ArrayLike) -> Array:
-<<<<<<< HEAD
-        """Unit rays (..., 3) in the world, from the camera's centre through pixels (..., 2). NaN where none."""
-=======
         """Unit rays (..., 3) in the world, from the centre through pixels (..., 2); NaN where there is no ray."""
->>>>>>> lenses
         rays_cam = self.lens.unproject(self.intrinsics.from_pixels(uv))
         return rotate(self.world_from_cam.rotation, rays_cam)
 
@@ -167,11 +159,7 @@ class Camera:
         return self.intrinsics.contains(self.project(points_world))
 
     def frustum(self, near: float, far: float, samples: int = 16) -> tuple[Array, Array]:
-<<<<<<< HEAD
-        """The rims of the viewed volume at `near` and `far` metres: two closed outlines (n, 3) in the world.
-=======
         """The rims of the viewed volume at distances `near` and `far` in metres: two outlines (n, 3) in the world.
->>>>>>> lenses
 
         Points of the image's border at equal distance *along the ray*, so the rims bend with the lens.
         """
