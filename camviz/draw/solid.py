@@ -122,7 +122,9 @@ class Studio:
             self.renderer.AddLight(light)
         self.renderer.SetAutomaticLightCreation(False)
         self.opaque, self.clear = self._actor(), self._actor()
-        self.sheets: list[Any] = []
+        self.sheets: dict[Sheet, Any] = {}
+        self.spare: list[Any] = []
+        self.size = np.zeros(2, dtype=int)
 
     def shoot(self, sight: Sight, items: Sequence[Item], scale: float) -> Shot:
         """A picture of the faces and sheets."""
@@ -147,20 +149,26 @@ class Studio:
         return actor
 
     def _hang(self, sheets: Sequence[Sheet]) -> None:
-        """One textured actor per sheet; those not needed now are hidden."""
+        """One textured actor per sheet. A sheet that hangs already stays as it is; actors without one are reused."""
+        spare = [self.sheets.pop(sheet) for sheet in set(self.sheets) - set(sheets)] + self.spare
+        for sheet in sheets:
+            if sheet not in self.sheets:
+                self.sheets[sheet] = spare.pop() if spare else self._textured()
+                _paper(self.sheets[sheet], sheet)
+            self.sheets[sheet].SetVisibility(True)
+        for actor in spare:
+            actor.SetVisibility(False)
+        self.spare = spare
+
+    def _textured(self) -> Any:
         from vtkmodules.vtkRenderingCore import vtkTexture
 
-        while len(self.sheets) < len(sheets):
-            actor, texture = self._actor(), vtkTexture()
-            texture.InterpolateOn()
-            texture.MipmapOn()
-            actor.SetTexture(texture)
-            actor.GetProperty().LightingOff()
-            self.sheets.append(actor)
-        for actor, sheet in zip(self.sheets, sheets, strict=False):
-            _paper(actor, sheet)
-        for i, actor in enumerate(self.sheets):
-            actor.SetVisibility(i < len(sheets))
+        actor, texture = self._actor(), vtkTexture()
+        texture.InterpolateOn()
+        texture.MipmapOn()
+        actor.SetTexture(texture)
+        actor.GetProperty().LightingOff()
+        return actor
 
     def _aim(self, sight: Sight, items: Sequence[Item]) -> None:
         """The camera of VTK where the sight's is, with the same field of view and all solid things in range."""
@@ -170,19 +178,25 @@ class Studio:
         camera.SetFocalPoint(sight.camera.centre + R[:, 2])
         camera.SetViewUp(-R[:, 1])
         camera.SetViewAngle(2 * degrees(atan(k.height / (2 * k.fy))))
-        solid = [np.reshape(item.vertices if isinstance(item, Face) else item.points, (-1, 3))
-                 for item in items if isinstance(item, Face | Sheet)]  # fmt: skip
+        solid = [item.vertices for item in items if isinstance(item, Face | Sheet)]
         depth = sight.points_cam(np.concatenate(solid or [np.zeros((1, 3))]))[:, 2]
         depth = depth[np.isfinite(depth)]
         far = max(1.05 * depth.max(initial=0), 2 * NEAR)
         camera.SetClippingRange(max(0.95 * depth.min(initial=far), far / 1e4, NEAR), far)
+
+    def _open(self, width: int, height: int) -> None:
+        """Draw into the window's corner; the window only ever grows, for every change of its size costs memory."""
+        self.size = np.maximum(self.size, (width, height))
+        if tuple(self.size) != self.window.GetSize():
+            self.window.SetSize(*self.size.tolist())
+        self.renderer.SetViewport(0, 0, width / self.size[0], height / self.size[1])
 
     def _develop(self, sight: Sight, scale: float) -> Shot:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkFloatArray, vtkUnsignedCharArray
 
         width, height = (round(scale * n) for n in (sight.camera.intrinsics.width, sight.camera.intrinsics.height))
-        self.window.SetSize(width, height)
+        self._open(width, height)
         self.window.Render()
         pixels, depths = vtkUnsignedCharArray(), vtkFloatArray()
         self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, False, pixels)
@@ -220,26 +234,20 @@ def _dress(actor: Any, faces: Sequence[Face]) -> None:
 
 
 def _paper(actor: Any, sheet: Sheet) -> None:
-    """Give an actor this sheet's shape and picture; a picture that it has already is not sent again."""
+    """Give an actor this sheet's shape and picture."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
 
-    m, n = sheet.points.shape[:2]
-    v, u = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n), indexing="ij")
-    a = (np.arange(m - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
-    triangles = np.concatenate([np.stack([a, a + 1, a + n + 1], -1), np.stack([a, a + n + 1, a + n], -1)])
-    points = sheet.points.reshape(-1, 3)
-    there = np.isfinite(points).all(axis=-1)
-    data = _surface(np.where(there[:, None], points, 0), triangles[there[triangles].all(axis=-1)])
-    data.GetPointData().SetTCoords(numpy_to_vtk(np.stack([u, v], -1).reshape(-1, 2), deep=True))
+    there = np.isfinite(sheet.vertices).all(axis=-1)
+    quads = sheet.quads[there[sheet.quads].all(axis=-1)]
+    data = _surface(np.where(there[:, None], sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
+    data.GetPointData().SetTCoords(numpy_to_vtk(sheet.uv, deep=True))
     actor.GetMapper().SetInputData(data)
     actor.GetProperty().SetOpacity(sheet.opacity)
-    if getattr(actor, "shows", None) is not sheet.image:
-        image = vtkImageData()
-        image.SetDimensions(sheet.image.shape[1], sheet.image.shape[0], 1)
-        image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(sheet.image).reshape(-1, 3), deep=True))
-        actor.GetTexture().SetInputData(image)
-        actor.shows = sheet.image
+    image = vtkImageData()
+    image.SetDimensions(sheet.picture.shape[1], sheet.picture.shape[0], 1)
+    image.GetPointData().SetScalars(numpy_to_vtk(sheet.picture[::-1].reshape(-1, 3), deep=True))
+    actor.GetTexture().SetInputData(image)
 
 
 def _surface(points: Array, triangles: np.ndarray) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import cos, exp, radians, sin, tan
 
 import numpy as np
@@ -13,10 +14,12 @@ from camviz.cameras import Camera, Intrinsics, look_at
 from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, camera_body, grid_lines
 from camviz.draw.panel import Panel
 from camviz.draw.wire import Sight, draw_wire
+from camviz.lenses.base import Array
+from camviz.scenes import Scene
 
 __all__ = [
-    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "draw_space", "grid_lines",
-    "space_panel",
+    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "chosen_renderer",
+    "draw_space", "grid_lines", "scene_items", "space_panel",
 ]  # fmt: skip
 
 
@@ -86,6 +89,21 @@ def draw_space(
 
         return draw_solid(sight, items, panel.name, draft)
     return draw_wire(sight, items, panel.name, scale=1 if draft else 2)
+
+
+@lru_cache(maxsize=4)
+def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
+    """A scene as a renderer shows it: its textured surfaces for "solid", its outlines for "wire".
+
+    The lawn and what stands on it beyond the terrace are left out: seen from outside, a scene is a model on a table.
+    """
+    if renderer == "solid":
+        return tuple(Sheet(m.vertices, m.quads, m.uv, m.picture) for m in scene.faces() if _near(m.name, m.vertices))
+    return tuple(Line(line, "ink", 1.3) for name, line in scene.outlines() if _near(name, line))
+
+
+def _near(name: str, points: Array) -> bool:
+    return name != "ground" and bool(np.nanmax(np.abs(points)) < 12)
 
 
 def chosen_renderer(renderer: str | None = None) -> str:
