@@ -15,7 +15,7 @@ from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, 
 from camviz.draw.panel import Panel
 from camviz.draw.wire import Sight, draw_wire
 from camviz.lenses.base import Array
-from camviz.scenes import Scene
+from camviz.scenes import Scene, wireframe_scene
 
 __all__ = [
     "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "chosen_renderer",
@@ -93,17 +93,24 @@ def draw_space(
 
 @lru_cache(maxsize=4)
 def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
-    """A scene as a renderer shows it: its textured surfaces for "solid", its outlines for "wire".
+    """A scene as a renderer shows it: its textured surfaces for "solid", its outlines, lightly filled, for "wire".
 
-    The lawn and what stands on it beyond the terrace are left out: seen from outside, a scene is a model on a table.
+    The lawn and what stands far off on it are left out: seen from outside, a scene is a model on a table.
     """
+    meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
-        return tuple(Sheet(m.vertices, m.quads, m.uv, m.picture) for m in scene.faces() if _near(m.name, m.vertices))
-    return tuple(Line(line, "ink", 1.3) for name, line in scene.outlines() if _near(name, line))
+        return tuple(Sheet(mesh.vertices, mesh.quads, mesh.uv, mesh.picture) for mesh in meshes)
+    flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
+    fills = [Face(mesh.vertices[mesh.quads[0]], "#%02x%02x%02x" % mesh.rgb, 0.25) for mesh in flat]
+    lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
+    drawn = [Line(line, "muted" if name in ("wall", "lamp", "easel") else "ink", 1.2) for name, line in lines]
+    squares = [Line(line, "ink", 0.7) for _, line in wireframe_scene().only("board")]
+    ground = [Line(line, "grid", 1.2) for _, line in wireframe_scene().only("ground")]
+    return (*ground, *fills, *drawn, *squares)
 
 
 def _near(name: str, points: Array) -> bool:
-    return name != "ground" and bool(np.nanmax(np.abs(points)) < 12)
+    return name not in ("ground", "lawn") and bool(np.nanmax(np.abs(points)) < 12)
 
 
 def chosen_renderer(renderer: str | None = None) -> str:
