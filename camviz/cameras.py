@@ -33,7 +33,7 @@ class Intrinsics:
     def __post_init__(self) -> None:
         for name in ("width", "height"):
             size = getattr(self, name)
-            if int(size) != size or size < 1:
+            if not isfinite(size) or int(size) != size or size < 1:
                 raise ValueError(f"{name} must be a whole number of pixels, at least 1, got {size}")
         for name in ("fx", "fy"):
             if not (isfinite(getattr(self, name)) and getattr(self, name) > 0):
@@ -72,7 +72,7 @@ class Intrinsics:
         return cls(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], K[0, 1])
 
     @property
-    def K(self) -> Array:
+    def K(self) -> Array:  # noqa: N802
         """The 3×3 camera matrix."""
         return np.array([[self.fx, self.skew, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
@@ -141,12 +141,12 @@ class Camera:
         return self.world_from_cam.inv()
 
     def project(self, points_world: ArrayLike) -> Array:
-        """Pixels (..., 2) of world points (..., 3) in metres: K ∘ lens ∘ cam_from_world. NaN where none."""
+        """Pixels (..., 2) of world points (..., 3) in metres, K ∘ lens ∘ cam_from_world; NaN where there is none."""
         points_cam = transform(self.cam_from_world, points_world)
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
     def unproject(self, uv: ArrayLike) -> Array:
-        """Unit rays (..., 3) in the world, from the camera's centre through pixels (..., 2). NaN where none."""
+        """Unit rays (..., 3) in the world, from the centre through pixels (..., 2); NaN where there is no ray."""
         rays_cam = self.lens.unproject(self.intrinsics.from_pixels(uv))
         return rotate(self.world_from_cam.rotation, rays_cam)
 
@@ -159,7 +159,7 @@ class Camera:
         return self.intrinsics.contains(self.project(points_world))
 
     def frustum(self, near: float, far: float, samples: int = 16) -> tuple[Array, Array]:
-        """The rims of the viewed volume at `near` and `far` metres: two closed outlines (n, 3) in the world.
+        """The rims of the viewed volume at distances `near` and `far` in metres: two outlines (n, 3) in the world.
 
         Points of the image's border at equal distance *along the ray*, so the rims bend with the lens.
         """
@@ -195,8 +195,9 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> R
     """
     eye, target, down = (np.asarray(v, dtype=float) for v in (eye, target, down))
     forward = unit(target - eye)
-    right = unit(np.cross(down, forward))
-    if not np.isfinite([forward, right]).all():
+    right = unit(np.cross(unit(down), forward))
+    sideways = np.linalg.norm(np.cross(unit(down), forward))
+    if not sideways > 1e-9:
         raise ValueError(f"cannot look from {eye.tolist()} at {target.tolist()} with down = {down.tolist()}")
     axes = np.stack([right, np.cross(forward, right), forward], axis=-1)
     return RigidTransform.from_components(eye, Rotation.from_matrix(axes))

@@ -54,7 +54,7 @@ def dots(points: ArrayLike, class_: str, diameter: float = 5, **attributes: obje
     points = np.asarray(points, dtype=float).reshape(-1, 2)
     points = points[np.isfinite(points).all(axis=1)]
     data = "".join(map("M%.1f,%.1fh0".__mod__, map(tuple, points.tolist())))
-    return element("path", d=data, class_=f"{class_} dots", stroke_width=diameter, **attributes) if data else ""
+    return element("path", d=data, class_=f"{class_} dots", style=f"stroke-width:{diameter:g}px", **attributes) if data else ""
 
 
 def text(point: ArrayLike, words: str, class_: str = "label", **attributes: object) -> str:

@@ -23,19 +23,21 @@ class Lens(Protocol):
     """
 
     def project(self, points_cam: ArrayLike) -> Array:
-        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where none."""
+        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where there is none."""
         ...
 
     def unproject(self, xy: ArrayLike) -> Array:
         """Unit rays (..., 3) of image points (..., 2) in focal lengths; NaN where no ray arrives."""
         ...
 
+    def __hash__(self) -> int: ...
+
 
 class RayLens(ABC):
-    """A lens written as its two equations, on plain coordinates (n,): `image` and `ray`. The shapes are seen to here."""
+    """A lens written as its two equations, on coordinates (n,): `image` and `ray`. The shapes are seen to here."""
 
     def project(self, points_cam: ArrayLike) -> Array:
-        """Image points (..., 2) in focal lengths of camera-frame points (..., 3) in any unit; NaN where there is none."""
+        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where there is none."""
         return blockwise(self.image, as_points(points_cam, 3, "points_cam"), 2)
 
     def unproject(self, xy: ArrayLike) -> Array:

@@ -23,9 +23,9 @@ class BrownConrady(RayLens):
     x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²) + s1 r² + s2 r⁴
     y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + p1 (r² + 2 y²) + 2 p2 x y + s3 r² + s4 r⁴
 
-    and from there onto a sensor tilted by τx and τy radians (OpenCV's calib3d; Brown 1971). A polynomial folds: an image
-    have only the rays in front of the camera whose way from the axis meets neither the fold of the radial part, nor its
-    pole, nor a Jacobian determinant of 0 (`valid`).
+    and from there onto a sensor tilted by τx and τy radians (OpenCV's calib3d; Brown 1971). A polynomial folds: only
+    rays in front of the camera have an image, and only if the way to them from the axis meets neither the fold of the
+    radial part, nor its pole, nor a Jacobian determinant of 0 (`valid`).
     """
 
     k1: float = 0.0
@@ -228,8 +228,7 @@ class BrownConrady(RayLens):
         """Radii: ideal points below the first are valid, beyond the second are not; no image lies beyond the third."""
         outer = min(self.fold_radius, self.pole_radius)
         if self._symmetric and self._tilt is None:
-            farthest = inf if self.pole_radius <= self.fold_radius else self.fold_radius * self._ratio(outer**2)
-            return outer, outer, farthest
+            return outer, outer, inf if self.pole_radius <= self.fold_radius else float(self.radial(outer))
         azimuth = np.linspace(0, 2 * pi, 65)[1:]
         r = np.tan(np.linspace(0, min(atan(outer), STEEPEST), 129)[1:, None])
         x, y = r * np.cos(azimuth), r * np.sin(azimuth)
@@ -237,8 +236,8 @@ class BrownConrady(RayLens):
             upright = np.logical_and.accumulate(self._upright(x, y))
             images = np.hypot(*self._polynomial(x, y))
         endless = (outer == inf and upright[-1].any()) or not upright[0].all()
-        farthest = inf if endless else 1.1 * images[upright].max()
-        return 0.99 * np.where(upright, r, 0).max(axis=0).min(), outer, farthest
+        farthest = inf if endless else 1.1 * float(images[upright].max())
+        return 0.99 * float(np.where(upright, r, 0).max(axis=0).min()), outer, farthest
 
     def _valid(self, x: Array, y: Array) -> np.ndarray:
         inner, outer, _ = self._limits
@@ -254,7 +253,7 @@ class BrownConrady(RayLens):
         r = np.hypot(x, y)
         steps = np.tan(np.linspace(0, 1, 33)[1:, None] * np.arctan(r)) / r
         steps[-1] = 1
-        return self._upright(steps * x, steps * y).all(axis=0)
+        return np.all(self._upright(steps * x, steps * y), axis=0)
 
     # Backwards.
 
@@ -308,6 +307,7 @@ class BrownConrady(RayLens):
         return np.where(error <= close, x, np.nan), np.where(error <= close, y, np.nan)
 
 
-def _homography(H: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
+def _homography(H: np.ndarray, x: Array, y: Array) -> tuple[Array, Array, Array]:
     """H (x, y, 1) as three coordinates."""
-    return tuple(row[0] * x + row[1] * y + row[2] for row in H)  # type: ignore[return-value]
+    u, v, w = (row[0] * x + row[1] * y + row[2] for row in H)
+    return u, v, w

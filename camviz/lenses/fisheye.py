@@ -3,7 +3,6 @@
 from abc import abstractmethod
 from dataclasses import dataclass
 from math import pi, tan
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +11,15 @@ from camviz.lenses.base import Array, RayLens, check_parameters, check_range
 
 
 class Fisheye(RayLens):
-    """A lens symmetric about its axis: a ray at θ = atan2(√(X² + Y²), Z) arrives at distance `radial(θ)` from the centre.
+    """A lens symmetric about its axis: a ray at θ = atan2(√(X² + Y²), Z) arrives `radial(θ)` from the image's centre.
 
     Rays beyond `max_angle` have no image; nor has the ray straight backwards, whose image would be a whole circle.
     """
 
-    max_angle: float = pi
+    @property
+    def max_angle(self) -> float:
+        """The last angle in radians that has an image."""
+        return pi
 
     @abstractmethod
     def radial(self, theta: ArrayLike) -> Array:
@@ -70,7 +72,9 @@ class Equisolid(Fisheye):
 class Orthographic(Fisheye):
     """r = sin θ: the hemisphere seen from far above; nothing beyond 90°."""
 
-    max_angle: ClassVar[float] = pi / 2
+    @property
+    def max_angle(self) -> float:
+        return pi / 2
 
     def radial(self, theta: ArrayLike) -> Array:
         return np.sin(np.asarray(theta, dtype=float))

@@ -37,11 +37,11 @@ class KannalaBrandt(Fisheye):
 
     @cached_property
     def fold_angle(self) -> float:
-        """The angle in radians, the smallest root of θ_d', where the polynomial turns back; infinity if it never does."""
+        """The smallest positive root of θ_d', in radians, where the polynomial turns back; infinity if none."""
         return sqrt(first_positive_root(np.array([1, 3 * self.k1, 5 * self.k2, 7 * self.k3, 9 * self.k4])))
 
     @cached_property
-    def max_angle(self) -> float:  # type: ignore[override]
+    def max_angle(self) -> float:
         """The last angle in radians that still has an image of its own."""
         return min(self.fold_angle, pi)
 

@@ -7,7 +7,7 @@ import numpy as np
 from camviz.lenses.base import Array
 
 
-def first_positive_root(coefficients: Array) -> float:
+def first_positive_root(coefficients: np.ndarray) -> float:
     """The smallest s > 0 with c0 + c1 s + c2 s² + … = 0; infinity where there is none. c0 must not be 0.
 
     Solved for 1/s, whose leading coefficient is c0: a vanishing last coefficient then costs no accuracy.
@@ -33,7 +33,8 @@ def solve_rising(
     todo = np.arange(len(t))
     for _ in range(60):
         error = function(t[todo]) - value[todo]
-        todo, error = (kept[np.abs(error) > 1e-13 * (1 + value[todo])] for kept in (todo, error))
+        off = np.abs(error) > 1e-13 * (1 + value[todo])
+        todo, error = todo[off], error[off]
         if not len(todo):
             return t
         # f(t) = value  →  t ← t - (f(t) - value) / f'(t)

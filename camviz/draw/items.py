@@ -1,0 +1,169 @@
+"""What a drawing in space consists of: lines, faces, pictures, dots and labels, with no renderer in sight.
+
+A colour is a name from the style sheet ("blue"), which follows the theme, or "#rrggbb", which does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import RigidTransform
+
+from camviz.cameras import Camera, transform
+from camviz.lenses import Perspective
+from camviz.lenses.base import Array, as_points
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line through points (n, 3) in metres; NaN interrupts it. `width` in picture units; `head` makes it an arrow."""
+
+    points: Array
+    class_: str = "ink"
+    width: float = 1.6
+    head: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", as_points(self.points, 3, "points").reshape(-1, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A flat convex outline (n, 3), filled. Not drawn when a vertex is NaN."""
+
+    vertices: Array
+    colour: str = "blue"
+    opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", as_points(self.vertices, 3, "vertices"))
+        if not 0 <= self.opacity <= 1:
+            raise ValueError(f"opacity must lie between 0 and 1, got {self.opacity}")
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A picture (height, width, 3), uint8 RGB, stretched over a grid of points (m, n, 3), row by row as the picture's.
+
+    Two by two points make a flat quad with exact perspective; more of them bend. Cells with a NaN corner are left out.
+    """
+
+    points: Array
+    image: np.ndarray
+    opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        points = as_points(self.points, 3, "points")
+        if points.ndim != 3 or min(points.shape[:2]) < 2:
+            raise ValueError(f"points must be a grid (m, n, 3) of at least 2 × 2, got {points.shape}")
+        if self.image.ndim != 3 or self.image.shape[2] != 3 or self.image.dtype != np.uint8:
+            raise ValueError(f"image must be uint8 (height, width, 3), got {self.image.dtype} {self.image.shape}")
+        object.__setattr__(self, "points", points)
+
+    @classmethod
+    def quad(cls, corners: ArrayLike, image: np.ndarray, opacity: float = 1.0) -> Sheet:
+        """A flat quad from its corners (4, 3), clockwise from the picture's top left."""
+        a, b, c, d = as_points(corners, 3, "corners")
+        return cls(np.array([[a, b], [d, c]]), image, opacity)
+
+
+@dataclass(frozen=True, eq=False)
+class Dots:
+    """Round marks at points (n, 3), `diameter` picture units wide."""
+
+    points: Array
+    class_: str = "ink"
+    diameter: float = 6.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", as_points(self.points, 3, "points").reshape(-1, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """Words beside a point (3,)."""
+
+    point: Array
+    words: str
+    class_: str = "label"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", as_points(self.point, 3, "point").reshape(3))
+
+
+Item = Line | Face | Sheet | Dots | Label
+
+
+def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") -> list[Item]:
+    """The axes of a frame as arrows `length` metres long: x orange, y green, z blue, each with its letter."""
+    origin, *tips = transform(world_from_frame, np.vstack([np.zeros(3), length * np.eye(3)]))
+    items: list[Item] = []
+    for letter, colour, tip in zip("xyz", ("orange", "green", "blue"), tips, strict=True):
+        items.append(Line(np.array([origin, tip]), colour, 2.4, head=True))
+        items.append(Label(origin + 1.12 * (tip - origin), letter, f"label {colour}"))
+    return [*items, Label(origin, name, "note")] if name else items
+
+
+def camera_body(
+    camera: Camera, depth: float, *, image: np.ndarray | None = None, colour: str = "blue", name: str = "", near: float = 0
+) -> list[Item]:
+    """A camera as seen from outside: its centre, the volume it sees out to `depth` metres, its up side, its picture.
+
+    The rim is where the rays of the image's border reach `depth`, so it bends with the lens; rays of one lens that
+    all point well forward end on a plane, as a pinhole's image does, those of a wider lens on a sphere. `image`, uint8
+    RGB, is shown there; `near` adds a second rim.
+    """
+    reach = _reach(camera, camera.intrinsics.border(12))
+    rim = camera.centre + depth * reach
+    corners = rim[::12]
+    items: list[Item] = [Line(_closed(rim), colour, 2.2), Dots(camera.centre, colour, 8)]
+    items += [Line(np.array([camera.centre, corner]), colour, 1.5) for corner in corners]
+    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(_closed(rim), 12)]
+    if near > 0:
+        items.append(Line(_closed(camera.centre + near * reach), colour, 1.2))
+    if image is not None:
+        mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 7, 9)
+        items.append(Sheet(camera.centre + depth * _reach(camera, mesh), image))
+    items += _up_marker(rim[0], rim[12], rim[6], rim[30], colour)
+    return [*items, Label(camera.centre, name, f"label {colour}")] if name else items
+
+
+def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid") -> list[Item]:
+    """A ground: lines `step` metres apart in the plane y = const around `centre` (3,), `size` metres to each side."""
+    x, y, z = as_points(centre, 3, "centre")
+    s = np.arange(-size, size + step / 2, step)
+    ends = np.array([-size, size, np.nan])
+    across, along = np.broadcast_arrays(ends, s[:, None])
+    lines = np.concatenate([np.stack([across, along], -1), np.stack([along, across], -1)]).reshape(-1, 2)
+    return [Line(np.stack([x + lines[:, 0], np.full(len(lines), y), z + lines[:, 1]], axis=-1), class_, 1.1)]
+
+
+def _reach(camera: Camera, uv: Array) -> Array:
+    """Vectors from the centre along the rays of pixels `uv`, to the plane z = 1 or, for a wide lens, the unit sphere."""
+    rays = camera.unproject(uv)
+    forward = camera.world_from_cam.rotation.as_matrix()[:, 2]
+    z = camera.unproject(camera.intrinsics.border(12)) @ forward
+    flat = np.isfinite(z).all() and z.min() > 0.25
+    return rays / (rays @ forward)[..., None] if flat else rays
+
+
+def _mesh(camera: Camera, rows: int, columns: int) -> Array:
+    u = np.linspace(-0.5, camera.intrinsics.width - 0.5, columns)
+    v = np.linspace(-0.5, camera.intrinsics.height - 0.5, rows)
+    return np.stack(np.meshgrid(u, v), axis=-1)
+
+
+def _up_marker(left: Array, right: Array, top: Array, bottom: Array, colour: str) -> list[Item]:
+    """A small triangle above the rim's upper edge."""
+    middle, half, up = top, (right - left) / 12, (top - bottom) / 7
+    return [Face(np.array([middle - half, middle + up, middle + half]), colour, 0.9)]
+
+
+def _closed(outline: Array) -> Array:
+    return np.vstack([outline, outline[:1]])
+
+
+def _sides(outline: Array, count: int) -> list[Array]:
+    return [outline[i : i + count + 1] for i in range(0, len(outline) - 1, count)]

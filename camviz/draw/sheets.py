@@ -1,0 +1,63 @@
+"""Pictures standing in space, warped into the onlooker's view."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from camviz.cameras import Intrinsics
+from camviz.draw.items import Sheet
+from camviz.lenses.base import Array
+
+Window = tuple[tuple[float, float, float, float], np.ndarray]
+
+
+def warp(px: Array, sheet: Sheet, view: Intrinsics, scale: float) -> Window | None:
+    """The sheet as seen, with its grid at picture units `px` (m, n, 2): a rectangle (x, y, width, height) and RGBA pixels.
+
+    `scale` is pixels per picture unit. None where nothing of it is in view.
+    """
+    if not np.isfinite(px).any():
+        return None
+    low = np.maximum(np.floor(np.nanmin(px, axis=(0, 1))), 0)
+    high = np.minimum(np.ceil(np.nanmax(px, axis=(0, 1))), (view.width, view.height))
+    if (high <= low).any():
+        return None
+    width, height = np.ceil((high - low) * scale).astype(int)
+    canvas = np.zeros((height, width, 4), np.uint8)
+    for corners, source in _cells(px, sheet):
+        _stamp(canvas, sheet.image, source, (corners - low) * scale)
+    canvas[..., 3] = np.rint(canvas[..., 3] * sheet.opacity)
+    return (float(low[0]), float(low[1]), width / scale, height / scale), canvas
+
+
+def _cells(px: Array, sheet: Sheet) -> list[tuple[Array, Array]]:
+    """Corners in view and in the sheet's picture, both (4, 2), of every cell that exists."""
+    m, n = px.shape[:2]
+    height, width = sheet.image.shape[:2]
+    v, u = np.linspace(0, height, m), np.linspace(0, width, n)
+    cells = []
+    for i in range(m - 1):
+        for j in range(n - 1):
+            corners = np.array([px[i, j], px[i, j + 1], px[i + 1, j + 1], px[i + 1, j]])
+            if np.isfinite(corners).all():
+                source = np.array([(u[j], v[i]), (u[j + 1], v[i]), (u[j + 1], v[i + 1]), (u[j], v[i + 1])])
+                cells.append((corners, source))
+    return cells
+
+
+def _stamp(canvas: np.ndarray, image: np.ndarray, source: Array, corners: Array) -> None:
+    """One cell of the picture, by the homography of its four corners, laid into the canvas."""
+    low = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
+    high = np.minimum(np.ceil(corners.max(axis=0)).astype(int), canvas.shape[1::-1])
+    if (high <= low).any() or cv2.contourArea(corners.astype(np.float32)) < 0.5:
+        return
+    to_cell = cv2.getPerspectiveTransform((source - 0.5).astype(np.float32), (corners - low - 0.5).astype(np.float32))
+    size = tuple(int(s) for s in high - low)
+    cell = cv2.warpPerspective(image, to_cell, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    mask = np.zeros(size[::-1], np.uint8)
+    cv2.fillConvexPoly(mask, np.rint((corners - low - 0.5) * 16).astype(np.int32), 255, cv2.LINE_AA, 4)
+    window = canvas[low[1] : high[1], low[0] : high[0]]
+    fresh = mask > window[..., 3]
+    window[fresh, :3] = cell[fresh]
+    np.maximum(window[..., 3], mask, out=window[..., 3])

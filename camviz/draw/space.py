@@ -1,0 +1,96 @@
+"""Drawing in space: items, an eye that looks at them, and the choice between a solid and a wireframe picture."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import cos, exp, radians, sin, tan
+
+import numpy as np
+
+from camviz.cameras import Camera, Intrinsics, look_at
+from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, camera_body, grid_lines
+from camviz.draw.panel import Panel
+from camviz.draw.wire import Sight, draw_wire
+
+__all__ = [
+    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "draw_space", "grid_lines",
+    "space_panel",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Eye:
+    """The onlooker, `distance` metres from the `target` (3,) it looks at and can walk around.
+
+    At yaw 0 and pitch 0 it looks along z, as a camera in the identity pose does; pitch raises it above the target.
+    """
+
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    distance: float = 5.0
+    yaw_deg: float = 30.0
+    pitch_deg: float = 20.0
+    vfov_deg: float = 35.0
+
+    def __post_init__(self) -> None:
+        if not self.distance > 0:
+            raise ValueError(f"distance must be a positive number of metres, got {self.distance}")
+        if not 0 < self.vfov_deg < 180:
+            raise ValueError(f"vfov_deg must lie between 0 and 180 degrees, got {self.vfov_deg}")
+        if not -89 <= self.pitch_deg <= 89:
+            raise ValueError(f"pitch_deg must lie between -89 and 89 degrees, got {self.pitch_deg}")
+
+    def camera(self, width: int, height: int) -> Camera:
+        """The pinhole camera through which it sees."""
+        yaw, pitch = radians(self.yaw_deg), radians(self.pitch_deg)
+        outward = np.array([-sin(yaw) * cos(pitch), -sin(pitch), -cos(yaw) * cos(pitch)])
+        f = height / (2 * tan(radians(self.vfov_deg) / 2))
+        intrinsics = Intrinsics(width, height, f, f, (width - 1) / 2, (height - 1) / 2)
+        return Camera(intrinsics, world_from_cam=look_at(self.target + self.distance * outward, self.target))
+
+    def orbited(self, dx: float, dy: float) -> Eye:
+        """After a drag by (dx, dy) picture units: what is near follows the pointer."""
+        yaw = (self.yaw_deg + 0.4 * dx + 180) % 360 - 180
+        return replace(self, yaw_deg=yaw, pitch_deg=min(85.0, max(-85.0, self.pitch_deg + 0.4 * dy)))
+
+    def zoomed(self, steps: float) -> Eye:
+        """Nearer by a tenth for every positive step."""
+        return replace(self, distance=min(1e4, max(0.05, self.distance * exp(-0.1 * steps))))
+
+    def key(self, key: str) -> Eye:
+        """After a key: arrows walk around by 5°, + and - (or page up and down) walk nearer and back."""
+        turns = {"ArrowLeft": (-12.5, 0), "ArrowRight": (12.5, 0), "ArrowUp": (0, -12.5), "ArrowDown": (0, 12.5)}
+        steps = {"+": 1, "=": 1, "PageUp": 1, "-": -1, "_": -1, "PageDown": -1}
+        if key in turns:
+            return self.orbited(*turns[key])
+        return self.zoomed(steps[key]) if key in steps else self
+
+
+def space_panel(name: str, x: float, y: float, width: float, height: float) -> Panel:
+    """A panel whose coordinates are its own picture units, to be filled by `draw_space`."""
+    return Panel(name, x, y, width, height, 0, width, 0, height)
+
+
+def draw_space(
+    panel: Panel, items: Sequence[Item], eye: Eye, *, draft: bool = False, renderer: str | None = None
+) -> tuple[str, dict[str, bytes]]:
+    """The content of a panel, and the photographs it needs.
+
+    `renderer` is "solid" or "wire"; left out, it is solid wherever OpenGL works, unless the environment variable
+    CAMVIZ_RENDERER says "wire". Both show the same points at the same places. Raises ValueError for another renderer.
+    """
+    sight = Sight(eye.camera(round(panel.width), round(panel.height)), eye.distance)
+    if chosen_renderer(renderer, draft) == "solid":
+        from camviz.draw.solid import draw_solid
+
+        return draw_solid(sight, items, panel.name, draft)
+    return draw_wire(sight, items, panel.name, scale=1 if draft else 2)
+
+
+def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
+    """ "solid" or "wire": what was asked for, as far as this machine can do it."""
+    renderer = renderer or os.environ.get("CAMVIZ_RENDERER") or "solid"
+    if renderer not in ("solid", "wire"):
+        raise ValueError(f"renderer must be 'solid' or 'wire', got {renderer!r}")
+    return "wire"

@@ -1,0 +1,244 @@
+"""What an onlooker sees of a drawing in space, as SVG: lines, faces, pictures, marks and words.
+
+Lines are cut into short pieces, so that each is as strong as it is near and can vanish where something solid hides it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from camviz.cameras import Camera
+from camviz.draw import svg
+from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet
+from camviz.draw.picture import png
+from camviz.draw.sheets import warp
+from camviz.lenses.base import Array
+
+NEAR = 0.02  # metres before the eye, where everything is cut
+LEVELS = 5  # of strength, from far to near
+_YES = np.ones(1, dtype=bool)
+
+Hidden = Callable[[Array, Array], np.ndarray]
+
+
+def nothing_hides(px: Array, depth: Array) -> np.ndarray:
+    """Says which points, pixels (n, 2) at depths (n,) in metres, something solid hides: none."""
+    return np.zeros(len(px), dtype=bool)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The onlooker's camera and how far it looks: what is `distance` metres deep is drawn at ordinary strength."""
+
+    camera: Camera
+    distance: float
+
+    @cached_property
+    def _extrinsics(self) -> tuple[Array, Array]:
+        cam_from_world = self.camera.cam_from_world
+        return cam_from_world.rotation.as_matrix(), cam_from_world.translation
+
+    def points_cam(self, points_world: Array) -> Array:
+        R, t = self._extrinsics
+        return points_world @ R.T + t
+
+    def place(self, points_cam: Array) -> Array:
+        """Picture units (..., 2), which count from the corner of the first pixel rather than from its centre."""
+        return self.camera.intrinsics.to_pixels(self.camera.lens.project(points_cam)) + 0.5
+
+    def strength(self, depth: Array) -> np.ndarray:
+        """0 … LEVELS - 1, the nearer the stronger."""
+        nearness = 0.5 + (self.distance - depth) / (1.1 * self.distance)
+        return np.clip(nearness * LEVELS, 0, LEVELS - 1).astype(int)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Short straight pieces of lines: ends (n, 2, 2), depth (n,), whence each comes and whether it is hidden."""
+
+    ends: Array
+    depth: Array
+    line: np.ndarray
+    segment: np.ndarray
+    hidden: np.ndarray
+
+
+def draw_wire(sight: Sight, items: Sequence[Item], name: str, scale: float = 1) -> tuple[str, dict[str, bytes]]:
+    """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …"""
+    fills = sorted(_fills(sight, items, name, scale), key=lambda fill: -fill[0])
+    depths = np.array([depth for depth, _, _ in fills])
+    strokes = draw_lines(sight, items, depths)
+    layers = [strokes.get(0, "")]
+    for i, (_, fragment, _) in enumerate(fills):
+        layers += [fragment, strokes.get(i + 1, "")]
+    photographs = {key: data for _, _, attached in fills for key, data in attached.items()}
+    return "".join(layers) + draw_marks(sight, items), photographs
+
+
+def draw_lines(
+    sight: Sight, items: Sequence[Item], fills: Array | None = None, hidden: Hidden = nothing_hides
+) -> dict[int, str]:
+    """The lines, keyed by how many of the filled things at depths `fills` (descending) they come after."""
+    lines = [item for item in items if isinstance(item, Line)]
+    pieces = cut(sight, lines, hidden, fine=hidden is not nothing_hides)
+    depths = np.empty(0) if fills is None else fills
+    slot = np.searchsorted(-depths, -0.98 * pieces.depth, side="left") if len(depths) else np.zeros(len(pieces.depth), int)
+    level = np.where(pieces.hidden, -1, sight.strength(pieces.depth))
+    pens = {pen: i for i, pen in enumerate(dict.fromkeys((line.class_, line.width) for line in lines))}
+    pen = np.array([pens[line.class_, line.width] for line in lines], dtype=int)[pieces.line]
+    layers: dict[int, str] = {}
+    names = list(pens)
+    for key, chosen in _groups(np.stack([slot, level, pen], axis=-1)):
+        class_, width = names[key[2]]
+        layers[key[0]] = layers.get(key[0], "") + _stroke(pieces, chosen, class_, width, key[1])
+    last = max(layers, default=0)
+    layers[last] = layers.get(last, "") + "".join(_heads(sight, lines))
+    return layers
+
+
+def draw_marks(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
+    """Dots and labels, over everything else; dots that something hides are faint."""
+    parts = []
+    for item in items:
+        if isinstance(item, Dots):
+            points_cam = sight.points_cam(item.points)
+            px = sight.place(points_cam)
+            behind = hidden(px, points_cam[:, 2])
+            style = f"stroke-width:{item.diameter:g}"
+            parts.append(svg.dots(px[~behind], item.class_, style=style))
+            parts.append(svg.dots(px[behind], f"{item.class_} faint", style=style))
+    for item in items:
+        if isinstance(item, Label):
+            px = sight.place(sight.points_cam(item.point))
+            parts.append(svg.text(px + (0, 4.5), item.words, f"{item.class_} halo middle"))
+    return "".join(parts)
+
+
+def cut(sight: Sight, lines: Sequence[Line], hidden: Hidden, fine: bool) -> Pieces:
+    """The visible parts of the lines, cut into pieces a few pixels long (`fine`) or as long as their depth allows."""
+    starts, ends, line = _segments(sight, lines)
+    starts, ends, inside = _clipped(sight, starts, ends)
+    segment, line = np.flatnonzero(inside), line[inside]
+    px0, px1, z0, z1 = sight.place(starts), sight.place(ends), starts[:, 2], ends[:, 2]
+    length = np.linalg.norm(px1 - px0, axis=-1)
+    count = np.ceil(np.maximum(length / (5 if fine else 160), np.abs(np.log(z1 / z0)) / 0.15)).clip(1, 300).astype(int)
+    whole = np.repeat(np.arange(len(count)), count)
+    step = np.arange(len(whole)) - np.repeat(np.cumsum(count) - count, count)
+    t = (step[:, None] + [0.0, 0.5, 1.0]) / count[whole, None]
+    # In perspective, 1/z rather than z is linear along the image of a line.
+    depth = 1 / ((1 - t) / z0[whole, None] + t / z1[whole, None])
+    px = px0[whole, None] + t[..., None] * (px1 - px0)[whole, None]
+    return Pieces(px[:, [0, 2]], depth[:, 1], line[whole], segment[whole], hidden(px[:, 1], depth[:, 1]))
+
+
+def _segments(sight: Sight, lines: Sequence[Line]) -> tuple[Array, Array, np.ndarray]:
+    if not lines:
+        return np.empty((0, 3)), np.empty((0, 3)), np.empty(0, int)
+    points = sight.points_cam(np.concatenate([line.points for line in lines]))
+    line = np.repeat(np.arange(len(lines)), [len(line.points) for line in lines])
+    here = (line[1:] == line[:-1]) & np.isfinite(points[1:] + points[:-1]).all(axis=-1)
+    return points[:-1][here], points[1:][here], line[1:][here]
+
+
+def _clipped(sight: Sight, starts: Array, ends: Array) -> tuple[Array, Array, np.ndarray]:
+    """The parts of segments (n, 3) inside the view, and which of the segments have one (Liang & Barsky 1984)."""
+    planes = _pyramid(sight)
+    d0, d1 = starts @ planes[:, :3].T - planes[:, 3], ends @ planes[:, :3].T - planes[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = d0 / (d0 - d1)
+    enter = np.where(d0 < 0, t, 0).max(axis=-1, initial=0)
+    leave = np.where(d1 < 0, t, 1).min(axis=-1, initial=1)
+    inside = (enter < leave) & ~((d0 < 0) & (d1 < 0)).any(axis=-1)
+    a, b, enter, leave = starts[inside], ends[inside], enter[inside, None], leave[inside, None]
+    return a + enter * (b - a), a + leave * (b - a), inside
+
+
+def _pyramid(sight: Sight) -> Array:
+    """Planes (5, 4) with n · p ≥ d inside: the near plane, and the sides of a view a little wider than the picture."""
+    k = sight.camera.intrinsics
+    x, y = 0.55 * k.width / k.fx, 0.55 * k.height / k.fy
+    return np.array([(0, 0, 1, NEAR), (1, 0, x, 0), (-1, 0, x, 0), (0, 1, y, 0), (0, -1, y, 0)])
+
+
+def _groups(keys: np.ndarray) -> Iterator[tuple[list[int], np.ndarray]]:
+    """Equal rows of keys (n, k) in ascending order: the row, and where it occurs."""
+    order = np.lexsort(keys.T[::-1])
+    ordered = keys[order]
+    borders = np.flatnonzero((ordered[1:] != ordered[:-1]).any(axis=-1)) + 1
+    for chosen in np.split(order, borders) if len(order) else []:
+        yield keys[chosen[0]].tolist(), np.sort(chosen)
+
+
+def _stroke(pieces: Pieces, chosen: np.ndarray, class_: str, width: float, level: int) -> str:
+    nearness = max(level, 0) / (LEVELS - 1)
+    opacity = 0.16 if level < 0 else 0.55 + 0.45 * nearness
+    style = f"stroke-width:{width * (0.75 + 0.5 * nearness):.2f};stroke-opacity:{opacity:.2f}"
+    return svg.element("path", d=_data(pieces, chosen), class_=class_, style=style)
+
+
+def _data(pieces: Pieces, chosen: np.ndarray) -> str:
+    """Path data: consecutive pieces of one segment become one stroke, strokes that touch become one line."""
+    segment = pieces.segment[chosen]
+    broken = (chosen[1:] != chosen[:-1] + 1) | (segment[1:] != segment[:-1])
+    firsts, lasts = chosen[np.concatenate([_YES, broken])], chosen[np.concatenate([broken, _YES])]
+    strokes = np.concatenate([pieces.ends[firsts, 0], pieces.ends[lasts, 1]], axis=-1).round(1)
+    touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1)])
+    return "".join(
+        ("L%g,%g" % (c, d)) if touch else ("M%g,%gL%g,%g" % (a, b, c, d))
+        for (a, b, c, d), touch in zip(strokes.tolist(), touches.tolist(), strict=True)
+    )
+
+
+def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
+    """Arrow heads, shorter where the arrow points towards the eye or away from it."""
+    for line in lines:
+        if line.head:
+            tail, tip = sight.place(sight.points_cam(line.points[-2:]))
+            along = tip - tail
+            length = float(np.hypot(*along))
+            if np.isfinite(length) and length > 1:
+                along *= min(4.2 * line.width, length) / length
+                across = 0.38 * np.array([-along[1], along[0]])
+                colour = line.class_.split()[0]
+                yield svg.polygon([tip + 0.3 * along, tip - 0.7 * along + across, tip - 0.7 * along - across], f"fill-{colour}")
+
+
+def _fills(
+    sight: Sight, items: Sequence[Item], name: str, scale: float
+) -> Iterator[tuple[float, str, dict[str, bytes]]]:
+    """Depth, fragment and attached pictures of every face and sheet in view."""
+    for i, item in enumerate(items):
+        if isinstance(item, Face):
+            vertices = _cut_near(sight.points_cam(item.vertices))
+            if len(vertices) > 2 and np.isfinite(vertices).all():
+                yield float(vertices[:, 2].mean()), _fill(sight.place(vertices), item), {}
+        elif isinstance(item, Sheet):
+            points = sight.points_cam(item.points)
+            window = warp(sight.place(points), item, sight.camera.intrinsics, scale)
+            if window is not None:
+                key, (x, y, width, height), pixels = f"{name}-{i}", *window
+                yield float(np.nanmean(points[..., 2])), svg.image(key, x, y, width, height), {key: png(pixels)}
+
+
+def _fill(px: Array, face: Face) -> str:
+    themed = not face.colour.startswith("#")
+    style = f"fill-opacity:{min(face.opacity, 0.8):.2g}" + ("" if themed else f";fill:{face.colour}")
+    return svg.polygon(px, f"fill-{face.colour}" if themed else "face", style=style)
+
+
+def _cut_near(vertices: Array) -> Array:
+    """The part of a convex outline (n, 3) beyond the near plane (Sutherland & Hodgman 1974)."""
+    inside = vertices[:, 2] >= NEAR
+    if inside.all():
+        return vertices
+    kept = []
+    for a, b, a_inside, b_inside in zip(vertices, np.roll(vertices, -1, 0), inside, np.roll(inside, -1), strict=True):
+        if a_inside:
+            kept.append(a)
+        if a_inside != b_inside:
+            kept.append(a + (NEAR - a[2]) / (b[2] - a[2]) * (b - a))
+    return np.array(kept).reshape(-1, 3)

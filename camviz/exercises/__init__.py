@@ -1,0 +1,48 @@
+"""The lessons' exercises: one module per lesson, each with the references, known mistakes and hints of its exercises.
+
+from camviz.exercises import Tutor
+
+check = Tutor()
+check("05.distort", distort)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module, util
+from typing import Any
+
+import numpy as np
+
+from camviz.checks import Exercise, Verdict, judge
+
+
+class Tutor:
+    """Checks exercises for one notebook and remembers how often each was tried, so that its hints grow stronger."""
+
+    def __init__(self, rng: np.random.Generator | None = None) -> None:
+        self._rng = np.random.default_rng() if rng is None else rng
+        self._tries: dict[str, int] = {}
+
+    def __call__(self, name: str, function: Any) -> Verdict:
+        """The verdict on a reader's function for the exercise `name`, such as "05.distort"."""
+        tries = self._tries.get(name, 0) + 1
+        verdict = judge(exercise(name), function, self._rng, tries)
+        if verdict.status == "wrong":
+            self._tries[name] = tries
+        return verdict
+
+
+def exercise(name: str) -> Exercise:
+    """The exercise called "LESSON.NAME". Raises ValueError listing the lesson's exercises when there is none."""
+    known = exercises(name.partition(".")[0])
+    if name not in known:
+        raise ValueError(f"no exercise is called {name!r}; this lesson has {', '.join(known) or 'none'}")
+    return known[name]
+
+
+def exercises(lesson: str) -> dict[str, Exercise]:
+    """The exercises of a lesson ("05"), by name and in their order; empty for a lesson without any."""
+    module = f"camviz.exercises.lesson{lesson}"
+    if not lesson.isalnum() or util.find_spec(module) is None:
+        return {}
+    return {one.name: one for one in import_module(module).EXERCISES}

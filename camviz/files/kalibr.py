@@ -1,0 +1,111 @@
+"""Kalibr camera chains: cam0, cam1 … each with a projection, a distortion and its place beside the one before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scipy.spatial.transform import RigidTransform
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.opencv import image_size
+from camviz.files.section import Section, explained
+from camviz.files.trees import shown
+from camviz.lenses import (
+    BrownConrady,
+    DoubleSphere,
+    ExtendedUnified,
+    FieldOfView,
+    KannalaBrandt,
+    Lens,
+    Perspective,
+    UnifiedSphere,
+)
+
+PROJECTIONS = {
+    "pinhole": "fu fv pu pv",
+    "omni": "xi fu fv pu pv",
+    "eucm": "alpha beta fu fv pu pv",
+    "ds": "xi alpha fu fv pu pv",
+}
+DISTORTIONS = {"radtan": "k1 k2 p1 p2", "equidistant": "k1 k2 k3 k4", "fov": "w", "none": ""}
+SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
+LENSES = {
+    ("pinhole", "radtan"): BrownConrady,
+    ("pinhole", "equidistant"): KannalaBrandt,
+    ("pinhole", "fov"): FieldOfView,
+    ("pinhole", "none"): Perspective,
+    ("omni", "radtan"): UnifiedSphere,
+    ("omni", "none"): UnifiedSphere,
+    ("eucm", "none"): ExtendedUnified,
+    ("ds", "none"): DoubleSphere,
+}
+
+
+def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+    """The cameras of the chain in place: the world is cam0's frame, T_cn_cnm1 is cam_n from cam_(n-1)."""
+    chain = _chain(section)
+    cameras: dict[str, Camera] = {}
+    cam_from_world, notes = RigidTransform.identity(), []
+    for index, (name, part) in enumerate(chain.items()):
+        if index:
+            step = _from_previous(part, chain[f"cam{index - 1}"])
+            if step is None:
+                step = RigidTransform.identity()
+                notes.append(f"The file does not say where {name} stands: it is drawn at the place of cam{index - 1}.")
+            cam_from_world = step * cam_from_world
+        cameras[name] = _camera(part, size).at(cam_from_world.inv())
+    imu = _cam_from_imu(chain["cam0"])
+    return Calibration(cameras, path, "Kalibr camchain", world_from_imu=imu, notes=tuple(notes))
+
+
+def _chain(section: Section) -> dict[str, Section]:
+    names = [key for key in section.values if key.startswith("cam") and key[3:].isdecimal()]
+    expected = [f"cam{index}" for index in range(len(names))]
+    if set(names) != set(expected):
+        raise CalibrationError(f"expected the cameras {', '.join(expected)}, got {', '.join(sorted(names))}")
+    return {name: section.section(name) for name in expected}
+
+
+def _camera(part: Section, size: tuple[int, int] | None) -> Camera:
+    projection = _choice(part, "camera_model", PROJECTIONS)
+    values = part.vector("intrinsics", [len(PROJECTIONS[projection].split())], PROJECTIONS[projection])
+    width, height = image_size(part, size)
+    with explained(part.where("intrinsics")):
+        grid = Intrinsics(width, height, *values[-4:])
+    return Camera(grid, _lens(part, projection, values[:-4]))
+
+
+def _lens(part: Section, projection: str, shape: list[float]) -> Lens:
+    distortion = _choice(part, "distortion_model", DISTORTIONS)
+    lens = LENSES.get((projection, distortion))
+    if lens is None:
+        known = ", ".join(other for model, other in LENSES if model == projection)
+        raise part.error("distortion_model", f"{known} with {projection}", shown(distortion))
+    names = DISTORTIONS[distortion].split()
+    held = part.values.get("distortion_coeffs") or names
+    coefficients = part.vector("distortion_coeffs", [len(names)], " ".join(names)) if held else []
+    with explained(part.path):
+        return lens(*shape, *coefficients)
+
+
+def _choice(part: Section, key: str, known: dict[str, str]) -> str:
+    value = SYNONYMS.get(part.text(key), part.text(key))
+    if value not in known:
+        raise part.error(key, " or ".join(known), shown(value))
+    return value
+
+
+def _from_previous(part: Section, previous: Section) -> RigidTransform | None:
+    """cam_n from cam_(n-1), said directly or by way of the IMU; None where the file says neither."""
+    if "T_cn_cnm1" in part:
+        return part.transform("T_cn_cnm1")
+    cam, before = _cam_from_imu(part), _cam_from_imu(previous)
+    return None if cam is None or before is None else cam * before.inv()
+
+
+def _cam_from_imu(part: Section) -> RigidTransform | None:
+    """Kalibr's T_cam_imu takes the IMU's points to the camera; OpenVINS writes its inverse, T_imu_cam."""
+    if "T_cam_imu" in part:
+        return part.transform("T_cam_imu")
+    return part.transform("T_imu_cam").inv() if "T_imu_cam" in part else None

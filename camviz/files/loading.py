@@ -1,0 +1,66 @@
+"""`load`: which program wrote this file, and what does it say?"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from camviz.files import kalibr, opencv, ros
+from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.section import LARGEST_SIDE, Section
+from camviz.files.text import read_text
+from camviz.files.trees import parse, shown
+
+Reader = Callable[[Section, Path, tuple[int, int] | None], Calibration]
+
+LOOKED_FOR = (
+    "a camera matrix as OpenCV names it (camera_matrix, K, cameraMatrix, M1 …), "
+    "a ROS CameraInfo (distortion_model with camera_matrix or K) or a Kalibr camchain (cam0 …)"
+)
+
+
+def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None) -> Calibration:
+    """Read a calibration that OpenCV (FileStorage, mono or stereo), ROS (CameraInfo) or Kalibr (camchain) wrote.
+
+    `size` is (width, height) in pixels for files that do not hold it. Raises CalibrationError, a ValueError whose
+    message is one sentence, for everything that is not such a calibration. The file is data: nothing in it is run.
+    """
+    path = Path(path)
+    if size is not None:
+        size = _checked_size(size)
+    text = read_text(path)
+    try:
+        section = _mapping(parse(text))
+        return _reader(section)(section, path, size)
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from error.__cause__
+
+
+def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    if len(size) != 2 or not all(isinstance(side, int) and 1 <= side <= LARGEST_SIDE for side in size):
+        raise CalibrationError(
+            f"size: expected (width, height), each from 1 to {LARGEST_SIDE} pixels, got {shown(size)}"
+        )
+    return size
+
+
+def _mapping(tree: Any) -> Section:
+    if not isinstance(tree, dict):
+        what = "a list" if isinstance(tree, list) else "plain text" if isinstance(tree, str) else shown(tree)
+        raise CalibrationError(f"expected a calibration, this is {what}; looked for {LOOKED_FOR}")
+    return Section(tree)
+
+
+def _reader(section: Section) -> Reader:
+    if any(re.fullmatch(r"cam\d+", key) for key in section.values):
+        return kalibr.read
+    if "distortion_model" in section or "projection_matrix" in section:
+        return ros.read
+    if opencv.camera_tags(section):
+        return opencv.read
+    keys = [shown(key) for key in list(section.values)[:6]]
+    found = ", ".join(keys + ["…"] * (len(section.values) > 6)) or "nothing"
+    raise CalibrationError(f"no camera found: looked for {LOOKED_FOR}, found {found}")

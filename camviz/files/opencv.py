@@ -1,0 +1,200 @@
+"""OpenCV FileStorage: one camera or a pair, under the spellings that OpenCV's samples and tutorials use."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.files.calibration import Board, Calibration, CalibrationError
+from camviz.files.section import LARGEST_SIDE, Section, explained
+from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
+
+# Spellings are compared without capitals and underscores: Camera_Matrix, cameraMatrix and camera_matrix are one.
+MATRIX = "cameramatrix|intrinsicmatrix|intrinsics|mtx|k|m"
+DISTORTION = "distortioncoefficients|distortioncoeffs|distcoeffs|distcoeff|distortion|dist|d"
+WIDTH, HEIGHT, SIZE = "(image|img)?width", "(image|img)?height", "(image|img)size|resolution"
+ROTATION, TRANSLATION = "r|rotation|rotationmatrix", "t|translation|translationvector"
+EXTRINSICS, ERRORS, DETECTIONS = "extrinsicparameters", "perviewreprojectionerrors", "imagepoints"
+
+PAIRS = ({"0", "1"}, {"1", "2"}, {"l", "r"}, {"left", "right"})
+FOUR_COEFFICIENTS = (
+    "Four distortion coefficients are read as k1 k2 p1 p2; cv2.fisheye writes four as well, "
+    "and a file of its needs the line fisheye_model: 1."
+)
+
+
+def camera_tags(section: Section) -> set[str]:
+    """What the names of the camera matrices end (or begin) with: {""} for one camera, {"1", "2"} for M1 and M2."""
+    matrices = {key for key, value in section.values.items() if isinstance(value, (dict, list))}
+    return {tag for key in matrices if (tag := _tag(key, MATRIX)) is not None}
+
+
+def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+    """One camera, or a pair with X_right = R X_left + T; the world is the left camera's frame."""
+    tags = camera_tags(section)
+    if len(tags) == 1:
+        return _read_one(section, path, size, tags.pop())
+    if tags in PAIRS:
+        return _read_pair(section, path, size, *sorted(tags))
+    keys = ", ".join(sorted(key for key in section.values if _tag(key, MATRIX) is not None))
+    raise CalibrationError(f"expected one camera matrix or a pair such as M1 and M2, got {keys}")
+
+
+def _read_one(section: Section, path: Path, size: tuple[int, int] | None, tag: str) -> Calibration:
+    name = section.text("camera_name") if "camera_name" in section else "camera"
+    width, height = image_size(section, size)
+    camera, notes = _camera(section, tag, width, height), _notes(section, [tag])
+    if key := _find(section, ROTATION):
+        section.rotation(key)
+        notes.append("R and T are not used: the file holds one camera, and it stands at the origin.")
+    views: dict[str, Any] = {field: {name: value} for field, value in _views(section).items()}
+    return Calibration({name: camera}, path, "OpenCV FileStorage", _board(section), notes=tuple(notes), **views)
+
+
+def _read_pair(section: Section, path: Path, size: tuple[int, int] | None, left: str, right: str) -> Calibration:
+    width, height = image_size(section, size)
+    notes = _notes(section, [left, right])
+    right_from_left = _right_from_left(section)
+    if right_from_left is None:
+        right_from_left = RigidTransform.identity()
+        notes.append("The file holds no R and T: both cameras are drawn at the same place.")
+    for tag in (left, right):
+        if key := _find(section, ROTATION, tag):
+            section.rotation(key)
+    cameras = {
+        "left": _camera(section, left, width, height),
+        "right": _camera(section, right, width, height).at(right_from_left.inv()),
+    }
+    return Calibration(cameras, path, "OpenCV FileStorage, stereo", _board(section), notes=tuple(notes))
+
+
+def image_size(section: Section, given: tuple[int, int] | None) -> tuple[int, int]:
+    """Width and height from the file, or as given where the file is silent; never one against the other."""
+    held = _held_size(section)
+    if held and given and held != given:
+        raise CalibrationError(
+            f"the file says {held[0]}×{held[1]} pixels, the size given is {given[0]}×{given[1]}: leave the size out"
+        )
+    if size := held or given:
+        return size
+    raise CalibrationError(
+        "the file holds no image size (image_width, image_height): add --size WIDTHxHEIGHT, such as --size 640x480 "
+        "(in Python size=(640, 480))"
+    )
+
+
+def _held_size(section: Section) -> tuple[int, int] | None:
+    if key := _find(section, SIZE):
+        width, height = section.vector(key, [2], "width height")
+        pair = Section({"width": width, "height": height}, section.where(key))
+        return pair.whole("width", LARGEST_SIDE), pair.whole("height", LARGEST_SIDE)
+    keys = _find(section, WIDTH), _find(section, HEIGHT)
+    if keys == (None, None):
+        return None
+    wide, high = keys[0] or "image_width", keys[1] or "image_height"
+    return section.whole(wide, LARGEST_SIDE), section.whole(high, LARGEST_SIDE)
+
+
+def intrinsics(section: Section, key: str, width: int, height: int) -> Intrinsics:
+    """The camera matrix under `key`, 3×3."""
+    with explained(section.where(key)):
+        return Intrinsics.from_matrix(section.matrix(key, 3, 3), width, height)
+
+
+def _camera(section: Section, tag: str, width: int, height: int) -> Camera:
+    key = _find(section, MATRIX, tag) or "camera_matrix"
+    return Camera(intrinsics(section, key, width, height), _lens(section, tag))
+
+
+def _lens(section: Section, tag: str) -> Lens:
+    key = _find(section, DISTORTION, tag)
+    if key is None:
+        raise CalibrationError(
+            f"expected distortion coefficients (distortion_coefficients, D{tag} …) beside the camera matrix, "
+            "found none; a lens without distortion has five zeros"
+        )
+    with explained(section.where(key)):
+        if xi := _find(section, "xi", tag):
+            return UnifiedSphere(section.number(xi), *section.vector(key, [4], "k1 k2 p1 p2 of cv2.omnidir"))
+        if _is_fisheye(section):
+            return KannalaBrandt(*section.vector(key, [4], "k1 k2 k3 k4 of cv2.fisheye"))
+        return BrownConrady.from_coefficients(section.vector(key, [4, 5, 8, 12, 14], "k1 k2 p1 p2 k3 …"))
+
+
+def _is_fisheye(section: Section) -> bool:
+    key = _find(section, "(is)?fisheye(model)?")
+    return key is not None and section.values[key] in (1, True, "1")
+
+
+def _notes(section: Section, tags: list[str]) -> list[str]:
+    keys = [key for tag in tags if (key := _find(section, DISTORTION, tag)) and not _find(section, "xi", tag)]
+    four = any(section.array(key).size == 4 for key in keys) and not _find(section, "(is)?fisheye(model)?")
+    return [FOUR_COEFFICIENTS] if four else []
+
+
+def _right_from_left(section: Section) -> RigidTransform | None:
+    rotation, translation = _find(section, ROTATION), _find(section, TRANSLATION)
+    if rotation is None and translation is None:
+        return None
+    t = section.vector(translation or "T", [3], "x y z of the left camera's origin in the right camera's frame")
+    return RigidTransform.from_components(t, section.rotation(rotation or "R"))
+
+
+def _board(section: Section) -> Board | None:
+    keys = [_find(section, name) for name in ("boardwidth", "boardheight", "squaresize")]
+    width, height, square = keys
+    if width is None or height is None or square is None:
+        return None
+    with explained(section.where("board")):
+        return Board(section.whole(width, 1000), section.whole(height, 1000), section.number(square))
+
+
+def _views(section: Section) -> dict[str, Any]:
+    """What the file keeps of each view: detections, board poses, errors; all of the same number of views."""
+    views: dict[str, Any] = {}
+    if key := _find(section, DETECTIONS):
+        views["detections"] = _detections(section, key)
+    if key := _find(section, EXTRINSICS):
+        views["cam_from_board"] = _board_poses(section, key)
+    if key := _find(section, ERRORS):
+        views["per_view_errors"] = section.array(key).ravel()
+    counts = {field: len(values) for field, values in views.items()}
+    if len(set(counts.values())) > 1:
+        held = ", ".join(f"{count} {field}" for field, count in counts.items())
+        raise CalibrationError(f"expected the same number of views everywhere, got {held}")
+    for values in views.values():
+        if not isinstance(values, RigidTransform):
+            values.flags.writeable = False
+    return views
+
+
+def _detections(section: Section, key: str) -> Any:
+    points = section.array(key, damaged=True)
+    if points.ndim != 3 or points.shape[-1] != 2:
+        raise section.error(key, "views × corners × 2 pixels", "×".join(map(str, points.shape)))
+    return points
+
+
+def _board_poses(section: Section, key: str) -> RigidTransform:
+    vectors = section.array(key)
+    if vectors.ndim != 2 or vectors.shape[1] != 6 or not len(vectors):
+        raise section.error(key, "views × 6 numbers (rotation vector, translation)", "×".join(map(str, vectors.shape)))
+    return RigidTransform.from_components(vectors[:, 3:], Rotation.from_rotvec(vectors[:, :3]))
+
+
+def _find(section: Section, spellings: str, tag: str = "") -> str | None:
+    """The one key that is a spelling of a name with its camera's tag; CalibrationError where two are."""
+    found = [key for key in section.values if key in section and _tag(key, spellings) == tag]
+    if len(found) > 1:
+        raise CalibrationError(f"expected one of the keys {' and '.join(found)}, got both")
+    return found[0] if found else None
+
+
+def _tag(key: str, spellings: str) -> str | None:
+    plain = key.replace("_", "").lower()
+    match = re.fullmatch(rf"(?P<before>left|right)?(?:{spellings})(?P<after>[0-9]|left|right|l|r)?", plain)
+    return match and (match["before"] or "") + (match["after"] or "")

@@ -1,0 +1,72 @@
+"""From a path to text, without trusting the path: nothing large, nothing binary, nothing that is not a file."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from camviz.files.calibration import CalibrationError
+
+MAX_BYTES = 16 * 2**20
+
+_SIGNATURES = {
+    b"\x89PNG": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"GIF8": "a GIF picture",
+    b"II*\0": "a TIFF picture",
+    b"MM\0*": "a TIFF picture",
+    b"\0\0\0\x0cjP": "a JPEG 2000 picture",
+    b"%PDF": "a PDF document",
+    b"PK\x03\x04": "a zip archive",
+    b"\x1f\x8b": "a gzip archive",
+    b"\x93NUMPY": "a NumPy array",
+    b"\x89HDF": "an HDF5 file",
+    b"MATLAB 5.0": "a MATLAB file",
+}
+
+
+def read_text(path: Path) -> str:
+    """The text of a calibration file; CalibrationError for anything that cannot be one."""
+    try:
+        _refuse_unreadable(path)
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise CalibrationError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:  # a NUL in the name
+        raise CalibrationError(f"{str(path)!r} is not a file name") from error
+    return _decoded(content, path)
+
+
+def _refuse_unreadable(path: Path) -> None:
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise CalibrationError(f"{path}: there is no such file") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise CalibrationError(f"{path}: expected a calibration file, this is a directory")
+    if not stat.S_ISREG(status.st_mode):
+        raise CalibrationError(f"{path}: expected a calibration file, this is not a regular file")
+    if status.st_size > MAX_BYTES:
+        raise CalibrationError(f"{path}: {_too_large(status.st_size)}")
+
+
+def _too_large(size: int) -> str:
+    return f"a calibration file has at most {MAX_BYTES // 2**20} MB, this one has {size / 2**20:.0f} MB"
+
+
+def _decoded(content: bytes, path: Path) -> str:
+    if len(content) > MAX_BYTES:
+        raise CalibrationError(f"{path}: {_too_large(len(content))}")
+    if not content.strip():
+        raise CalibrationError(f"{path}: expected a calibration, the file is empty")
+    for signature, what in _SIGNATURES.items():
+        if content.startswith(signature):
+            raise CalibrationError(f"{path}: expected a calibration as text (YAML, XML or JSON), this is {what}")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise CalibrationError(f"{path}: expected text in UTF-8, byte {error.start} is not") from None
+    if "\0" in text:
+        raise CalibrationError(f"{path}: expected text, this is binary data")
+    return text

@@ -1,0 +1,40 @@
+"""Light: linear radiance inside, sRGB only at the screen, and the one sun that shades the scenes."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from camviz.lenses.base import Array
+
+SUN = np.array([-0.48, -0.72, -0.50])  # towards the sun: from the left, above and behind a camera at the origin
+SKYLIGHT = 0.42  # the share of light that comes from everywhere, and reaches the shade
+
+
+def to_linear(encoded: ArrayLike) -> Array:
+    """Linear light 0…1 of sRGB values 0…1, any shape (IEC 61966-2-1:1999, section 5.2)."""
+    c = np.asarray(encoded, dtype=np.float64)
+    return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def to_encoded(linear: ArrayLike) -> Array:
+    """sRGB values 0…1 of linear light 0…1, any shape: the inverse of `to_linear`."""
+    c = np.asarray(linear, dtype=np.float64)
+    return np.where(c <= 0.0031308, 12.92 * c, 1.055 * np.maximum(c, 0) ** (1 / 2.4) - 0.055)
+
+
+def to_display(radiance: ArrayLike) -> NDArray[np.uint8]:
+    """sRGB bytes of linear radiance, any shape; 1 is white, what is brighter is cut off, and NaN is black."""
+    steps = np.multiply(radiance, _STEPS - 1, dtype=np.float32)
+    np.fmin(np.fmax(steps, 0, out=steps), _STEPS - 1, out=steps)
+    steps += 0.5
+    return _BYTES[steps.astype(np.uint16)]
+
+
+def sunlight(normals: ArrayLike) -> Array:
+    """How brightly (...) the open sky and the sun light a matt surface with unit normals (..., 3): Lambert's law."""
+    direct = np.maximum(np.asarray(normals, dtype=np.float64) @ (SUN / np.linalg.norm(SUN)), 0)
+    return SKYLIGHT + (1 - SKYLIGHT) * direct
+
+
+_STEPS = 1 << 16
+_BYTES = np.rint(255 * to_encoded(np.arange(_STEPS) / (_STEPS - 1))).astype(np.uint8)
+_BYTES.flags.writeable = False

@@ -1,0 +1,164 @@
+"""Pictures for the surfaces, painted from noise and from photographs: sRGB 0…1, (height, width, 3)."""
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.lenses.base import Array
+from camviz.photographs import photograph
+from camviz.scenes.light import sunlight, to_linear
+
+HILLS = (0.50, 0.62, 0.58)  # the nearer hills, and the colour that distance gives the lawn
+
+
+def noise(height: int, width: int, cell: int, seed: int, octaves: int = 4) -> Array:
+    """Smooth noise (height, width) around 0, of standard deviation 1, that tiles; its largest blots are `cell` wide."""
+    rng = np.random.default_rng(seed)
+    total = np.zeros((height, width))
+    for octave in range(octaves):
+        size = max(cell >> octave, 1)
+        coarse = rng.standard_normal((max(height // size, 1), max(width // size, 1)))
+        fine = cv2.resize(np.tile(coarse, (3, 3)), (3 * width, 3 * height), interpolation=cv2.INTER_CUBIC)
+        total += fine[height : 2 * height, width : 2 * width] / 2**octave
+    return (total - total.mean()) / total.std()
+
+
+def tinted(values: Array, colours: ArrayLike) -> Array:
+    """Grey values (height, width), 0…1, turned into a gradient through colours (n, 3)."""
+    colours = np.asarray(colours, dtype=float)
+    stops = np.linspace(0, 1, len(colours))
+    return np.stack([np.interp(values, stops, channel) for channel in colours.T], axis=-1)
+
+
+def lit_round(picture: Array, upright: bool = False) -> Array:
+    """Linear light of an sRGB picture wound around a sphere, or around an upright column, in the sun."""
+    height, width = picture.shape[:2]
+    longitude = 2 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
+    latitude = np.full(height, np.pi / 2) if upright else np.pi * (np.arange(height) + 0.5) / height
+    ring, rise = np.sin(latitude)[:, None], np.cos(latitude)[:, None] + 0 * longitude
+    normals = np.stack([ring * np.sin(longitude), -rise, -ring * np.cos(longitude)], axis=-1)
+    return to_linear(picture) * sunlight(normals)[..., None]
+
+
+def bricks(columns: int = 8, courses: int = 24) -> Array:
+    """A wall in running bond that tiles: dead level, so that whatever bends it is the lens."""
+    high, wide, joint = 22, 64, 3
+    rng = np.random.default_rng(7)
+    height, width = courses * high, columns * wide
+    v, u = np.mgrid[0:height, 0:width]
+    course = v // high
+    across = (u + course % 2 * wide // 2) % width
+    tone = 0.45 + rng.normal(0, 0.13, (courses, columns))[course, across // wide]
+    tone += 0.05 * noise(height, width, 16, seed=6) + 0.04 * rng.standard_normal((height, width))
+    clay = tinted(np.clip(tone, 0, 1), [(0.36, 0.17, 0.13), (0.64, 0.34, 0.25), (0.84, 0.55, 0.42)])
+    mortar = (across % wide < joint) | (v % high < joint)
+    return np.where(
+        mortar[..., None], np.array([0.80, 0.75, 0.67]) * (1 + 0.02 * noise(height, width, 8, 9))[..., None], clay
+    )
+
+
+def lawn() -> Array:
+    """Grass that tiles: the grey photograph beside its mirror images, tinted."""
+    grey = cv2.resize(photograph("grass")[..., 0], (256, 256), interpolation=cv2.INTER_AREA) / 255
+    grey = np.block([[grey, grey[:, ::-1]], [grey[::-1], grey[::-1, ::-1]]])
+    return tinted(
+        np.clip(0.5 + 1.1 * (grey - grey.mean()), 0, 1), [(0.16, 0.27, 0.08), (0.42, 0.56, 0.20), (0.68, 0.76, 0.38)]
+    )
+
+
+def paving(columns: int, rows: int, texels: int = 80) -> Array:
+    """Square flagstones, each with a tone of its own, and joints between them."""
+    height, width = rows * texels, columns * texels
+    rng = np.random.default_rng(3)
+    tone = np.kron(rng.normal(0, 0.035, (rows, columns)), np.ones((texels, texels)))
+    chequer = np.kron((np.add.outer(np.arange(rows), np.arange(columns)) % 2) * 0.16, np.ones((texels, texels)))
+    grain = 0.018 * noise(height, width, 32, seed=5) + 0.012 * rng.standard_normal((height, width))
+    stone = tinted(np.clip(0.46 + tone + chequer + grain, 0, 1), [(0.30, 0.26, 0.22), (1.0, 0.95, 0.86)])
+    edge = np.minimum(np.arange(texels), np.arange(texels)[::-1])
+    joint = np.clip(np.minimum.outer(edge, edge) / 1.5, 0, 1)
+    return stone * (0.55 + 0.45 * np.tile(joint, (rows, columns)))[..., None]
+
+
+def checkerboard(columns: int, rows: int, texels: int = 40, margin: int = 20) -> Array:
+    """columns × rows squares, `texels` wide, the first one black, on white paper with a margin."""
+    dark = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0
+    squares = np.kron(np.where(dark, 0.07, 0.95), np.ones((texels, texels)))
+    return np.repeat(np.pad(squares, margin, constant_values=0.95)[..., None], 3, axis=2)
+
+
+def planks(size: int = 256) -> Array:
+    """The side of a wooden crate: five boards in a frame, with a brace from corner to corner."""
+    y, x = np.mgrid[0:size, 0:size] / size
+    grain = noise(size, size, 64, seed=11)
+    streaks = cv2.GaussianBlur(np.random.default_rng(12).standard_normal((size, size)), (0, 0), 9, sigmaY=0.8)
+    board = np.floor(y * 5)
+    tone = 0.52 + 0.05 * np.cos(2.4 * board + 1) + 0.02 * grain + 0.30 * streaks
+    tone -= 0.30 * (np.abs(y * 5 - np.rint(y * 5)) < 0.035)
+    edge = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
+    brace = np.abs(x - y) / np.sqrt(2)
+    for distance, width in ((brace, 0.055), (edge, 0.105)):
+        rail = 0.60 + 0.02 * grain + 0.25 * streaks.T
+        tone = np.where(distance < width, rail, tone - 0.16 * np.exp(-np.maximum(distance - width, 0) / 0.012))
+        tone -= 0.25 * (np.abs(distance - width) < 0.004)
+    return tinted(np.clip(tone, 0, 1), [(0.16, 0.08, 0.04), (0.62, 0.38, 0.18), (0.93, 0.75, 0.50)])
+
+
+def globe(height: int = 256) -> Array:
+    """A made-up planet: land and sea from noise, ice at the poles, meridians and parallels every 30°."""
+    width = 2 * height
+    land = noise(height, width, 64, seed=29, octaves=6)
+    latitude = np.abs(np.linspace(-90, 90, height))[:, None] + 5 * noise(height, width, 16, seed=8)
+    shore = np.clip(0.5 + 0.25 * land, 0, 1)
+    sea = tinted(shore, [(0.03, 0.16, 0.40), (0.10, 0.42, 0.66), (0.45, 0.76, 0.82)])
+    earth = tinted(
+        np.clip(land / 2.2, 0, 1), [(0.78, 0.74, 0.48), (0.36, 0.56, 0.24), (0.47, 0.38, 0.22), (0.9, 0.88, 0.85)]
+    )
+    planet = np.where((land > 0.15)[..., None], earth, sea)
+    planet = np.where((latitude > 74)[..., None], (0.95, 0.97, 0.99), planet)
+    step = height / 6
+    v, u = np.arange(height)[:, None] + 0.5, np.arange(width)[None, :] + 0.5
+    line = np.maximum(np.abs(v / step - np.rint(v / step)), 0) * step < 0.9
+    stretch = np.maximum(np.sin(np.pi * v / height), 0.05)
+    line = line | (np.abs(u / step - np.rint(u / step)) * step * stretch < 0.9)
+    return np.where(line[..., None], 0.55 * planet + 0.45, planet)
+
+
+def beach_ball(height: int = 128) -> Array:
+    """Six coloured gores and a white cap at each pole."""
+    colours = np.array([(0.86, 0.22, 0.20), (0.97, 0.95, 0.90), (0.98, 0.76, 0.20), (0.97, 0.95, 0.90)])
+    gore = np.arange(2 * height) * 8 // (2 * height)
+    picture = np.broadcast_to(colours[gore % 4], (height, 2 * height, 3)).copy()
+    picture[: height // 12] = picture[-height // 12 :] = colours[1]
+    return picture
+
+
+def framed(picture: Array, border: float = 0.07) -> Array:
+    """A picture in a passe-partout and a dark wooden frame."""
+    frame = int(border * max(picture.shape))
+    mat = np.pad(picture, ((frame, frame), (frame, frame), (0, 0)), constant_values=0.96)
+    edged = np.pad(mat, ((frame // 2, frame // 2), (frame // 2, frame // 2), (0, 0)), constant_values=0.0)
+    wood = np.all(edged == 0, axis=-1)
+    return np.where(wood[..., None], (0.24, 0.15, 0.10), edged)
+
+
+def sky(height: int = 512) -> Array:
+    """Equirectangular sky: pale at the horizon, deep blue above, fair-weather clouds, two ridges of hills."""
+    width = 2 * height
+    elevation = 90 - 180 * (np.arange(height)[:, None] + 0.5) / height
+    blues = [(0.89, 0.93, 0.93), (0.70, 0.85, 0.94), (0.45, 0.69, 0.89), (0.30, 0.55, 0.82), (0.22, 0.45, 0.74)]
+    picture = tinted(np.clip(elevation / 55, 0, 1) ** 0.75 + np.zeros(width), blues)
+    puffs = cv2.resize(noise(2 * height, width, 64, seed=21, octaves=6), (width, height), interpolation=cv2.INTER_AREA)
+    cover = np.clip(puffs - 0.7, 0, 0.85) * np.clip((elevation - 5) / 8, 0, 1)
+    picture += cover[..., None] * (np.array([1.0, 0.99, 0.97]) - picture)
+    ridges = noise(8, width, 128, seed=2, octaves=5)
+    for row, (rise, swing, colour) in enumerate([(3.6, 1.2, (0.62, 0.73, 0.80)), (1.9, 0.7, HILLS)]):
+        ridge = rise + swing * ridges[4 * row]
+        cover = np.clip((ridge - elevation) / (180 / height) + 0.5, 0, 1)
+        picture += cover[..., None] * (np.array(colour) - picture)
+    return picture
+
+
+def leaves(size: int = 128) -> Array:
+    """Clipped box leaves, for something round."""
+    tone = 0.5 + 0.16 * noise(size, 2 * size, 8, seed=41, octaves=3)
+    return tinted(np.clip(tone, 0, 1), [(0.06, 0.14, 0.05), (0.22, 0.38, 0.14), (0.52, 0.64, 0.30)])

@@ -1,0 +1,123 @@
+"""A scene, and the one tracer that photographs it through every lens."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from camviz.cameras import Camera
+from camviz.lenses.base import Array, as_points
+from camviz.scenes.rays import RUN, Bounds, Floats, Runs
+from camviz.scenes.surfaces import Meeting, Mesh, Surface, on_sphere
+from camviz.scenes.texture import Texture
+from camviz.scenes.wireframe import Wireframe
+
+BLOCK = 1 << 15  # rays traced together: few enough to stay in the processor's cache
+NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be mistaken for a hole in the scene
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Surfaces under a sky. List them near to far: what is hidden then costs nothing.
+
+    The sky is an equirectangular texture infinitely far away, its middle towards +z and its first row straight up.
+    """
+
+    surfaces: Sequence[Surface]
+    sky: Texture = field(default_factory=lambda: Texture.plain((0.62, 0.72, 0.82)))
+
+    def trace(self, origins: ArrayLike, directions: ArrayLike, spread: float = 0.0) -> tuple[Floats, Floats]:
+        """Follow rays from `origins` along unit `directions`, (..., 3) each, to the nearest surface.
+
+        Returns linear light (..., 3) and the distance along the ray (...) in metres, both float32. A ray that meets
+        nothing shows the sky at distance NaN; a NaN direction is no ray: NEUTRAL grey, NaN. `spread` is the angle in
+        radians between neighbouring rays, over which textures are averaged (Amanatides 1984, "Ray tracing with
+        cones"); 0 averages nothing. Raises ValueError when the directions are not of unit length.
+        """
+        origins, directions = as_points(origins, 3, "origins"), as_points(directions, 3, "directions")
+        shape = np.broadcast_shapes(origins.shape, directions.shape)
+        if 0 in shape:
+            return np.zeros(shape, np.float32), np.zeros(shape[:-1], np.float32)
+        origins, directions = _flat(origins, shape), np.broadcast_to(directions, shape).reshape(-1, 3)
+        light, depth = np.empty(directions.shape, np.float32), np.empty(len(directions), np.float32)
+        for start in range(0, len(directions), BLOCK):
+            block = slice(start, start + BLOCK)
+            runs = Runs.gather(origins[block] if len(origins) > 1 else origins, directions[block])
+            light[block], depth[block] = self._trace(runs, spread, len(directions[block]))
+        return light.reshape(shape), depth.reshape(shape[:-1])
+
+    @cached_property
+    def _bounds(self) -> Bounds:
+        return Bounds.around([surface.ball() for surface in self.surfaces])
+
+    def _trace(self, runs: Runs, spread: float, count: int) -> tuple[Floats, Floats]:
+        depth = np.full(runs.directions[0].size, np.inf, dtype=np.float32)
+        light = np.empty((depth.size, 3), dtype=np.float32)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for surface, may_meet in zip(self.surfaces, runs.may_meet(self._bounds), strict=True):
+                near = np.flatnonzero(may_meet)
+                if near.size:
+                    self._meet(surface, runs, near, depth, light, spread)
+            self._paint_sky(runs, depth, light, spread)
+        return light[:count], depth[:count]
+
+    def _meet(
+        self, surface: Surface, runs: Runs, near: NDArray[np.intp], depth: Floats, light: Floats, spread: float
+    ) -> None:
+        """Let the rays of the runs `near` meet one surface, and where it is the nearest so far, see it."""
+        at = surface.meet(*runs.pick(near))
+        hit = np.flatnonzero(at.depth < depth.reshape(-1, RUN).take(near, axis=0).ravel())
+        if hit.size:
+            rays = near[hit // RUN] * RUN + hit % RUN
+            seen = Meeting(at.depth[hit], at.place.take(hit, axis=1))
+            depth[rays] = seen.depth
+            light[rays] = surface.radiance(seen, spread)
+
+    def _paint_sky(self, runs: Runs, depth: Floats, light: Floats, spread: float) -> None:
+        missed = np.flatnonzero(depth == np.inf)
+        if missed.size == 0:
+            return
+        x, y, z = runs.directions.reshape(3, -1)[:, missed]
+        depth[missed] = np.nan
+        light[missed] = self.sky.sample(*on_sphere(x, y, -z), spread * self.sky.height / np.pi)
+        light[missed[(x == 0) & (y == 0) & (z == 0)]] = NEUTRAL
+
+    def outlines(self) -> Wireframe:
+        """The same scene as lines, each named after its surface."""
+        lines = [(line, surface.name) for surface in self.surfaces for line in surface.outline()]
+        return Wireframe(tuple(line for line, _ in lines), tuple(name for _, name in lines))
+
+    def faces(self) -> tuple[Mesh, ...]:
+        """The same scene as meshes for a solid renderer; the sky is not among them."""
+        return tuple(surface.mesh() for surface in self.surfaces)
+
+
+def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
+    """The picture (height, width, 3) that the camera takes, linear light, float32.
+
+    With `supersample` = n each pixel is the mean of n × n rays. Raises ValueError unless n is a whole number ≥ 1.
+    """
+    if int(supersample) != supersample or supersample < 1:
+        raise ValueError(f"supersample must be a whole number, at least 1, got {supersample}")
+    pixels = camera.intrinsics
+    fine = pixels.resized(pixels.width * supersample, pixels.height * supersample)
+    rays = replace(camera, intrinsics=fine).rays()
+    light, _ = scene.trace(camera.centre, rays, _spread(rays))
+    return cv2.resize(light, (pixels.width, pixels.height), interpolation=cv2.INTER_AREA) if supersample > 1 else light
+
+
+def _flat(origins: Array, shape: tuple[int, ...]) -> Array:
+    """(1, 3) for a single origin, otherwise one (n, 3) for each ray."""
+    return origins.reshape(1, 3) if origins.size == 3 else np.broadcast_to(origins, shape).reshape(-1, 3)
+
+
+def _spread(rays: Array) -> float:
+    """The typical angle in radians between the rays of neighbouring pixels."""
+    steps = np.linalg.norm(np.diff(rays[::8], axis=1), axis=-1)
+    steps = steps[np.isfinite(steps)]
+    return float(np.median(steps)) if steps.size else 0.0

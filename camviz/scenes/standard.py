@@ -1,0 +1,140 @@
+"""The standard scenes: one garden, in which every lesson takes its pictures, and the same place as lines.
+
+Metres, x right, y down, z forward: a camera with an identity pose stands 1.25 m above the terrace and looks at it.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.lenses.base import Array
+from camviz.photographs import photograph
+from camviz.scenes import paint
+from camviz.scenes.light import SKYLIGHT, SUN, sunlight, to_linear
+from camviz.scenes.scene import Scene
+from camviz.scenes.surfaces import Column, Ground, Rectangle, Sphere, Surface, box
+from camviz.scenes.texture import Texture
+from camviz.scenes.wireframe import Wireframe
+
+FLOOR = 1.25
+SQUARE = 0.1
+BOARD_COLUMNS, BOARD_ROWS = 9, 6  # inner corners
+_BOARD_CORNER = np.array([-1.42, -0.28, 2.75])  # the upper left corner of the first black square
+_BOARD_ACROSS = np.array([np.cos(0.42), 0, np.sin(0.42)])
+_BOARD_DOWN = np.cross(np.array([-np.sin(0.42), 0.17, np.cos(0.42)]), _BOARD_ACROSS)
+_BOARD_DOWN /= np.linalg.norm(_BOARD_DOWN)
+
+
+def board_corners() -> Array:
+    """The 9 × 6 inner corners (54, 3) of the checkerboard in the world, row by row, in metres; squares of 0.1 m."""
+    s, r = np.meshgrid(np.arange(1, BOARD_COLUMNS + 1), np.arange(1, BOARD_ROWS + 1))
+    return _BOARD_CORNER + SQUARE * (s.reshape(-1, 1) * _BOARD_ACROSS + r.reshape(-1, 1) * _BOARD_DOWN)
+
+
+@lru_cache(maxsize=1)
+def textured_scene() -> Scene:
+    """The garden: a calibration board, a crate with a globe, a ball, a brick wall, and lamps into the distance."""
+    sky = Texture(to_linear(paint.sky()), repeat=True)
+    things = [*_board(), *_still_life(), *_lamps(), *_wall()]
+    grass = Texture(to_linear(paint.lawn()) * sunlight((0, -1, 0)), repeat=True)
+    lawn = Ground(FLOOR + 0.005, grass, tile=3.2, haze=to_linear(paint.HILLS), sight=90)
+    return Scene([*things, _terrace(things), lawn], sky)
+
+
+def _board() -> list[Surface]:
+    margin = SQUARE / 2
+    corner = _BOARD_CORNER - margin * (_BOARD_ACROSS + _BOARD_DOWN)
+    across = (SQUARE * (BOARD_COLUMNS + 1) + 2 * margin) * _BOARD_ACROSS
+    down = (SQUARE * (BOARD_ROWS + 1) + 2 * margin) * _BOARD_DOWN
+    picture = Texture(to_linear(paint.checkerboard(BOARD_COLUMNS + 1, BOARD_ROWS + 1)))
+    wood = Texture(paint.lit_round(np.full((1, 32, 3), (0.55, 0.36, 0.20)), upright=True))
+    back = 0.03 * np.cross(_BOARD_ACROSS, _BOARD_DOWN)
+    legs = [corner + down * 0.2 + across * s + back for s in (0.12, 0.88)]
+    easel = [Column([x, FLOOR, z], FLOOR - y, 0.018, wood, "easel") for x, y, z in legs]
+    return [Rectangle(corner, across, down, picture, name="board"), *easel]
+
+
+def _still_life() -> list[Surface]:
+    wood = Texture(to_linear(paint.planks()))
+    crate = box([0.68, FLOOR, 3.3], [0.62, 0.62, 0.62], wood, yaw=0.5, name="crate")
+    globe = Sphere([0.68, FLOOR - 0.62 - 0.27, 3.3], 0.27, Texture(paint.lit_round(paint.globe())), "globe")
+    ball = Sphere([0.13, FLOOR - 0.16, 3.0], 0.16, Texture(paint.lit_round(paint.beach_ball())), "ball")
+    clay = Texture(paint.lit_round(np.full((1, 32, 3), (0.74, 0.42, 0.28)), upright=True))
+    pot = Column([1.42, FLOOR, 4.7], 0.36, 0.2, clay, "pot")
+    bush = Sphere([1.42, FLOOR - 0.58, 4.7], 0.33, Texture(paint.lit_round(paint.leaves())), "bush")
+    return [ball, globe, *crate, bush, pot]
+
+
+def _lamps() -> list[Surface]:
+    iron = Texture(paint.lit_round(np.full((1, 32, 3), (0.20, 0.25, 0.27)), upright=True))
+    glass = Texture(paint.lit_round(np.full((32, 64, 3), (0.98, 0.96, 0.90))))
+    surfaces: list[Surface] = []
+    for z in 3.5 + 1.9 * np.arange(9):
+        surfaces.append(Sphere([2.05, FLOOR - 1.95, z], 0.17, glass, "lamp"))
+        surfaces.append(Column([2.05, FLOOR, z], 1.80, 0.045, iron, "lamp"))
+    return surfaces
+
+
+def _wall() -> list[Surface]:
+    bricks = Texture(to_linear(paint.bricks()), repeat=True)
+    cat = paint.framed(photograph("chelsea") / 255)
+    picture = Rectangle([-0.75, -0.65, 6.47], [1.35, 0, 0], [0, 0.95, 0], Texture(to_linear(cat)), name="picture")
+    coping = box([-1.5, FLOOR - 2.5, 6.65], [5.3, 0.09, 0.4], Texture.plain((0.86, 0.82, 0.75)), name="wall")
+    return [picture, *coping, *box([-1.5, FLOOR, 6.65], [5.2, 2.5, 0.3], bricks, tile=2.4, name="wall")]
+
+
+def _terrace(things: list[Surface]) -> Rectangle:
+    """Flagstones with the shadows of the things that stand on them."""
+    corner, across, down = np.array([-4.5, FLOOR, 9.0]), np.array([7.5, 0, 0]), np.array([0, 0, -12.0])
+    light = to_linear(paint.paving(15, 24, texels=40))
+    height, width = light.shape[:2]
+    s, r = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+    points = corner + s[None, :, None] * across + r[:, None, None] * down
+    _, depth = Scene(things).trace(points, SUN / np.linalg.norm(SUN))
+    lit = np.isnan(depth).astype(float)
+    share = SKYLIGHT + (float(sunlight((0, -1, 0))) - SKYLIGHT) * lit
+    return Rectangle(corner, across, down, Texture(light * share[..., None]), name="terrace")
+
+
+@lru_cache(maxsize=1)
+def wireframe_scene() -> Wireframe:
+    """A house on a ground grid of one metre, the same board as in the garden, and the world's axes, one metre each.
+
+    Names: "ground", "house", "board", "axis x", "axis y", "axis z". Every line is straight between its points.
+    """
+    return _grid() + _house() + _board_lines() + _axes()
+
+
+def _grid(x_reach: float = 4.0, z_reach: float = 10.0) -> Wireframe:
+    along = [[[x, FLOOR, 0], [x, FLOOR, z_reach]] for x in np.arange(-x_reach, x_reach + 1)]
+    across = [[[-x_reach, FLOOR, z], [x_reach, FLOOR, z]] for z in np.arange(z_reach + 1)]
+    return _named("ground", *along, *across)
+
+
+def _house(width: float = 2.0, wall: float = 1.3, ridge: float = 2.1, depth: float = 2.4) -> Wireframe:
+    """Two gables, the eaves and the ridge that join them, a door and a window; its door stands at (0.9, FLOOR, 4.5)."""
+    middle, front = 0.9, 4.5
+    outline = np.array([[-1, 0], [-1, wall], [0, ridge], [1, wall], [1, 0], [-1, 0]]) * [width / 2, 1]
+    gables = [[[middle + x, FLOOR - y, z] for x, y in outline] for z in (front, front + depth)]
+    beams = [[near, far] for near, far in zip(*gables, strict=True)][:-1]
+    door = [[middle + x, FLOOR - y, front] for x, y in [(-0.7, 0), (-0.7, 0.95), (-0.2, 0.95), (-0.2, 0)]]
+    frame = [(0.15, 0.45), (0.15, 0.95), (0.7, 0.95), (0.7, 0.45), (0.15, 0.45)]
+    return _named("house", *gables, *beams, door, [[middle + x, FLOOR - y, front] for x, y in frame])
+
+
+def _board_lines() -> Wireframe:
+    columns, rows = BOARD_COLUMNS + 1, BOARD_ROWS + 1
+    ends = [((0, r), (columns, r)) for r in range(rows + 1)] + [((s, 0), (s, rows)) for s in range(columns + 1)]
+    return _named("board", *(SQUARE * (np.array(e) @ [_BOARD_ACROSS, _BOARD_DOWN]) + _BOARD_CORNER for e in ends))
+
+
+def _axes() -> Wireframe:
+    x, y, z = (_named(f"axis {name}", [[0, 0, 0], tip]) for name, tip in zip("xyz", np.eye(3), strict=True))
+    return x + y + z
+
+
+def _named(name: str, *lines: ArrayLike) -> Wireframe:
+    return Wireframe(tuple(np.asarray(line, dtype=float) for line in lines), (name,) * len(lines))

@@ -1,0 +1,370 @@
+"""Surfaces: each is a unit shape in its own frame, so that meeting it with a ray takes a few lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from camviz.lenses.base import Array, unit
+from camviz.scenes.light import sunlight, to_display, to_linear
+from camviz.scenes.rays import Floats
+from camviz.scenes.texture import Texture
+
+_FAR, _HALF = np.float32(np.inf), np.float32(0.5)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A surface as quadrilaterals, for a solid renderer: vertices (n, 3) in metres, quads (m, 4) of their indices.
+
+    `uv` (n, 2) places the vertices on `picture` (sRGB bytes), u to the right and v upwards; `rgb` is the picture's
+    mean, 0…255, for a renderer without textures.
+    """
+
+    name: str
+    vertices: Array
+    quads: NDArray[np.intp]
+    uv: Array
+    picture: NDArray[np.uint8]
+    rgb: tuple[int, int, int]
+
+
+class Meeting(NamedTuple):
+    """Where n rays meet a surface: the distance (n,) along each, inf on a miss, and `place` (3, n) in its own frame."""
+
+    depth: Floats
+    place: Floats
+
+
+class Surface(Protocol):
+    """What a scene is made of."""
+
+    name: str
+
+    def ball(self) -> tuple[Array, float, Array]:
+        """Centre (3,) and radius of a ball around it, and its unit normal (3,) if it is flat, otherwise 0."""
+        ...
+
+    def meet(self, origins: Array, directions: Floats) -> Meeting:
+        """Where rays with unit directions (3, n) from origins (3, n) or (3, 1) meet the surface first."""
+        ...
+
+    def radiance(self, at: Meeting, spread: float) -> Floats:
+        """Linear light (n, 3) that leaves the surface towards rays `spread` radians apart."""
+        ...
+
+    def outline(self) -> tuple[Array, ...]:
+        """The lines a drawing of it needs: polylines (n, 3)."""
+        ...
+
+    def mesh(self) -> Mesh:
+        """The surface for a solid renderer."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Rectangle:
+    """The parallelogram corner + s across + r down, 0 ≤ s, r ≤ 1, seen from both sides; metres.
+
+    Its texture's first row lies along `across`, and fits `repeats` times along either edge. `shade` is the light it
+    receives: 1 for full light. Raises ValueError when the two edges span no area.
+    """
+
+    corner: ArrayLike
+    across: ArrayLike
+    down: ArrayLike
+    texture: Texture
+    shade: float = 1.0
+    repeats: tuple[float, float] = (1.0, 1.0)
+    name: str = "rectangle"
+
+    def __post_init__(self) -> None:
+        for edge in ("corner", "across", "down"):
+            object.__setattr__(self, edge, _vector(getattr(self, edge), edge))
+        if not np.linalg.norm(np.cross(self.across, self.down)) > 0:
+            raise ValueError(f"across and down must span an area, got {self.across.tolist()} and {self.down.tolist()}")
+
+    @cached_property
+    def normal(self) -> Array:
+        """Unit normal (3,), towards a viewer who sees the texture the right way round."""
+        return unit(np.cross(self.down, self.across))
+
+    @cached_property
+    def corners(self) -> Array:
+        """The four corners (4, 3), clockwise as seen by such a viewer."""
+        return self.corner + np.array([0 * self.across, self.across, self.across + self.down, self.down])
+
+    @cached_property
+    def _local_from_world(self) -> Array:
+        return np.linalg.inv(np.stack([self.across, self.down, self.normal], axis=1))
+
+    def ball(self) -> tuple[Array, float, Array]:
+        centre = self.corners.mean(axis=0)
+        return centre, float(np.linalg.norm(self.corners - centre, axis=1).max()), self.normal
+
+    def meet(self, origins: Array, directions: Floats) -> Meeting:
+        at = _meet_plane(self._local_from_world, self.corner, origins, directions)
+        s, r, _ = at.place
+        inside = (np.abs(s - _HALF) <= _HALF) & (np.abs(r - _HALF) <= _HALF) & (at.depth > 0)
+        return at._replace(depth=np.where(inside, at.depth, _FAR))
+
+    def radiance(self, at: Meeting, spread: float) -> Floats:
+        columns, rows = (np.float32(n) for n in self.repeats)
+        wide = self.texture.width * columns / np.linalg.norm(self.across)
+        high = self.texture.height * rows / np.linalg.norm(self.down)
+        s, r, cosine = at.place
+        light = self.texture.sample(s * columns, r * rows, _texels(at.depth, cosine, spread * max(wide, high)))
+        return light if self.shade == 1 else light * np.float32(self.shade)
+
+    def outline(self) -> tuple[Array, ...]:
+        return (np.concatenate([self.corners, self.corners[:1]]),)
+
+    def mesh(self) -> Mesh:
+        uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]]) * self.repeats
+        return _mesh(self.name, self.corners, np.array([[0, 1, 2, 3]]), uv, self.texture, self.shade)
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The endless horizontal plane y = `height` (y points down), its texture repeated every `tile` metres along x and z.
+
+    With the distance d it takes on the colour of the air, linear RGB `haze`: a share 1 - exp(-d / `sight`) of it.
+    """
+
+    height: float
+    texture: Texture
+    tile: float = 1.0
+    haze: ArrayLike = (0.55, 0.65, 0.75)
+    sight: float = 60.0
+    name: str = "ground"
+
+    def __post_init__(self) -> None:
+        if not self.tile > 0:
+            raise ValueError(f"tile must be a positive length in metres, got {self.tile}")
+        if not self.sight > 0:
+            raise ValueError(f"sight must be a positive distance in metres, got {self.sight}")
+
+    @cached_property
+    def _point(self) -> Array:
+        return np.array([0, self.height, 0])
+
+    @cached_property
+    def _local_from_world(self) -> Array:
+        return np.array([[1 / self.tile, 0, 0], [0, 0, -1 / self.tile], [0, -1, 0]])
+
+    def ball(self) -> tuple[Array, float, Array]:
+        return self._point, np.inf, np.array([0.0, -1.0, 0.0])
+
+    def meet(self, origins: Array, directions: Floats) -> Meeting:
+        at = _meet_plane(self._local_from_world, self._point, origins, directions)
+        return at._replace(depth=np.where(at.depth > 0, at.depth, _FAR))
+
+    def radiance(self, at: Meeting, spread: float) -> Floats:
+        s, r, cosine = at.place
+        light = self.texture.sample(s, r, _texels(at.depth, cosine, spread * self.texture.width / self.tile))
+        clear = np.exp(at.depth * np.float32(-1 / self.sight))[:, None]
+        haze = np.asarray(self.haze, dtype=np.float32)
+        return haze + (light - haze) * clear
+
+    def outline(self) -> tuple[Array, ...]:
+        return ()
+
+    def mesh(self) -> Mesh:
+        reach = 2 * self.sight
+        square = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]]) * reach + self._point
+        uv = square[:, [0, 2]] / self.tile
+        return _mesh(self.name, square, np.array([[0, 1, 2, 3]]), uv, self.texture)
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """A ball around `centre` (3,) with `radius`, in metres, under an equirectangular texture.
+
+    The texture's middle faces -z, towards a camera at the origin; its first row is the pole -y, the top.
+    """
+
+    centre: ArrayLike
+    radius: float
+    texture: Texture
+    name: str = "sphere"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _vector(self.centre, "centre"))
+        if not self.radius > 0:
+            raise ValueError(f"radius must be a positive length in metres, got {self.radius}")
+
+    def ball(self) -> tuple[Array, float, Array]:
+        return self.centre, self.radius, np.zeros(3)
+
+    def meet(self, origins: Array, directions: Floats) -> Meeting:
+        start = ((origins - self.centre[:, None]) / self.radius).astype(np.float32)
+        step = directions / np.float32(self.radius)
+        first, second = _meet_circle(start, step)
+        depth = np.where(first > 0, first, second)
+        return Meeting(np.where(depth > 0, depth, _FAR), start + depth * step)
+
+    def radiance(self, at: Meeting, spread: float) -> Floats:
+        density = self.texture.height / (np.pi * self.radius)
+        return self.texture.sample(*on_sphere(*at.place), at.depth * np.float32(spread * density))
+
+    def outline(self) -> tuple[Array, ...]:
+        turn = np.linspace(0, 2 * np.pi, 49)
+        circle = self.radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
+        return tuple(self.centre + circle[:, axes] for axes in ([0, 1, 2], [0, 2, 1], [2, 1, 0]))
+
+    def mesh(self) -> Mesh:
+        s, r, uv, quads = _lattice(32, 16)
+        longitude, latitude = 2 * np.pi * (s - 0.5), np.pi * r
+        ring = np.sin(latitude)
+        normals = np.stack([ring * np.sin(longitude), -np.cos(latitude), -ring * np.cos(longitude)], axis=-1)
+        return _mesh(self.name, self.centre + self.radius * normals, quads, uv, self.texture)
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """An upright tube, open at both ends: it stands on `foot` (3,), `height` high, with `radius`; metres.
+
+    The middle of its texture faces -z, the first row is at the top.
+    """
+
+    foot: ArrayLike
+    height: float
+    radius: float
+    texture: Texture
+    name: str = "column"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "foot", _vector(self.foot, "foot"))
+        for size in ("height", "radius"):
+            if not getattr(self, size) > 0:
+                raise ValueError(f"{size} must be a positive length in metres, got {getattr(self, size)}")
+
+    @cached_property
+    def _top(self) -> Array:
+        return self.foot - [0, self.height, 0]
+
+    def ball(self) -> tuple[Array, float, Array]:
+        return (self.foot + self._top) / 2, float(np.hypot(self.height / 2, self.radius)), np.zeros(3)
+
+    def meet(self, origins: Array, directions: Floats) -> Meeting:
+        scale = np.array([[self.radius], [self.height], [self.radius]])
+        start = ((origins - self._top[:, None]) / scale).astype(np.float32)
+        step = directions / scale.astype(np.float32)
+        first, second = _meet_circle(start[::2], step[::2])
+        outside = (first > 0) & (np.abs(start[1] + first * step[1] - _HALF) <= _HALF)
+        depth = np.where(outside, first, second)
+        place = start + depth * step
+        return Meeting(np.where((depth > 0) & (np.abs(place[1] - _HALF) <= _HALF), depth, _FAR), place)
+
+    def radiance(self, at: Meeting, spread: float) -> Floats:
+        x, r, z = at.place
+        density = self.texture.height / self.height
+        return self.texture.sample(around(x, -z), r, at.depth * np.float32(spread * density))
+
+    def outline(self) -> tuple[Array, ...]:
+        turn = np.linspace(0, 2 * np.pi, 25)
+        rim = self.radius * np.stack([np.sin(turn), 0 * turn, -np.cos(turn)], axis=-1)
+        sides = tuple(np.stack([self.foot + p, self._top + p]) for p in rim[:-1:6])
+        return (self.foot + rim, self._top + rim, *sides)
+
+    def mesh(self) -> Mesh:
+        s, r, uv, quads = _lattice(24, 1)
+        longitude = 2 * np.pi * (s - 0.5)
+        offset = [self.radius * np.sin(longitude), self.height * r, -self.radius * np.cos(longitude)]
+        return _mesh(self.name, self._top + np.stack(offset, axis=-1), quads, uv, self.texture)
+
+
+def box(
+    foot: ArrayLike,
+    size: ArrayLike,
+    texture: Texture,
+    yaw: float = 0.0,
+    tile: float | None = None,
+    name: str = "box",
+) -> tuple[Rectangle, ...]:
+    """The four walls and the lid of a box that stands on `foot` (3,), the middle of its floor, lit by the sun.
+
+    `size` is its width, height and depth in metres before it is turned by `yaw` radians about the vertical, clockwise
+    as seen from above. The texture covers each side once, or repeats every `tile` metres.
+    """
+    foot, (width, height, depth) = _vector(foot, "foot"), _vector(size, "size")
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    right, down, away = width * np.array([cos, 0, -sin]), np.array([0, height, 0]), depth * np.array([sin, 0, cos])
+    front = foot - down - right / 2 - away / 2  # its upper left corner
+    walls = [(front, right, down), (front + right, away, down), (front + right + away, -right, down)]
+    walls += [(front + away, -away, down), (front + away, right, -away)]
+    return tuple(_lit(Rectangle(*wall, texture, name=name), tile) for wall in walls)
+
+
+def _lit(wall: Rectangle, tile: float | None) -> Rectangle:
+    repeats = tuple(float(np.linalg.norm(edge)) / tile for edge in (wall.across, wall.down)) if tile else (1.0, 1.0)
+    return replace(wall, shade=float(sunlight(wall.normal)), repeats=repeats)
+
+
+def _vector(values: ArrayLike, name: str) -> Array:
+    vector = np.array(values, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name} must be three finite numbers, got {values}")
+    vector.flags.writeable = False
+    return vector
+
+
+def around(x: Floats, z: Floats) -> Floats:
+    """How far round (n,) a direction points, 0…1: 0.5 along +z, more to the right."""
+    return np.arctan2(x, z) * np.float32(0.5 / np.pi) + _HALF
+
+
+def on_sphere(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
+    """Equirectangular s, r (n,) of unit normals, seen from outside: the middle faces -z, the first row is up."""
+    return around(x, -z), np.arccos(np.clip(-y, -1, 1)) * np.float32(1 / np.pi)
+
+
+def _meet_plane(local_from_world: Array, point: Array, origins: Array, directions: Floats) -> Meeting:
+    """Where rays meet the plane z = 0 of a frame at `point` whose third axis is a unit normal: t = -z₀ / ż.
+
+    The third row of `place` is not z, which is 0, but the cosine of the angle between ray and normal.
+    """
+    start = (local_from_world @ (origins - point[:, None])).astype(np.float32)
+    place = local_from_world.astype(np.float32) @ directions
+    depth = -start[2] / place[2]
+    place[:2] *= depth
+    place[:2] += start[:2]
+    np.abs(place[2], out=place[2])
+    return Meeting(depth, place)
+
+
+def _meet_circle(start: Floats, step: Floats) -> tuple[Floats, Floats]:
+    """Both distances (n,) to the unit circle or sphere about 0, near one first; NaN where a ray passes it by.
+
+    From the point m of the ray that is nearest to the centre it is sqrt(1 - m²) either way; taking m first keeps the
+    digits that the textbook's b² - 4ac would lose.
+    """
+    squared = (step * step).sum(axis=0)
+    middle = -(start * step).sum(axis=0) / squared
+    nearest = start + middle * step
+    half = np.sqrt((1 - (nearest * nearest).sum(axis=0)) / squared)
+    return middle - half, middle + half
+
+
+def _texels(depth: Floats, cosine: Floats, density: float) -> Floats | float:
+    """Texels between neighbouring rays; a slanted look stretches them by 1 / cos, of which the square root is taken as
+    a compromise between too sharp along the slope and too soft across it."""
+    return depth * np.float32(density) / np.sqrt(cosine) if density > 0 else 0.0
+
+
+def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """s, r, uv and the quads of a rectangular net, for a surface wound around an axis."""
+    r, s = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, columns + 1), indexing="ij")
+    index = np.arange(r.size).reshape(r.shape)
+    quads = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    return s.ravel(), r.ravel(), np.stack([s.ravel(), 1 - r.ravel()], axis=-1), quads
+
+
+def _mesh(name: str, vertices: Array, quads: NDArray[np.intp], uv: Array, texture: Texture, shade: float = 1.0) -> Mesh:
+    picture = to_display(to_linear(np.arange(256) / 255) * shade)[texture.photograph]
+    red, green, blue = to_display(texture.mean * shade).tolist()
+    return Mesh(name, np.asarray(vertices, dtype=float), quads, uv, picture, (red, green, blue))

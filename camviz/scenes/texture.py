@@ -1,0 +1,99 @@
+"""Textures: pictures that lie on surfaces, averaged beforehand so that far away they do not flicker."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from camviz.scenes.light import to_display, to_linear
+
+Floats = NDArray[np.float32]
+_FULL = 65535  # linear light 0…1 is kept in 16 bits: half the memory of floats, and no banding in the dark
+
+
+class Texture:
+    """A picture on a surface: linear light 0…1 (height, width, 3), looked up by s (to the right) and r (down), 0…1.
+
+    It keeps halved copies of itself down to a single texel, side by side in one mosaic, and mixes the two whose texels
+    come nearest to the distance between rays (Williams 1983, "Pyramidal parametrics"). With `repeat` it tiles the
+    plane; otherwise its border goes on for ever. Raises ValueError for any other shape.
+    """
+
+    def __init__(self, light: ArrayLike, repeat: bool = False) -> None:
+        picture = np.asarray(light, dtype=np.float32)
+        if picture.ndim != 3 or picture.shape[2] != 3 or 0 in picture.shape:
+            raise ValueError(f"light must have shape (height, width, 3), got {picture.shape}")
+        self.height, self.width = picture.shape[:2]
+        self.repeat = repeat
+        self.mean = picture.mean(axis=(0, 1))
+        self._mosaic, self._places = _pyramid(picture, repeat)
+
+    @classmethod
+    def of_photograph(cls, picture: ArrayLike, repeat: bool = False) -> Texture:
+        """From sRGB bytes (height, width, 3)."""
+        return cls(to_linear(np.arange(256) / 255)[np.asarray(picture)], repeat)
+
+    @classmethod
+    def plain(cls, rgb: ArrayLike) -> Texture:
+        """One colour, sRGB 0…1."""
+        return cls(to_linear(rgb).reshape(1, 1, 3))
+
+    @property
+    def photograph(self) -> NDArray[np.uint8]:
+        """The finest copy as sRGB bytes (height, width, 3)."""
+        return to_display(self._mosaic[: self.height, : self.width].astype(np.float32) / _FULL)
+
+    def sample(self, s: Floats, r: Floats, texels: Floats | float = 0.0) -> Floats:
+        """Linear light (n, 3) at s, r (n,), for rays that lie `texels` of the finest copy apart."""
+        level = np.minimum(np.log2(np.maximum(texels, np.float32(1))), np.float32(self._places.shape[1] - 1))
+        if not np.any(level):
+            return self._look_up(s, r, np.zeros((), dtype=np.intp))
+        fine = np.broadcast_to(level, s.shape).astype(np.intp)
+        near = self._look_up(s, r, fine)
+        far = self._look_up(s, r, np.minimum(fine + 1, self._places.shape[1] - 1))
+        far -= near
+        far *= (level - fine).astype(np.float32)[..., None]
+        near += far
+        return near
+
+    def _look_up(self, s: Floats, r: Floats, level: NDArray[np.intp]) -> Floats:
+        left, top, width, height = self._places.take(level, axis=1)
+        x = _texel(s, width, self.repeat)
+        y = _texel(r, height, self.repeat)
+        return _remap(self._mosaic, x + left, y + top)
+
+
+def _texel(s: Floats, size: Floats, repeat: bool) -> Floats:
+    x = s * size - np.float32(0.5)
+    if repeat:
+        return x - size * np.floor(x / size)
+    return np.minimum(np.maximum(x, np.float32(0)), size - np.float32(1))
+
+
+def _pyramid(picture: Floats, repeat: bool) -> tuple[NDArray[np.uint16], Floats]:
+    """All halved copies in one mosaic, and where they lie: (4, levels) as left, top, width, height."""
+    copies = [picture]
+    while max(copies[-1].shape[:2]) > 1:
+        height, width = (max(size // 2, 1) for size in copies[-1].shape[:2])
+        copies.append(cv2.resize(copies[-1], (width, height), interpolation=cv2.INTER_AREA))
+    tops = [0, 0, *np.cumsum([copy.shape[0] + 1 for copy in copies[1:]]).tolist()]
+    height = max(picture.shape[0] + 1, tops[-1])
+    width = picture.shape[1] + 1 + (copies[1].shape[1] + 1 if len(copies) > 1 else 0)
+    mosaic = np.zeros((height, width, 3), dtype=np.uint16)
+    places = np.zeros((4, len(copies)), dtype=np.float32)
+    for level, copy in enumerate(copies):
+        left, top = (picture.shape[1] + 1) * (level > 0), tops[level]
+        padded = np.pad(copy, ((0, 1), (0, 1), (0, 0)), mode="wrap" if repeat else "edge")
+        mosaic[top : top + padded.shape[0], left : left + padded.shape[1]] = np.rint(np.clip(padded, 0, 1) * _FULL)
+        places[:, level] = left, top, copy.shape[1], copy.shape[0]
+    return mosaic, places
+
+
+def _remap(picture: NDArray[np.uint16], x: Floats, y: Floats, row: int = 1024) -> Floats:
+    """Bilinear look-up (n, 3); cv2.remap takes no side longer than 32767, so the points are laid out in rows."""
+    rows = -(-x.size // row)
+    maps = np.zeros((2, rows * row), dtype=np.float32)
+    maps[0, : x.size], maps[1, : x.size] = x, y
+    seen = cv2.remap(picture, *maps.reshape(2, rows, row), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return seen.reshape(-1, 3)[: x.size] * np.float32(1 / _FULL)

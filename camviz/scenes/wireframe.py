@@ -1,0 +1,56 @@
+"""Lines in space, for drawings of the same world that the tracer photographs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camviz.lenses.base import Array, as_points
+
+
+@dataclass(frozen=True, eq=False)
+class Wireframe:
+    """Polylines (n, 3) in metres, each with a name that says what it belongs to ("ground", "house", ...).
+
+    Raises ValueError when there are not as many names as lines, or a line is not (n, 3).
+    """
+
+    lines: tuple[Array, ...]
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.lines) != len(self.names):
+            raise ValueError(f"names must be one for each of {len(self.lines)} lines, got {len(self.names)}")
+        object.__setattr__(self, "lines", tuple(as_points(line, 3, "lines") for line in self.lines))
+
+    def __iter__(self) -> Iterator[tuple[str, Array]]:
+        return iter(zip(self.names, self.lines, strict=True))
+
+    def __add__(self, other: Wireframe) -> Wireframe:
+        return Wireframe(self.lines + other.lines, self.names + other.names)
+
+    def only(self, *names: str) -> Wireframe:
+        """The lines with these names."""
+        kept = [(name, line) for name, line in self if name in names]
+        return Wireframe(tuple(line for _, line in kept), tuple(name for name, _ in kept))
+
+    def subdivided(self, max_length: float) -> Wireframe:
+        """The same lines with points no more than `max_length` metres apart, so that a lens can bend them.
+
+        All corners are kept. Raises ValueError unless max_length is positive.
+        """
+        if not max_length > 0:
+            raise ValueError(f"max_length must be a positive length in metres, got {max_length}")
+        return Wireframe(tuple(_subdivided(line, max_length) for line in self.lines), self.names)
+
+
+def _subdivided(line: Array, max_length: float) -> Array:
+    if len(line) < 2:
+        return line
+    lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    pieces = np.maximum(np.ceil(lengths / max_length - 1e-9), 1).astype(int)
+    knots = np.concatenate([[0], np.cumsum(pieces)])
+    fine = np.arange(knots[-1] + 1)
+    return np.stack([np.interp(fine, knots, coordinate) for coordinate in line.T], axis=-1)

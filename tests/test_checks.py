@@ -1,0 +1,271 @@
+"""The exercise checker: says "correct" to solutions only, speaks to known mistakes, and never raises."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camviz.checks import SHAPES, Exercise, Misconception, judge
+from camviz.exercises import Tutor, exercise, exercises
+
+SEEDS = range(3)
+ALL = [one for lesson in range(17) for one in exercises(f"{lesson:02d}").values()]
+
+
+def distance(points):
+    return np.linalg.norm(points, axis=-1)
+
+
+DISTANCE = Exercise(
+    name="00.distance",
+    reference=distance,
+    cases=lambda rng: [(rng.uniform(1, 2, (*shape, 3)),) for shape in SHAPES],
+    shown=((np.array([3.0, 0.0, 4.0]),),),
+    hints=("Think of Pythagoras.", "`np.sqrt(np.sum(points**2, axis=-1))`"),
+    praise="Pythagoras holds.",
+    misconceptions=(Misconception(lambda points: np.sum(points**2, axis=-1), "This is the *square* of the distance."),),
+)
+
+
+def verdict(function, attempt=1, of=DISTANCE, seed=0):
+    return judge(of, function, np.random.default_rng(seed), attempt)
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_reference_passes_its_own_checker(one, seed):
+    assert verdict(one.reference, of=one, seed=seed).correct
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_known_mistake_is_answered_with_its_own_explanation(one, seed):
+    for known in one.misconceptions:
+        answer = verdict(known.reference, of=one, seed=seed)
+        assert answer.status == "wrong"
+        assert answer.message == known.explanation
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_no_stub_and_no_constant_is_ever_called_correct(one):
+    (first, *_) = list(one.cases(np.random.default_rng(1)))
+    frozen = one.reference(*first)
+    for function in (lambda *a: None, lambda *a: ..., lambda *a: 0.0, lambda *a: np.nan, lambda *a: frozen, ..., None):
+        assert not verdict(function, of=one)
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_the_cases_are_different_every_time(one):
+    cases = [[one.answer(c) for c in one.cases(np.random.default_rng(seed))] for seed in (1, 2)]
+    assert not all(one.same(a, b) for a, b in zip(*cases, strict=True))
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_the_second_hint_says_more_than_the_first(one):
+    assert len(one.hints) >= 2
+    assert len(set(one.hints)) == len(one.hints)
+
+
+def raises(points):
+    raise NotImplementedError
+
+
+@pytest.mark.parametrize("stub", [raises, lambda points: None, lambda points: ..., ..., None])
+def test_a_stub_is_not_solved_yet_rather_than_wrong(stub):
+    assert verdict(stub).status == "unsolved"
+    assert not verdict(stub)
+
+
+def test_a_solution_of_the_shown_numbers_alone_is_found_out():
+    shown = verdict(lambda points: 5 + np.round(points[..., 0] - 3, 12))
+    assert "shown in the lesson" in shown.message
+
+
+def test_a_solution_for_one_point_that_does_not_broadcast_is_told_for_which_shapes_it_works():
+    answer = verdict(lambda points: np.sqrt(points[0] ** 2 + points[1] ** 2 + points[2] ** 2))
+    assert answer.status == "wrong"
+    assert "right when `points` has shape (3,)" in answer.message
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda d: -d, "sign"),
+        (np.degrees, "degrees"),
+        (lambda d: 1.5 * d, "times 1.5"),
+        (lambda d: d**2, "square"),
+        (lambda d: d + 1e-7, "Close"),
+        (lambda d: d * 0 + 7, "same number"),
+        (lambda d: np.where(d > 2.5, np.nan, d), "NaN where there is an answer"),
+        (lambda d: d[..., None], "shape"),
+        (lambda d: d + 1j, "real numbers"),
+        (lambda d: "five", "type str"),
+        (lambda d: [[1], [2, 3]], "type list"),
+        (lambda d: d + 1 / (1 + d), "where"),
+    ],
+)
+def test_each_kind_of_wrong_answer_is_named(change, word):
+    answer = verdict(lambda points: change(distance(points)))
+    assert answer.status == "wrong"
+    assert word in answer.message
+
+
+def test_reversed_and_transposed_answers_are_recognised():
+    turn = Exercise("00.turn", lambda m: m, lambda rng: [(rng.normal(size=(3, 3)),)], ("-",), "-")
+    assert "transpose" in verdict(lambda m: m.T, of=turn).message
+    assert "reverse order" in verdict(lambda m: m[:, ::-1], of=turn).message
+
+
+def test_a_number_where_nothing_can_be_is_asked_to_be_nan():
+    root = Exercise("00.root", lambda x: np.sqrt(x), lambda rng: [(rng.uniform(-1, 1, 20),)], ("-",), "-")
+    assert "NaN is wanted" in verdict(lambda x: np.sqrt(np.maximum(x, 0)), of=root).message
+
+
+def test_an_exception_is_told_in_words_with_its_line():
+    def broken(points):
+        return points[..., 7]
+
+    answer = verdict(broken)
+    assert answer.status == "wrong"
+    assert "IndexError" in answer.message
+    assert "return points[..., 7]" in answer.message
+
+
+def test_a_function_with_other_parameters_is_told_how_it_will_be_called():
+    assert "called with `(points)`" in verdict(lambda: 1).message
+
+
+def test_a_solution_that_overwrites_its_input_is_told_so():
+    def overwrites(points):
+        points **= 2
+        return np.sqrt(points.sum(-1))
+
+    answer = verdict(overwrites)
+    assert answer.status == "wrong"
+    assert "overwrites its input `points`" in answer.message
+
+
+def test_what_a_function_prints_is_caught_and_repeated_once(capsys):
+    def chatty(points):
+        print("here")
+        return distance(points)
+
+    assert verdict(chatty).printed == "here"
+    assert capsys.readouterr().out == ""
+
+
+def test_a_matrix_up_to_scale_is_accepted_at_any_scale():
+    scaled = Exercise(
+        "00.scale",
+        lambda m: m,
+        lambda rng: [(rng.uniform(1, 2, (3, 3)),)],
+        ("-",),
+        "-",
+        canonical=lambda m: m / m[0, 0],
+    )
+    assert verdict(lambda m: -3 * m, of=scaled).correct
+    assert not verdict(lambda m: m + 1, of=scaled)
+
+
+def test_a_law_that_does_not_hold_speaks_for_itself():
+    def pure(function, rng):
+        return "" if function(rng.normal(size=3)) >= 0 else "A distance is never negative."
+
+    lawful = Exercise(
+        "00.law", distance, DISTANCE.cases, ("-",), "-", laws=(pure, lambda function, rng: function(np.zeros(3))[0])
+    )
+    assert "IndexError" in verdict(distance, of=lawful).message
+
+
+def test_hints_grow_stronger_with_wrong_tries_but_not_with_stubs():
+    check = Tutor(np.random.default_rng(0))
+    hints = exercise("05.fold_radius").hints
+    assert check("05.fold_radius", lambda k1: None).hint == ""
+    assert [check("05.fold_radius", lambda k1: k1).hint for _ in range(3)] == [hints[0], hints[1], hints[1]]
+    assert check("05.distort", lambda xy, k1, k2, k3: xy).hint == exercise("05.distort").hints[0]
+
+
+def test_a_tutor_without_a_seed_asks_differently_each_time():
+    seen = []
+    check = Tutor()
+    for _ in range(2):
+        check("05.fold_radius", lambda k1: seen.append(k1))
+    assert len(set(seen)) > len(seen) // 2 + 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.one_of(
+        st.none(), st.text(), st.floats(), st.lists(st.floats()), st.dictionaries(st.text(), st.floats()), st.binary()
+    )
+)
+def test_whatever_a_function_returns_the_checker_does_not_raise(result):
+    for one in (DISTANCE, exercise("05.distort")):
+        assert not verdict(lambda *a: result, of=one)
+
+
+@pytest.mark.parametrize(
+    "error", [SystemExit, RecursionError, MemoryError, KeyError("x"), StopIteration, AssertionError]
+)
+def test_whatever_a_function_raises_the_checker_answers_in_words(error):
+    def raiser(points):
+        raise error
+
+    assert verdict(raiser).status == "wrong"
+
+
+def test_a_verdict_is_safe_html_and_plain_text():
+    def inject(points):
+        raise ValueError("<script>alert(1)</script>")
+
+    answer = verdict(inject)
+    assert "<script>" not in answer._repr_html_()
+    assert "ValueError" in repr(answer)
+    assert "<" not in repr(verdict(distance))
+
+
+def test_a_lesson_s_exercises_are_found_by_name_and_a_wrong_name_is_answered_with_the_right_ones():
+    assert list(exercises("05")) == [
+        f"05.{n}" for n in ("distort", "tangential", "fold_radius", "undistort", "undistort_map")
+    ]
+    assert exercises("99") == {}
+    with pytest.raises(ValueError, match=r"05\.distort"):
+        exercise("05.distrot")
+
+
+def test_checks_import_neither_drawing_nor_widgets():
+    code = "import sys, camviz.checks, camviz.exercises.lesson05 as _; print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"matplotlib", "ipywidgets", "anywidget", "pyvista", "cv2", "IPython", "scipy"} & set(modules)
+
+
+def test_the_distortion_exercises_agree_with_opencv():
+    cv2 = pytest.importorskip("cv2")
+    rng = np.random.default_rng(5)
+    xy, (k1, k2, k3), (p1, p2) = rng.uniform(-0.5, 0.5, (50, 2)), rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.1, 0.1, 2)
+    points = np.concatenate([xy, np.ones((50, 1))], axis=1)
+    pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.eye(3), np.array([k1, k2, p1, p2, k3]))
+    ours = exercise("05.distort").reference(xy, k1, k2, k3) + exercise("05.tangential").reference(xy, p1, p2)
+    np.testing.assert_allclose(ours, pixels[:, 0], atol=1e-12)
+
+
+def test_the_map_exercise_is_opencv_s_undistortion_map():
+    cv2 = pytest.importorskip("cv2")
+    width, height, f, k1 = 12, 9, 10.0, -0.2
+    K = np.array([[f, 0, (width - 1) / 2], [0, f, (height - 1) / 2], [0, 0, 1]])
+    maps = cv2.initUndistortRectifyMap(K, np.array([k1, 0, 0, 0]), np.eye(3), K, (width, height), cv2.CV_32FC1)
+    ours = exercise("05.undistort_map").reference(width, height, f, k1)
+    np.testing.assert_allclose(ours, np.stack(maps[:2], axis=-1), atol=1e-5)
+
+
+def test_the_fold_of_k1_minus_0_3_is_the_published_one_and_the_inverse_ends_there():
+    fold = exercise("05.fold_radius").reference(-0.3)
+    assert fold == pytest.approx(1.0541, abs=5e-5)
+    assert np.degrees(np.arctan(fold)) == pytest.approx(46.5, abs=0.05)
+    inverse = exercise("05.undistort").reference
+    r = np.linspace(0, 0.99 * fold, 50)
+    np.testing.assert_allclose(inverse(r - 0.3 * r**3, -0.3), r, atol=1e-7)
+    assert np.isnan(inverse(np.array([0.71, 2.0, 9.0]), -0.3)).all()

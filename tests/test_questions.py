@@ -1,0 +1,200 @@
+"""Predict questions and quizzes: well formed, safe, and silent about the answer until the reader has committed."""
+
+import json
+import re
+from importlib.resources import files
+
+import pytest
+
+from camviz import prose
+from camviz.questions import Question, parse, question, questions, quiz_questions
+from camviz.widgets.question import QuestionWidget, Sheet, ask, quiz, score
+
+LESSONS = sorted(
+    path.name.removesuffix(".toml") for path in files("camviz.questions").iterdir() if path.name.endswith(".toml")
+)
+ALL = [one for lesson in LESSONS for one in questions(lesson).values()]
+
+GOOD = """
+[[question]]
+id = "colour"
+kind = "predict"
+text = "Is the sky blue?"
+[[question.choice]]
+text = "Yes"
+reply = "Yes, by Rayleigh scattering."
+correct = true
+[[question.choice]]
+text = "No"
+reply = "Look up."
+misconception = "the sky is a ceiling"
+"""
+
+
+@pytest.fixture
+def widget():
+    return QuestionWidget(Sheet(quiz_questions("05"), "Exit quiz"))
+
+
+def page(widget):
+    """Everything of the widget's state that reaches the browser, but its script and style."""
+    state = widget.get_state()
+    return json.dumps({key: state[key] for key in ("title", "cards", "summary", "problem")})
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_every_question_has_one_correct_choice_and_every_wrong_one_its_misconception_and_its_own_reply(one):
+    assert sum(choice.correct for choice in one.choices) == 1
+    assert all(choice.misconception for choice in one.choices if not choice.correct)
+    assert len({choice.reply for choice in one.choices}) == len(one.choices) >= 2
+    assert len({choice.misconception for choice in one.choices}) == len(one.choices)
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_a_reply_is_a_sentence_of_its_own_and_ends_like_one(one):
+    for choice in one.choices:
+        assert len(choice.reply.split()) >= 6, choice.text
+        assert choice.reply.strip()[-1] in ".?!"
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_every_exit_quiz_has_three_to_five_questions_whose_answers_do_not_stand_in_one_place(lesson):
+    quiz = quiz_questions(lesson)
+    if lesson != "00":
+        assert 3 <= len(quiz) <= 5
+        assert len({one.answer for one in quiz}) > 1
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_the_longest_choice_is_not_always_the_correct_one(lesson):
+    longest = [
+        max(range(len(one.choices)), key=lambda i, o=one: len(o.choices[i].text)) for one in questions(lesson).values()
+    ]
+    assert longest != [one.answer for one in questions(lesson).values()]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("correct = true", "", "exactly one choice with correct = true, has 0"),
+        ('misconception = "the sky is a ceiling"', "correct = true", "exactly one choice with correct = true, has 2"),
+        ('misconception = "the sky is a ceiling"', "", "must be correct or name its misconception"),
+        ('reply = "Look up."', 'reply = "Yes, by Rayleigh scattering."', "same reply"),
+        ('reply = "Look up."', "", "choice 2: reply must be given as str"),
+        ('text = "No"', 'text = "Yes"', "same text"),
+        ('kind = "predict"', 'kind = "exam"', 'kind must be "predict" or "quiz", got \'exam\''),
+        ('id = "colour"', "", "without an id"),
+        ("correct = true", "correkt = true", "got correkt"),
+        ("[[question.choice]]", "[[question.choices]]", "got choices"),
+        ('text = "Is', 'text = Is', "not TOML"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_the_file_is_named(old, new, complaint):
+    with pytest.raises(ValueError, match=re.escape(complaint)):
+        parse("99", GOOD.replace(old, new))
+
+
+def test_a_good_file_is_read_and_a_doubled_question_refused():
+    assert parse("99", GOOD)["99.colour"].answer == 0
+    with pytest.raises(ValueError, match="occurs 2 times"):
+        parse("99", GOOD + GOOD)
+
+
+def test_a_wrong_name_is_answered_with_the_right_ones():
+    with pytest.raises(ValueError, match=r"05\.fold"):
+        question("05.fould")
+    with pytest.raises(ValueError, match=r"no questions for lesson '\.\./05'"):
+        questions("../05")
+
+
+def test_no_reply_reaches_the_page_before_a_choice_is_committed(widget):
+    for one in widget.sheet.questions:
+        assert json.dumps(prose.inline(one.choices[0].text))[1:-1] in page(widget)
+        for choice in one.choices:
+            assert json.dumps(prose.to_html(choice.reply))[1:-1] not in page(widget)
+    assert "misconception" not in page(widget)
+    assert all(card["correct"] is None and card["chosen"] is None for card in widget.cards)
+
+
+def test_the_reply_is_that_of_the_choice_made_and_of_no_other(widget):
+    wrong = (widget.sheet.questions[0].answer + 1) % 3
+    widget.commit(0, wrong)
+    card = widget.cards[0]
+    assert card["chosen"] == wrong
+    assert card["correct"] is False
+    assert card["reply"] == prose.to_html(widget.sheet.questions[0].choices[wrong].reply)
+    assert all(other["reply"] == "" for other in widget.cards[1:])
+
+
+def test_a_quiz_counts_first_tries_only_and_waits_for_all_of_them(widget):
+    answers = [one.answer for one in widget.sheet.questions]
+    widget.commit(0, (answers[0] + 1) % 3)
+    for number, answer in enumerate(answers):
+        assert widget.summary == ""
+        widget.commit(number, answer)
+    assert widget.summary == "3 of 4 right at the first try."
+    assert all(card["correct"] for card in widget.cards)
+    assert score(widget.sheet.questions[:1], ((answers[0],),)) == ""
+
+
+@pytest.mark.parametrize(
+    "message", [{"question": 9, "choice": 0}, {"question": 0, "choice": -1}, {"question": 0}, "nonsense"]
+)
+def test_a_message_that_makes_no_sense_is_shown_in_the_pane_and_raised(widget, message):
+    with pytest.raises((ValueError, KeyError, TypeError)):
+        widget._receive(widget, message, [])
+    assert widget.problem.startswith("This went wrong in the kernel")
+    assert all(card["tries"] == 0 for card in widget.cards)
+
+
+def test_without_a_kernel_questions_are_a_page_with_folded_replies():
+    sheet = ask("05.fold")
+    assert isinstance(sheet, Sheet)
+    html = sheet._repr_html_()
+    assert html.count("<details>") == html.count("<summary>") == len(question("05.fold").choices)
+    assert "(a)" in repr(sheet)
+    assert question("05.fold").choices[0].reply.split(".")[0] not in repr(sheet)
+
+
+def test_in_a_kernel_the_widget_is_shown_and_the_page_beside_it(monkeypatch):
+    class Shell:
+        kernel = object()
+
+    monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
+    monkeypatch.setattr("IPython.core.getipython.get_ipython", Shell)
+    live = quiz("05")
+    data, _ = live._repr_mimebundle_()
+    assert {"application/vnd.jupyter.widget-view+json", "text/html", "text/plain"} <= set(data)
+    monkeypatch.setenv("CAMVIZ_STATIC", "1")
+    assert isinstance(quiz("05"), Sheet)
+
+
+def test_a_lesson_without_a_quiz_says_so(monkeypatch):
+    monkeypatch.setattr("camviz.widgets.question.quiz_questions", lambda lesson: ())
+    with pytest.raises(ValueError, match="lesson '05' has no quiz"):
+        quiz("05")
+
+
+@pytest.mark.parametrize(
+    ("text", "html"),
+    [
+        ("a < b & *c*", "<p>a &lt; b &amp; <em>c</em></p>"),
+        ("`2*p1*x*y` and ``a`b``", "<p><code>2*p1*x*y</code> and <code>a`b</code></p>"),
+        ("<img src=x onerror=alert(1)>", "<p>&lt;img src=x onerror=alert(1)&gt;</p>"),
+        ("`<b>` *<b>*", "<p><code>&lt;b&gt;</code> <em>&lt;b&gt;</em></p>"),
+        ("2 * 3 * 4", "<p>2 * 3 * 4</p>"),
+        ("one\nline\n\nnext", "<p>one line</p><p>next</p>"),
+        ("[x](javascript:alert(1))", "<p>[x](javascript:alert(1))</p>"),
+    ],
+)
+def test_prose_becomes_safe_html_and_code_is_left_alone(text, html):
+    assert prose.to_html(text) == html
+
+
+def test_prose_in_a_terminal_keeps_code_and_drops_emphasis():
+    assert prose.to_plain("the *only* `a*b*c`") == "the only `a*b*c`"
+
+
+def test_a_question_cannot_be_built_without_choices():
+    with pytest.raises(ValueError, match="at least two choices"):
+        Question("00.x", "quiz", "Why?", ())
