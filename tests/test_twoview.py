@@ -224,6 +224,18 @@ def test_sampson_distance_squared_is_opencvs():
     assert tv.sampson_distance(F, uv_left, uv_right) ** 2 == pytest.approx(np.array(theirs), rel=1e-9)
 
 
+def test_symmetric_distance_is_that_from_opencvs_lines_in_both_images():
+    left, right = stereo()
+    _, uv_left, uv_right = seen(left, right)
+    uv_right = uv_right + np.random.default_rng(18).normal(size=uv_right.shape)
+    F = tv.fundamental(left, right)
+    squares = 0
+    for which, uv, other in ((1, uv_left, uv_right), (2, uv_right, uv_left)):
+        lines = cv2.computeCorrespondEpilines(uv, which, F).reshape(-1, 3)
+        squares = squares + np.sum(lines * tv.to_homogeneous(other), axis=1) ** 2
+    assert tv.symmetric_distance(F, uv_left, uv_right) == pytest.approx(np.sqrt(squares), abs=1e-9)
+
+
 def test_sampson_distance_is_the_correction_that_opencv_finds_to_first_order():
     left, right = stereo()
     _, uv_left, uv_right = seen(left, right)
@@ -392,6 +404,22 @@ def test_opencv_recovers_the_same_pose():
     assert motion.translation == pytest.approx(t[:, 0], abs=1e-9)
 
 
+def test_the_nearest_essential_matrix_is_nearer_than_its_neighbours():
+    E = tv.essential(tv.right_from_left(*stereo()))
+    rng = np.random.default_rng(17)
+    noisy = E + rng.normal(0, 0.02, (3, 3))
+    nearest = tv.nearest_essential(noisy)
+    s = np.linalg.svd(nearest)[1]
+    assert s == pytest.approx([s[0], s[0], 0], abs=1e-12)
+    for scale in (0.99, 1.01):
+        assert np.linalg.norm(noisy - nearest) < np.linalg.norm(noisy - scale * nearest)
+    motion = tv.decompose_essential(nearest)[0]
+    for turn in rng.normal(0, 0.01, (20, 3)):
+        turned = RigidTransform.from_components(motion.translation * s[0], Rotation.from_rotvec(turn) * motion.rotation)
+        sign = np.sign(np.sum(tv.essential(turned) * noisy))
+        assert np.linalg.norm(noisy - nearest) < np.linalg.norm(noisy - sign * tv.essential(turned))
+
+
 def test_a_pose_cannot_be_recovered_from_points_that_tell_nothing():
     E = tv.essential(tv.right_from_left(*stereo()))
     with pytest.raises(ValueError, match="four motions"):
@@ -462,6 +490,37 @@ def test_parallel_diverging_and_missing_rays_meet_nowhere(method):
     uvs = [[good, good, good, [np.nan] * 2], [[250, 200], good, [350, 200], good]]
     points = method([left, right], uvs)
     assert np.isfinite(points).all(axis=-1).tolist() == [True, False, False, False]
+
+
+def test_rays_that_are_parallel_but_for_rounding_meet_nowhere():
+    left, right = stereo()
+    stars = unit(left.unproject([320, 240]) + np.random.default_rng(16).uniform(-0.1, 0.1, (200, 3)))
+    uvs = [camera.project(camera.centre + stars) for camera in (left, right)]
+    nearest_credible = 0.1 / 1e-12  # metres: baseline over the parallax that rounding leaves
+    for points in (tv.triangulate([left, right], uvs), tv.triangulate_linear([left, right], uvs)):
+        distance = np.linalg.norm(points, axis=-1)
+        assert np.isnan(distance).mean() > 0.9
+        assert (distance[np.isfinite(distance)] > nearest_credible).all()
+
+
+def test_a_point_in_front_of_one_camera_and_behind_the_other_is_no_point():
+    left, point = Camera(LEFT_PIXELS), np.array([0.1, 0.2, 4])
+    centre = np.array([1.0, 0, 1])
+    right = left.at(look_at(centre, 2 * centre - point))  # its back to the point, on the line through it
+    uvs = [left.project(point), right.project(2 * centre - point)]
+    assert np.isnan(tv.triangulate([left, right], uvs)).all()
+    assert np.isnan(tv.triangulate_linear([left, right], uvs)).all()
+
+
+@pytest.mark.parametrize("lens", [None, Equidistant()])
+def test_ray_distances_are_the_distances_to_the_point(lens):
+    left, right = stereo(lens)
+    points, uv_left, uv_right = seen(left, right)
+    rays = [c.lens.unproject(c.intrinsics.from_pixels(uv)) for c, uv in ((left, uv_left), (right, uv_right))]
+    distances = np.stack([np.linalg.norm(points - camera.centre, axis=-1) for camera in (left, right)], axis=-1)
+    motion = tv.right_from_left(left, right)
+    assert tv.ray_distances(motion, *rays) == pytest.approx(distances, rel=1e-9)
+    assert tv.ray_distances(motion, -rays[0], rays[1]) == pytest.approx(distances * [-1, 1], rel=1e-9)
 
 
 def test_triangulation_says_what_it_takes():

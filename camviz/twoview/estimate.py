@@ -35,11 +35,11 @@ def linear_fundamental(uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
     uv_left, uv_right = _pairs(uv_left, uv_right)
     x_left, x_right = to_homogeneous(uv_left), to_homogeneous(uv_right)
     A = (x_right[:, :, None] * x_left[:, None, :]).reshape(-1, 9)
-    if np.linalg.matrix_rank(A) < 8:
-        raise ValueError(
-            "these points leave F undetermined: they coincide, or lie on one plane or another critical surface"
-        )
-    return _scaled(np.linalg.svd(A)[2][-1].reshape(3, 3))
+    # A row of zeros changes nothing, and gives 8 pairs too a ninth singular vector.
+    _, s, Vt = np.linalg.svd(np.concatenate([A, np.zeros((1, 9))]), full_matrices=False)
+    if not s[7] > len(A) * np.finfo(float).eps * s[0]:
+        raise ValueError("these points leave F undetermined: they coincide, or lie on one plane or critical surface")
+    return _scaled(Vt[-1].reshape(3, 3))
 
 
 def normalising_transform(uv: ArrayLike) -> Array:
