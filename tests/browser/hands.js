@@ -48,6 +48,7 @@ window.hands = {
   // A point of the page where the pointer would take hold of a handle.
   grip(root, name) {
     for (const part of root.querySelectorAll(`[data-drag="${CSS.escape(name)}"]`)) {
+      part.scrollIntoView({ block: "center" });
       const box = part.getBoundingClientRect();
       for (const [s, t] of [[0.5, 0.5], [0.15, 0.5], [0.5, 0.15], [0.85, 0.5], [0.5, 0.85], [0.08, 0.08]]) {
         const [x, y] = [box.left + s * box.width, box.top + t * box.height];

@@ -21,10 +21,10 @@ from playwright.sync_api import Browser, Page, sync_playwright
 ROOT = Path(__file__).resolve().parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 # No sandbox, because root (a container, a build server) can have none; no calls home.
-FLAGS = (
-    "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync"
-).split()
+FLAGS = [
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+]
 QUIET = """{"@jupyterlab/apputils-extension:notification":
   {"checkForUpdates": false, "doNotDisturbMode": true, "fetchNews": "false"}}"""
 RUN_ALL = """async () => {
@@ -92,7 +92,7 @@ class Notebook:
         """Change JupyterLab's theme, as its Settings menu does."""
         self.page.evaluate("theme => jupyterapp.commands.execute('apputils:change-theme', { theme })", name)
         light = str(name == "JupyterLab Light").lower()
-        self.page.wait_for_selector(f"body[data-jp-theme-light='{light}']")
+        self.page.wait_for_selector(f"body[data-jp-theme-light='{light}']", state="attached")
 
     def close(self) -> None:
         """Close the page and its kernel."""

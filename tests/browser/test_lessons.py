@@ -100,31 +100,32 @@ def test_questions_answer_every_choice(lesson) -> None:
 
 def test_a_visualizer_obeys_the_keyboard_alone(lesson) -> None:
     """Tab reaches every control, arrows move it, typing a number does the same, Enter on Reset brings it back."""
-    sliders = [one for one in explorers(lesson) if one.query_selector("input[type=range]")]
-    for explorer in sliders[:1]:
+    keys = lesson.page.keyboard
+    for explorer in [one for one in explorers(lesson) if one.query_selector("input[type=range]")][:1]:
         explorer.scroll_into_view_if_needed()
         first = picture(explorer)
         explorer.query_selector(".camviz-controls").click(position={"x": 1, "y": 1})
-        keys, focused = lesson.page.keyboard, "() => document.activeElement.type"
-        for _ in range(3):
-            if lesson.page.evaluate(focused) == "range":
-                break
-            keys.press("Tab")
-        assert lesson.page.evaluate(focused) == "range"
+        tab_to(lesson, explorer, "input[type=range]")
         for _ in range(5):
             keys.press("ArrowRight")
         moved = picture(explorer)
         assert moved != first
-        keys.press("Tab")
-        assert lesson.page.evaluate(focused) == "number"
-        typed = explorer.query_selector("input[type=range]").get_attribute("min")
+        tab_to(lesson, explorer, "input[type=number]")
         keys.press("Control+a")
-        keys.type(typed)
+        keys.type(explorer.query_selector("input[type=range]").get_attribute("min"))
         keys.press("Enter")
         assert picture(explorer) not in (first, moved)
-        for _ in range(40):
-            keys.press("Tab")
-            if lesson.page.evaluate("() => document.activeElement.dataset.action") == "reset":
-                break
+        tab_to(lesson, explorer, "button[data-action=reset]")
         keys.press("Enter")
         assert picture(explorer) == first
+
+
+def tab_to(lesson, explorer, selector: str) -> None:
+    """Press Tab until the focus is on the next element of the visualizer that `selector` names."""
+    for _ in range(60):
+        lesson.page.keyboard.press("Tab")
+        if explorer.evaluate(
+            "(root, s) => root.contains(document.activeElement) && document.activeElement.matches(s)", selector
+        ):
+            return
+    raise AssertionError(f"Tab never reaches {selector}")
