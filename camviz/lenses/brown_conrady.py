@@ -74,7 +74,8 @@ class BrownConrady(RayLens):
         """The derivative (..., 2, 2) of `distort` at ideal points (..., 2)."""
         xy = as_points(xy, 2, "xy")
         bent = blockwise(lambda x, y: self._bend_and_slopes(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
-        return self._tilt_jacobian(blockwise(self._polynomial, xy, 2)) @ bent
+        with np.errstate(all="ignore"):
+            return self._tilt_jacobian(blockwise(self._polynomial, xy, 2)) @ bent
 
     # Its domain.
 
@@ -318,7 +319,7 @@ class BrownConrady(RayLens):
         return x, y, self._step(x, y, u, v)[2]
 
     def _newton_inside(self, u: Array, v: Array) -> tuple[Array, Array]:
-        """Newton's method that shortens a step which comes no closer or leaves the domain; NaN where it gets nowhere."""
+        """Newton's method that shortens a step which comes no closer or leaves the domain; NaN where that fails."""
         inner, outer = self._limits
         close = CLOSE * (1 + np.abs(u) + np.abs(v))
         x, y = self._guess(u, v)
