@@ -26,8 +26,9 @@ class Bounds:
     @classmethod
     def around(cls, balls: Sequence[tuple[Array, float, Array]]) -> Bounds:
         """From a centre, a radius and a normal for each surface."""
-        centre, radius, normal = zip(*balls, strict=True)
-        return cls(*(np.array(values, dtype=np.float32) for values in (centre, radius, normal)))
+        rows = np.array([[*centre, radius, *normal] for centre, radius, normal in balls], dtype=np.float32)
+        rows = rows.reshape(-1, 7)
+        return cls(rows[:, :3], rows[:, 3], rows[:, 4:])
 
 
 @dataclass(frozen=True)

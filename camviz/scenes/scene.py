@@ -41,6 +41,7 @@ class Scene:
         """
         origins, directions = as_points(origins, 3, "origins"), as_points(directions, 3, "directions")
         shape = np.broadcast_shapes(origins.shape, directions.shape)
+        _require_unit(directions)
         if 0 in shape:
             return np.zeros(shape, np.float32), np.zeros(shape[:-1], np.float32)
         origins, directions = _flat(origins, shape), np.broadcast_to(directions, shape).reshape(-1, 3)
@@ -116,6 +117,15 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
 def _flat(origins: Array, shape: tuple[int, ...]) -> Array:
     """(1, 3) for a single origin, otherwise one (n, 3) for each ray."""
     return origins.reshape(1, 3) if origins.size == 3 else np.broadcast_to(origins, shape).reshape(-1, 3)
+
+
+def _require_unit(directions: Array) -> None:
+    """One direction in RUN is looked at: a wrong scale is seldom wrong once."""
+    lengths = np.linalg.norm(directions.reshape(-1, 3)[::RUN], axis=-1)
+    if (np.abs(lengths - 1) > 1e-3).any():
+        raise ValueError(
+            f"directions must be unit vectors, got one of length {lengths[np.abs(lengths - 1) > 1e-3][0]:g}"
+        )
 
 
 def _spread(rays: Array) -> float:
