@@ -77,18 +77,24 @@ def facing(z, texture=RED, half=1.0, **kwargs):
 
 @pytest.mark.parametrize("lens", lenses())
 def test_the_boards_corners_are_rendered_where_the_camera_projects_them(lens):
-    """Corners found by OpenCV in the picture, within 0.1 px of Camera.project; off-centre, fx ≠ fy, tilted pose."""
+    """Corners found and refined by OpenCV in the picture, within 0.1 px of Camera.project: off-centre, fx ≠ fy, tilted.
+
+    The refinement works on linear light that a Gaussian of one pixel has softened, as every real lens does: OpenCV
+    itself errs by more than 0.1 px on edges as sharp as a pinhole's.
+    """
     eye = np.array([-0.9, 0.05, 1.3])
     camera = Camera(Intrinsics(640, 480, 470, 450, 333, 228), lens, look_at(eye, board_corners().mean(axis=0)))
     expected = camera.project(board_corners())
     assert camera.sees(board_corners()).all()
-    found, corners = cv2.findChessboardCornersSB(
-        to_display(render(textured_scene(), camera, 2)), (9, 6), flags=cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
-    )
+    light = render(textured_scene(), camera)
+    found, corners = cv2.findChessboardCornersSB(to_display(light), (9, 6), flags=cv2.CALIB_CB_EXHAUSTIVE)
     assert found
-    corners = corners.reshape(-1, 2)
-    errors = min(np.linalg.norm(c - expected, axis=1).max() for c in (corners, corners[::-1]))
-    assert errors < 0.1
+    soft = cv2.GaussianBlur(light[..., 1], (0, 0), 1.0)
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
+    corners = cv2.cornerSubPix(soft, corners.reshape(-1, 1, 2), (5, 5), (-1, -1), stop).reshape(-1, 2)
+    errors = min((np.linalg.norm(c - expected, axis=1) for c in (corners, corners[::-1])), key=np.max)
+    assert errors.max() < 0.1
+    assert errors.mean() < 0.04
 
 
 def test_a_camera_with_an_identity_pose_sees_the_whole_board():
