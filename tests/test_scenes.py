@@ -135,7 +135,6 @@ def test_depth_of_a_tilted_plane_is_its_closed_form(tilt):
     rays = Camera(Intrinsics.from_fov(64, 48, 50)).rays()
     normal = np.cross(across, down)
     expected = (normal @ point) / (rays @ normal)
-    hit = point + 0 * rays
     hit = expected[..., None] * rays - point
     inside = (expected > 0) & (np.abs(hit @ across) < 800) & (np.abs(hit @ down) < 800)
     _, depth = scene.trace(np.zeros(3), rays)
@@ -245,6 +244,11 @@ def test_directions_that_are_not_unit_vectors_are_refused():
         Scene([facing(2)]).trace(np.zeros(3), [0, 0, 2])
 
 
+def test_origins_that_are_nowhere_are_refused():
+    with pytest.raises(ValueError, match="origins must be finite"):
+        Scene([facing(2)]).trace([0, np.nan, 0], AHEAD)
+
+
 def test_rays_of_any_shape_come_back_in_it():
     scene, rays = textured_scene(), random_rays(60)
     flat, flat_depth = scene.trace(np.zeros(3), rays)
@@ -284,6 +288,14 @@ def test_moving_an_origin_back_along_its_ray_adds_to_the_depth_alone():
     both = np.isfinite(depth + moved)
     np.testing.assert_allclose((moved - step[:, 0])[both], depth[both], atol=2e-2)
     assert np.median(np.abs((moved - step[:, 0])[both] - depth[both])) < 1e-5
+
+
+def test_the_shadow_of_a_sphere_in_parallel_light_is_a_disc_of_its_radius():
+    """Parallel rays from a wide grid: neighbours share a direction but not an origin, and none may be ruled out."""
+    across, up = np.meshgrid(np.linspace(-2, 2, 201), np.linspace(-2, 2, 201))
+    origins = np.stack([across, up, 0 * up], axis=-1)
+    _, depth = Scene([Sphere(np.array([0.3, -0.2, 50.0]), 0.41, RED)]).trace(origins, AHEAD)
+    assert np.array_equal(np.isfinite(depth), np.hypot(across - 0.3, up + 0.2) < 0.41)
 
 
 def test_every_surface_is_found_from_wherever_one_looks_straight_at_it():
