@@ -35,13 +35,17 @@ class Picture:
             f'viewBox="0 0 {self.width:g} {self.height:g}">{words}{self.body}</svg>'
         )
 
-    def standalone(self) -> str:
-        """One SVG document with style and photographs inside, that opens anywhere and needs nothing."""
-        svg = self.svg().replace("viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1)
-        svg = svg.replace("<title>", f"<style>{style()}</style><title>", 1)
+    def embedded(self) -> str:
+        """The `<svg>` element with its photographs inside, for a page that has the style sheet."""
+        svg = self.svg()
         for name, data in self.photographs.items():
             svg = svg.replace(f'"attached:{name}"', f'"data:{_mime(data)};base64,{b64encode(data).decode()}"')
         return svg
+
+    def standalone(self) -> str:
+        """One SVG document with style and photographs inside, that opens anywhere and needs nothing."""
+        svg = self.embedded().replace("viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1)
+        return svg.replace("<title>", f"<style>{style()}</style><title>", 1)
 
     def figure(self) -> str:
         """An HTML figure with alternative text."""
@@ -77,11 +81,13 @@ def style() -> str:
 
 
 def _encode(extension: str, image: np.ndarray, options: list[int]) -> bytes:
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or not image.size:
+        raise ValueError(f"a picture is uint8 (height, width) or (height, width, 3), got {image.dtype} {image.shape}")
     swap = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
     pixels = cv2.cvtColor(image, swap[image.shape[2]]) if image.ndim == 3 else image
     done, data = cv2.imencode(extension, pixels, options)
     if not done:
-        raise ValueError(f"cannot encode an image of shape {image.shape} and type {image.dtype} as {extension}")
+        raise ValueError(f"OpenCV cannot write an image of shape {image.shape} as {extension}")
     return data.tobytes()
 
 

@@ -81,7 +81,7 @@ class DistortionView(View):
         """The state's key figures, as text."""
         corner = distortion.image_corner_radius(self.intrinsics)
         fold = distortion.fold_radius(self.camera.lens)
-        moved = self._moved(self.intrinsics.border(1))
+        moved = self.moved(self.intrinsics.border(1))
         return {
             "image corner": f"r = {_with_angle(corner)}",
             "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
@@ -113,7 +113,7 @@ class DistortionView(View):
                 self._numbers_column(),
             ]
         )
-        photographs["camera"] = jpeg(self._image(draft))
+        photographs["camera"] = jpeg(self.image(draft=draft))
         return Picture(body, 960, 602, self.title, self.description(), photographs)
 
     def _name(self) -> str:
@@ -128,7 +128,7 @@ class DistortionView(View):
 
     # The picture -----------------------------------------------------------------------------------------------------
 
-    def _image(self, draft: bool) -> np.ndarray:
+    def image(self, *, draft: bool) -> np.ndarray:
         width = 320 if draft else 480
         small = Camera(
             self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
@@ -176,7 +176,7 @@ class DistortionView(View):
 
     # The displacement ------------------------------------------------------------------------------------------------
 
-    def _moved(self, uv: np.ndarray) -> np.ndarray:
+    def moved(self, uv: np.ndarray) -> np.ndarray:
         """How far, in pixels (...,), the lens moves ideal pixels (..., 2)."""
         return np.linalg.norm(self._distorted(uv) - uv, axis=-1)
 
@@ -188,12 +188,12 @@ class DistortionView(View):
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
-        content = self._folded_area(panel) + self._contours(panel) + arrows + self._fold_circle(panel, bent=False)
+        content = self._folded_area(panel) + arrows + self._contours(panel) + self._fold_circle(panel, bent=False)
         return panel.show(content, title="Where each point goes", note="contours: shift in px")
 
     def _contours(self, panel: Panel) -> str:
         uv = _pixel_grid(self.intrinsics, 49)
-        contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self._moved(uv)))
+        contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self.moved(uv)))
         lines = {level: [panel.place(line) for line in contours.lines(level)] for level in _LEVELS}
         names = [
             svg.text(line[len(line) // 8], f"{level}", "tick halo middle")
@@ -214,7 +214,7 @@ class DistortionView(View):
     def _curve_panel(self) -> str:
         corner = distortion.image_corner_radius(self.intrinsics)
         top = 1.5 * corner
-        panel = plot.plot_panel("curve", 70, 382, 420, 168, (0, top), (0, 1.2 * corner))
+        panel = plot.plot_panel("curve", 70, 370, 420, 180, (0, top), (0, 1.2 * corner))
         r = np.linspace(0, top, 241)
         fold = distortion.fold_radius(self.camera.lens)
         curve, beyond = self._radial(np.where(r <= fold, r, np.nan)), self._radial(np.where(r >= fold, r, np.nan))
@@ -251,7 +251,7 @@ class DistortionView(View):
     # The frustum -----------------------------------------------------------------------------------------------------
 
     def _frustum_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = space_panel("frustum", 545, 382, 255, 168)
+        panel = space_panel("frustum", 545, 370, 255, 180)
         content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
         return panel.show(
