@@ -85,7 +85,9 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """All of the command line. A new subcommand is one function here and one that does it."""
-    everything = _Parser("camviz", description=DESCRIPTION, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter)
+    everything = _Parser(
+        "camviz", description=DESCRIPTION, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
     commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_Parser)
     for add in (_add_lab, _add_doctor, _add_show):
@@ -214,7 +216,9 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _add(commands: Any, name: str, run: Callable[..., int], what: str, description: str) -> argparse.ArgumentParser:
-    command = commands.add_parser(name, help=what, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    command = commands.add_parser(
+        name, help=what, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     command.set_defaults(run=run)
     return command
 

@@ -112,9 +112,10 @@ def widgets() -> Iterator[Finding]:
     except ImportError:
         return
     folders = jupyter_path("labextensions")
-    disabled = get_page_config(folders).get("disabledExtensions", {})
+    disabled = get_page_config(folders).get("disabledExtensions", [])  # a list, or truth values by name
+    off = {name for name in disabled if not isinstance(disabled, dict) or disabled[name]}
     for extension, distribution in WIDGET_EXTENSIONS.items():
-        yield _widget(extension, distribution, folders, bool(disabled.get(extension)))
+        yield _widget(extension, distribution, folders, extension in off)
 
 
 def _widget(extension: str, distribution: str, folders: list[str], disabled: bool) -> Finding:
@@ -153,7 +154,9 @@ def memory() -> Finding:
     detail = f"{free / 1e9:.1f} GB free"
     if free >= ENOUGH_MEMORY:
         return Finding("memory", "ok", detail)
-    return Finding("memory", "warn", detail, "close other programs, or set CAMVIZ_RENDERER=wire: it takes 150 MB a lesson")
+    return Finding(
+        "memory", "warn", detail, "close other programs, or set CAMVIZ_RENDERER=wire: it takes 150 MB a lesson"
+    )
 
 
 def _free_memory() -> int | None:
