@@ -141,7 +141,8 @@ def _fetched(name: str) -> Path:
 def _picture(path: Path) -> NDArray[np.uint8]:
     import cv2
 
-    return np.asarray(cv2.cvtColor(cv2.imread(str(path), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB), dtype=np.uint8)
+    picture: Any = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    return np.ascontiguousarray(picture[..., ::-1])
 
 
 def _rendered(names: tuple[str, ...], side: str, sentence: str) -> Pictures:
