@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import cos, exp, radians, sin, tan
 
 import numpy as np
@@ -13,10 +14,12 @@ from camviz.cameras import Camera, Intrinsics, look_at
 from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, camera_body, grid_lines
 from camviz.draw.panel import Panel
 from camviz.draw.wire import Sight, draw_wire
+from camviz.lenses.base import Array
+from camviz.scenes import Scene, wireframe_scene
 
 __all__ = [
-    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "draw_space", "grid_lines",
-    "space_panel",
+    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "chosen_renderer",
+    "draw_space", "grid_lines", "scene_items", "space_panel",
 ]  # fmt: skip
 
 
@@ -81,16 +84,42 @@ def draw_space(
     CAMVIZ_RENDERER says "wire". Both show the same points at the same places. Raises ValueError for another renderer.
     """
     sight = Sight(eye.camera(round(panel.width), round(panel.height)), eye.distance)
-    if chosen_renderer(renderer, draft) == "solid":
+    if chosen_renderer(renderer) == "solid":
         from camviz.draw.solid import draw_solid
 
         return draw_solid(sight, items, panel.name, draft)
     return draw_wire(sight, items, panel.name, scale=1 if draft else 2)
 
 
-def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
+@lru_cache(maxsize=4)
+def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
+    """A scene as a renderer shows it: its textured surfaces for "solid", its outlines, lightly filled, for "wire".
+
+    The lawn and what stands far off on it are left out: seen from outside, a scene is a model on a table.
+    """
+    meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
+    if renderer == "solid":
+        return tuple(Sheet(mesh.vertices, mesh.quads, mesh.uv, mesh.picture) for mesh in meshes)
+    flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
+    fills = [Face(mesh.vertices[mesh.quads[0]], "#%02x%02x%02x" % mesh.rgb, 0.25) for mesh in flat]
+    lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
+    drawn = [Line(line, "muted" if name in ("wall", "lamp", "easel") else "ink", 1.2) for name, line in lines]
+    squares = [Line(line, "ink", 0.7) for _, line in wireframe_scene().only("board")]
+    ground = [Line(line, "grid", 1.2) for _, line in wireframe_scene().only("ground")]
+    return (*ground, *fills, *drawn, *squares)
+
+
+def _near(name: str, points: Array) -> bool:
+    return name not in ("ground", "lawn") and bool(np.nanmax(np.abs(points)) < 12)
+
+
+def chosen_renderer(renderer: str | None = None) -> str:
     """ "solid" or "wire": what was asked for, as far as this machine can do it."""
     renderer = renderer or os.environ.get("CAMVIZ_RENDERER") or "solid"
     if renderer not in ("solid", "wire"):
         raise ValueError(f"renderer must be 'solid' or 'wire', got {renderer!r}")
-    return "wire"
+    if renderer == "wire":
+        return "wire"
+    from camviz.draw.opengl import opengl_works
+
+    return "solid" if opengl_works()[0] else "wire"

@@ -108,9 +108,8 @@ def draw_marks(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hid
             points_cam = sight.points_cam(item.points)
             px = sight.place(points_cam)
             behind = hidden(px, points_cam[:, 2])
-            style = f"stroke-width:{item.diameter:g}"
-            parts.append(svg.dots(px[~behind], item.class_, style=style))
-            parts.append(svg.dots(px[behind], f"{item.class_} faint", style=style))
+            parts.append(svg.dots(px[~behind], item.class_, item.diameter))
+            parts.append(svg.dots(px[behind], f"{item.class_} faint", item.diameter))
     for item in items:
         if isinstance(item, Label):
             px = sight.place(sight.points_cam(item.point))
@@ -217,7 +216,7 @@ def _fills(
             if len(vertices) > 2 and np.isfinite(vertices).all():
                 yield float(vertices[:, 2].mean()), _fill(sight.place(vertices), item), {}
         elif isinstance(item, Sheet):
-            points = sight.points_cam(item.points)
+            points = sight.points_cam(item.vertices)
             window = warp(sight.place(points), item, sight.camera.intrinsics, scale)
             if window is not None:
                 key, (x, y, width, height), pixels = f"{name}-{i}", *window
