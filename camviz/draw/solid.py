@@ -29,15 +29,16 @@ COLOURS = {
     "blue": "#2b8cd0", "orange": "#e0752e", "green": "#12a57e", "red": "#e0407f", "sky": "#58aee6", "yellow": "#d6a520",
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
+FINE = 1.5
 _BACKGROUND = 128
 
 
 def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> tuple[str, dict[str, bytes]]:
     """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
 
-    The photograph has two pixels per picture unit, as a draft one.
+    The photograph has FINE pixels per picture unit, as a draft one.
     """
-    shot = _stage().submit(_shoot, sight, items, 1 if draft else 2).result()
+    shot = _stage().submit(_shoot, sight, items, 1.0 if draft else FINE).result()
     fragment, photographs = _cut_out(shot, sight, name)
     fragment += "".join(draw_lines(sight, items, hidden=shot.hides).values()) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
@@ -111,6 +112,7 @@ class Studio:
         self.window.SetOffScreenRendering(True)
         self.window.SetMultiSamples(0)
         self.window.SetAlphaBitPlanes(True)
+        self.window.SetFrameBlitModeToNoBlit()
         self.renderer: Any = vtkRenderingCore.vtkRenderer()
         self.renderer.SetBackground(*[_BACKGROUND / 255] * 3)
         self.renderer.SetBackgroundAlpha(0)
