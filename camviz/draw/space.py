@@ -110,7 +110,9 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     """
     meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
-        return tuple(Sheet(mesh.vertices, mesh.quads, mesh.uv, mesh.picture) for mesh in meshes)
+        pictures: dict[bytes, np.ndarray] = {}
+        shared = [pictures.setdefault(mesh.picture.tobytes(), mesh.picture) for mesh in meshes]
+        return tuple(Sheet(m.vertices, m.quads, m.uv, p) for m, p in zip(meshes, shared, strict=True))
     flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
     fills = [Face(mesh.vertices[mesh.quads[0]], "#%02x%02x%02x" % mesh.rgb, 0.25) for mesh in flat]
     lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]

@@ -38,11 +38,11 @@ class FrustumView(View):
     title: ClassVar[str] = "A camera in its world"
 
     mode: str = choice("edit C", "edit t", "orbit", help="what x, y, z are: the centre C, the vector t, or the subject")
-    x: float = slider(0.9, **_METRES, help="right")
-    y: float = slider(-0.6, **_METRES, help="down")
-    z: float = slider(0.4, **_METRES, help="forward")
-    yaw_deg: float = slider(-16.0, **_TURN, label="yaw", help="to the right, about y")
-    pitch_deg: float = slider(-10.0, -90.0, 90.0, 1.0, label="pitch", unit="°", help="up, about x")
+    x: float = slider(-0.6, **_METRES, help="right")
+    y: float = slider(-0.5, **_METRES, help="down")
+    z: float = slider(0.2, **_METRES, help="forward")
+    yaw_deg: float = slider(12.0, **_TURN, label="yaw", help="to the right, about y")
+    pitch_deg: float = slider(-8.0, -90.0, 90.0, 1.0, label="pitch", unit="°", help="up, about x")
     roll_deg: float = slider(0.0, **_TURN, label="roll", help="clockwise, about z")
     hfov_deg: float = slider(60.0, 20.0, 120.0, 1.0, label="field of view", unit="°", help="2 atan(width / 2 fx)")
     near: float = slider(0.3, 0.1, 1.0, 0.05, unit="m", help="where the drawn volume begins")
