@@ -29,15 +29,16 @@ COLOURS = {
     "blue": "#2b8cd0", "orange": "#e0752e", "green": "#12a57e", "red": "#e0407f", "sky": "#58aee6", "yellow": "#d6a520",
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
+FINE = 1.5
 _BACKGROUND = 128
 
 
 def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> tuple[str, dict[str, bytes]]:
     """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
 
-    The photograph has two pixels per picture unit, as a draft one.
+    The photograph has FINE pixels per picture unit, as a draft one.
     """
-    shot = _stage().submit(_shoot, sight, items, 1 if draft else 2).result()
+    shot = _stage().submit(_shoot, sight, items, 1.0 if draft else FINE).result()
     fragment, photographs = _cut_out(shot, sight, name)
     fragment += "".join(draw_lines(sight, items, hidden=shot.hides).values()) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
@@ -111,6 +112,7 @@ class Studio:
         self.window.SetOffScreenRendering(True)
         self.window.SetMultiSamples(0)
         self.window.SetAlphaBitPlanes(True)
+        self.window.SetFrameBlitModeToNoBlit()
         self.renderer: Any = vtkRenderingCore.vtkRenderer()
         self.renderer.SetBackground(*[_BACKGROUND / 255] * 3)
         self.renderer.SetBackgroundAlpha(0)
@@ -123,7 +125,6 @@ class Studio:
         self.renderer.SetAutomaticLightCreation(False)
         self.opaque, self.clear = self._actor(), self._actor()
         self.sheets: dict[Sheet, Any] = {}
-        self.spare: list[Any] = []
         self.size = np.zeros(2, dtype=int)
 
     def shoot(self, sight: Sight, items: Sequence[Item], scale: float) -> Shot:
@@ -149,25 +150,27 @@ class Studio:
         return actor
 
     def _hang(self, sheets: Sequence[Sheet]) -> None:
-        """One textured actor per sheet. A sheet that hangs already stays as it is; actors without one are reused."""
-        spare = [self.sheets.pop(sheet) for sheet in set(self.sheets) - set(sheets)] + self.spare
+        """One textured actor per sheet; a sheet that hangs already stays as it is, one that is gone frees its actor."""
+        for sheet in set(self.sheets) - set(sheets):
+            self.renderer.RemoveActor(self.sheets.pop(sheet))
         for sheet in sheets:
             if sheet not in self.sheets:
-                self.sheets[sheet] = spare.pop() if spare else self._textured()
-                _paper(self.sheets[sheet], sheet)
-            self.sheets[sheet].SetVisibility(True)
-        for actor in spare:
-            actor.SetVisibility(False)
-        self.spare = spare
+                self.sheets[sheet] = self._paper(sheet)
 
-    def _textured(self) -> Any:
-        from vtkmodules.vtkRenderingCore import vtkTexture
+    def _paper(self, sheet: Sheet) -> Any:
+        """An actor of the sheet's shape and picture, unlit, for pictures bring their own light."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk
 
-        actor, texture = self._actor(), vtkTexture()
-        texture.InterpolateOn()
-        texture.MipmapOn()
-        actor.SetTexture(texture)
+        actor = self._actor()
+        there = np.isfinite(sheet.vertices).all(axis=-1)
+        quads = sheet.quads[there[sheet.quads].all(axis=-1)]
+        data = _surface(np.where(there[:, None], sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
+        data.GetPointData().SetTCoords(numpy_to_vtk(sheet.uv * (1, -1) + (0, 1), deep=True))
+        actor.GetMapper().SetInputData(data)
+        actor.GetProperty().SetOpacity(sheet.opacity)
         actor.GetProperty().LightingOff()
+        alike = (hung.GetTexture() for other, hung in self.sheets.items() if other.picture is sheet.picture)
+        actor.SetTexture(next(alike, None) or _texture(sheet.picture))
         return actor
 
     def _aim(self, sight: Sight, items: Sequence[Item]) -> None:
@@ -233,21 +236,19 @@ def _dress(actor: Any, faces: Sequence[Face]) -> None:
     actor.SetVisibility(bool(faces))
 
 
-def _paper(actor: Any, sheet: Sheet) -> None:
-    """Give an actor this sheet's shape and picture."""
+def _texture(picture: np.ndarray) -> Any:
+    """A picture (height, width, 3) as a texture whose v runs downwards, like the picture's rows."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkRenderingCore import vtkTexture
 
-    there = np.isfinite(sheet.vertices).all(axis=-1)
-    quads = sheet.quads[there[sheet.quads].all(axis=-1)]
-    data = _surface(np.where(there[:, None], sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
-    data.GetPointData().SetTCoords(numpy_to_vtk(sheet.uv, deep=True))
-    actor.GetMapper().SetInputData(data)
-    actor.GetProperty().SetOpacity(sheet.opacity)
-    image = vtkImageData()
-    image.SetDimensions(sheet.picture.shape[1], sheet.picture.shape[0], 1)
-    image.GetPointData().SetScalars(numpy_to_vtk(sheet.picture[::-1].reshape(-1, 3), deep=True))
-    actor.GetTexture().SetInputData(image)
+    image, texture = vtkImageData(), vtkTexture()
+    image.SetDimensions(picture.shape[1], picture.shape[0], 1)
+    image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(picture).reshape(-1, 3)))
+    texture.SetInputData(image)
+    texture.InterpolateOn()
+    texture.MipmapOn()
+    return texture
 
 
 def _surface(points: Array, triangles: np.ndarray) -> Any:

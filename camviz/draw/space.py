@@ -9,6 +9,7 @@ from functools import lru_cache
 from math import cos, exp, radians, sin, tan
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics, look_at
 from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, camera_body, grid_lines
@@ -76,14 +77,24 @@ def space_panel(name: str, x: float, y: float, width: float, height: float) -> P
 
 
 def draw_space(
-    panel: Panel, items: Sequence[Item], eye: Eye, *, draft: bool = False, renderer: str | None = None
+    panel: Panel,
+    items: Sequence[Item],
+    eye: Eye,
+    *,
+    draft: bool = False,
+    renderer: str | None = None,
+    frame: RigidTransform | None = None,
 ) -> tuple[str, dict[str, bytes]]:
     """The content of a panel, and the photographs it needs.
 
     `renderer` is "solid" or "wire"; left out, it is solid wherever OpenGL works, unless the environment variable
-    CAMVIZ_RENDERER says "wire". Both show the same points at the same places. Raises ValueError for another renderer.
+    CAMVIZ_RENDERER says "wire". Both show the same points at the same places. `frame` is world_from_frame where the eye
+    stands in another frame than the world's. Raises ValueError for another renderer.
     """
-    sight = Sight(eye.camera(round(panel.width), round(panel.height)), eye.distance)
+    camera = eye.camera(round(panel.width), round(panel.height))
+    if frame is not None:
+        camera = camera.at(frame * camera.world_from_cam)
+    sight = Sight(camera, eye.distance)
     if chosen_renderer(renderer) == "solid":
         from camviz.draw.solid import draw_solid
 
@@ -99,7 +110,9 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     """
     meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
-        return tuple(Sheet(mesh.vertices, mesh.quads, mesh.uv, mesh.picture) for mesh in meshes)
+        pictures: dict[bytes, np.ndarray] = {}
+        shared = [pictures.setdefault(mesh.picture.tobytes(), mesh.picture) for mesh in meshes]
+        return tuple(Sheet(m.vertices, m.quads, m.uv, p) for m, p in zip(meshes, shared, strict=True))
     flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
     fills = [Face(mesh.vertices[mesh.quads[0]], "#%02x%02x%02x" % mesh.rgb, 0.25) for mesh in flat]
     lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
