@@ -54,7 +54,8 @@ class Runs:
         np.nan_to_num(directions_in_runs, copy=False, nan=0.0)
         origins_in_runs = np.asarray(_in_runs(origins) if len(origins) > 1 else origins.T[..., None], dtype=float)
         axis = directions_in_runs.sum(axis=2)
-        axis /= np.sqrt((axis * axis).sum(axis=0))
+        with np.errstate(invalid="ignore"):  # a run without rays has no axis
+            axis /= np.sqrt((axis * axis).sum(axis=0))
         along = (axis[..., None] * directions_in_runs).sum(axis=0)
         cosine = np.minimum(along.min(axis=1), np.float32(1))
         sine = np.sqrt(1 - cosine * cosine)

@@ -81,7 +81,7 @@ class DistortionView(View):
         """The state's key figures, as text."""
         corner = distortion.image_corner_radius(self.intrinsics)
         fold = distortion.fold_radius(self.camera.lens)
-        moved = self._moved(self.intrinsics.border(1))
+        moved = self.moved(self.intrinsics.border(1))
         return {
             "image corner": f"r = {_with_angle(corner)}",
             "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
@@ -113,7 +113,7 @@ class DistortionView(View):
                 self._numbers_column(),
             ]
         )
-        photographs["camera"] = jpeg(self._image(draft))
+        photographs["camera"] = jpeg(self.image(draft=draft))
         return Picture(body, 960, 602, self.title, self.description(), photographs)
 
     def _name(self) -> str:
@@ -128,7 +128,7 @@ class DistortionView(View):
 
     # The picture -----------------------------------------------------------------------------------------------------
 
-    def _image(self, draft: bool) -> np.ndarray:
+    def image(self, *, draft: bool) -> np.ndarray:
         width = 320 if draft else 480
         small = Camera(
             self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
@@ -176,7 +176,7 @@ class DistortionView(View):
 
     # The displacement ------------------------------------------------------------------------------------------------
 
-    def _moved(self, uv: np.ndarray) -> np.ndarray:
+    def moved(self, uv: np.ndarray) -> np.ndarray:
         """How far, in pixels (...,), the lens moves ideal pixels (..., 2)."""
         return np.linalg.norm(self._distorted(uv) - uv, axis=-1)
 
@@ -193,7 +193,7 @@ class DistortionView(View):
 
     def _contours(self, panel: Panel) -> str:
         uv = _pixel_grid(self.intrinsics, 49)
-        contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self._moved(uv)))
+        contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self.moved(uv)))
         lines = {level: [panel.place(line) for line in contours.lines(level)] for level in _LEVELS}
         names = [
             svg.text(line[len(line) // 8], f"{level}", "tick halo middle")
