@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _CREDITS = {
-    "astronaut": "Astronaut Eileen Collins. NASA Great Images database; public domain, no known copyright restrictions.",
+    "astronaut": "Astronaut Eileen Collins. NASA Great Images database; public domain.",
     "brick": "Brick wall. CC0Textures, Bricks25, after a perspective transform; CC0.",
     "camera": "Photographer with a camera. Lav Varshney; CC0.",
     "chelsea": "Chelsea the cat. Stéfan van der Walt; CC0.",

@@ -35,13 +35,17 @@ class Picture:
             f'viewBox="0 0 {self.width:g} {self.height:g}">{words}{self.body}</svg>'
         )
 
-    def standalone(self) -> str:
-        """One SVG document with style and photographs inside, that opens anywhere and needs nothing."""
-        svg = self.svg().replace("viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1)
-        svg = svg.replace("<title>", f"<style>{style()}</style><title>", 1)
+    def embedded(self) -> str:
+        """The `<svg>` element with its photographs inside, for a page that has the style sheet."""
+        svg = self.svg()
         for name, data in self.photographs.items():
             svg = svg.replace(f'"attached:{name}"', f'"data:{_mime(data)};base64,{b64encode(data).decode()}"')
         return svg
+
+    def standalone(self) -> str:
+        """One SVG document with style and photographs inside, that opens anywhere and needs nothing."""
+        svg = self.embedded().replace("viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1)
+        return svg.replace("<title>", f"<style>{style()}</style><title>", 1)
 
     def figure(self) -> str:
         """An HTML figure with alternative text."""

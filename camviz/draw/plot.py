@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 
 from camviz.draw import svg
 from camviz.draw.panel import Panel
@@ -71,15 +70,22 @@ def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top 
     return "".join(rows)
 
 
+def ticks(low: float, high: float, count: float) -> np.ndarray:
+    """Round numbers from `low` to `high`, at most about `count` of them: multiples of 1, 2 or 5 times a power of ten."""
+    rough = (high - low) / max(count, 1)
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))
+    return step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+
+
 def _ticks(low: float, high: float, length: float) -> np.ndarray:
-    ticks = MaxNLocator(max(2, int(length / 55)), steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return ticks[(ticks >= low - 1e-9 * (high - low)) & (ticks <= high + 1e-9 * (high - low))]
+    return ticks(low, high, length / 50)
 
 
-def _written(ticks: np.ndarray) -> list[str]:
-    step = float(np.min(np.diff(ticks))) if len(ticks) > 1 else 1.0
-    decimals = max(0, int(np.ceil(-np.log10(step) + (0 if np.isclose(step, 10 ** np.round(np.log10(step))) else 0.4))))
-    return [f"{tick:.{decimals}f}".replace("-", "−") if abs(tick) > step / 1e6 else "0" for tick in ticks]
+def _written(values: np.ndarray) -> list[str]:
+    step = float(np.min(np.diff(values))) if len(values) > 1 else 1.0
+    decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
+    return [f"{value:.{decimals}f}".replace("-", "−") if abs(value) > step / 1e6 else "0" for value in values]
 
 
 def _pairs(x: object, y: object) -> np.ndarray:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-12  # how far beyond the rim of its image a point may lie and still be a rounded point of the rim
 BLOCK = 16384  # points worked on at a time, so that the temporaries stay in the processor's cache
 
 
@@ -68,9 +69,18 @@ def blockwise(function: Callable[..., tuple[Array, ...]], points: Array, size: i
     with np.errstate(all="ignore"):
         for start in range(0, len(flat), BLOCK):
             block = slice(start, start + BLOCK)
-            for i, coordinate in enumerate(function(*flat[block].T.copy())):
+            coordinates = function(*flat[block].T.copy())
+            for i, coordinate in enumerate(coordinates):
                 result[block, i] = coordinate
+            whole = np.isfinite(sum(coordinates))
+            if not whole.all():
+                result[block][~whole] = np.nan
     return result.reshape(*points.shape[:-1], size)
+
+
+def up_to(limit: float, values: Array) -> Array:
+    """`values` as far as `limit`, at which they may arrive rounded; NaN beyond it."""
+    return np.where(values <= limit * (1 + ROUNDING), np.minimum(values, limit), np.nan)
 
 
 def check_parameters(lens: Any, limit: float = 1e15) -> None:

@@ -125,10 +125,12 @@ class BrownConrady(RayLens):
 
     def straighten(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Ideal coordinates (n,) of distorted ones (n,), by Newton's method; NaN where there are none."""
-        x, y = self._invert(*self._untilt(x, y))
-        valid = self._valid(x, y)
-        if not valid.all():
-            x[~valid] = y[~valid] = np.nan
+        u, v = self._untilt(x, y)
+        u = np.where(u * u + v * v <= self._limits[2] ** 2, u, np.nan)
+        x, y, error = self._newton(u, v)
+        found = (error <= CLOSE * (1 + np.abs(u) + np.abs(v))) & self._valid(x, y)
+        if not found.all():
+            x[~found], y[~found] = self._newton_inside(u[~found], v[~found])
         return x, y
 
     # Forwards. With m = N/D + 2 (p1 y + p2 x): x' = x m + (p2 + s1) r² + s2 r⁴, y' = y m + (p1 + s3) r² + s4 r⁴.
@@ -195,7 +197,9 @@ class BrownConrady(RayLens):
             return None
         cx, sx, cy, sy = cos(self.tau_x), sin(self.tau_x), cos(self.tau_y), sin(self.tau_y)
         R = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
-        return np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]]) @ R
+        tilt = np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]]) @ R
+        tilt[:2, 2] = 0  # R₂₂ R₀₂ - R₀₂ R₂₂, without its rounding
+        return tilt
 
     def _untilt(self, x: Array, y: Array) -> tuple[Array, Array]:
         if self._tilt is None:
@@ -230,7 +234,7 @@ class BrownConrady(RayLens):
         if self._symmetric and self._tilt is None:
             return outer, outer, inf if self.pole_radius <= self.fold_radius else float(self.radial(outer))
         azimuth = np.linspace(0, 2 * pi, 65)[1:]
-        r = np.tan(np.linspace(0, min(atan(outer), STEEPEST), 129)[1:, None])
+        r = np.tan(min(atan(outer), STEEPEST) * _fractions(128)[:, None])
         x, y = r * np.cos(azimuth), r * np.sin(azimuth)
         with np.errstate(all="ignore"):
             upright = np.logical_and.accumulate(self._upright(x, y))
@@ -251,7 +255,7 @@ class BrownConrady(RayLens):
     def _upright_all_the_way(self, x: Array, y: Array) -> np.ndarray:
         """True where the map keeps its orientation all along the line from the axis to (x, y)."""
         r = np.hypot(x, y)
-        steps = np.tan(np.linspace(0, 1, 33)[1:, None] * np.arctan(r)) / r
+        steps = np.tan(_fractions(32)[:, None] * np.arctan(r)) / r
         steps[-1] = 1
         return np.all(self._upright(steps * x, steps * y), axis=0)
 
@@ -270,41 +274,51 @@ class BrownConrady(RayLens):
         scale = np.interp(u * u + v * v, *self._inverse_table)
         return u * scale, v * scale
 
-    def _step(self, x: Array, y: Array, u: Array, v: Array) -> tuple[Array, Array, Array]:
-        """Newton's step from (x, y) towards the ideal point of (u, v), and how far its image still is from there."""
+    def _step(self, x: Array, y: Array, u: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+        """Newton's step from (x, y) towards the point whose image is (u, v), the error of its image now, and det J."""
         bent_x, bent_y, u_x, u_y, v_x, v_y = self._bend_and_slopes(x, y)
         du, dv = u - bent_x, v - bent_y
-        scale = 1 / (u_x * v_y - u_y * v_x)
-        return (v_y * du - u_y * dv) * scale, (u_x * dv - v_x * du) * scale, np.maximum(np.abs(du), np.abs(dv))
+        determinant = u_x * v_y - u_y * v_x
+        dx, dy = (v_y * du - u_y * dv) / determinant, (u_x * dv - v_x * du) / determinant
+        return dx, dy, np.maximum(np.abs(du), np.abs(dv)), determinant
 
-    def _invert(self, u: Array, v: Array) -> tuple[Array, Array]:
-        _, _, farthest = self._limits
-        x, y = self._guess(np.where(u * u + v * v <= farthest * farthest, u, np.nan), v)
-        close = CLOSE * (1 + np.abs(u) + np.abs(v))
+    def _newton(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
+        """A point whose image is (u, v), perhaps beyond the fold, and the error of its image."""
+        x, y = self._guess(u, v)
         for _ in range(4):
-            dx, dy, error = self._step(x, y, u, v)
-            if not (error > close).any():
-                return x, y
+            dx, dy, error, _ = self._step(x, y, u, v)
+            if not (error > CLOSE).any():
+                return x, y, error
             x, y = x + dx, y + dy
-        stuck = np.flatnonzero(self._step(x, y, u, v)[2] > close)
-        x[stuck], y[stuck] = self._invert_carefully(u[stuck], v[stuck], close[stuck])
-        return x, y
+        return x, y, self._step(x, y, u, v)[2]
 
-    def _invert_carefully(self, u: Array, v: Array, close: Array) -> tuple[Array, Array]:
+    def _newton_inside(self, u: Array, v: Array) -> tuple[Array, Array]:
         """Newton's method that halves a step which comes no closer or leaves the domain; NaN where it gets nowhere."""
-        x, y = (0.999 * guess for guess in self._guess(u, v))
-        dx, dy, error = self._step(x, y, u, v)
-        factor = np.ones_like(x)
+        inner, outer, _ = self._limits
+        close = CLOSE * (1 + np.abs(u) + np.abs(v))
+        x, y = self._guess(u, v)
+        inwards = np.minimum(1, 0.999 * inner / np.maximum(np.hypot(x, y), 1e-300))
+        state = np.stack([inwards * x, inwards * y, u, v])
+        state = np.stack([*state, *self._step(*state)[:3], np.ones_like(u)])
         for _ in range(60):
-            if not (error > close).any():
+            moving = (state[6] > close) & (state[7] > 1e-4)
+            if not moving.any():
                 break
+            x, y, u, v, dx, dy, error, factor = old = state[:, moving]
             new_x, new_y = x + factor * dx, y + factor * dy
-            new_dx, new_dy, new_error = self._step(new_x, new_y, u, v)
-            better = (new_error < error) & self._valid(new_x, new_y)
-            for old, new in ((x, new_x), (y, new_y), (dx, new_dx), (dy, new_dy), (error, new_error)):
-                old[better] = new[better]
-            factor = np.where(better, np.minimum(1, 2 * factor), factor / 2)
-        return np.where(error <= close, x, np.nan), np.where(error <= close, y, np.nan)
+            new_dx, new_dy, new_error, determinant = self._step(new_x, new_y, u, v)
+            better = (new_error < error) & (determinant > 0) & (np.hypot(new_x, new_y) < outer)
+            new = np.stack([new_x, new_y, u, v, new_dx, new_dy, new_error, np.minimum(1, 2 * factor)])
+            old[7] /= 2
+            state[:, moving] = np.where(better, new, old)
+        x, y, error = state[0], state[1], state[6]
+        found = (error <= close) & self._valid(x, y)
+        return np.where(found, x, np.nan), np.where(found, y, np.nan)
+
+
+def _fractions(count: int) -> Array:
+    """1/count … 1 in equal steps, and before them ever smaller ones, for a fold close to the axis."""
+    return np.concatenate([np.geomspace(1e-5, 1 / count, 24)[:-1], np.linspace(0, 1, count + 1)[1:]])
 
 
 def _homography(H: np.ndarray, x: Array, y: Array) -> tuple[Array, Array, Array]:

@@ -7,7 +7,7 @@ from math import pi, tan
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, RayLens, check_parameters, check_range
+from camviz.lenses.base import Array, RayLens, check_parameters, check_range, up_to
 
 
 class Fisheye(RayLens):
@@ -39,8 +39,7 @@ class Fisheye(RayLens):
 
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         radius = np.hypot(x, y)
-        theta = self.angle(radius)
-        theta = np.where(theta <= self.max_angle, theta, np.nan)
+        theta = self.angle(up_to(float(self.radial(self.max_angle)), radius))
         scale = np.sin(theta) / radius
         scale[radius == 0] = 1
         return x * scale, y * scale, np.cos(theta)
@@ -119,5 +118,5 @@ class FieldOfView(Fisheye):
         return np.arctan2(2 * tan(self.omega / 2) * np.sin(theta), np.cos(theta)) / self.omega
 
     def angle(self, radius: Array) -> Array:
-        bent = np.where(radius * self.omega <= pi, radius * self.omega, np.nan)
+        bent = radius * self.omega
         return np.arctan2(np.sin(bent), 2 * tan(self.omega / 2) * np.cos(bent))

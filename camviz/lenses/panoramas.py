@@ -5,9 +5,7 @@ from math import pi
 
 import numpy as np
 
-from camviz.lenses.base import Array, RayLens
-
-ROUNDING = 1e-12  # the edge of a panorama, ±π, may arrive rounded from its pixels
+from camviz.lenses.base import Array, RayLens, up_to
 
 
 @dataclass(frozen=True)
@@ -21,12 +19,11 @@ class Equirectangular(RayLens):
         ground = np.hypot(x, z)
         longitude = np.where(ground > 0, np.arctan2(x, z), 0.0)
         latitude = np.where((ground > 0) | (y != 0), np.arctan2(y, ground), np.nan)
-        return np.where(np.isnan(latitude), np.nan, longitude), latitude
+        return longitude, latitude
 
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        inside = (np.abs(x) <= pi + ROUNDING) & (np.abs(y) <= pi / 2 + ROUNDING)
-        ground = np.where(inside, np.cos(y), np.nan)
-        return ground * np.sin(x), np.sin(y), ground * np.cos(x)
+        x, y = np.copysign(up_to(pi, np.abs(x)), x), np.copysign(up_to(pi / 2, np.abs(y)), y)
+        return np.cos(y) * np.sin(x), np.sin(y), np.cos(y) * np.cos(x)
 
 
 @dataclass(frozen=True)
@@ -38,9 +35,8 @@ class Cylindrical(RayLens):
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         ground = np.hypot(x, z)
-        ground = np.where(ground > 0, ground, np.nan)
-        return np.where(ground > 0, np.arctan2(x, z), np.nan), y / ground
+        return np.arctan2(x, z), y / np.where(ground > 0, ground, np.nan)
 
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        x = np.where(np.abs(x) <= pi + ROUNDING, x, np.nan)
+        x = np.copysign(up_to(pi, np.abs(x)), x)
         return np.sin(x), y, np.cos(x)

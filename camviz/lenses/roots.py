@@ -24,7 +24,7 @@ def solve_rising(
     """The t (n,) with function(t) = value (n,), by Newton's method kept inside the bracket that a table gives.
 
     `levels` are the function's values at the rising `nodes`, between whose ends it must rise. NaN for a value beyond
-    the table and where the equation does not hold to 1e-13 in the end.
+    the table and where the equation does not hold to 13 digits in the end.
     """
     cell = np.clip(np.searchsorted(levels, value, side="right"), 1, len(nodes) - 1)
     low, high = nodes[cell - 1], nodes[cell]
@@ -33,7 +33,7 @@ def solve_rising(
     todo = np.arange(len(t))
     for _ in range(60):
         error = function(t[todo]) - value[todo]
-        off = np.abs(error) > 1e-13 * (1 + value[todo])
+        off = np.abs(error) > 1e-13 * value[todo]
         todo, error = todo[off], error[off]
         if not len(todo):
             return t

@@ -6,7 +6,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from camviz.lenses.base import Array, RayLens, check_parameters, check_range
+from camviz.lenses.base import ROUNDING, Array, RayLens, check_parameters, check_range
 from camviz.lenses.brown_conrady import BrownConrady
 
 
@@ -43,8 +43,7 @@ class UnifiedSphere(RayLens):
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         distance = np.sqrt(x * x + y * y + z * z)
-        seen = z > -_widest(self.xi) * distance
-        depth = np.where(seen, z + self.xi * distance, np.nan)
+        depth = np.where(_seen(z, self.xi, distance), z + self.xi * distance, np.nan)
         x, y = x / depth, y / depth
         return self.distortion.bend(x, y) if self.distortion else (x, y)
 
@@ -53,7 +52,7 @@ class UnifiedSphere(RayLens):
             x, y = self.distortion.straighten(x, y)
         r2 = x * x + y * y
         # η (x, y, 1) - (0, 0, ξ) lies on the sphere
-        eta = (self.xi + np.sqrt(1 + (1 - self.xi**2) * r2)) / (1 + r2)
+        eta = (self.xi + _root(1 + (1 - self.xi**2) * r2)) / (1 + r2)
         return eta * x, eta * y, eta - self.xi
 
 
@@ -74,8 +73,7 @@ class ExtendedUnified(RayLens):
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         distance = np.sqrt(self.beta * (x * x + y * y) + z * z)
-        seen = z > -_widest(_xi(self.alpha)) * distance
-        depth = np.where(seen, self.alpha * distance + (1 - self.alpha) * z, np.nan)
+        depth = np.where(_seen(z, _xi(self.alpha), distance), self.alpha * distance + (1 - self.alpha) * z, np.nan)
         return x / depth, y / depth
 
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -117,20 +115,31 @@ class DoubleSphere(RayLens):
 
     def _seen(self, z: Array, first: Array | float, shifted: Array, second: Array) -> np.ndarray:
         """The published half-space (eq. 43); for ξ < 0 it holds rays that have no image, so that is asked as well."""
-        w1 = _widest(_xi(self.alpha))
+        w1 = min(_xi(self.alpha), 1 / _xi(self.alpha)) if self.alpha else 0.0
         w2 = (w1 + self.xi) / sqrt(2 * w1 * self.xi + self.xi**2 + 1)
-        return (z > -w2 * first) & (shifted > -w1 * second)
+        return (z > -(w2 + ROUNDING) * first) & _seen(shifted, _xi(self.alpha), second)
 
 
 def _xi(alpha: float) -> float:
     return alpha / (1 - alpha) if alpha < 1 else inf
 
 
-def _widest(xi: float) -> float:
-    """w, with Z > -w D the half-space that a sphere seen from ξ behind its centre shows once: min(ξ, 1/ξ)."""
-    return min(xi, 1 / xi) if xi > 0 else 0.0
+def _seen(z: Array, xi: float, distance: Array) -> np.ndarray:
+    """True where a sphere seen from ξ behind its centre shows a point at all, Z > -ξ D, and for ξ > 1 on its near side.
+
+    That is Z > -D/ξ. There the image has a rim, which belongs to it.
+    """
+    return (z > -xi * distance) if xi <= 1 else (z >= -(1 / xi + ROUNDING) * distance)
+
+
+def _root(squared: Array) -> Array:
+    """The square root, of 0 where rounding has carried a point of the rim beyond it; NaN further out."""
+    return np.sqrt(np.where(squared > -ROUNDING, np.maximum(squared, 0), np.nan))
 
 
 def _depth(alpha: float, r2: Array) -> Array:
     """Z of the point (x, y, Z) whose image is (x, y); NaN beyond the outline of the sphere (Usenko 2018, eq. 18)."""
-    return (1 - alpha**2 * r2) / (alpha * np.sqrt(1 - (2 * alpha - 1) * r2) + (1 - alpha))
+    root = _root(1 - (2 * alpha - 1) * r2)
+    if alpha > 0.75:  # the same fraction reduced, which at α = 1 is 0/0 on the rim
+        return (alpha * root - (1 - alpha)) / (2 * alpha - 1)
+    return (1 - alpha**2 * r2) / (alpha * root + (1 - alpha))

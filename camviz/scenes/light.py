@@ -9,9 +9,11 @@ SUN = np.array([-0.48, -0.72, -0.50])  # towards the sun: from the left, above a
 SKYLIGHT = 0.42  # the share of light that comes from everywhere, and reaches the shade
 
 
-def to_linear(encoded: ArrayLike) -> Array:
-    """Linear light 0…1 of sRGB values 0…1, any shape (IEC 61966-2-1:1999, section 5.2)."""
-    c = np.asarray(encoded, dtype=np.float64)
+def to_linear(encoded: ArrayLike) -> NDArray[np.floating]:
+    """Linear light 0…1, any shape, of sRGB values 0…1, or of sRGB bytes 0…255 as float32 (IEC 61966-2-1:1999, 5.2)."""
+    c = np.asarray(encoded)
+    if c.dtype == np.uint8:
+        return to_linear(np.arange(256) / 255).astype(np.float32)[c]
     return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0) + 0.055) / 1.055) ** 2.4)
 
 

@@ -17,7 +17,7 @@ _ROUNDING = np.float32(1e-5)
 
 @dataclass(frozen=True)
 class Bounds:
-    """Balls around surfaces, `centre` (n, 3) and `radius` (n,), and for the flat ones a unit `normal` (n, 3), else 0."""
+    """Balls around surfaces, `centre` (n, 3) and `radius` (n,), and a unit `normal` (n, 3): 0 where it is not flat."""
 
     centre: Floats
     radius: Floats
@@ -52,7 +52,7 @@ class Runs:
         """Runs of rays (n, 3) from origins (1, 3) or (n, 3); a NaN direction is no ray."""
         directions_in_runs = _in_runs(directions)
         np.nan_to_num(directions_in_runs, copy=False, nan=0.0)
-        origins_in_runs = _in_runs(origins) if len(origins) > 1 else origins.T[..., None].copy()
+        origins_in_runs = np.asarray(_in_runs(origins) if len(origins) > 1 else origins.T[..., None], dtype=float)
         axis = directions_in_runs.sum(axis=2)
         axis /= np.sqrt((axis * axis).sum(axis=0))
         along = (axis[..., None] * directions_in_runs).sum(axis=0)

@@ -108,7 +108,9 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
     fine = pixels.resized(pixels.width * supersample, pixels.height * supersample)
     rays = replace(camera, intrinsics=fine).rays()
     light, _ = scene.trace(camera.centre, rays, _spread(rays))
-    return cv2.resize(light, (pixels.width, pixels.height), interpolation=cv2.INTER_AREA) if supersample > 1 else light
+    if supersample == 1:
+        return light
+    return np.asarray(cv2.resize(light, (pixels.width, pixels.height), interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
 def _flat(origins: Array, shape: tuple[int, ...]) -> Array:

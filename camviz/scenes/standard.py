@@ -6,9 +6,10 @@ Metres, x right, y down, z forward: a camera with an identity pose stands 1.25 m
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
+import cv2
 import numpy as np
-from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array
 from camviz.photographs import photograph
@@ -50,53 +51,54 @@ def _board() -> list[Surface]:
     across = (SQUARE * (BOARD_COLUMNS + 1) + 2 * margin) * _BOARD_ACROSS
     down = (SQUARE * (BOARD_ROWS + 1) + 2 * margin) * _BOARD_DOWN
     picture = Texture(to_linear(paint.checkerboard(BOARD_COLUMNS + 1, BOARD_ROWS + 1)))
-    wood = Texture(paint.lit_round(np.full((1, 32, 3), (0.55, 0.36, 0.20)), upright=True))
+    wood = Texture(paint.lit_round(paint.plain(1, 32, (0.55, 0.36, 0.20)), upright=True))
     back = 0.03 * np.cross(_BOARD_ACROSS, _BOARD_DOWN)
     legs = [corner + down * 0.2 + across * s + back for s in (0.12, 0.88)]
-    easel = [Column([x, FLOOR, z], FLOOR - y, 0.018, wood, "easel") for x, y, z in legs]
+    easel = [Column(np.array([x, FLOOR, z]), FLOOR - y, 0.018, wood, "easel") for x, y, z in legs]
     return [Rectangle(corner, across, down, picture, name="board"), *easel]
 
 
 def _still_life() -> list[Surface]:
     wood = Texture(to_linear(paint.planks()))
     crate = box([0.68, FLOOR, 3.3], [0.62, 0.62, 0.62], wood, yaw=0.5, name="crate")
-    globe = Sphere([0.68, FLOOR - 0.62 - 0.27, 3.3], 0.27, Texture(paint.lit_round(paint.globe())), "globe")
-    ball = Sphere([0.13, FLOOR - 0.16, 3.0], 0.16, Texture(paint.lit_round(paint.beach_ball())), "ball")
-    clay = Texture(paint.lit_round(np.full((1, 32, 3), (0.74, 0.42, 0.28)), upright=True))
-    pot = Column([1.42, FLOOR, 4.7], 0.36, 0.2, clay, "pot")
-    bush = Sphere([1.42, FLOOR - 0.58, 4.7], 0.33, Texture(paint.lit_round(paint.leaves())), "bush")
+    globe = Sphere(np.array([0.68, FLOOR - 0.62 - 0.27, 3.3]), 0.27, Texture(paint.lit_round(paint.globe())), "globe")
+    ball = Sphere(np.array([0.13, FLOOR - 0.16, 3.0]), 0.16, Texture(paint.lit_round(paint.beach_ball())), "ball")
+    clay = Texture(paint.lit_round(paint.plain(1, 32, (0.74, 0.42, 0.28)), upright=True))
+    pot = Column(np.array([1.42, FLOOR, 4.7]), 0.36, 0.2, clay, "pot")
+    bush = Sphere(np.array([1.42, FLOOR - 0.58, 4.7]), 0.33, Texture(paint.lit_round(paint.leaves())), "bush")
     return [ball, globe, *crate, bush, pot]
 
 
 def _lamps() -> list[Surface]:
-    iron = Texture(paint.lit_round(np.full((1, 32, 3), (0.20, 0.25, 0.27)), upright=True))
-    glass = Texture(paint.lit_round(np.full((32, 64, 3), (0.98, 0.96, 0.90))))
+    iron = Texture(paint.lit_round(paint.plain(1, 32, (0.20, 0.25, 0.27)), upright=True))
+    glass = Texture(paint.lit_round(paint.plain(32, 64, (0.98, 0.96, 0.90))))
     surfaces: list[Surface] = []
     for z in 3.5 + 1.9 * np.arange(9):
-        surfaces.append(Sphere([2.05, FLOOR - 1.95, z], 0.17, glass, "lamp"))
-        surfaces.append(Column([2.05, FLOOR, z], 1.80, 0.045, iron, "lamp"))
+        surfaces.append(Sphere(np.array([2.05, FLOOR - 1.95, z]), 0.17, glass, "lamp"))
+        surfaces.append(Column(np.array([2.05, FLOOR, z]), 1.80, 0.045, iron, "lamp"))
     return surfaces
 
 
 def _wall() -> list[Surface]:
     bricks = Texture(to_linear(paint.bricks()), repeat=True)
-    cat = paint.framed(photograph("chelsea") / 255)
-    picture = Rectangle([-0.75, -0.65, 6.47], [1.35, 0, 0], [0, 0.95, 0], Texture(to_linear(cat)), name="picture")
+    cat = paint.framed(photograph("chelsea"))
+    corner, across, down = np.array([[-0.75, -0.65, 6.47], [1.35, 0, 0], [0, 0.95, 0]])
+    picture = Rectangle(corner, across, down, Texture(to_linear(cat)), name="picture")
     coping = box([-1.5, FLOOR - 2.5, 6.65], [5.3, 0.09, 0.4], Texture.plain((0.86, 0.82, 0.75)), name="wall")
     return [picture, *coping, *box([-1.5, FLOOR, 6.65], [5.2, 2.5, 0.3], bricks, tile=2.4, name="wall")]
 
 
 def _terrace(things: list[Surface]) -> Rectangle:
-    """Flagstones with the shadows of the things that stand on them."""
+    """Flagstones with the shadows of the things that stand on them, soft as half of its texels are."""
     corner, across, down = np.array([-4.5, FLOOR, 9.0]), np.array([7.5, 0, 0]), np.array([0, 0, -12.0])
-    light = to_linear(paint.paving(15, 24, texels=40))
+    light = to_linear(paint.paving(15, 24))
     height, width = light.shape[:2]
-    s, r = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+    s, r = (np.arange(0, width, 2) + 1) / width, (np.arange(0, height, 2) + 1) / height
     points = corner + s[None, :, None] * across + r[:, None, None] * down
     _, depth = Scene(things).trace(points, SUN / np.linalg.norm(SUN))
-    lit = np.isnan(depth).astype(float)
-    share = SKYLIGHT + (float(sunlight((0, -1, 0))) - SKYLIGHT) * lit
-    return Rectangle(corner, across, down, Texture(light * share[..., None]), name="terrace")
+    lit = cv2.resize(np.isnan(depth).astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+    light *= (SKYLIGHT + (sunlight((0, -1, 0)) - SKYLIGHT) * lit)[..., None]
+    return Rectangle(corner, across, down, Texture(light), name="terrace")
 
 
 @lru_cache(maxsize=1)
@@ -122,7 +124,8 @@ def _house(width: float = 2.0, wall: float = 1.3, ridge: float = 2.1, depth: flo
     beams = [[near, far] for near, far in zip(*gables, strict=True)][:-1]
     door = [[middle + x, FLOOR - y, front] for x, y in [(-0.7, 0), (-0.7, 0.95), (-0.2, 0.95), (-0.2, 0)]]
     frame = [(0.15, 0.45), (0.15, 0.95), (0.7, 0.95), (0.7, 0.45), (0.15, 0.45)]
-    return _named("house", *gables, *beams, door, [[middle + x, FLOOR - y, front] for x, y in frame])
+    window = [[middle + x, FLOOR - y, front] for x, y in frame]
+    return _named("house", *gables) + _named("house", *beams) + _named("house", door, window)
 
 
 def _board_lines() -> Wireframe:
@@ -136,5 +139,5 @@ def _axes() -> Wireframe:
     return x + y + z
 
 
-def _named(name: str, *lines: ArrayLike) -> Wireframe:
+def _named(name: str, *lines: Any) -> Wireframe:
     return Wireframe(tuple(np.asarray(line, dtype=float) for line in lines), (name,) * len(lines))

@@ -43,7 +43,10 @@ class Meeting(NamedTuple):
 class Surface(Protocol):
     """What a scene is made of."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """What it belongs to, in drawings."""
+        ...
 
     def ball(self) -> tuple[Array, float, Array]:
         """Centre (3,) and radius of a ball around it, and its unit normal (3,) if it is flat, otherwise 0."""
@@ -74,9 +77,9 @@ class Rectangle:
     receives: 1 for full light. Raises ValueError when the two edges span no area.
     """
 
-    corner: ArrayLike
-    across: ArrayLike
-    down: ArrayLike
+    corner: Array
+    across: Array
+    down: Array
     texture: Texture
     shade: float = 1.0
     repeats: tuple[float, float] = (1.0, 1.0)
@@ -130,7 +133,7 @@ class Rectangle:
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """The endless horizontal plane y = `height` (y points down), its texture repeated every `tile` metres along x and z.
+    """The endless horizontal plane y = `height` (y points down), its texture repeated every `tile` metres.
 
     With the distance d it takes on the colour of the air, linear RGB `haze`: a share 1 - exp(-d / `sight`) of it.
     """
@@ -187,7 +190,7 @@ class Sphere:
     The texture's middle faces -z, towards a camera at the origin; its first row is the pole -y, the top.
     """
 
-    centre: ArrayLike
+    centre: Array
     radius: float
     texture: Texture
     name: str = "sphere"
@@ -231,7 +234,7 @@ class Column:
     The middle of its texture faces -z, the first row is at the top.
     """
 
-    foot: ArrayLike
+    foot: Array
     height: float
     radius: float
     texture: Texture
@@ -253,7 +256,7 @@ class Column:
     def meet(self, origins: Array, directions: Floats) -> Meeting:
         scale = np.array([[self.radius], [self.height], [self.radius]])
         start = ((origins - self._top[:, None]) / scale).astype(np.float32)
-        step = directions / scale.astype(np.float32)
+        step = np.divide(directions, scale, dtype=np.float32)
         first, second = _meet_circle(start[::2], step[::2])
         outside = (first > 0) & (np.abs(start[1] + first * step[1] - _HALF) <= _HALF)
         depth = np.where(outside, first, second)
@@ -301,14 +304,14 @@ def box(
 
 
 def _lit(wall: Rectangle, tile: float | None) -> Rectangle:
-    repeats = tuple(float(np.linalg.norm(edge)) / tile for edge in (wall.across, wall.down)) if tile else (1.0, 1.0)
-    return replace(wall, shade=float(sunlight(wall.normal)), repeats=repeats)
+    wide, high = (float(np.linalg.norm(edge)) for edge in (wall.across, wall.down))
+    return replace(wall, shade=float(sunlight(wall.normal)), repeats=(wide / tile, high / tile) if tile else (1.0, 1.0))
 
 
 def _vector(values: ArrayLike, name: str) -> Array:
     vector = np.array(values, dtype=np.float64)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name} must be three finite numbers, got {values}")
+        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
     vector.flags.writeable = False
     return vector
 
@@ -353,7 +356,7 @@ def _meet_circle(start: Floats, step: Floats) -> tuple[Floats, Floats]:
 def _texels(depth: Floats, cosine: Floats, density: float) -> Floats | float:
     """Texels between neighbouring rays; a slanted look stretches them by 1 / cos, of which the square root is taken as
     a compromise between too sharp along the slope and too soft across it."""
-    return depth * np.float32(density) / np.sqrt(cosine) if density > 0 else 0.0
+    return np.multiply(depth / np.sqrt(cosine), density, dtype=np.float32) if density > 0 else 0.0
 
 
 def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.intp]]:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from camviz.scenes.light import to_display, to_linear
 
 Floats = NDArray[np.float32]
+Steps = NDArray[np.uint16]
 _FULL = 65535  # linear light 0…1 is kept in 16 bits: half the memory of floats, and no banding in the dark
 
 
@@ -21,18 +22,14 @@ class Texture:
     """
 
     def __init__(self, light: ArrayLike, repeat: bool = False) -> None:
-        picture = np.asarray(light, dtype=np.float32)
+        picture = np.asarray(light)
         if picture.ndim != 3 or picture.shape[2] != 3 or 0 in picture.shape:
             raise ValueError(f"light must have shape (height, width, 3), got {picture.shape}")
         self.height, self.width = picture.shape[:2]
         self.repeat = repeat
-        self.mean = picture.mean(axis=(0, 1))
-        self._mosaic, self._places = _pyramid(picture, repeat)
-
-    @classmethod
-    def of_photograph(cls, picture: ArrayLike, repeat: bool = False) -> Texture:
-        """From sRGB bytes (height, width, 3)."""
-        return cls(to_linear(np.arange(256) / 255)[np.asarray(picture)], repeat)
+        self.mean = picture.mean(axis=(0, 1), dtype=np.float64)
+        steps = np.multiply(picture, _FULL, dtype=np.float32)
+        self._mosaic, self._places = _pyramid(np.clip(np.rint(steps, out=steps), 0, _FULL).astype(np.uint16), repeat)
 
     @classmethod
     def plain(cls, rgb: ArrayLike) -> Texture:
@@ -71,29 +68,38 @@ def _texel(s: Floats, size: Floats, repeat: bool) -> Floats:
     return np.minimum(np.maximum(x, np.float32(0)), size - np.float32(1))
 
 
-def _pyramid(picture: Floats, repeat: bool) -> tuple[NDArray[np.uint16], Floats]:
-    """All halved copies in one mosaic, and where they lie: (4, levels) as left, top, width, height."""
-    copies = [picture]
-    while max(copies[-1].shape[:2]) > 1:
-        height, width = (max(size // 2, 1) for size in copies[-1].shape[:2])
-        copies.append(cv2.resize(copies[-1], (width, height), interpolation=cv2.INTER_AREA))
-    tops = [0, 0, *np.cumsum([copy.shape[0] + 1 for copy in copies[1:]]).tolist()]
-    height = max(picture.shape[0] + 1, tops[-1])
-    width = picture.shape[1] + 1 + (copies[1].shape[1] + 1 if len(copies) > 1 else 0)
-    mosaic = np.zeros((height, width, 3), dtype=np.uint16)
+def _pyramid(picture: Steps, repeat: bool) -> tuple[Steps, Floats]:
+    """All halved copies in one mosaic, and where they lie: (4, levels) as left, top, width, height.
+
+    The finest is on the left and the others in a column beside it, each with a border of one texel on its right and
+    below, which continues it.
+    """
+    copies = _halved(picture)
+    left = picture.shape[1] + 1
+    tops = np.concatenate([[0, 0], np.cumsum([len(copy) + 1 for copy in copies[1:]])]).astype(int)
+    mosaic = np.zeros((max(len(picture) + 1, tops[-1]), left + picture.shape[1] // 2 + 2, 3), dtype=np.uint16)
     places = np.zeros((4, len(copies)), dtype=np.float32)
-    for level, copy in enumerate(copies):
-        left, top = (picture.shape[1] + 1) * (level > 0), tops[level]
-        padded = np.pad(copy, ((0, 1), (0, 1), (0, 0)), mode="wrap" if repeat else "edge")
-        mosaic[top : top + padded.shape[0], left : left + padded.shape[1]] = np.rint(np.clip(padded, 0, 1) * _FULL)
-        places[:, level] = left, top, copy.shape[1], copy.shape[0]
+    for level, (copy, top) in enumerate(zip(copies, tops, strict=False)):
+        place = mosaic[top:, left * (level > 0) :][: len(copy) + 1, : copy.shape[1] + 1]
+        place[:] = np.pad(copy, ((0, 1), (0, 1), (0, 0)), mode="wrap" if repeat else "edge")
+        places[:, level] = left * (level > 0), top, copy.shape[1], len(copy)
     return mosaic, places
 
 
-def _remap(picture: NDArray[np.uint16], x: Floats, y: Floats, row: int = 1024) -> Floats:
+def _halved(picture: Steps) -> list[Steps]:
+    copies = [picture]
+    while max(copies[-1].shape[:2]) > 1:
+        height, width = (max(size // 2, 1) for size in copies[-1].shape[:2])
+        smaller = cv2.resize(copies[-1], (width, height), interpolation=cv2.INTER_AREA)
+        copies.append(np.asarray(smaller, dtype=np.uint16))
+    return copies
+
+
+def _remap(picture: Steps, x: Floats, y: Floats, row: int = 1024) -> Floats:
     """Bilinear look-up (n, 3); cv2.remap takes no side longer than 32767, so the points are laid out in rows."""
     rows = -(-x.size // row)
     maps = np.zeros((2, rows * row), dtype=np.float32)
     maps[0, : x.size], maps[1, : x.size] = x, y
-    seen = cv2.remap(picture, *maps.reshape(2, rows, row), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return seen.reshape(-1, 3)[: x.size] * np.float32(1 / _FULL)
+    across, down = maps.reshape(2, rows, row)
+    seen = cv2.remap(picture, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.multiply(seen.reshape(-1, 3)[: x.size], 1 / _FULL, dtype=np.float32)

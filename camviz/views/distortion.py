@@ -188,7 +188,7 @@ class DistortionView(View):
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
-        content = self._folded_area(panel) + self._contours(panel) + arrows + self._fold_circle(panel, bent=False)
+        content = self._folded_area(panel) + arrows + self._contours(panel) + self._fold_circle(panel, bent=False)
         return panel.show(content, title="Where each point goes", note="contours: shift in px")
 
     def _contours(self, panel: Panel) -> str:
@@ -214,7 +214,7 @@ class DistortionView(View):
     def _curve_panel(self) -> str:
         corner = distortion.image_corner_radius(self.intrinsics)
         top = 1.5 * corner
-        panel = plot.plot_panel("curve", 70, 382, 420, 168, (0, top), (0, 1.2 * corner))
+        panel = plot.plot_panel("curve", 70, 370, 420, 180, (0, top), (0, 1.2 * corner))
         r = np.linspace(0, top, 241)
         fold = distortion.fold_radius(self.camera.lens)
         curve, beyond = self._radial(np.where(r <= fold, r, np.nan)), self._radial(np.where(r >= fold, r, np.nan))
@@ -251,7 +251,7 @@ class DistortionView(View):
     # The frustum -----------------------------------------------------------------------------------------------------
 
     def _frustum_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = space_panel("frustum", 545, 382, 255, 168)
+        panel = space_panel("frustum", 545, 370, 255, 180)
         content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
         return panel.show(

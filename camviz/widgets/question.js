@@ -9,9 +9,15 @@ function element(tag, className, html) {
   return node;
 }
 
+// JupyterLab takes the arrow keys for its cells unless the focused element itself asks it not to.
+function keepKeys(node) {
+  node.dataset.lmSuppressShortcuts = "true";
+  return node;
+}
+
 function choiceRow(name, card, index) {
   const row = element("label", "camviz-choice");
-  const radio = element("input");
+  const radio = keepKeys(element("input"));
   Object.assign(radio, { type: "radio", name, value: index, checked: card.chosen === index });
   row.append(radio, element("span", "", card.choices[index]));
   return row;
@@ -22,7 +28,7 @@ function cardForm(name, number, send) {
   const fieldset = element("fieldset");
   const text = element("legend");
   const rows = element("div");
-  const button = element("button", "camviz-commit");
+  const button = keepKeys(element("button", "camviz-commit"));
   const reply = element("div", "camviz-reply");
   button.type = "submit";
   reply.setAttribute("role", "status"); // read out when it changes
@@ -69,7 +75,6 @@ function cardForm(name, number, send) {
 function render({ model, el }) {
   const view = ++views;
   const root = element("section", "camviz-question");
-  root.dataset.lmSuppressShortcuts = "true"; // the arrow keys move between choices, not between cells
   const title = element("div", "camviz-title");
   title.textContent = model.get("title");
   root.setAttribute("aria-label", model.get("title"));

@@ -1,0 +1,362 @@
+"""Tools for the lessons: what a lesson must have, its teacher's edition, and its saved outputs.
+
+    python -m camviz.lessons check            what departs from the pattern of a lesson
+    python -m camviz.lessons refresh [05 …]   run and save with static outputs
+    python -m camviz.lessons fresh            which saved outputs are older than their lesson
+    python -m camviz.lessons teacher FOLDER   write the teacher's edition
+
+A lesson's cells carry tags: `setup`, `build` (what exercises may rely on), `stub`, `check`, `solution`, `glossary`
+(filled by `refresh`), `nbval-check-output`. A stub's metadata names its exercise, {"camviz": {"exercise":
+"05.distort"}}; notes for the teacher are Markdown in the metadata of the cell they belong to, {"camviz": {"teacher":
+"10 minutes. Ask …"}}. A stub is followed, before the next one, by its check and its solution, a fenced block in
+<details>.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from camviz import glossary
+from camviz.checks import Verdict
+
+Notebook = Any
+Cell = Any
+
+_FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
+_RANDOM_ID = re.compile(r"[0-9a-f]{8}")
+
+
+def lessons_folder() -> Path:
+    """Where the lessons are: inside an installed package, or beside it in the repository."""
+    installed = Path(__file__).with_name("_lessons")
+    return installed if installed.is_dir() else Path(__file__).parents[1] / "lessons"
+
+
+def read(path: Path) -> Notebook:
+    """A notebook, nbformat 4. Raises ValueError naming the file when it is not one."""
+    import nbformat
+
+    try:
+        return nbformat.read(path, as_version=4)
+    except (nbformat.reader.NotJSONError, nbformat.ValidationError) as error:
+        raise ValueError(f"{path} is not a notebook: {error}") from error
+
+
+def write(notebook: Notebook, path: Path) -> None:
+    """Writes a notebook, with its keys in order and a newline at its end."""
+    import nbformat
+
+    path.write_text(nbformat.writes(notebook).rstrip("\n") + "\n", encoding="utf-8")
+
+
+# What is in a lesson ------------------------------------------------------------------------------------------------
+
+
+def tagged(notebook: Notebook, tag: str) -> list[Cell]:
+    """The cells with a tag, in order."""
+    return [cell for cell in notebook.cells if tag in cell.metadata.get("tags", [])]
+
+
+def stubs(notebook: Notebook) -> dict[str, str]:
+    """The source of each exercise's stub, by the exercise's name."""
+    return {exercise_of(cell): cell.source for cell in tagged(notebook, "stub")}
+
+
+def solutions(notebook: Notebook) -> dict[str, str]:
+    """The code of each exercise's folded solution. Raises ValueError for a stub without one."""
+    return {name: _code(solution) for name, (_, _, solution) in _exercises(notebook).items()}
+
+
+def checks(notebook: Notebook) -> dict[str, str]:
+    """The source of the cell that checks each exercise. Raises ValueError for a stub without one."""
+    return {name: check.source for name, (_, check, _) in _exercises(notebook).items()}
+
+
+def exercise_of(stub: Cell) -> str:
+    """The exercise that a stub's metadata names. Raises ValueError when it names none."""
+    name = stub.metadata.get("camviz", {}).get("exercise")
+    if not name:
+        raise ValueError(f'a stub needs the metadata {{"camviz": {{"exercise": …}}}}: {stub.source[:60]!r}')
+    return name
+
+
+def verdicts(notebook: Notebook, solved: bool) -> dict[str, Verdict]:
+    """What the lesson's own checks say of its solutions, or of its stubs.
+
+    Runs the setup, `build` and exercise cells in order in an empty namespace, as a reader would, without Jupyter.
+    """
+    exercises = _exercises(notebook)
+    given: dict[str, Verdict] = {}
+    namespace: dict[str, Any] = {"__name__": "lesson"}
+    for cell in notebook.cells:
+        tags = cell.metadata.get("tags", [])
+        if "setup" in tags or "build" in tags:
+            exec(compile(cell.source, "<lesson>", "exec"), namespace)
+        elif "stub" in tags:
+            name = exercise_of(cell)
+            stub, check, solution = exercises[name]
+            exec(compile(_code(solution) if solved else stub.source, f"<{name}>", "exec"), namespace)
+            given[name] = eval(check.source.strip(), namespace)
+    return given
+
+
+def _exercises(notebook: Notebook) -> dict[str, tuple[Cell, Cell, Cell]]:
+    """The stub, check and solution cells of each exercise."""
+    found = {}
+    for stub, following in _stretches(notebook):
+        name = exercise_of(stub)
+        parts = {
+            tag: [cell for cell in following if tag in cell.metadata.get("tags", [])] for tag in ("check", "solution")
+        }
+        for tag, cells in parts.items():
+            if len(cells) != 1:
+                raise ValueError(f"exercise {name} needs one cell tagged {tag} after its stub, has {len(cells)}")
+        found[name] = (stub, parts["check"][0], parts["solution"][0])
+    return found
+
+
+def _stretches(notebook: Notebook) -> Iterator[tuple[Cell, list[Cell]]]:
+    """Each stub with the cells between it and the next."""
+    starts = [i for i, cell in enumerate(notebook.cells) if "stub" in cell.metadata.get("tags", [])]
+    for start, end in zip(starts, [*starts[1:], len(notebook.cells)], strict=True):
+        yield notebook.cells[start], notebook.cells[start + 1 : end]
+
+
+def _code(solution: Cell) -> str:
+    fenced = _FENCE.search(solution.source)
+    if fenced is None:
+        raise ValueError(f"a solution needs its code fenced by ```python: {solution.source[:60]!r}")
+    return fenced[1].rstrip("\n")
+
+
+# The teacher's edition ----------------------------------------------------------------------------------------------
+
+
+def teacher_edition(notebook: Notebook) -> Notebook:
+    """The same lesson with its stubs solved, its solutions open and the teacher's notes beside the cells they speak of.
+
+    Solutions and hidden tests stand between nbgrader's marks, so that `nbgrader generate_assignment` takes them out.
+    """
+    edition = deepcopy(notebook)
+    for name, (stub, check, solution) in _exercises(edition).items():
+        stub.source = mark_solution(stub.source, _code(solution))
+        stub.metadata["nbgrader"] = _nbgrader(name, solution=True)
+        check.source = f"### BEGIN HIDDEN TESTS\nassert {check.source.strip()}\n### END HIDDEN TESTS\n{check.source}"
+        check.metadata["nbgrader"] = {**_nbgrader(f"{name}-check", grade=True), "points": 1}
+    for details in edition.cells:
+        if details.cell_type == "markdown":
+            details.source = details.source.replace("<details>", "<details open>")
+    edition.cells = [cell for one in edition.cells for cell in (one, *_notes(one))]
+    edition.cells[0].source = re.sub(r"\A# (.*)", r"# \1 (teacher's edition)", edition.cells[0].source)
+    for cell in edition.cells:
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
+    edition.metadata.get("camviz", {}).pop("source", None)
+    return edition
+
+
+def write_teacher_edition(source: Path, out: Path) -> list[Path]:
+    """Writes the teacher's edition of every lesson in `source` into `out`, under the same names.
+
+    Raises ValueError when `out` is the lessons' own folder.
+    """
+    if out.resolve() == source.resolve():
+        raise ValueError(f"the teacher's edition cannot be written over the lessons themselves, {source}")
+    out.mkdir(parents=True, exist_ok=True)
+    written = []
+    for path in sorted(source.glob("*.ipynb")):
+        write(teacher_edition(read(path)), out / path.name)
+        written.append(out / path.name)
+    return written
+
+
+def mark_solution(stub: str, solution: str) -> str:
+    """The solution with what differs from the stub between ### BEGIN SOLUTION and ### END SOLUTION."""
+    lines, given = solution.splitlines(), stub.splitlines()
+    same = 0
+    while same < min(len(lines), len(given)) and lines[same] == given[same]:
+        same += 1
+    if same == len(lines):
+        raise ValueError(f"a solution must differ from its stub: {solution[:60]!r}")
+    indent = re.match(r"\s*", next(line for line in lines[same:] if line.strip()))
+    margin = indent[0] if indent else ""
+    return "\n".join([*lines[:same], f"{margin}### BEGIN SOLUTION", *lines[same:], f"{margin}### END SOLUTION"])
+
+
+def _notes(cell: Cell) -> list[Cell]:
+    import nbformat
+
+    note = cell.metadata.get("camviz", {}).get("teacher")
+    if not note:
+        return []
+    made = nbformat.v4.new_markdown_cell(f"> **For the teacher:** {note.strip()}".replace("\n", "\n> "))
+    made.id, made.metadata["tags"] = f"teacher-{cell.id}"[:64], ["teacher"]
+    return [made]
+
+
+def _nbgrader(name: str, grade: bool = False, solution: bool = False) -> dict[str, Any]:
+    marks = {"grade": grade, "solution": solution, "locked": grade, "task": False}
+    return {"schema_version": 3, "grade_id": name.replace(".", "-"), **marks}
+
+
+# Saved outputs ------------------------------------------------------------------------------------------------------
+
+
+def refresh(path: Path) -> None:
+    """Runs a lesson with static, wireframe outputs and saves it so that the same lesson gives the same file.
+
+    Raises nbclient's CellExecutionError when a cell does; the file is left alone then.
+    """
+    from nbclient import NotebookClient
+
+    notebook = read(path)
+    for cell in tagged(notebook, "glossary"):
+        cell.source = glossary.markdown().rstrip("\n")
+    client = NotebookClient(
+        notebook,
+        timeout=120,
+        kernel_name="python3",
+        record_timing=False,
+        coalesce_streams=True,
+        resources={"metadata": {"path": str(path.parent)}},
+    )
+    client.execute(env={**os.environ, "PYTHONPATH": _python_path(), "CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "wire"})
+    write(tidied(notebook), path)
+
+
+def _python_path() -> str:
+    """Where the lesson's kernel, which runs in the lessons' folder, finds this very package."""
+    return os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
+def tidied(notebook: Notebook) -> Notebook:
+    """The notebook without what changes from run to run: times, widget state, versions, random ids."""
+    notebook = deepcopy(notebook)
+    notebook.metadata = type(notebook.metadata)(
+        {
+            "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
+            "language_info": {"name": "python"},
+            "camviz": {"source": fingerprint(notebook)},
+        }
+    )
+    notebook.nbformat, notebook.nbformat_minor = 4, 5
+    counter = 0
+    ids: set[str] = set()
+    for cell in notebook.cells:
+        cell.id = _steady_id(cell, ids)
+        ids.add(cell.id)
+        cell.metadata.pop("execution", None)
+        if cell.cell_type == "code":
+            counter += 1
+            cell.execution_count = counter
+            for output in cell.outputs:
+                if "execution_count" in output:
+                    output.execution_count = counter
+    return notebook
+
+
+def fingerprint(notebook: Notebook) -> str:
+    """A hash of the code whose outputs are saved."""
+    code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    return hashlib.sha256(json.dumps(code).encode()).hexdigest()
+
+
+def is_fresh(notebook: Notebook) -> bool:
+    """True when the saved outputs come from the code that is there, and the glossary cell from the glossary."""
+    current = all(cell.source == glossary.markdown().rstrip("\n") for cell in tagged(notebook, "glossary"))
+    return current and notebook.metadata.get("camviz", {}).get("source") == fingerprint(notebook)
+
+
+def _steady_id(cell: Cell, taken: set[str]) -> str:
+    """The cell's id, or where that was drawn at random one made from the cell's text."""
+    if not _RANDOM_ID.fullmatch(cell.id) and cell.id not in taken:
+        return cell.id
+    text, number = hashlib.sha256(cell.source.encode()).hexdigest()[:12], 1
+    while f"c-{text}-{number}" in taken:
+        number += 1
+    return f"c-{text}-{number}"
+
+
+# Command line -------------------------------------------------------------------------------------------------------
+
+
+def add_teacher_command(subparsers: Any) -> None:
+    """Adds `teacher OUT_DIR` to a command line; its `run(arguments)` returns the exit status."""
+    parser = subparsers.add_parser(
+        "teacher",
+        help="write the teacher's edition of the lessons",
+        description="Writes the lessons with solutions in place, timings and discussion prompts into a folder.",
+    )
+    parser.add_argument("out", type=Path, metavar="OUT_DIR", help="the folder to write to; made when it is not there")
+    parser.set_defaults(run=_run_teacher)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """`python -m camviz.lessons`; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m camviz.lessons", description="Tools for those who write lessons.")
+    subparsers = parser.add_subparsers(required=True)
+    for name, run, text in _COMMANDS:
+        command = subparsers.add_parser(name, help=text)
+        command.add_argument("names", nargs="*", metavar="NAME", help="how a lesson's file name begins; default: all")
+        command.set_defaults(run=run)
+    add_teacher_command(subparsers)
+    given = parser.parse_args(arguments)
+    try:
+        return given.run(given)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _paths(names: Sequence[str]) -> list[Path]:
+    paths = sorted(lessons_folder().glob("*.ipynb"))
+    chosen = [path for path in paths if not names or any(path.name.startswith(name) for name in names)]
+    if not chosen:
+        raise ValueError(f"no lesson in {lessons_folder()} begins with {' or '.join(names) or 'anything'}")
+    return chosen
+
+
+def _run_teacher(given: argparse.Namespace) -> int:
+    written = write_teacher_edition(lessons_folder(), given.out)
+    print(f"{len(written)} lessons written to {given.out}")
+    return 0
+
+
+def _run_refresh(given: argparse.Namespace) -> int:
+    for path in _paths(given.names):
+        print(f"running {path.name}", flush=True)
+        refresh(path)
+    return 0
+
+
+def _run_fresh(given: argparse.Namespace) -> int:
+    stale = [path.name for path in _paths(given.names) if not is_fresh(read(path))]
+    print("\n".join(f"{name} is stale: python -m camviz.lessons refresh {name}" for name in stale) or "all fresh")
+    return 1 if stale else 0
+
+
+def _run_check(given: argparse.Namespace) -> int:
+    from camviz.pattern import complaints
+
+    found = [f"{path.name}: {one}" for path in _paths(given.names) for one in complaints(read(path), path.name)]
+    print("\n".join(found) or "every lesson follows the pattern")
+    return 1 if found else 0
+
+
+_COMMANDS = (
+    ("check", _run_check, "say where lessons depart from the pattern"),
+    ("refresh", _run_refresh, "run lessons and save them with static outputs"),
+    ("fresh", _run_fresh, "say which lessons' saved outputs are stale"),
+)
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,107 @@
+"""One calibration as one HTML page: the three visualizers, with everything inside, readable without a network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from camviz import __version__
+from camviz.cameras import Camera
+from camviz.draw.picture import Picture, style
+from camviz.files import Calibration
+from camviz.views.distortion import DistortionView
+from camviz.views.epipolar import EpipolarView
+from camviz.views.frustum import FrustumView
+
+SIDE_STEP = 0.1  # metres: how far a lone camera is moved to give it a partner
+
+_LAYOUT = """
+:root { color-scheme: light dark; }
+body { margin: 0 auto; max-width: 1040px; padding: 1.5rem; font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto,
+  "DejaVu Sans", sans-serif; background: light-dark(#ffffff, #14181f); color: light-dark(#1c2330, #e8ebf0); }
+h1 { font-size: 1.5rem; margin: 0; } h2 { font-size: 1.15rem; margin: 2.2rem 0 .3rem; }
+p { margin: .3rem 0 .8rem; max-width: 75ch; } figure { margin: .5rem 0 1.5rem; }
+figcaption { font-weight: 600; margin-bottom: .2rem; }
+.scroll { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid light-dark(#d9dde4, #39424f); }
+.note { border-left: 4px solid #c05300; padding-left: .8rem; }
+footer { margin-top: 2rem; opacity: .7; font-size: .85rem; } svg.camviz-svg { width: 100%; height: auto; display: block; }
+"""
+
+
+def write_page(calibration: Calibration, path: str | Path) -> None:
+    """Write the page of a calibration to `path`."""
+    Path(path).write_text(page(calibration), encoding="utf-8")
+
+
+def page(calibration: Calibration) -> str:
+    """The page as HTML text: the cameras' numbers, then their frusta, their distortion and their epipolar geometry."""
+    name = escape(calibration.source.name)
+    sections = [_numbers(calibration), *_frusta(calibration), *_distortions(calibration), *_epipolar(calibration)]
+    return (
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name} · camviz</title>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style()}{_LAYOUT}</style></head>'
+        f"<body><h1>{name}</h1><p>{escape(calibration.format)}</p>{''.join(sections)}"
+        f"<footer>Made by camviz {__version__}. Pixels count from the centre of the first one; metres; "
+        f"x right, y down, z forward.</footer></body></html>\n"
+    )
+
+
+def _numbers(calibration: Calibration) -> str:
+    head = "".join(f"<th>{title}</th>" for title in ("camera", "image", "fx", "fy", "cx", "cy", "lens"))
+    rows = "".join(_row(name, camera) for name, camera in calibration.cameras.items())
+    notes = "".join(f'<p class="note">{escape(note)}</p>' for note in calibration.notes)
+    return f'<div class="scroll"><table><tr>{head}</tr>{rows}</table></div>{notes}'
+
+
+def _row(name: str, camera: Camera) -> str:
+    K = camera.intrinsics
+    cells = [name, f"{K.width} × {K.height}", *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)), repr(camera.lens)]
+    return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+
+
+def _frusta(calibration: Calibration) -> Iterator[str]:
+    yield "<h2>What the camera sees</h2><p>The camera in camviz's garden, through its own lens and pixels.</p>"
+    for name, camera in calibration.cameras.items():
+        yield _figure(name, FrustumView.of(camera.at(RigidTransform.identity())).figure())
+
+
+def _distortions(calibration: Calibration) -> Iterator[str]:
+    yield (
+        "<h2>What the lens does</h2><p>A red circle marks where the model folds: rays beyond it land where others "
+        "already are, and pixels beyond it have no ray at all.</p>"
+    )
+    for name, camera in calibration.cameras.items():
+        yield _figure(name, DistortionView.of(camera).figure())
+
+
+def _epipolar(calibration: Calibration) -> Iterator[str]:
+    yield "<h2>What two pictures share</h2>"
+    pairs = [pair for pair in combinations(calibration.cameras, 2) if _apart(calibration, *pair)]
+    for left, right in pairs:
+        view = EpipolarView.of(calibration.cameras[left], calibration.cameras[right])
+        yield _figure(f"{left} and {right}", view.figure())
+    if not pairs:
+        yield (
+            f"<p>The file does not say how one camera stands to another, so each is shown with its own copy "
+            f"{SIDE_STEP * 100:.0f} cm to its right.</p>"
+        )
+        for name, camera in calibration.cameras.items():
+            yield _figure(name, EpipolarView.of(camera, camera.at(_stepped_aside(camera))).figure())
+
+
+def _apart(calibration: Calibration, a: str, b: str) -> bool:
+    return bool(np.linalg.norm(calibration.cameras[a].centre - calibration.cameras[b].centre) > 1e-9)
+
+
+def _stepped_aside(camera: Camera) -> RigidTransform:
+    return camera.world_from_cam * RigidTransform.from_translation([SIDE_STEP, 0, 0])
+
+
+def _figure(name: str, picture: Picture) -> str:
+    return f"<figure><figcaption>{escape(name)}</figcaption>{picture.embedded()}</figure>"

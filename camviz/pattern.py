@@ -1,0 +1,127 @@
+"""The pattern of a lesson, as statements that a notebook keeps or breaks; `complaints` lists the broken ones."""
+
+from __future__ import annotations
+
+import ast
+import re
+from typing import Any
+
+from camviz import glossary, lessons, questions
+from camviz.exercises import exercises
+
+Notebook = Any
+
+LONGEST_CELL = 30
+"""Lines of code a reader can take in at once."""
+
+_DRAWING = re.compile(r"\bplt\.|\bmatplotlib\b|\bpyvista\b|\bset_xlabel\b")
+_LINK = re.compile(r"00_start_here\.ipynb#([^)\s]+)\)")
+_HEADER = ("minutes", "prerequisites", "what you'll do", "what you'll learn", "what you'll need", "badge")
+
+
+def complaints(notebook: Notebook, file_name: str) -> list[str]:
+    """Where a lesson departs from the pattern, in words; empty for a good one. Lesson 00 has no exercises to hold."""
+    number = file_name[:2]
+    found = [*_header(notebook, number), *_setup(notebook), *_cells(notebook), *_links(notebook)]
+    if number != "00":
+        found += [*_questions(notebook, number), *_exercises(notebook, number), *_ending(notebook)]
+    return found
+
+
+def _header(notebook: Notebook, number: str) -> list[str]:
+    first = notebook.cells[0]
+    if first.cell_type != "markdown" or not first.source.startswith("# "):
+        return ["the first cell must be the header: Markdown that begins with # and the title"]
+    text = first.source.replace("’", "'").lower()
+    wanted = ("?", *_HEADER) if number != "00" else _HEADER[:1]
+    return [f"the header does not mention {word!r}" for word in wanted if word not in text]
+
+
+def _setup(notebook: Notebook) -> list[str]:
+    """One setup cell, the first code: imports by name, and `check = Tutor()` where there are exercises."""
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    setup = lessons.tagged(notebook, "setup")
+    if len(setup) != 1 or not code or code[0] is not setup[0]:
+        return [f"the first code cell, and no other, must be tagged setup; {len(setup)} are"]
+    statements = ast.parse(setup[0].source).body
+    found = [f"setup holds more than imports: {ast.unparse(one)}" for one in statements if not _is_setup(one)]
+    if lessons.tagged(notebook, "stub") and "check = Tutor()" not in setup[0].source.splitlines():
+        found.append("setup must end with check = Tutor()")
+    return found
+
+
+def _is_setup(statement: ast.stmt) -> bool:
+    if isinstance(statement, ast.ImportFrom):
+        return all(alias.name != "*" for alias in statement.names)
+    return isinstance(statement, ast.Import) or ast.unparse(statement) == "check = Tutor()"
+
+
+def _cells(notebook: Notebook) -> list[str]:
+    found = []
+    for number, cell in enumerate(notebook.cells):
+        if cell.cell_type != "code":
+            continue
+        lines = cell.source.splitlines()
+        if len(lines) > LONGEST_CELL:
+            found.append(f"cell {number} has {len(lines)} lines of code, more than {LONGEST_CELL}: {lines[0]}")
+        drawing = _DRAWING.search(cell.source)
+        if drawing:
+            found.append(f"cell {number} draws by itself ({drawing[0]}): drawing belongs in camviz.views")
+    if not lessons.tagged(notebook, "nbval-check-output"):
+        found.append("no cell is tagged nbval-check-output, so no number of this lesson is held")
+    return found
+
+
+def _links(notebook: Notebook) -> list[str]:
+    anchors = {one.anchor for one in glossary.glossary().terms}
+    text = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    return [f"no glossary entry has the address {one}" for one in sorted(set(_LINK.findall(text)) - anchors)]
+
+
+def _questions(notebook: Notebook, number: str) -> list[str]:
+    code = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
+    asked, quizzes = re.findall(r"\bask\(\"([^\"]+)\"\)", code), re.findall(r"\bquiz\(\"([^\"]+)\"\)", code)
+    known = {one.name: one for one in questions.questions(number).values()}
+    predict = [name for name, one in known.items() if one.kind == "predict"]
+    found = [f"ask({name!r}): lesson {number} has no such predict question" for name in asked if name not in predict]
+    found += [f"the predict question {name} is never asked" for name in predict if name not in asked]
+    if len(asked) < 2:
+        found.append(f"at least two predict questions are wanted, {len(asked)} are asked")
+    if quizzes != [number]:
+        found.append(f'the lesson must end with one quiz("{number}"), has {quizzes}')
+    return found
+
+
+def _exercises(notebook: Notebook, number: str) -> list[str]:
+    try:
+        stubs, checks, solutions = lessons.stubs(notebook), lessons.checks(notebook), lessons.solutions(notebook)
+    except ValueError as error:
+        return [str(error)]
+    known = exercises(number)
+    found = [f"{name} is no exercise of lesson {number}" for name in stubs if name not in known]
+    found += [f"the exercise {name} has no stub" for name in known if name not in stubs]
+    if not 3 <= len(stubs) <= 5:
+        found.append(f"three to five exercises are wanted, there are {len(stubs)}")
+    if not any(known[name].bug for name in stubs if name in known):
+        found.append("one exercise should be to find a bug")
+    for name in stubs:
+        if f'check("{name}"' not in checks[name]:
+            found.append(f'the check of {name} must call check("{name}", …)')
+        if solutions[name].strip() == stubs[name].strip():
+            found.append(f"the solution of {name} is its stub")
+    closed = [cell for cell in lessons.tagged(notebook, "solution") if "<details>" not in cell.source]
+    return [*found, *(f"a solution is not folded by <details>: {cell.source[:40]!r}" for cell in closed)]
+
+
+def _ending(notebook: Notebook) -> list[str]:
+    text = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    found = [f"there is no heading {title!r}" for title in ("Recap", "Further reading") if not _heading(title, text)]
+    if len(set(_LINK.findall(text))) < 3:
+        found.append("at least three terms should be linked to the glossary, as 00_start_here.ipynb#principal-point")
+    if not any(cell.metadata.get("camviz", {}).get("teacher") for cell in notebook.cells):
+        found.append("no cell has a note for the teacher in its metadata")
+    return found
+
+
+def _heading(title: str, text: str) -> bool:
+    return re.search(rf"^#+ .*{title}", text, re.MULTILINE | re.IGNORECASE) is not None

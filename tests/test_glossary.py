@@ -1,0 +1,114 @@
+"""The glossary: every key term of the source text, one sentence each, and links that lead somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from camviz.glossary import anchor, glossary, markdown, page, term
+
+ROOT = Path(__file__).parents[1]
+
+KEY_TERMS = (
+    """
+Camera Calibration Techniques|Camera Coordinates|Camera Matrix|CCD Sensor|Checkerboard pattern method|CMOS Sensor
+Color Filter Array|Color Space|David Marr|Demosaicing Algorithms|Depth of Field|Disparity and Depth Estimation
+Dynamic Range|Epipolar Geometry|Extrinsic Calibration|Field of View|Fisheye lenses|Focal Length
+Homogeneous Coordinates|Homogeneous Transformations|Image formation pipeline|Image resolution
+Intrinsic Calibration|Light Field Cameras|Omnidirectional Cameras|Perspective Camera|Pinhole Camera
+Pixel Aspect Ratio|Projection|Quantum Efficiency|Radial distortion|Radial distortion coefficients|Ray Tracing
+Rotation Matrix|Shai Shalev-Shwartz|Skew coefficient|Stereo Rectification|Tangential Distortion
+Thin lens approximation|Translation Vector|Viewing Frustum|White Balance and Color Correction|World Coordinates
+Zhang's Calibration Algorithm
+""".strip()
+    .replace("\n", "|")
+    .split("|")
+)
+
+ALL = pytest.mark.parametrize("one", glossary().terms, ids=lambda one: one.anchor)
+
+
+def test_the_44_key_terms_of_the_source_text_are_all_there_and_no_other_is_called_one():
+    assert len(KEY_TERMS) == 44
+    assert {term(name).name for name in KEY_TERMS} == {one.name for one in glossary().terms if one.key}
+    assert sum(one.key for one in glossary().terms) == 44
+
+
+@ALL
+def test_an_entry_is_one_sentence(one):
+    assert one.sentence[0].isupper()
+    assert one.sentence.endswith(".")
+    assert not re.search(r"[.?!] [A-Z]", one.sentence)
+
+
+@ALL
+def test_an_entry_says_which_lessons_use_it_and_those_exist_in_the_course(one):
+    assert one.lessons
+    assert all(number in [f"{n:02d}" for n in range(17)] for number in one.lessons)
+    assert list(one.lessons) == sorted(one.lessons)
+
+
+def test_no_two_entries_share_a_name_or_an_address():
+    names = [name.casefold() for one in glossary().terms for name in (one.name, *one.also)]
+    assert len(names) == len(set(names))
+    assert len({one.anchor for one in glossary().terms}) == len(glossary().terms)
+
+
+def test_a_term_is_found_by_its_other_names_and_an_unknown_one_brings_suggestions():
+    assert term("FOV") == term("field of view")
+    assert term("Color Space").name == "Colour space"
+    with pytest.raises(ValueError, match="perhaps Principal point"):
+        term("principle point")
+
+
+@pytest.mark.parametrize(
+    ("name", "needs", "never"),
+    [
+        ("translation vector", "t = −R C", "position of the camera"),
+        ("homogeneous transformations", "rigid", "and scaling"),
+        ("checkerboard pattern method", "printed", "projecting"),
+        ("skew coefficient", "perpendicular", "optical axis"),
+        ("CMOS sensor", "as low as that of a CCD or lower", "higher noise"),
+        ("undistortion", "forward model", "inverse model"),
+        ("fundamental matrix", "not sufficient", "sufficient condition"),
+        ("Zhang's calibration algorithm", "two when the skew", "few images"),
+        ("Shai Shalev-Shwartz", "none of which could be found", "contributions"),
+        ("white balance", "tint", "color temperature only"),
+    ],
+)
+def test_the_source_text_s_errors_are_not_repeated(name, needs, never):
+    text = repr(term(name))
+    assert needs in text
+    assert never not in text
+
+
+def test_entries_show_as_safe_html_and_as_plain_text():
+    assert '<dt id="principal-point">' in term("principal point")._repr_html_()
+    assert "<em>pixels</em>" in term("fundamental matrix")._repr_html_()
+    assert "<" not in repr(term("fundamental matrix"))
+    assert len(re.findall("<dt id=", glossary()._repr_html_())) == len(glossary().terms)
+
+
+def test_the_saved_glossary_is_fresh():
+    """Mend with: python -m camviz.glossary"""
+    assert (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8") == page()
+
+
+def test_addresses_are_those_github_gives_a_heading():
+    assert anchor("Zhang's calibration algorithm") == "zhangs-calibration-algorithm"
+    assert '<a id="shai-shalev-shwartz"></a>' in markdown()
+    assert "[05](lessons/05_distortion.ipynb)" in markdown("lessons/")
+
+
+def test_every_glossary_link_in_the_lessons_has_a_target():
+    anchors = {one.anchor for one in glossary().terms}
+    for path in sorted((ROOT / "lessons").glob("*.ipynb")):
+        linked = set(re.findall(r"00_start_here\.ipynb#([^)\"\\]+)\)", path.read_text(encoding="utf-8")))
+        assert linked <= anchors, f"{path.name} links to {sorted(linked - anchors)}"
+
+
+def test_the_lessons_that_the_glossary_links_to_exist_once_there_are_lessons():
+    notebooks = {path.name for path in (ROOT / "lessons").glob("*.ipynb")}
+    linked = set(re.findall(r"\(lessons/([^)]+)\)", markdown("lessons/")))
+    assert linked
+    assert "00_start_here.ipynb" not in notebooks or linked <= notebooks

@@ -1,0 +1,300 @@
+"""The lessons: they follow the pattern, solutions pass, stubs do not, and both editions come from one source."""
+
+import inspect
+import os
+import textwrap
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from camviz import lessons
+from camviz.exercises import exercises, lesson05
+from camviz.pattern import complaints
+
+ROOT = Path(__file__).parents[1]
+LESSONS = sorted((ROOT / "lessons").glob("*.ipynb"))
+EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+
+HEADER = """# 05 Lens distortion
+*What does a polynomial do beyond its last data point?* ![badge](badge.svg)
+
+**60 minutes.** **Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""
+
+SETUP = """import numpy as np
+from camviz.exercises import Tutor
+from camviz.widgets.question import ask, quiz
+check = Tutor()"""
+
+ENDING = """## Recap
+A [fold](00_start_here.ipynb#fold), the [principal point](00_start_here.ipynb#principal-point) and
+[undistortion](00_start_here.ipynb#undistortion).
+## Further reading
+Hartley and Zisserman 2004, section 7.4."""
+
+BUG = """def tangential(xy, p1, p2):
+    x, y = xy[..., 0], xy[..., 1]
+    r2 = x**2 + y**2
+    return np.stack([p1 * x * y + p2 * (r2 + 2 * x**2), p1 * (r2 + 2 * y**2) + 2 * p2 * x * y], axis=-1)"""
+
+
+def code(source, *tags, **camviz):
+    return nbformat.v4.new_code_cell(source, metadata={"tags": [*tags], **({"camviz": camviz} if camviz else {})})
+
+
+def text(source, *tags, **camviz):
+    return nbformat.v4.new_markdown_cell(source, metadata={"tags": [*tags], **({"camviz": camviz} if camviz else {})})
+
+
+def exercise_cells(name):
+    """The stub, check and folded solution of an exercise of lesson 05, made from its reference."""
+    function = name.split(".")[1]
+    source = textwrap.dedent(inspect.getsource(getattr(lesson05, function)))
+    solution = source.replace(": Array", "").replace(" -> Array", "").replace("ArrayLike", "object")
+    signature = solution.splitlines()[0]
+    stub = BUG if function == "tangential" else f"{signature}\n    raise NotImplementedError"
+    folded = f"<details><summary>Solution</summary>\n\n```python\n{solution}```\n\n</details>"
+    return [
+        code(stub, "stub", exercise=name),
+        code(f'check("{name}", {function})', "check"),
+        text(folded, "solution"),
+    ]
+
+
+@pytest.fixture
+def lesson():
+    cells = [
+        text(HEADER),
+        code(SETUP, "setup"),
+        code('ask("05.barrel")'),
+        text("## Predict", teacher="10 minutes.\nAsk for hands before the reveal."),
+        code('ask("05.fold")'),
+        code('ask("05.undistort")'),
+        code("print(round((1 / 0.9) ** 0.5, 3))", "nbval-check-output"),
+        *(cell for name in exercises("05") for cell in exercise_cells(name)),
+        code('quiz("05")'),
+        text(ENDING),
+    ]
+    return nbformat.v4.new_notebook(cells=cells)
+
+
+def test_a_lesson_that_follows_the_pattern_brings_no_complaints(lesson):
+    nbformat.validate(lesson)
+    assert complaints(lesson, "05_distortion.ipynb") == []
+
+
+def drop(tag):
+    def change(notebook):
+        notebook.cells = [cell for cell in notebook.cells if tag not in cell.metadata.get("tags", [])]
+
+    return change
+
+
+def replace(old, new):
+    def change(notebook):
+        assert any(old in cell.source for cell in notebook.cells)
+        for cell in notebook.cells:
+            cell.source = cell.source.replace(old, new)
+
+    return change
+
+
+def drop_first(notebook):
+    del notebook.cells[0]
+
+
+def drop_notes(notebook):
+    for cell in notebook.cells:
+        cell.metadata.get("camviz", {}).pop("teacher", None)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (drop_first, "header"),
+        (replace("minutes.**", "hours**"), "minutes"),
+        (replace("badge", "link"), "badge"),
+        (drop("setup"), "tagged setup"),
+        (replace("import Tutor", "import *"), "more than imports"),
+        (replace("import numpy as np", "import numpy as np\nsize = 3"), "size = 3"),
+        (replace("check = Tutor()", ""), "check = Tutor()"),
+        (replace('ask("05.fold")', ""), "05.fold is never asked"),
+        (replace('ask("05.fold")', 'ask("05.quiz_fold")'), "no such predict question"),
+        (replace('quiz("05")', ""), "one quiz"),
+        (drop("check"), "needs one cell tagged check"),
+        (drop("solution"), "needs one cell tagged solution"),
+        (replace('check("05.distort"', 'check("05.tangential"'), 'must call check("05.distort"'),
+        (replace("print(", "plt.show("), "draws by itself"),
+        (replace("print(", "\n" * 30 + "print("), "lines of code"),
+        (drop("nbval-check-output"), "nbval-check-output"),
+        (replace("## Recap", "## End"), "Recap"),
+        (replace("## Further reading", ""), "Further reading"),
+        (replace("#undistortion", "#undistorsion"), "undistorsion"),
+        (replace("[fold](00_start_here.ipynb#fold)", "fold"), "at least three terms"),
+        (replace("<details>", "<div>"), "not folded"),
+        (drop_notes, "note for the teacher"),
+    ],
+)  # fmt: skip
+def test_each_departure_from_the_pattern_is_named(lesson, change, complaint):
+    change(lesson)
+    found = complaints(lesson, "05_distortion.ipynb")
+    assert any(complaint in one for one in found), found
+
+
+def test_every_solution_passes_its_checker_and_no_stub_does(lesson):
+    solved, unsolved = lessons.verdicts(lesson, solved=True), lessons.verdicts(lesson, solved=False)
+    assert list(solved) == list(unsolved) == list(exercises("05"))
+    assert all(solved.values()), solved
+    assert not any(unsolved.values())
+    assert unsolved["05.tangential"].message.startswith("This is what you get with `p1*x*y` instead of `2*p1*x*y`")
+
+
+def test_the_teacher_s_edition_has_solutions_in_place_notes_visible_and_hidden_tests(lesson):
+    edition = lessons.teacher_edition(lesson)
+    nbformat.validate(edition)
+    stub = lessons.stubs(edition)["05.fold_radius"]
+    assert "### BEGIN SOLUTION" in stub
+    assert "NotImplementedError" not in stub
+    assert edition.cells[0].source.startswith("# 05 Lens distortion (teacher's edition)\n")
+    notes = [cell.source for cell in lessons.tagged(edition, "teacher")]
+    assert notes == ["> **For the teacher:** 10 minutes.\n> Ask for hands before the reveal."]
+    assert all("<details open>" in cell.source for cell in lessons.tagged(edition, "solution"))
+    assert 'assert check("05.distort", distort)' in lessons.checks(edition)["05.distort"]
+    assert not any(cell.get("outputs") for cell in edition.cells)
+
+
+def test_the_student_s_edition_shows_nothing_of_the_teacher_s(lesson):
+    before = nbformat.writes(lesson)
+    lessons.teacher_edition(lesson)
+    assert nbformat.writes(lesson) == before
+    assert not any("Ask for hands" in cell.source or "BEGIN SOLUTION" in cell.source for cell in lesson.cells)
+
+
+def test_every_check_of_the_teacher_s_edition_holds_when_run_as_code(lesson):
+    edition, namespace = lessons.teacher_edition(lesson), {}
+    for cell in edition.cells:
+        if {"setup", "stub", "check"} & set(cell.metadata.get("tags", [])):
+            exec(cell.source, namespace)
+
+
+def test_a_wrong_solution_makes_the_teacher_s_edition_fail(lesson):
+    replace("np.sqrt(-3 * k1)", "np.sqrt(-k1)")(lesson)
+    with pytest.raises(AssertionError):
+        test_every_check_of_the_teacher_s_edition_holds_when_run_as_code(lesson)
+
+
+def test_what_stub_and_solution_share_stays_outside_the_solution_s_marks():
+    stub = 'def f(x):\n    """Doubles."""\n    raise NotImplementedError'
+    solution = 'def f(x):\n    """Doubles."""\n    y = 2 * x\n    return y'
+    marked = lessons.mark_solution(stub, solution)
+    assert marked.splitlines()[:3] == ["def f(x):", '    """Doubles."""', "    ### BEGIN SOLUTION"]
+    assert marked.splitlines()[-1] == "    ### END SOLUTION"
+    exec(marked, namespace := {})
+    assert namespace["f"](2) == 4
+    with pytest.raises(ValueError, match="must differ from its stub"):
+        lessons.mark_solution(stub, stub)
+
+
+def test_the_teacher_s_edition_is_never_written_over_the_lessons(tmp_path, lesson):
+    lessons.write(lesson, tmp_path / "05_distortion.ipynb")
+    with pytest.raises(ValueError, match="over the lessons"):
+        lessons.write_teacher_edition(tmp_path, tmp_path / ".." / tmp_path.name)
+    (written,) = lessons.write_teacher_edition(tmp_path, tmp_path / "teacher")
+    assert "BEGIN SOLUTION" in written.read_text(encoding="utf-8")
+
+
+def test_tidying_makes_two_runs_of_one_lesson_equal(lesson):
+    def run(seed):
+        notebook = nbformat.from_dict(lesson)
+        notebook.metadata["widgets"] = {"state": seed}
+        for number, cell in enumerate(notebook.cells):
+            cell.id = f"{seed + number:08x}"
+            cell.metadata["execution"] = {"iopub.execute_input": seed}
+        return nbformat.writes(lessons.tidied(notebook))
+
+    assert run(1) == run(1000)
+    tidy = lessons.tidied(lesson)
+    assert [cell.execution_count for cell in tidy.cells if cell.cell_type == "code"][:3] == [1, 2, 3]
+    assert len({cell.id for cell in tidy.cells}) == len(tidy.cells)
+    assert nbformat.writes(lessons.tidied(tidy)) == nbformat.writes(tidy)
+
+
+def test_saved_outputs_are_fresh_until_the_code_changes(lesson):
+    saved = lessons.tidied(lesson)
+    assert lessons.is_fresh(saved)
+    saved.cells[0].source += "\nOne more word."
+    assert lessons.is_fresh(saved)
+    saved.cells[6].source += "\n"
+    assert not lessons.is_fresh(saved)
+
+
+def test_refreshing_runs_a_lesson_with_static_outputs_twice_alike(tmp_path):
+    path = tmp_path / "99_tiny.ipynb"
+    cells = [
+        code("import os\nfrom camviz.widgets.question import ask"),
+        code("print(os.environ['CAMVIZ_STATIC'], os.environ['CAMVIZ_RENDERER'])"),
+        code('ask("05.fold")'),
+        text("", "glossary"),
+    ]
+    lessons.write(nbformat.v4.new_notebook(cells=cells), path)
+    assert not lessons.is_fresh(lessons.read(path))
+    lessons.refresh(path)
+    first = path.read_text(encoding="utf-8")
+    notebook = lessons.read(path)
+    assert lessons.is_fresh(notebook)
+    assert notebook.cells[1].outputs[0].text == "1 wire\n"
+    assert set(notebook.cells[2].outputs[0].data) == {"text/plain", "text/html"}
+    assert '<a id="fold"></a>' in notebook.cells[3].source
+    lessons.refresh(path)
+    assert path.read_text(encoding="utf-8") == first
+
+
+def test_a_file_that_is_no_notebook_is_named(tmp_path):
+    path = tmp_path / "05_picture.ipynb"
+    path.write_text("not json")
+    with pytest.raises(ValueError, match=r"05_picture\.ipynb is not a notebook"):
+        lessons.read(path)
+
+
+def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp_path, lesson, monkeypatch, capsys):
+    monkeypatch.setattr(lessons, "lessons_folder", lambda: tmp_path)
+    lessons.write(lesson, tmp_path / "05_distortion.ipynb")
+    assert lessons.main(["check"]) == 0
+    assert lessons.main(["fresh"]) == 1
+    assert "05_distortion.ipynb is stale" in capsys.readouterr().out
+    assert lessons.main(["teacher", str(tmp_path / "out")]) == 0
+    assert lessons.main(["fresh", "06"]) == 2
+    assert "begins with 06" in capsys.readouterr().err
+
+
+def test_metadata_survives_jupytext_s_percent_format():
+    jupytext = pytest.importorskip("jupytext")
+    percent = (
+        '# %% tags=["stub"] camviz={"exercise": "05.distort", "teacher": "5 minutes.\\nAsk."}\ndef distort(): ...\n'
+    )
+    notebook = jupytext.reads(percent, fmt="py:percent")
+    assert lessons.stubs(notebook) == {"05.distort": "def distort(): ..."}
+    assert notebook.cells[0].metadata["camviz"]["teacher"] == "5 minutes.\nAsk."
+
+
+@EACH
+def test_every_lesson_follows_the_pattern(path):
+    """Told also by: python -m camviz.lessons check"""
+    assert complaints(lessons.read(path), path.name) == []
+
+
+@EACH
+def test_every_lesson_s_solutions_pass_and_its_stubs_do_not(path, monkeypatch):
+    monkeypatch.chdir(path.parent)
+    monkeypatch.setitem(os.environ, "CAMVIZ_STATIC", "1")
+    notebook = lessons.read(path)
+    assert all(lessons.verdicts(notebook, solved=True).values())
+    assert not any(lessons.verdicts(notebook, solved=False).values())
+
+
+@EACH
+def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
+    """Mend with: python -m camviz.lessons refresh"""
+    notebook = lessons.read(path)
+    assert lessons.is_fresh(notebook)
+    assert "application/vnd.jupyter.widget-view+json" not in path.read_text(encoding="utf-8")
