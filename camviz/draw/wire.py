@@ -108,9 +108,8 @@ def draw_marks(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hid
             points_cam = sight.points_cam(item.points)
             px = sight.place(points_cam)
             behind = hidden(px, points_cam[:, 2])
-            style = f"stroke-width:{item.diameter:g}"
-            parts.append(svg.dots(px[~behind], item.class_, style=style))
-            parts.append(svg.dots(px[behind], f"{item.class_} faint", style=style))
+            parts.append(svg.dots(px[~behind], item.class_, item.diameter))
+            parts.append(svg.dots(px[behind], f"{item.class_} faint", item.diameter))
     for item in items:
         if isinstance(item, Label):
             px = sight.place(sight.points_cam(item.point))
