@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from math import degrees, atan
+from math import atan, degrees
 from typing import Any
 from zlib import crc32
 
@@ -91,7 +91,7 @@ def _shoot(sight: Sight, items: Sequence[Item], scale: float) -> Shot:
 
 
 def rehearse(window: str) -> None:
-    """Draw a square with the named window class, as opengl_works does in a process of its own. Exits 0 if it is there."""
+    """Draw a square with the named window class and exit, 0 if it can be seen: for a process of its own."""
     from camviz.draw.space import Eye
 
     def square() -> bool:
@@ -108,7 +108,8 @@ class Studio:
     def __init__(self, window: str) -> None:
         from vtkmodules import vtkRenderingCore, vtkRenderingOpenGL2
 
-        self.window: Any = getattr(vtkRenderingOpenGL2, window, vtkRenderingCore.vtkRenderWindow)()
+        windows: Any = vtkRenderingCore if window == "vtkRenderWindow" else vtkRenderingOpenGL2
+        self.window = getattr(windows, window)()
         self.window.SetOffScreenRendering(True)
         self.window.SetMultiSamples(0)
         self.window.SetAlphaBitPlanes(True)
@@ -162,9 +163,9 @@ class Studio:
         from vtkmodules.util.numpy_support import numpy_to_vtk
 
         actor = self._actor()
-        there = np.isfinite(sheet.vertices).all(axis=-1)
-        quads = sheet.quads[there[sheet.quads].all(axis=-1)]
-        data = _surface(np.where(there[:, None], sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
+        there = np.isfinite(sheet.vertices).all(axis=-1, keepdims=True)
+        quads = sheet.quads[there[sheet.quads, 0].all(axis=-1)]
+        data = _surface(np.where(there, sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
         data.GetPointData().SetTCoords(numpy_to_vtk(sheet.uv * (1, -1) + (0, 1), deep=True))
         actor.GetMapper().SetInputData(data)
         actor.GetProperty().SetOpacity(sheet.opacity)
@@ -213,7 +214,7 @@ class Studio:
 
 
 def _unmixed(rgba: np.ndarray) -> np.ndarray:
-    """Colours (h, w, 3) without the background, which shows through as c = alpha * colour + (1 - alpha) * background."""
+    """Colours (h, w, 3) without the background that shows through: c = alpha * colour + (1 - alpha) * background."""
     rgb = np.ascontiguousarray(rgba[..., :3])
     mixed = (rgba[..., 3] > 0) & (rgba[..., 3] < 255)
     alpha = rgba[mixed][:, 3:] / 255

@@ -114,7 +114,7 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
         shared = [pictures.setdefault(mesh.picture.tobytes(), mesh.picture) for mesh in meshes]
         return tuple(Sheet(m.vertices, m.quads, m.uv, p) for m, p in zip(meshes, shared, strict=True))
     flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
-    fills = [Face(mesh.vertices[mesh.quads[0]], "#%02x%02x%02x" % mesh.rgb, 0.25) for mesh in flat]
+    fills = [Face(mesh.vertices[mesh.quads[0]], f"#{bytes(mesh.rgb).hex()}", 0.25) for mesh in flat]
     lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
     drawn = [Line(line, "muted" if name in ("wall", "lamp", "easel") else "ink", 1.2) for name, line in lines]
     squares = [Line(line, "ink", 0.7) for _, line in wireframe_scene().only("board")]
