@@ -26,7 +26,8 @@ NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be 
 class Scene:
     """Surfaces under a sky. List them near to far: what is hidden then costs nothing.
 
-    The sky is an equirectangular texture infinitely far away, its middle towards +z and its first row straight up.
+    The sky is an equirectangular texture infinitely far away, its texels square, its middle towards +z and its first
+    row straight up. Where it ends before the nadir, its last row goes on.
     """
 
     surfaces: Sequence[Surface]
@@ -88,7 +89,10 @@ class Scene:
             return
         x, y, z = runs.directions.reshape(3, -1)[:, missed]
         depth[missed] = np.nan
-        light[missed] = self.sky.sample(*on_sphere(x, y, -z), spread * self.sky.height / np.pi)
+        s, r = on_sphere(x, y, -z)
+        rows = self.sky.width / 2  # of a whole sphere
+        r = np.minimum(r * np.float32(rows / self.sky.height), np.float32(1 - 0.5 / self.sky.height))
+        light[missed] = self.sky.sample(s, r, spread * rows / np.pi)
         light[missed[(x == 0) & (y == 0) & (z == 0)]] = NEUTRAL
 
     def outlines(self) -> Wireframe:
