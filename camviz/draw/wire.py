@@ -216,7 +216,7 @@ def _fills(
             if len(vertices) > 2 and np.isfinite(vertices).all():
                 yield float(vertices[:, 2].mean()), _fill(sight.place(vertices), item), {}
         elif isinstance(item, Sheet):
-            points = sight.points_cam(item.points)
+            points = sight.points_cam(item.vertices)
             window = warp(sight.place(points), item, sight.camera.intrinsics, scale)
             if window is not None:
                 key, (x, y, width, height), pixels = f"{name}-{i}", *window
