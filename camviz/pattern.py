@@ -16,7 +16,7 @@ LONGEST_CELL = 30
 
 _DRAWING = re.compile(r"\bplt\.|\bmatplotlib\b|\bpyvista\b|\bset_xlabel\b")
 _LINK = re.compile(r"00_start_here\.ipynb#([^)\s]+)\)")
-_HEADER = ("minutes", "prerequisites", "what you'll do", "what you'll learn", "what you'll need", "badge")
+_HEADER = ("minutes", "prerequisites", "what you'll do", "what you'll learn", "what you'll need", "mybinder.org")
 
 
 def complaints(notebook: Notebook, file_name: str) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, transform
@@ -31,7 +31,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A flat convex outline (n, 3), filled. Not drawn when a vertex is NaN."""
+    """A convex outline (n, 3), filled: a fan of triangles around its first vertex. Not drawn when a vertex is NaN."""
 
     vertices: Array
     colour: str = "blue"
@@ -45,28 +45,37 @@ class Face:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A picture (height, width, 3), uint8 RGB, stretched over a grid of points (m, n, 3), row by row as the picture's.
+    """A picture (height, width, 3), uint8 RGB, stretched over quadrilaterals.
 
-    Two by two points make a flat quad with exact perspective; more of them bend. Cells with a NaN corner are left out.
+    `quads` (m, 4) are indices of vertices (n, 3) in metres; uv (n, 2) places these on the picture, u to the right and
+    v upwards, 0 … 1. A quad with a NaN vertex is left out. A flat quad shows the picture in exact perspective.
     """
 
-    points: Array
-    image: np.ndarray
+    vertices: Array
+    quads: NDArray[np.intp]
+    uv: Array
+    picture: NDArray[np.uint8]
     opacity: float = 1.0
 
     def __post_init__(self) -> None:
-        points = as_points(self.points, 3, "points")
-        if points.ndim != 3 or min(points.shape[:2]) < 2:
-            raise ValueError(f"points must be a grid (m, n, 3) of at least 2 × 2, got {points.shape}")
-        if self.image.ndim != 3 or self.image.shape[2] != 3 or self.image.dtype != np.uint8:
-            raise ValueError(f"image must be uint8 (height, width, 3), got {self.image.dtype} {self.image.shape}")
-        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "vertices", as_points(self.vertices, 3, "vertices"))
+        object.__setattr__(self, "uv", as_points(self.uv, 2, "uv"))
+        if len(self.uv) != len(self.vertices):
+            raise ValueError(f"uv must be one for each of {len(self.vertices)} vertices, got {len(self.uv)}")
+        if self.picture.ndim != 3 or self.picture.shape[2] != 3 or self.picture.dtype != np.uint8:
+            raise ValueError(f"picture must be uint8 (height, width, 3), got {self.picture.dtype} {self.picture.shape}")
 
     @classmethod
-    def quad(cls, corners: ArrayLike, image: np.ndarray, opacity: float = 1.0) -> Sheet:
-        """A flat quad from its corners (4, 3), clockwise from the picture's top left."""
-        a, b, c, d = as_points(corners, 3, "corners")
-        return cls(np.array([[a, b], [d, c]]), image, opacity)
+    def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: float = 1.0) -> Sheet:
+        """The picture over a grid of points (m, n, 3), at least 2 × 2, whose rows follow the picture's."""
+        points = as_points(points, 3, "points")
+        if points.ndim != 3 or min(points.shape[:2]) < 2:
+            raise ValueError(f"points must be a grid (m, n, 3) of at least 2 × 2, got {points.shape}")
+        m, n = points.shape[:2]
+        u, v = np.meshgrid(np.linspace(0, 1, n), np.linspace(1, 0, m))
+        a = (np.arange(m - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
+        quads = np.stack([a, a + 1, a + n + 1, a + n], axis=-1)
+        return cls(points.reshape(-1, 3), quads, np.stack([u, v], axis=-1).reshape(-1, 2), picture, opacity)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +102,8 @@ class Label:
         object.__setattr__(self, "point", as_points(self.point, 3, "point").reshape(3))
 
 
+SIDE = 16  # points along each side of a camera's rim
+
 Item = Line | Face | Sheet | Dots | Label
 
 
@@ -103,11 +114,17 @@ def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") 
     for letter, colour, tip in zip("xyz", ("orange", "green", "blue"), tips, strict=True):
         items.append(Line(np.array([origin, tip]), colour, 2.4, head=True))
         items.append(Label(origin + 1.12 * (tip - origin), letter, f"label {colour}"))
-    return [*items, Label(origin, name, "note")] if name else items
+    return [*items, Label(1.3 * origin - 0.3 * tips[1], name, "note")] if name else items
 
 
 def camera_body(
-    camera: Camera, depth: float, *, image: np.ndarray | None = None, colour: str = "blue", name: str = "", near: float = 0
+    camera: Camera,
+    depth: float,
+    *,
+    image: NDArray[np.uint8] | None = None,
+    colour: str = "blue",
+    name: str = "",
+    near: float = 0,
 ) -> list[Item]:
     """A camera as seen from outside: its centre, the volume it sees out to `depth` metres, its up side, its picture.
 
@@ -115,18 +132,18 @@ def camera_body(
     all point well forward end on a plane, as a pinhole's image does, those of a wider lens on a sphere. `image`, uint8
     RGB, is shown there; `near` adds a second rim.
     """
-    reach = _reach(camera, camera.intrinsics.border(12))
+    reach = _reach(camera, camera.intrinsics.border(SIDE))
     rim = camera.centre + depth * reach
-    corners = rim[::12]
+    corners = rim[::SIDE]
     items: list[Item] = [Line(_closed(rim), colour, 2.2), Dots(camera.centre, colour, 8)]
     items += [Line(np.array([camera.centre, corner]), colour, 1.5) for corner in corners]
-    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(_closed(rim), 12)]
+    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(_closed(rim))]
     if near > 0:
         items.append(Line(_closed(camera.centre + near * reach), colour, 1.2))
     if image is not None:
-        mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 7, 9)
-        items.append(Sheet(camera.centre + depth * _reach(camera, mesh), image))
-    items += _up_marker(rim[0], rim[12], rim[6], rim[30], colour)
+        mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 10, 13)
+        items.append(Sheet.over(camera.centre + depth * _reach(camera, mesh), image))
+    items.append(_up_marker(camera, rim[SIDE // 2], depth, colour))
     return [*items, Label(camera.centre, name, f"label {colour}")] if name else items
 
 
@@ -141,10 +158,10 @@ def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid"
 
 
 def _reach(camera: Camera, uv: Array) -> Array:
-    """Vectors from the centre along the rays of pixels `uv`, to the plane z = 1 or, for a wide lens, the unit sphere."""
+    """Vectors from the centre along the rays of pixels `uv`, to z = 1 or, for a wide lens, to the unit sphere."""
     rays = camera.unproject(uv)
     forward = camera.world_from_cam.rotation.as_matrix()[:, 2]
-    z = camera.unproject(camera.intrinsics.border(12)) @ forward
+    z = camera.unproject(camera.intrinsics.border(SIDE)) @ forward
     flat = np.isfinite(z).all() and z.min() > 0.25
     return rays / (rays @ forward)[..., None] if flat else rays
 
@@ -155,15 +172,15 @@ def _mesh(camera: Camera, rows: int, columns: int) -> Array:
     return np.stack(np.meshgrid(u, v), axis=-1)
 
 
-def _up_marker(left: Array, right: Array, top: Array, bottom: Array, colour: str) -> list[Item]:
-    """A small triangle above the rim's upper edge."""
-    middle, half, up = top, (right - left) / 12, (top - bottom) / 7
-    return [Face(np.array([middle - half, middle + up, middle + half]), colour, 0.9)]
+def _up_marker(camera: Camera, top: Array, depth: float, colour: str) -> Item:
+    """A small triangle above the middle of the rim's upper edge."""
+    right, down, _ = 0.1 * depth * camera.world_from_cam.rotation.as_matrix().T
+    return Face(top - [0.2 * down + right, 0.2 * down - right, 1.5 * down], colour, 0.9)
 
 
 def _closed(outline: Array) -> Array:
     return np.vstack([outline, outline[:1]])
 
 
-def _sides(outline: Array, count: int) -> list[Array]:
-    return [outline[i : i + count + 1] for i in range(0, len(outline) - 1, count)]
+def _sides(outline: Array) -> list[Array]:
+    return [outline[i : i + SIDE + 1] for i in range(0, len(outline) - 1, SIDE)]

@@ -81,11 +81,13 @@ def style() -> str:
 
 
 def _encode(extension: str, image: np.ndarray, options: list[int]) -> bytes:
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or not image.size:
+        raise ValueError(f"a picture is uint8 (height, width) or (height, width, 3), got {image.dtype} {image.shape}")
     swap = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
     pixels = cv2.cvtColor(image, swap[image.shape[2]]) if image.ndim == 3 else image
     done, data = cv2.imencode(extension, pixels, options)
     if not done:
-        raise ValueError(f"cannot encode an image of shape {image.shape} and type {image.dtype} as {extension}")
+        raise ValueError(f"OpenCV cannot write an image of shape {image.shape} as {extension}")
     return data.tobytes()
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 
@@ -13,37 +15,31 @@ Window = tuple[tuple[float, float, float, float], np.ndarray]
 
 
 def warp(px: Array, sheet: Sheet, view: Intrinsics, scale: float) -> Window | None:
-    """The sheet as seen, with its grid at picture units `px` (m, n, 2): a rectangle (x, y, width, height) and RGBA pixels.
+    """The sheet as seen, its vertices at picture units `px` (n, 2): a rectangle (x, y, width, height) and RGBA pixels.
 
     `scale` is pixels per picture unit. None where nothing of it is in view.
     """
     if not np.isfinite(px).any():
         return None
-    low = np.maximum(np.floor(np.nanmin(px, axis=(0, 1))), 0)
-    high = np.minimum(np.ceil(np.nanmax(px, axis=(0, 1))), (view.width, view.height))
+    low = np.maximum(np.floor(np.nanmin(px, axis=0)), 0)
+    high = np.minimum(np.ceil(np.nanmax(px, axis=0)), (view.width, view.height))
     if (high <= low).any():
         return None
     width, height = np.ceil((high - low) * scale).astype(int)
     canvas = np.zeros((height, width, 4), np.uint8)
     for corners, source in _cells(px, sheet):
-        _stamp(canvas, sheet.image, source, (corners - low) * scale)
+        _stamp(canvas, sheet.picture, source, (corners - low) * scale)
     canvas[..., 3] = np.rint(canvas[..., 3] * sheet.opacity)
     return (float(low[0]), float(low[1]), width / scale, height / scale), canvas
 
 
-def _cells(px: Array, sheet: Sheet) -> list[tuple[Array, Array]]:
-    """Corners in view and in the sheet's picture, both (4, 2), of every cell that exists."""
-    m, n = px.shape[:2]
-    height, width = sheet.image.shape[:2]
-    v, u = np.linspace(0, height, m), np.linspace(0, width, n)
-    cells = []
-    for i in range(m - 1):
-        for j in range(n - 1):
-            corners = np.array([px[i, j], px[i, j + 1], px[i + 1, j + 1], px[i + 1, j]])
-            if np.isfinite(corners).all():
-                source = np.array([(u[j], v[i]), (u[j + 1], v[i]), (u[j + 1], v[i + 1]), (u[j], v[i + 1])])
-                cells.append((corners, source))
-    return cells
+def _cells(px: Array, sheet: Sheet) -> Iterator[tuple[Array, Array]]:
+    """Corners in view and in the sheet's picture, both (4, 2), of every quad that exists."""
+    height, width = sheet.picture.shape[:2]
+    source = (sheet.uv * (1, -1) + (0, 1)) * (width, height)
+    for quad in sheet.quads:
+        if np.isfinite(px[quad]).all():
+            yield px[quad], source[quad]
 
 
 def _stamp(canvas: np.ndarray, image: np.ndarray, source: Array, corners: Array) -> None:

@@ -5,18 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import cos, exp, radians, sin, tan
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics, look_at
 from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, camera_body, grid_lines
 from camviz.draw.panel import Panel
 from camviz.draw.wire import Sight, draw_wire
+from camviz.lenses.base import Array
+from camviz.scenes import Scene, wireframe_scene
 
 __all__ = [
-    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "draw_space", "grid_lines",
-    "space_panel",
+    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "chosen_renderer",
+    "draw_space", "grid_lines", "scene_items", "space_panel",
 ]  # fmt: skip
 
 
@@ -73,24 +77,62 @@ def space_panel(name: str, x: float, y: float, width: float, height: float) -> P
 
 
 def draw_space(
-    panel: Panel, items: Sequence[Item], eye: Eye, *, draft: bool = False, renderer: str | None = None
+    panel: Panel,
+    items: Sequence[Item],
+    eye: Eye,
+    *,
+    draft: bool = False,
+    renderer: str | None = None,
+    frame: RigidTransform | None = None,
 ) -> tuple[str, dict[str, bytes]]:
     """The content of a panel, and the photographs it needs.
 
     `renderer` is "solid" or "wire"; left out, it is solid wherever OpenGL works, unless the environment variable
-    CAMVIZ_RENDERER says "wire". Both show the same points at the same places. Raises ValueError for another renderer.
+    CAMVIZ_RENDERER says "wire". Both show the same points at the same places. `frame` is world_from_frame where the eye
+    stands in another frame than the world's. Raises ValueError for another renderer.
     """
-    sight = Sight(eye.camera(round(panel.width), round(panel.height)), eye.distance)
-    if chosen_renderer(renderer, draft) == "solid":
+    camera = eye.camera(round(panel.width), round(panel.height))
+    if frame is not None:
+        camera = camera.at(frame * camera.world_from_cam)
+    sight = Sight(camera, eye.distance)
+    if chosen_renderer(renderer) == "solid":
         from camviz.draw.solid import draw_solid
 
         return draw_solid(sight, items, panel.name, draft)
     return draw_wire(sight, items, panel.name, scale=1 if draft else 2)
 
 
-def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
+@lru_cache(maxsize=4)
+def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
+    """A scene as a renderer shows it: its textured surfaces for "solid", its outlines, lightly filled, for "wire".
+
+    The lawn and what stands far off on it are left out: seen from outside, a scene is a model on a table.
+    """
+    meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
+    if renderer == "solid":
+        pictures: dict[bytes, np.ndarray] = {}
+        shared = [pictures.setdefault(mesh.picture.tobytes(), mesh.picture) for mesh in meshes]
+        return tuple(Sheet(m.vertices, m.quads, m.uv, p) for m, p in zip(meshes, shared, strict=True))
+    flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
+    fills = [Face(mesh.vertices[mesh.quads[0]], f"#{bytes(mesh.rgb).hex()}", 0.25) for mesh in flat]
+    lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
+    drawn = [Line(line, "muted" if name in ("wall", "lamp", "easel") else "ink", 1.2) for name, line in lines]
+    squares = [Line(line, "ink", 0.7) for _, line in wireframe_scene().only("board")]
+    ground = [Line(line, "grid", 1.2) for _, line in wireframe_scene().only("ground")]
+    return (*ground, *fills, *drawn, *squares)
+
+
+def _near(name: str, points: Array) -> bool:
+    return name not in ("ground", "lawn") and bool(np.nanmax(np.abs(points)) < 12)
+
+
+def chosen_renderer(renderer: str | None = None) -> str:
     """ "solid" or "wire": what was asked for, as far as this machine can do it."""
     renderer = renderer or os.environ.get("CAMVIZ_RENDERER") or "solid"
     if renderer not in ("solid", "wire"):
         raise ValueError(f"renderer must be 'solid' or 'wire', got {renderer!r}")
-    return "wire"
+    if renderer == "wire":
+        return "wire"
+    from camviz.draw.opengl import opengl_works
+
+    return "solid" if opengl_works()[0] else "wire"

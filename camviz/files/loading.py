@@ -21,6 +21,8 @@ LOOKED_FOR = (
     "a ROS CameraInfo (distortion_model with camera_matrix or K) or a Kalibr camchain (cam0 …)"
 )
 
+_KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}
+
 
 def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None) -> Calibration:
     """Read a calibration that OpenCV (FileStorage, mono or stereo), ROS (CameraInfo) or Kalibr (camchain) wrote.
@@ -49,7 +51,7 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
 
 def _mapping(tree: Any) -> Section:
     if not isinstance(tree, dict):
-        what = "a list" if isinstance(tree, list) else "plain text" if isinstance(tree, str) else shown(tree)
+        what = _KINDS.get(type(tree)) or shown(tree)
         raise CalibrationError(f"expected a calibration, this is {what}; looked for {LOOKED_FOR}")
     return Section(tree)
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.files.calibration import CalibrationError
-from camviz.files.trees import shown
+from camviz.files.trees import MAX_NODES, shown
 from camviz.lenses.base import Array
 
 LARGEST = 1e9  # larger magnitudes are damage, not metres or pixels
@@ -126,17 +126,22 @@ def as_rotation(matrix: Array, where: str) -> Rotation:
 
 
 def _as_matrix(section: Section) -> Array:
-    """The matrices of OpenCV and ROS: rows, cols, data, and in OpenCV `dt`, its channels before its letter."""
-    rows, columns = (section.whole(key, 10**6) if section.values.get(key) != 0 else 0 for key in ("rows", "cols"))
+    """The matrices of OpenCV and ROS: rows and cols (or OpenCV's `sizes`), data, and `dt`: channels, letter."""
     dt = section.text("dt") if "dt" in section else "d"
     if not (match := re.fullmatch(r"([1-9]?)([a-zA-Z])", dt)):
         raise section.error("dt", "an element type such as d, f or 2f", shown(dt))
-    shape = (rows, columns, int(match[1])) if match[1] else (rows, columns)
-    data = section.values.get("data")
-    values = _as_array([] if data is None else data, section.where("data"))
+    shape = _matrix_shape(section) + ((int(match[1]),) if match[1] else ())
+    values = section.array("data", damaged=True).ravel() if "data" in section else np.empty(0)
     if values.size != prod(shape):
         raise section.error("data", f"{'×'.join(map(str, shape))} = {prod(shape)} numbers", f"{values.size}")
     return values.reshape(shape)
+
+
+def _matrix_shape(section: Section) -> tuple[int, ...]:
+    sides = section.array("sizes").ravel() if "sizes" in section else [section.number(key) for key in ("rows", "cols")]
+    if len(sides) > 4 or not all(side == int(side) and 0 <= side <= MAX_NODES for side in sides):
+        raise section.error("sizes", f"up to 4 whole numbers from 0 to {MAX_NODES}", shown(list(map(float, sides))))
+    return tuple(int(side) for side in sides)
 
 
 def _as_array(value: Any, where: str) -> Array:

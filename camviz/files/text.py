@@ -33,8 +33,6 @@ def read_text(path: Path) -> str:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise CalibrationError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:  # a NUL in the name
-        raise CalibrationError(f"{str(path)!r} is not a file name") from error
     return _decoded(content, path)
 
 
@@ -43,6 +41,8 @@ def _refuse_unreadable(path: Path) -> None:
         status = path.stat()
     except FileNotFoundError:
         raise CalibrationError(f"{path}: there is no such file") from None
+    except ValueError:  # a NUL in the name
+        raise CalibrationError(f"{str(path)!r} is not a file name") from None
     if stat.S_ISDIR(status.st_mode):
         raise CalibrationError(f"{path}: expected a calibration file, this is a directory")
     if not stat.S_ISREG(status.st_mode):
@@ -58,8 +58,6 @@ def _too_large(size: int) -> str:
 def _decoded(content: bytes, path: Path) -> str:
     if len(content) > MAX_BYTES:
         raise CalibrationError(f"{path}: {_too_large(len(content))}")
-    if not content.strip():
-        raise CalibrationError(f"{path}: expected a calibration, the file is empty")
     for signature, what in _SIGNATURES.items():
         if content.startswith(signature):
             raise CalibrationError(f"{path}: expected a calibration as text (YAML, XML or JSON), this is {what}")
@@ -67,6 +65,8 @@ def _decoded(content: bytes, path: Path) -> str:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise CalibrationError(f"{path}: expected text in UTF-8, byte {error.start} is not") from None
+    if not text.strip():
+        raise CalibrationError(f"{path}: expected a calibration, the file is empty")
     if "\0" in text:
         raise CalibrationError(f"{path}: expected text, this is binary data")
     return text

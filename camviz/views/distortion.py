@@ -81,12 +81,12 @@ class DistortionView(View):
         """The state's key figures, as text."""
         corner = distortion.image_corner_radius(self.intrinsics)
         fold = distortion.fold_radius(self.camera.lens)
-        moved = self._moved(self.intrinsics.border(1))
+        moved = self.moved(self.intrinsics.border(1))
         return {
             "image corner": f"r = {_with_angle(corner)}",
             "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
             "fold": f"r = {_with_angle(fold)}" if isfinite(fold) else "none",
-            "rays reach r =": f"{self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
+            "farthest a ray lands": f"r = {self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
         }
 
     def equation(self) -> str:
@@ -94,7 +94,7 @@ class DistortionView(View):
         if self.lens:
             return type(self.lens).__name__
         above, below = (_polynomial(self.k1, self.k2, self.k3), _polynomial(self.k4, self.k5, self.k6))
-        return f"g(r) = r ({above})" + (f" / ({below})" if below != "1" else "")
+        return "g(r) = r" + (f" ({above})" if above != "1" else "") + (f" / ({below})" if below != "1" else "")
 
     def description(self) -> str:
         """The state in words and numbers."""
@@ -113,7 +113,7 @@ class DistortionView(View):
                 self._numbers_column(),
             ]
         )
-        photographs["camera"] = jpeg(self._image(draft))
+        photographs["camera"] = jpeg(self.image(draft=draft))
         return Picture(body, 960, 602, self.title, self.description(), photographs)
 
     def _name(self) -> str:
@@ -128,7 +128,7 @@ class DistortionView(View):
 
     # The picture -----------------------------------------------------------------------------------------------------
 
-    def _image(self, draft: bool) -> np.ndarray:
+    def image(self, *, draft: bool) -> np.ndarray:
         width = 320 if draft else 480
         small = Camera(
             self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
@@ -176,7 +176,7 @@ class DistortionView(View):
 
     # The displacement ------------------------------------------------------------------------------------------------
 
-    def _moved(self, uv: np.ndarray) -> np.ndarray:
+    def moved(self, uv: np.ndarray) -> np.ndarray:
         """How far, in pixels (...,), the lens moves ideal pixels (..., 2)."""
         return np.linalg.norm(self._distorted(uv) - uv, axis=-1)
 
@@ -192,12 +192,12 @@ class DistortionView(View):
         return panel.show(content, title="Where each point goes", note="contours: shift in px")
 
     def _contours(self, panel: Panel) -> str:
-        uv = _pixel_grid(self.intrinsics, 49)
-        contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self._moved(uv)))
+        uv = _pixel_grid(self.intrinsics, 65)
+        contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self.moved(uv)))
         lines = {level: [panel.place(line) for line in contours.lines(level)] for level in _LEVELS}
         names = [
-            svg.text(line[len(line) // 8], f"{level}", "tick halo middle")
-            for level, drawn in lines.items()
+            svg.text(line[int((0.1 + 0.07 * i) * len(line))], f"{level}", "tick halo middle")
+            for i, (level, drawn) in enumerate(lines.items())
             for line in drawn[:1]
         ]
         return svg.path([line for drawn in lines.values() for line in drawn], "muted thin") + "".join(names)

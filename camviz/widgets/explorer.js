@@ -4,7 +4,7 @@
 const SETTLE_MS = 60;   // idle time after which a draft is replaced by the fine picture
 
 function render({ model, el }) {
-  const root = build(`<div class="camviz-explorer" data-lm-suppress-shortcuts="true" data-busy="false" data-rendered="0">
+  const root = build(`<div class="camviz-explorer" data-busy="false" data-rendered="0">
     <div class="camviz-controls"></div><div class="camviz-error" role="alert" hidden></div><div class="camviz-picture"></div></div>`);
   const [controls, error, picture] = root.children;
   el.replaceChildren(root);
@@ -31,6 +31,7 @@ function render({ model, el }) {
     root.dataset.rendered = String(Number(root.dataset.rendered) + 1);
   };
   const stopHands = hands(picture, ask);
+  keepKeys(root);
   model.on("change:values", showValues);
   model.on("change:frame", showFrame);
   showValues();
@@ -94,6 +95,7 @@ async function swap(picture, frame) {
   if (turn !== picture.turn) return urls.forEach(URL.revokeObjectURL);
   const focused = picture.contains(document.activeElement) ? document.activeElement.dataset.drag : null;
   picture.innerHTML = svg;
+  keepKeys(picture);
   if (focused) picture.querySelector(`[data-drag="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
   picture.urls?.forEach(URL.revokeObjectURL);
   picture.urls = urls;
@@ -138,6 +140,11 @@ function hands(picture, ask) {
   const all = { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, keydown: key, wheel };
   for (const [type, listener] of Object.entries(all)) picture.addEventListener(type, listener, { passive: false });
   return () => { for (const [type, listener] of Object.entries(all)) picture.removeEventListener(type, listener); };
+}
+
+// JupyterLab takes the arrow keys from whatever does not say, on the focused element itself, that it needs them.
+function keepKeys(part) {
+  for (const element of part.querySelectorAll("input, select, button, [tabindex]")) element.dataset.lmSuppressShortcuts = "true";
 }
 
 let count = 0;

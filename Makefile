@@ -1,0 +1,25 @@
+# For those who work on camviz; a reader needs only start.py.
+BIN := .venv/bin
+
+.PHONY: test lint browser bench lock
+
+test:
+	python3 start.py test
+
+lint:
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/codespell
+
+browser:
+	$(BIN)/python -m pytest -m browser tests/browser
+
+bench:
+	$(BIN)/python benchmarks/kernel.py
+	$(BIN)/python benchmarks/browser.py
+
+# Newest versions that pyproject.toml allows, for every platform and Python, with hashes and without naming any host.
+lock:
+	uv pip compile --universal --generate-hashes --no-header --no-annotate --no-emit-index-url --upgrade \
+	  pyproject.toml --extra test --output-file requirements.lock

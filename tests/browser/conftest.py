@@ -1,0 +1,49 @@
+"""One JupyterLab and one browser for all browser tests; one open notebook per lesson."""
+
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from laboratory import ROOT, Notebook, chromium, jupyterlab
+from playwright.sync_api import Browser
+
+LESSONS = sorted(path.name for path in (ROOT / "lessons").glob("*.ipynb"))
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="session")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    home = tmp_path_factory.mktemp("jupyter")
+    shutil.copytree(ROOT / "lessons", home / "lessons")
+    with jupyterlab(home / "lessons", home / "private") as address:
+        yield address
+
+
+@pytest.fixture(scope="module", params=LESSONS)
+def lesson(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Notebook]:
+    """A lesson, opened and run from top to bottom; `lesson.cells` is what came out."""
+    notebook = Notebook(browser, address, request.param)
+    notebook.cells = notebook.run_all()
+    yield notebook
+    notebook.close()
+
+
+@pytest.fixture
+def screenshot(request: pytest.FixtureRequest, tmp_path: Path):
+    """Takes a picture of an element, into the folder that CAMVIZ_SCREENSHOTS names if it names one."""
+    folder = Path(os.environ.get("CAMVIZ_SCREENSHOTS", tmp_path))
+
+    def take(element, name: str) -> None:
+        stem = re.sub(r"[^\w.-]+", "-", f"{request.node.name}-{name}")
+        folder.mkdir(parents=True, exist_ok=True)
+        element.screenshot(path=folder / f"{stem}.png")
+
+    return take

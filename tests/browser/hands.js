@@ -1,0 +1,79 @@
+// What tests and benchmarks do to a visualizer inside the page: find its controls, move them, look at its picture.
+window.hands = {
+  pause: (ms) => new Promise((done) => setTimeout(done, ms)),
+
+  // Nothing under way and nothing new on two looks in a row.
+  async settled(root, limit = 15000) {
+    const end = performance.now() + limit;
+    for (let before = null; performance.now() < end; await hands.pause(40)) {
+      const now = root.dataset.rendered;
+      if (root.dataset.busy === "false" && now === before) return;
+      before = now;
+    }
+    throw new Error(`the visualizer did not come to rest within ${limit} ms`);
+  },
+
+  // The picture as text, with every photograph in it replaced by the digest of its bytes.
+  async picture(root) {
+    let svg = root.querySelector(".camviz-picture svg")?.outerHTML ?? "";
+    for (const url of new Set(svg.match(/blob:[^"]+/g))) {
+      const bytes = await (await fetch(url)).arrayBuffer();
+      const digest = new Uint8Array(await crypto.subtle.digest("SHA-1", bytes));
+      svg = svg.replaceAll(url, digest.join("."));
+    }
+    return svg;
+  },
+
+  controls: (root) => [...root.querySelectorAll("[data-control]")].map((one) => one.dataset.control),
+
+  // Move a control to a place between 0 (one end) and 1 (the other), by the events a browser sends.
+  move(root, name, place) {
+    const input = root.querySelector(`[data-control="${CSS.escape(name)}"]`).querySelector("input, select");
+    if (input.type === "checkbox") {
+      if (input.checked !== place > 0.5) input.click();
+      return String(input.checked);
+    }
+    if (input.tagName === "SELECT") input.selectedIndex = Math.round(place * (input.options.length - 1));
+    else input.value = Number(input.min) + place * (Number(input.max) - Number(input.min));
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+    input.dispatchEvent(new Event("change", { bubbles: true }));
+    return input.value;
+  },
+
+  reset: (root) => root.querySelector('button[data-action="reset"]').click(),
+  error: (root) => root.querySelector(".camviz-error:not([hidden])")?.textContent ?? "",
+
+  handles: (root) => [...new Set([...root.querySelectorAll(".camviz-picture [data-drag]")].map((one) => one.dataset.drag))],
+
+  // A point of the page where the pointer would take hold of a handle.
+  grip(root, name) {
+    for (const part of root.querySelectorAll(`[data-drag="${CSS.escape(name)}"]`)) {
+      part.scrollIntoView({ block: "center" });
+      const box = part.getBoundingClientRect();
+      for (const [s, t] of [[0.5, 0.5], [0.15, 0.5], [0.5, 0.15], [0.85, 0.5], [0.5, 0.85], [0.08, 0.08]]) {
+        const [x, y] = [box.left + s * box.width, box.top + t * box.height];
+        if (document.elementFromPoint(x, y)?.closest("[data-drag]")?.dataset.drag === name) return [x, y];
+      }
+    }
+    throw new Error(`the pointer cannot reach the handle ${name}`);
+  },
+
+  // Elements whose words have a contrast below 4.5 with the colour behind them, as "words: contrast".
+  weak(selector) {
+    const channels = (colour) => (colour.match(/[\d.]+/g) ?? []).map(Number);
+    const luminance = (rgb) => {
+      const [r, g, b] = rgb.map((c) => (c / 255 <= 0.04045 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4));
+      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const behind = (one) => {
+      const colour = channels(getComputedStyle(one).backgroundColor);
+      return colour.length === 3 || colour[3] > 0.99 ? colour.slice(0, 3) : one.parentElement ? behind(one.parentElement) : [255, 255, 255];
+    };
+    const contrast = (one) => {
+      const [low, high] = [luminance(channels(getComputedStyle(one).color).slice(0, 3)), luminance(behind(one))].sort((a, b) => a - b);
+      return (high + 0.05) / (low + 0.05);
+    };
+    const all = [...document.querySelectorAll(selector)].filter((one) => one.offsetParent && contrast(one) < 4.5);
+    return all.map((one) => `${one.textContent.trim()}: ${contrast(one).toFixed(1)}`);
+  },
+};

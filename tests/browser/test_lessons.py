@@ -1,0 +1,136 @@
+"""Every lesson in a real JupyterLab: it runs, every control changes the picture, nothing raises, in light and dark."""
+
+import re
+
+import pytest
+
+pytestmark = pytest.mark.browser
+
+THEMES = {"light": "JupyterLab Light", "dark": "JupyterLab Dark"}
+BROKEN = ".camviz-error:not([hidden]), .jp-RenderedText[data-mime-type='application/vnd.jupyter.stderr']"
+WIDGET_FAILED = re.compile("Error (displaying|creating|rendering) widget|Loading widget|Failed to load")
+
+
+def outputs(cells):
+    """Every output of cells that are not there to show an error."""
+    for cell in cells:
+        if cell["cell_type"] == "code" and "raises-exception" not in cell["metadata"].get("tags", []):
+            yield from cell["outputs"]
+
+
+def explorers(lesson):
+    return lesson.page.query_selector_all(".camviz-explorer")
+
+
+def picture(explorer) -> str:
+    """The picture once it rests; fails when the visualizer shows an error."""
+    explorer.evaluate("root => hands.settled(root)")
+    assert explorer.evaluate("root => hands.error(root)") == ""
+    return explorer.evaluate("root => hands.picture(root)")
+
+
+def test_runs_from_top_to_bottom_and_shows_no_error(lesson) -> None:
+    shown = [out for out in outputs(lesson.cells) if out["output_type"] == "error" or out.get("name") == "stderr"]
+    assert shown == []
+    assert lesson.page.locator(BROKEN).all_inner_texts() == []
+    assert lesson.page.get_by_text(WIDGET_FAILED).all_inner_texts() == []
+    assert lesson.errors == []
+
+
+def test_shows_a_visualizer_wherever_the_lesson_makes_one(lesson) -> None:
+    made = sum("explore(" in cell["source"] for cell in lesson.cells if cell["cell_type"] == "code")
+    assert len(explorers(lesson)) >= made
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_every_control_changes_the_picture_at_both_ends_and_the_middle(lesson, theme, screenshot) -> None:
+    lesson.theme(THEMES[theme])
+    still = []
+    for number, explorer in enumerate(explorers(lesson), 1):
+        explorer.scroll_into_view_if_needed()
+        first = picture(explorer)
+        screenshot(explorer, f"{number}")
+        for control in explorer.evaluate("root => hands.controls(root)"):
+            seen = set()
+            for place in (0, 1, 0.5):
+                value = explorer.evaluate("(root, [name, to]) => hands.move(root, name, to)", [control, place])
+                seen.add(picture(explorer))
+                if place != 0.5:
+                    screenshot(explorer, f"{number}-{control}-{value}")
+            if len(seen) == 1:
+                still.append(f"visualizer {number}: {control}")
+            explorer.evaluate("root => hands.reset(root)")
+            assert picture(explorer) == first, f"reset after {control} does not bring the first picture back"
+    assert still == [], "controls that change nothing"
+    assert lesson.errors == []
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_words_stand_out_from_what_is_behind_them(lesson, theme) -> None:
+    """Labels of controls and of questions reach a contrast of 4.5 to 1 (WCAG 2.2, 1.4.3)."""
+    lesson.theme(THEMES[theme])
+    weak = lesson.page.evaluate("selector => hands.weak(selector)", ".camviz-explorer label, .camviz-question label")
+    assert weak == []
+
+
+def test_handles_follow_the_pointer(lesson) -> None:
+    for explorer in explorers(lesson):
+        for handle in explorer.evaluate("root => hands.handles(root)"):
+            before = picture(explorer)
+            explorer.scroll_into_view_if_needed()
+            x, y = explorer.evaluate("(root, name) => hands.grip(root, name)", handle)
+            lesson.page.mouse.move(x, y)
+            lesson.page.mouse.down()
+            lesson.page.mouse.move(x + 20, y + 12, steps=4)
+            lesson.page.mouse.up()
+            assert picture(explorer) != before, handle
+            explorer.evaluate("root => hands.reset(root)")
+
+
+def test_questions_answer_every_choice(lesson) -> None:
+    for form in lesson.page.locator(".camviz-question form").all():
+        for choice in form.locator("input[type=radio]").all():
+            if not choice.is_enabled() or not form.locator("button").is_visible():
+                break
+            choice.check()
+            form.locator("button").click()
+            form.locator("button:disabled").wait_for(state="attached")  # the answer is in, the reply has come
+            assert len(form.locator("[role=status]").inner_text()) > 20
+
+
+def test_a_visualizer_obeys_the_keyboard_alone(lesson) -> None:
+    """Tab reaches every control, arrows move it, typing a number does the same, Enter on Reset brings it back."""
+    keys = lesson.page.keyboard
+    for explorer in [one for one in explorers(lesson) if one.query_selector("input[type=range]")][:1]:
+        explorer.scroll_into_view_if_needed()
+        first = picture(explorer)
+        explorer.query_selector(".camviz-controls").click(position={"x": 1, "y": 1})
+        tab_to(lesson, explorer, "input[type=range]")
+        for _ in range(5):
+            keys.press("ArrowRight")
+        moved = picture(explorer)
+        assert moved != first
+        tab_to(lesson, explorer, "input[type=number]")
+        keys.press("Control+a")
+        keys.type(explorer.query_selector("input[type=range]").get_attribute("min"))
+        keys.press("Enter")
+        assert picture(explorer) not in (first, moved)
+        if explorer.evaluate("root => hands.handles(root).length"):
+            before = picture(explorer)
+            tab_to(lesson, explorer, "[data-drag]")
+            keys.press("ArrowRight")
+            assert picture(explorer) != before
+        tab_to(lesson, explorer, "button[data-action=reset]", "Shift+Tab")
+        keys.press("Enter")
+        assert picture(explorer) == first
+
+
+def tab_to(lesson, explorer, selector: str, key: str = "Tab") -> None:
+    """Press Tab until the focus is on the next element of the visualizer that `selector` names."""
+    for _ in range(60):
+        lesson.page.keyboard.press(key)
+        if explorer.evaluate(
+            "(root, s) => root.contains(document.activeElement) && document.activeElement.matches(s)", selector
+        ):
+            return
+    raise AssertionError(f"{key} never reaches {selector}")

@@ -1,0 +1,92 @@
+"""The distortion visualizer shows true numbers and true pictures."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz.scenes import render, textured_scene, to_display
+from camviz.views.distortion import DistortionView
+
+
+def test_the_fold_of_a_plain_barrel_is_named_where_it_is():
+    assert DistortionView(k1=-0.3, k2=0).numbers()["fold"] == "r = 1.0541 (46.5°)"
+
+
+def test_published_stereo_calibration_folds_inside_its_images():
+    """OpenCV's samples/data/intrinsics.yml: r = 0.73041 and 0.97853 by the quadratic formula."""
+    left = DistortionView(k1=0.29589439552724328, k2=-1.0354662043042675)
+    right = DistortionView(k1=-0.16916358306948096, k2=-0.11214173641213163)
+    assert left.numbers()["fold"].startswith("r = 0.7304")
+    assert right.numbers()["fold"].startswith("r = 0.9785")
+
+
+def test_a_corner_moves_as_far_as_opencv_says():
+    view = DistortionView(k1=-0.2, k2=0.05, p1=0.01, p2=-0.02, k3=0.01, k4=0.02, s1=0.01, s3=-0.02)
+    K = view.intrinsics
+    corners = np.array([(0.0, 0), (K.width - 1, 0), (0, K.height - 1), (K.width - 1, K.height - 1)])
+    rays = np.concatenate([K.from_pixels(corners), np.ones((4, 1))], axis=-1)
+    coefficients = np.array([-0.2, 0.05, 0.01, -0.02, 0.01, 0.02, 0, 0, 0.01, 0, -0.02, 0])
+    there = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), K.K, coefficients)[0].reshape(-1, 2)
+    np.testing.assert_allclose(view.moved(corners), np.linalg.norm(there - corners, axis=-1), atol=1e-9)
+
+
+def test_straightening_the_picture_gives_what_a_perfect_lens_would_have_seen():
+    view = DistortionView(k1=-0.28, k2=0.07, show="undistorted")
+    straight = view.image(draft=True)
+    perfect = to_display(render(textured_scene(), Camera(view.intrinsics.resized(320, 240))))
+    inner = np.s_[30:210, 40:280]  # away from the border, where both have light
+    assert cv2.PSNR(straight[inner], perfect[inner]) > 23
+    bent = view.but(show="distorted").image(draft=True)
+    assert cv2.PSNR(bent[inner], perfect[inner]) < 18
+
+
+def test_pixels_beyond_the_fold_stay_dark_only_while_folds_are_hidden():
+    view = DistortionView(k1=-0.6, k2=0, show="undistorted")
+    corner = np.s_[:12, :12]
+    assert np.ptp(view.image(draft=True)[corner], axis=(0, 1)).max() == 0
+    assert np.ptp(view.but(hide_fold=False).image(draft=True)[corner], axis=(0, 1)).max() > 0
+
+
+@pytest.mark.parametrize("name", DistortionView.controls())
+def test_every_control_changes_the_picture_at_both_ends(name):
+    control = DistortionView.controls()[name]
+    base = DistortionView(k1=-0.3, k2=0.0, show="undistorted")  # it folds, so that hiding the fold shows
+    ends = control.choices or ((control.low, control.high) if control.low is not None else (True, False))
+    pictures = [base.but(**{name: end}).figure(draft=True) for end in ends]
+    assert len({picture.svg() for picture in pictures} | {picture.photographs["camera"] for picture in pictures}) > 2
+
+
+def test_a_loaded_camera_keeps_its_numbers():
+    camera = Camera(Intrinsics(640, 480, 536, 534, 342, 236), BrownConrady(k1=-0.27, k2=-0.04, p1=0.002, k3=0.24))
+    view = DistortionView.of(camera)
+    assert view.camera.lens == camera.lens
+    assert view.camera.intrinsics == camera.intrinsics
+
+
+def test_a_lens_of_another_kind_is_shown_as_it_is():
+    lens = KannalaBrandt(0.007, -0.0014, -0.0003, -0.0005)
+    view = DistortionView.of(Camera(Intrinsics(640, 480, 380, 380, 320, 240), lens))
+    assert view.camera.lens == lens
+    assert "KannalaBrandt" in view.figure(draft=True).description
+
+
+def test_dragging_walks_around_and_changes_nothing_else():
+    view = DistortionView()
+    turned = view.dragged("orbit", 0, 0, 50, 10)
+    assert turned.eye != view.eye
+    assert turned.but(eye=view.eye) == view
+    assert view.pressed("orbit", "ArrowLeft").eye != view.eye
+
+
+def test_the_description_states_the_state():
+    words = DistortionView(k1=-0.3, k2=0.0).description()
+    assert "k1 = -0.3" in words
+    assert "1.0541" in words
+
+
+@pytest.mark.parametrize("bad", [{"k1": np.nan}, {"k1": "much"}, {"show": "sideways"}, {"hide_fold": 1}])
+def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        DistortionView(**bad)

@@ -1,0 +1,423 @@
+"""A file that is no calibration gets one sentence, soon; a stranger's file starts nothing and unfolds nothing."""
+
+import os
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import camviz
+from camviz.files import Calibration, CalibrationError
+from camviz.files.loading import parse
+from camviz.files.text import MAX_BYTES
+
+DATA = Path(__file__).parent / "data"
+FILES = sorted(DATA.iterdir())
+MONO = """%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 500., 0., 320., 0., 500., 240., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ -0.3, 0.1, 0., 0., 0. ]
+"""
+PAIR = "%YAML:1.0\nimage_size: [640, 480]\n" + "".join(
+    f"M{n}: [[500, 0, 320], [0, 500, 240], [0, 0, 1]]\nD{n}: [0, 0, 0, 0, 0]\n" for n in (1, 2)
+)
+KALIBR = (DATA / "kalibr_chain.yaml").read_text()
+ROS = (DATA / "ros_file.yaml").read_text()
+
+
+def complaint(path, **options):
+    """The sentence that `load` refuses a file with, soon, on one line and naming the file."""
+    start = time.perf_counter()
+    with pytest.raises(CalibrationError) as caught:
+        camviz.load(path, **options)
+    assert time.perf_counter() - start < 10
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    assert Path(path).name in sentence or repr(path) in sentence
+    assert len(sentence) < 600
+    return sentence
+
+
+def refusal(tmp_path, text):
+    path = tmp_path / "camera.yml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return complaint(path)
+
+
+def test_the_healthy_originals_load(tmp_path):
+    """What the tests below damage is good before they do."""
+    for name, text in {"mono": MONO, "pair": PAIR, "kalibr": KALIBR, "ros": ROS}.items():
+        (tmp_path / name).write_text(text)
+        assert isinstance(camviz.load(tmp_path / name), Calibration)
+
+
+def test_a_missing_file(tmp_path):
+    assert "there is no such file" in complaint(tmp_path / "nowhere.yml")
+
+
+def test_a_directory(tmp_path):
+    assert "this is a directory" in complaint(tmp_path)
+
+
+def test_a_name_that_is_none(tmp_path):
+    assert "is not a file name" in complaint(f"{tmp_path}/a\0b")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert "not a regular file" in complaint(tmp_path / "pipe")
+
+
+def test_a_gigabyte_is_refused_unread(tmp_path):
+    path = tmp_path / "large.yml"
+    with path.open("wb") as file:
+        file.truncate(2**30)
+    start = time.perf_counter()
+    assert "1024 MB" in complaint(path)
+    assert time.perf_counter() - start < 0.1
+
+
+@pytest.mark.parametrize("content", [b"", b" \n\n\t", b"\xef\xbb\xbf"])
+def test_an_empty_file(tmp_path, content):
+    assert "the file is empty" in refusal(tmp_path, content)
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "PNG picture"),
+        (b"\xff\xd8\xff\xe0\0\x10JFIF", "JPEG picture"),
+        (b"PK\x03\x04", "zip archive"),
+        (b"\x93NUMPY\x01\0", "NumPy array"),
+        (b"\x80\x04\x95\x0b\0\0\0", "UTF-8"),
+        (b"K: 1\0", "binary"),
+        ("K: é".encode("latin-1"), "UTF-8, byte 3"),
+        (MONO.encode("utf-16"), "UTF-8"),
+    ],
+)
+def test_pictures_and_binary_data_are_called_what_they_are(tmp_path, content, what):
+    assert what in refusal(tmp_path, content)
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("just a sentence", "plain text"),
+        ("- 1\n- 2", "a list"),
+        ("42", "this is 42"),
+        ("a: 1\nb: 2", "found 'a', 'b'"),
+        ("{}", "found nothing"),
+        ("R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.1, 0, 0]", "no camera found"),
+        ("<html></html>", "<opencv_storage>"),
+        ("<opencv_storage><a>1</a><a>2</a></opencv_storage>", "twice"),
+        ("<opencv_storage>", "not valid XML"),
+        ("K: [1, 2\nD: ", "not valid YAML"),
+        ("K: 1\nK: 2", "twice"),
+        ("? [1, 2]\n: 3", "key of a mapping"),
+        ("a: *b", "alias 'b'"),
+        ("a: &b [*b]", "alias 'b'"),
+        ("--- {a: 1}\n--- {b: 2}\n", "one YAML document"),
+    ],
+)
+def test_text_that_is_no_calibration(tmp_path, text, what):
+    assert what in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("[ 500.,", "[ .nan,", r"camera_matrix\[0, 0\]: expected a finite number .* got nan"),
+        ("[ 500.,", "[ .Inf,", "finite"),
+        ("[ 500.,", "[ 1e400,", "finite"),
+        ("[ 500.,", "[ 0.,", "fx must be a positive focal length"),
+        ("[ 500.,", "[ -500.,", "fx must be a positive focal length"),
+        ("[ 500.,", "[ five,", "data.0.: expected a number, got 'five'"),
+        ("[ 500.,", "[ true,", "data.0.: expected a number, got True"),
+        ("[ 500.,", "[ [1, 2],", "rows of equal length"),
+        ("[ 500.,", "[ ", "3×3 = 9 numbers, got 8"),
+        ("0., 0., 1. ]", "0., 0., 2. ]", r"K\[2, 2\] = 1"),
+        ("320., 0.", "0., 320.", "upper triangular"),
+        ("rows: 3\n   cols: 3", "rows: 1\n   cols: 9", "3×3 numbers, got 1×9"),
+        ("rows: 3", "rows: 3.5", "whole numbers"),
+        ("rows: 3", "rows: -3", "whole numbers"),
+        ("rows: 3", "rows: 1000000", "numbers, got 9"),
+        ("dt: d", "dt: []", "expected a word"),
+        ("cols: 5", "cols: 4", "1×4 = 4 numbers, got 5"),
+        ("cols: 5\n   dt: d\n   data: [ -0.3, ", "cols: 4\n   dt: d\n   data: [ ", None),
+        ("cols: 5\n   dt: d\n   data: [ -0.3, ", "cols: 6\n   dt: d\n   data: [ 1, -0.3,", "4, 5, 8, 12 or 14 numbers"),
+        ("distortion_coefficients", "something_else", "expected distortion coefficients"),
+        ("image_width: 640", "image_width: 0", "image_width: expected a whole number from 1 to"),
+        ("image_width: 640", "image_width: 640.5", "whole number"),
+        ("image_width: 640", "image_width: 999999999", "whole number from 1 to"),
+        ("image_width: 640", "image_width: wide", "expected a number, got 'wide'"),
+        ("image_width: 640\n", "", "image_width: expected a number, the key is missing"),
+        ("image_width: 640\nimage_height: 480\n", "", "--size WIDTHxHEIGHT"),
+        ("image_width: 640", "image_width: 640\nwidth: 640", "image_width and width, got both"),
+        ("image_width: 640", "image_width: 640\nK: [1]", "image_width|both"),
+    ],
+)
+def test_a_damaged_opencv_file_names_the_key_and_the_number(tmp_path, old, new, what):
+    assert old in MONO
+    damaged = MONO.replace(old, new, 1)
+    if what is None:
+        (tmp_path / "camera.yml").write_text(damaged)
+        assert camviz.load(tmp_path / "camera.yml").cameras["camera"].lens.k1 == 0.1
+    else:
+        assert re.search(what, refusal(tmp_path, damaged))
+
+
+@pytest.mark.parametrize(
+    ("R", "what"),
+    [
+        ("[[1, 0, 0], [0, 1, 0], [0, 0, 2]]", "R: expected a rotation, but R Rᵀ differs from the identity by 3"),
+        ("[[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "R: expected a rotation, but this is a reflection"),
+        ("[[0, 0, 0], [0, 0, 0], [0, 0, 0]]", "R: expected a rotation"),
+        ("[[.nan, 0, 0], [0, 1, 0], [0, 0, 1]]", r"R\[0, 0\]: expected a finite number"),
+        ("[0.1, 0.2, 0.3]", "R: expected 3×3 numbers, got 3"),
+    ],
+)
+def test_what_is_not_a_rotation_says_by_how_much(tmp_path, R, what):
+    assert re.search(what, refusal(tmp_path, PAIR + f"R: {R}\nT: [-0.1, 0, 0]\n"))
+
+
+def test_half_a_pose_is_not_completed(tmp_path):
+    assert "T: expected" in refusal(tmp_path, PAIR + "R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n")
+    assert "R: expected" in refusal(tmp_path, PAIR + "T: [-0.1, 0, 0]\n")
+
+
+def test_three_cameras_are_no_pair(tmp_path):
+    assert "M1, M2, M3" in refusal(tmp_path, PAIR + "M3: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("model: plumb_bob", "model: fisheye", "plumb_bob or rational_polynomial or equidistant, got 'fisheye'"),
+        ("model: plumb_bob", "model: equidistant", "4 numbers .* got 5; 5 belong to plumb_bob"),
+        ("430.15433", ".nan", "finite"),
+        ("430.15433", "0", "fx must be a positive focal length"),
+        ("0.999989", "0.5", "rectification_matrix: expected a rotation"),
+        ("295.53402, 0, 285.55760", "0, 0, 285.55760", "positive focal length"),
+        ("image_width: 640", "image_width: [640]\nwidth: 640", "both"),
+    ],
+)
+def test_a_damaged_ros_file_names_the_key_and_the_number(tmp_path, old, new, what):
+    assert old in ROS
+    assert re.search(what, refusal(tmp_path, ROS.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("cam1:", "cam7:", "expected the cameras cam0, cam1, cam2"),
+        ("camera_model: pinhole", "camera_model: pinole", r"cam0.camera_model: .*'pinole'"),
+        ("camera_model: pinhole", "camera_model: eucm", "cam0.intrinsics: expected 6 numbers"),
+        ("distortion_model: radtan", "distortion_model: [1]", "cam0.distortion_model: expected a word"),
+        (
+            "distortion_model: radtan",
+            "distortion_model: fov",
+            r"cam0.distortion_coeffs: expected 1 numbers \(w\), got 4",
+        ),
+        ("[458.654,", "[", "cam0.intrinsics: expected 4 numbers"),
+        ("[458.654,", "[-1,", "fx must be a positive focal length"),
+        ("resolution: &size [752, 480]", "resolution: &size [752]", "cam0.resolution: expected 2 numbers"),
+        ("  - [1.0, 0.0, 0.0, -0.11]", "  - [2.0, 0.0, 0.0, -0.11]", "cam1.T_cn_cnm1: expected a rotation"),
+        ("  - [0.0, 0.0, 0.0, 1.0]", "  - [0.0, 0.0, 0.0, 2.0]", "cam0.T_cam_imu: expected 0 0 0 1"),
+    ],
+)
+def test_a_damaged_kalibr_file_names_the_camera_the_key_and_the_number(tmp_path, old, new, what):
+    assert old in KALIBR
+    assert re.search(what, refusal(tmp_path, KALIBR.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize(
+    "tag",
+    [
+        "!!python/object/apply:os.system ['touch {mark}']",
+        "!!python/object/new:os.system ['touch {mark}']",
+        "!!python/name:os.system",
+        "!!python/module:os",
+        "!<tag:yaml.org,2002:python/object/apply:os.system> ['touch {mark}']",
+        "!!opencv-matrix 3",
+        "!!set {{a, b}}",
+        "!!binary aGVsbG8=",
+    ],
+)
+def test_a_tag_starts_nothing(tmp_path, tag):
+    mark = tmp_path / "mark"
+    assert "is refused" in refusal(tmp_path, MONO + "extra: " + tag.format(mark=mark))
+    assert not mark.exists()
+
+
+def test_a_billion_laughs_in_yaml_do_not_unfold(tmp_path):
+    lines = ["a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]"]
+    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 12)]
+    assert "unfolds to more than 1,000,000 values" in refusal(tmp_path, "\n".join(lines))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<?xml version="1.0"?><!DOCTYPE lolz [<!ENTITY lol "lol"><!ENTITY l2 "&lol;&lol;">]>'
+        "<opencv_storage><a>&l2;</a></opencv_storage>",
+        '<!DOCTYPE a SYSTEM "file:///etc/passwd"><opencv_storage></opencv_storage>',
+        '<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><opencv_storage><a>&x;</a></opencv_storage>',
+    ],
+)
+def test_entities_in_xml_are_not_unfolded(tmp_path, text):
+    assert "document types and entities are refused" in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 200_000,
+        "{a: " * 200_000,
+        "K: " + "[" * 100_000 + "]" * 100_000,
+        "".join(" " * n + "a:\n" for n in range(500)),
+        "- " * 100_000,
+        "<opencv_storage>" + "<a>" * 200_000,
+    ],
+)
+def test_deep_nesting_stays_shallow(tmp_path, text):
+    assert "32 levels" in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" + "1," * (MAX_BYTES // 2 - 2) + "]",
+        "<opencv_storage><a>" + "1 " * (MAX_BYTES // 2 - 40) + "</a></opencv_storage>",
+        "<opencv_storage>" + "<a/>" * (MAX_BYTES // 4 - 20) + "</opencv_storage>",
+        "a: " + "x" * (MAX_BYTES - 10),
+        "a" * (MAX_BYTES - 10),
+        "9" * (MAX_BYTES - 10),
+        "# " + "x" * (MAX_BYTES - 10),
+        '"' + "\\n" * (MAX_BYTES // 2 - 10),
+    ],
+    ids=["list", "xml words", "xml elements", "word", "plain text", "number", "comment", "open string"],
+)
+def test_the_largest_allowed_file_is_refused_in_seconds(tmp_path, text):
+    refusal(tmp_path, text)
+
+
+def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):
+    assert "\x1b" not in refusal(tmp_path, 'distortion_model: "\\e[31m\\n\\n red"\nK: [1]\nwidth: 1\nheight: 1')
+
+
+def attempt(path, content):
+    """Load whatever this is; anything but a calibration or a CalibrationError is a failure."""
+    path.write_bytes(content)
+    try:
+        calibration = camviz.load(path)
+    except CalibrationError:
+        return
+    for camera in calibration.rig:
+        assert camera.intrinsics.fx > 0
+        assert np.isfinite(camera.world_from_cam.as_matrix()).all()
+
+
+@pytest.fixture(scope="module")
+def anywhere(tmp_path_factory):
+    return tmp_path_factory.mktemp("fuzz") / "camera.yml"
+
+
+FUZZ = settings(max_examples=60, deadline=None)
+
+
+@pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
+@FUZZ
+@given(data=st.data())
+def test_a_truncated_file_is_read_or_refused(anywhere, original, data):
+    content = original.read_bytes()
+    attempt(anywhere, content[: data.draw(st.integers(0, len(content) - 1))])
+
+
+@pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
+@FUZZ
+@given(data=st.data())
+def test_a_file_with_bytes_overwritten_is_read_or_refused(anywhere, original, data):
+    content = bytearray(original.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
+    attempt(anywhere, bytes(content))
+
+
+ODD = st.sampled_from(
+    [
+        "[]",
+        "{}",
+        "~",
+        "true",
+        "nothing",
+        "0",
+        "-1",
+        "1e-300",
+        "1e8",
+        ".nan",
+        "[1, [2, 3]]",
+        "{rows: 1}",
+        '""',
+        "99999999999999",
+    ]
+)
+
+
+@pytest.mark.parametrize("original", [path for path in FILES if path.suffix != ".xml"], ids=lambda path: path.name)
+@FUZZ
+@given(data=st.data())
+def test_a_file_with_values_of_other_types_is_read_or_refused(anywhere, original, data):
+    """Any one value, list or mapping of the tree becomes something else."""
+    tree = parse(original.read_text())
+    parent, key = data.draw(st.sampled_from(list(places(tree))))
+    parent[key] = parse(data.draw(ODD))
+    attempt(anywhere, flow(tree).encode())
+
+
+def places(tree):
+    """Every (container, key) of a tree."""
+    for key, value in list(tree.items() if isinstance(tree, dict) else enumerate(tree)):
+        yield tree, key
+        if isinstance(value, (dict, list)):
+            yield from places(value)
+
+
+def flow(tree):
+    """The tree as YAML in one line; numbers keep all digits."""
+    if isinstance(tree, dict):
+        return "{" + ", ".join(f'"{key}": {flow(value)}' for key, value in tree.items()) + "}"
+    if isinstance(tree, list):
+        return "[" + ", ".join(map(flow, tree)) + "]"
+    return "~" if tree is None else f'"{tree}"' if isinstance(tree, str) else repr(tree)
+
+
+@FUZZ
+@given(text=st.text(max_size=200))
+def test_any_text_is_refused(anywhere, text):
+    attempt(anywhere, text.encode("utf-8", "surrogatepass"))
+
+
+@FUZZ
+@given(
+    text=st.recursive(
+        st.text("abc<>/&_ 1.", max_size=8), lambda inner: inner.map(lambda t: f"<a>{t}</a>"), max_leaves=9
+    )
+)
+def test_any_xml_is_refused(anywhere, text):
+    attempt(anywhere, f"<opencv_storage>{text}</opencv_storage>".encode())

@@ -1,0 +1,113 @@
+"""The repository keeps its promises: light imports, a lock without hosts, live links, a Binder that builds."""
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+FLOOR_1 = ("cameras", "lenses", "distortion", "scenes", "twoview", "files")
+HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
+LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)|(?:src|href)=\"([^\"#]+)\"")
+
+
+def python(code: str) -> str:
+    """What a fresh interpreter prints for `code`."""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("module", ["camviz", *(f"camviz.{name}" for name in FLOOR_1)])
+def test_what_is_true_needs_nothing_that_draws(module: str) -> None:
+    """A fresh interpreter that imports the first floor has loaded no drawing or widget library."""
+    code = f"import sys, {module}; print(*[name for name in {HEAVY} if name in sys.modules])"
+    assert python(code).split() == []
+
+
+def test_import_of_camviz_loads_not_even_numpy() -> None:
+    assert python("import sys, camviz; print('numpy' in sys.modules)").strip() == "False"
+
+
+def test_every_public_name_of_camviz_can_be_had() -> None:
+    assert python("import camviz; [getattr(camviz, name) for name in camviz.__all__]") == ""
+
+
+def test_the_lock_pins_every_dependency_with_hashes_and_names_no_host() -> None:
+    lock = (ROOT / "requirements.lock").read_text()
+    assert "://" not in lock
+    assert not re.search(r"^\s*-[a-z-]", lock.replace("--hash=", ""), flags=re.MULTILINE)
+    entries = re.split(r"\n(?=\S)", lock.strip())
+    assert [entry.split()[0] for entry in entries if "==" not in entry or "--hash=sha256:" not in entry] == []
+
+
+def test_the_lock_covers_every_dependency_that_the_package_declares() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    declared = chain(project["dependencies"], *project["optional-dependencies"].values())
+    names = {re.match(r"[\w.-]+", one)[0].lower().replace("_", "-") for one in declared} - {"camviz"}  # type: ignore[index]
+    locked = set(re.findall(r"^([\w.-]+)==", (ROOT / "requirements.lock").read_text(), flags=re.MULTILINE))
+    assert names <= locked
+
+
+@pytest.mark.parametrize(
+    "page", sorted(p.relative_to(ROOT).as_posix() for p in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+)
+def test_links_and_pictures_of_a_page_lead_to_files_that_exist(page: str) -> None:
+    text = re.sub(r"```.*?```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
+    targets = [first or second for first, second in LINK.findall(text)]
+    local = [target for target in targets if "://" not in target and not target.startswith("mailto:")]
+    assert [target for target in local if not ((ROOT / page).parent / target).exists()] == []
+
+
+def test_repo2docker_builds_binder_with_the_libraries_that_3d_needs() -> None:
+    """Asked for the Dockerfile only (no Docker, no network), it takes our Python, libraries, package and start."""
+    command = [
+        sys.executable,
+        "-m",
+        "repo2docker",
+        "--no-build",
+        "--debug",
+        "--user-id",
+        "1000",
+        "--user-name",
+        "reader",
+        ".",
+    ]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    dockerfile = done.stdout + done.stderr
+    assert done.returncode == 0, dockerfile
+    python_version = (ROOT / "binder/runtime.txt").read_text().strip().removeprefix("python-")
+    assert f"environment.py-{python_version}" in dockerfile.replace("-2d", "-").replace("-2e", ".")
+    assert "apt-get install --yes --no-install-recommends libegl1 libgl1" in dockerfile
+    assert 'pip install --no-cache-dir -r "binder/requirements.txt"' in dockerfile
+    assert 'R2D_ENTRYPOINT="${REPO_DIR}/binder/start"' in dockerfile
+
+
+def test_binder_starts_the_server_with_vtk_drawing_off_screen() -> None:
+    start = ROOT / "binder/start"
+    assert os.access(start, os.X_OK)
+    shown = subprocess.run(
+        [start, "printenv", "VTK_DEFAULT_OPENGL_WINDOW"],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={"PATH": os.environ["PATH"]},
+    )
+    assert shown.stdout == "vtkEGLRenderWindow\n"
+
+
+def test_start_says_in_one_sentence_what_it_does() -> None:
+    shown = subprocess.run([sys.executable, "start.py", "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "python start.py test" in shown.stdout
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), flags=re.MULTILINE)
+    assert cited
+    assert cited[1] == project["version"] == python("import camviz; print(camviz.__version__)").strip()
