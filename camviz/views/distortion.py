@@ -255,7 +255,7 @@ class DistortionView(View):
         content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
         return panel.show(
-            content, title="Its rays in space", note="drag to turn", drag="orbit", label=label
+            content, title="Its rays in space", hint="drag to turn", drag="orbit", label=label
         ), photographs
 
     def _bent_frustum(self) -> list[Item]:
