@@ -95,7 +95,7 @@ def draw_space(
     if frame is not None:
         camera = camera.at(frame * camera.world_from_cam)
     sight = Sight(camera, eye.distance)
-    if chosen_renderer(renderer) == "solid":
+    if chosen_renderer(renderer, draft) == "solid":
         from camviz.draw.solid import draw_solid
 
         return draw_solid(sight, items, panel.name, draft)
@@ -126,13 +126,17 @@ def _near(name: str, points: Array) -> bool:
     return name not in ("ground", "lawn") and bool(np.nanmax(np.abs(points)) < 12)
 
 
-def chosen_renderer(renderer: str | None = None) -> str:
-    """ "solid" or "wire": what was asked for, as far as this machine can do it."""
-    renderer = renderer or os.environ.get("CAMVIZ_RENDERER") or "solid"
-    if renderer not in ("solid", "wire"):
-        raise ValueError(f"renderer must be 'solid' or 'wire', got {renderer!r}")
-    if renderer == "wire":
+def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
+    """ "solid" or "wire": what was asked for, as far as this machine can do it.
+
+    Where nobody asked, a draft is a wireframe once solid pictures have proved too slow to be dragged.
+    """
+    asked = renderer or os.environ.get("CAMVIZ_RENDERER") or ""
+    if asked not in ("solid", "wire", ""):
+        raise ValueError(f"renderer must be 'solid' or 'wire', got {asked!r}")
+    if asked == "wire":
         return "wire"
     from camviz.draw.opengl import opengl_works
+    from camviz.draw.solid import too_slow
 
-    return "solid" if opengl_works()[0] else "wire"
+    return "wire" if not opengl_works()[0] or (draft and not asked and too_slow()) else "solid"

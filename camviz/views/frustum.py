@@ -142,8 +142,9 @@ class FrustumView(View):
         panel = space_panel("world", 20, 34, 540, 400)
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else RigidTransform.identity()
-        items = [*scene_items(textured_scene(), chosen_renderer()), *self._items(image)]
-        content, photographs = draw_space(panel, items, self.eye, draft=draft, frame=frame)
+        renderer = chosen_renderer(draft=draft)
+        items = [*scene_items(textured_scene(), renderer), *self._items(image)]
+        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer=renderer, frame=frame)
         title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
         return panel.show(content, title=title, note="drag to turn", drag="eye", label=label), photographs

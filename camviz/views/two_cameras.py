@@ -136,7 +136,12 @@ class TwoCameras(View):
 
     @cached_property
     def pairs(self) -> tuple[Array, Array]:
-        """Points of the scene that lie in both pictures: true pixels (n, 2) in the left and in the right one."""
+        """Points of the scene that lie in both pictures: true pixels (n, 2) in the left and in the right one.
+
+        None in photographs, where nobody knows them.
+        """
+        if self.photographs is not None:
+            return np.empty((0, 2)), np.empty((0, 2))
         points = garden.landmarks(self.left)
         points = points[self.right.sees(points)][: int(self.matches)]
         return self.left.project(points), self.right.project(points)
