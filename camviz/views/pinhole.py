@@ -26,6 +26,7 @@ WHITE_PHOTONS = 2000  # in a pixel that is just white
 ENLARGED = 30  # the box beside the garden, or nobody would see it
 TOWER = np.array([0.68, 0.67, 3.3])  # the middle of the crate and the globe on it, in the world
 TOWER_M = 1.16
+_GRID = np.array([[0, 1], [3, 2]])  # of an outline's corners, as a picture hangs on them
 _HOLES, _BLURS = (0.05, 2.0), (0.1, 4.0)  # the plot's range, mm
 _POINTS = {  # of the tower, from its middle, metres: what the rays start from
     "blue": (0.0, -TOWER_M / 2, 0.0),
@@ -186,8 +187,8 @@ class PinholeView(View):
         stage = np.array([(-0.95, -0.72), (0.95, -0.72), (0.95, 0.72), (-0.95, 0.72)])
         scene = np.insert(stage, 2, self.object_m, axis=1)
         items: list[Item] = [
-            Sheet.quad(scene, _stage()),
-            Sheet.quad(back, upright),
+            Sheet.over(scene[_GRID], _stage()),
+            Sheet.over(back[_GRID], upright),
             Line(_closed(scene), "muted", 1.2),
             Face(front, "shade", 0.25),
             *(Line(_closed(rim), "ink", 1.6) for rim in (front, back)),
