@@ -61,7 +61,12 @@ def _numbers(calibration: Calibration) -> str:
 
 def _row(name: str, camera: Camera) -> str:
     K = camera.intrinsics
-    cells = [name, f"{K.width} × {K.height}", *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)), repr(camera.lens)]
+    cells = [
+        name,
+        f"{K.width} × {K.height}",
+        *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)),
+        repr(camera.lens),
+    ]
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 
 

@@ -1,6 +1,7 @@
 """Panels: rectangles of a picture with coordinates of their own."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,7 +61,7 @@ def image_panel(
     return Panel(name, x, y, width, width * (bottom - top) / (right - left), left, right, top, bottom)
 
 
-def photograph(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: object) -> str:
+def photograph(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: Any) -> str:
     """The attached photograph where its pixels belong in an image panel."""
     (x0, y0), (x1, y1) = panel.place([(-0.5, -0.5), (image_width - 0.5, image_height - 0.5)])
     return svg.image(attached, x0, y0, x1 - x0, y1 - y0, **attributes)

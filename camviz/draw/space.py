@@ -116,7 +116,9 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
     fills = [Face(mesh.vertices[mesh.quads[0]], f"#{bytes(mesh.rgb).hex()}", 0.25) for mesh in flat]
     lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
-    drawn = [Line(line, "muted" if name in ("wall", "lamp", "easel") else "ink", 1.2) for name, line in lines]
+    drawn = [
+        Line(line, "muted" if name in ("wall", "lamp", "easel", "terrace") else "ink", 1.2) for name, line in lines
+    ]
     squares = [Line(line, "ink", 0.7) for _, line in wireframe_scene().only("board")]
     ground = [Line(line, "grid", 1.2) for _, line in wireframe_scene().only("ground")]
     return (*ground, *fills, *drawn, *squares)
