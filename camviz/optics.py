@@ -118,7 +118,7 @@ def f_number(diameter_mm: ArrayLike, focal_mm: ArrayLike) -> Array:
 def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: ArrayLike) -> Array:
     """Light gathered from a sunlit scene, relative to a correct exposure at ISO 100: ∝ t d² / f².
 
-    By the "sunny 16" rule f/16 and 1/100 s are correct (ISO 2720:1974 gives much the same).
+    By photographers' "sunny 16" rule, f/16 and 1/100 s are correct.
     """
     return 100 * np.asarray(exposure_s) * (16 / f_number(diameter_mm, focal_mm)) ** 2
 

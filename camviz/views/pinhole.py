@@ -47,11 +47,9 @@ class PinholeView(View):
 
     title: ClassVar[str] = "Pinhole camera"
 
-    hole_mm: float = slider(0.3, 0.05, 2.0, 0.01, label="hole diameter", unit="mm")
-    depth_mm: float = slider(50.0, 15.0, 120.0, 1.0, label="box depth f", unit="mm", help="from the hole to the wall")
-    object_m: float = slider(
-        3.0, 1.0, 6.0, 0.05, label="object distance Z", unit="m", help="from the hole to the globe"
-    )
+    hole_mm: float = slider(0.3, 0.05, 2.0, 0.01, label="hole d", unit="mm", help="diameter of the hole")
+    depth_mm: float = slider(50.0, 15.0, 120.0, 1.0, label="depth f", unit="mm", help="from the hole to the wall")
+    object_m: float = slider(3.0, 1.0, 6.0, 0.05, label="distance Z", unit="m", help="from the hole to the globe")
     exposure_s: float = slider(1.0, 0.05, 10.0, 0.05, label="exposure", unit="s", help="how long the hole is open")
     match_exposure: bool = switch(False, label="match exposure", help="expose as long as the brightness needs")
     turn_picture: bool = switch(False, label="turn the picture", help="as it hangs on the wall, or upright")
@@ -223,14 +221,15 @@ class PinholeView(View):
         content = (
             _log_grid(panel)
             + "".join(curve(panel, np.log10(hole), np.log10(y), class_) for y, class_ in lines)
-            + svg.text((panel.width - 10, right[1] + 26), "the hole's shadow", "orange halo end")
+            + svg.text((panel.width - 10, right[1] + 36), "the hole's shadow", "orange halo end")
             + svg.text(left + (0, 34), "diffraction", "green halo")
+            + svg.text(right + (-14, -8), "both together", "blue halo end")
             + self._best_mark(panel)
             + svg.dots([panel.place(_logs((self.hole_mm, self.blur_mm)))], "red", 11)
         )
         label = "Blur against the hole's diameter; drag or press the arrow keys to change the hole"
         return _log_ticks(panel) + panel.show(
-            content, title="Blur on the wall: both together", note="drag to change the hole", drag="hole", label=label
+            content, title="Blur on the wall", note="drag to change the hole", drag="hole", label=label
         )
 
     def _best_mark(self, panel: Panel) -> str:
