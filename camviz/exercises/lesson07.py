@@ -315,13 +315,13 @@ IN_FRONT = Exercise(
     misconceptions=(
         Misconception(
             lambda R, t, rays_left, rays_right: _distances(R, t, rays_left, rays_right)[:, 0] > 0,
-            "You looked at the left camera only. One of the four motions has its points in front of the left camera "
-            "and behind the right one.",
+            "You looked at the left camera only. There are motions with points in front of the left camera that lie "
+            "behind the right one.",
         ),
         Misconception(
             lambda R, t, rays_left, rays_right: _distances(R, t, rays_left, rays_right)[:, 1] > 0,
-            "You looked at the right camera only. One of the four motions has its points in front of the right camera "
-            "and behind the left one.",
+            "You looked at the right camera only. There are motions with points in front of the right camera that lie "
+            "behind the left one.",
         ),
         Misconception(
             lambda R, t, rays_left, rays_right: np.ptp(np.sign(_distances(R, t, rays_left, rays_right)), axis=-1) == 0,
