@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -11,18 +11,19 @@ from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
+from camviz.draw.matrix import matrix
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
 from camviz.lenses.base import Array, unit
-from camviz.scenes import Column, Scene, Sphere, Texture, paint, render, textured_scene, to_display
+from camviz.scenes import render, to_display
+from camviz.scenes.balloon import BALLOON, balloon_in_sight, balloon_rim, balloon_scene, towards_balloon
 from camviz.views.base import Control, View, choice, slider, switch
 
-GLOBE = np.array([0.68, 0.36, 3.3])  # the subject, in the world; the camera stands before it on the z axis
-BALLOON, BALLOON_RADIUS = np.array([1.75, -1.1, 11.6]), 0.22
+GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the camera stands before it on the z axis
 BINS = 4
 _NEAREST, _FARTHEST = 1.5, 12.0  # metres between camera and globe
-_FOCAL = {"low": 150.0, "high": 2000.0, "step": 1.0, "unit": "px"}
+_FOCAL: dict[str, Any] = {"low": 150.0, "high": 2000.0, "step": 1.0, "unit": "px"}
 _LEAN_DRAWN = 3
 
 
@@ -50,7 +51,7 @@ class IntrinsicsView(View):
     pitch_um: float = slider(6.0, 1.0, 12.0, 0.1, label="pixel width", unit="µm", help="K does not know it")
     width: int = 640
     height: int = 480
-    eye: Eye = Eye(target=(-0.3, 0.4, 2.6), distance=17.0, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
+    eye: Eye = Eye(distance=20.5, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
 
     @classmethod
     def of(cls, camera: Camera, **state: Any) -> Self:
@@ -63,7 +64,7 @@ class IntrinsicsView(View):
         """The fields' controls, and those of the two readings that can be set."""
         lens = Control("focal length", "mm", 0.9, 12.0, 0.01, help="the lens: fx and fy together")
         shape = Control("pixel aspect", "", 0.5, 2.0, 0.01, help="width of a pixel / its height = fy / fx")
-        return {"focal_mm": lens, "aspect": shape, **super().controls()}
+        return {**super().controls(), "focal_mm": lens, "aspect": shape}
 
     @property
     def focal_mm(self) -> float:
@@ -146,7 +147,7 @@ class IntrinsicsView(View):
 
     def in_sight(self) -> float:
         """The share of the balloon that nothing stands before: a matter of the camera's place, not of K."""
-        return _share_in_sight(float(self.camera.centre[2]))
+        return balloon_in_sight(self.camera.centre)
 
     # The words -------------------------------------------------------------------------------------------------------
 
@@ -186,22 +187,14 @@ class IntrinsicsView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         picture = self.image(draft=draft)
         space, photographs = self._space_panel(draft)
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 604, "paper"),
-                self._picture_panel(),
-                space,
-                self._matrices(20, 414),
-                self._lattice_panel(),
-                self._numbers_column(724, 398),
-            ]
-        )
+        body = svg.rectangle(0, 0, 960, 604, "paper") + self._picture_panel() + space + self._matrices(20, 414)
+        body += self._lattice_panel() + self._numbers_column(724, 398)
         return Picture(body, 960, 604, self.title, self.description(), {**photographs, "camera": jpeg(picture)})
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The picture (height, width, 3); a crop is shown within the whole, so it shows the picture as taken."""
         K = self.taken if self.operation == "cropped" else self.intrinsics
-        wide = min(K.width, 320 if draft else 480)
+        wide = min(K.width, 320 if draft else 440)
         grid = K if wide == K.width else K.resized(wide, max(1, round(wide * K.height / K.width)))
         return _photographed(grid, float(self.camera.centre[2]), max(1, round(320 / wide)))
 
@@ -214,7 +207,8 @@ class IntrinsicsView(View):
     def _picture_panel(self) -> str:
         panel, K = self._picture, self.intrinsics
         coarse = {"style": "image-rendering:pixelated"} if K.width < 200 else {}
-        content = photograph(panel, "camera", self.width, self.height, **coarse) + self._window() + self._behind()
+        content = photograph(panel, "camera", self.width, self.height, **coarse) + self._window()
+        content += self._behind() + self._globe()
         note = f"{K.width} × {K.height} pixels"
         return panel.show(content + self._principal_point(), title=f"The picture, {self.operation}", note=note)
 
@@ -222,8 +216,7 @@ class IntrinsicsView(View):
         """The corners' names in the picture's own pixels; around a crop, what it leaves out."""
         panel, K = self._picture, self.intrinsics
         (x0, y0), (x1, y1) = self._as_taken([(-0.5, -0.5), (K.width - 0.5, K.height - 0.5)])
-        names = svg.text((x0 + 5, y0 + 15), "(0, 0)", "number halo")
-        names += svg.text((x1 - 5, y1 - 7), f"({K.width - 1}, {K.height - 1})", "number halo end")
+        names = _tag((x0 + 8, y0 + 17), "(0, 0)") + _tag((x1 - 8, y1 - 9), f"({K.width - 1}, {K.height - 1})", "end")
         if self.operation != "cropped":
             return names
         hole = f"M0,0H{panel.width:g}V{panel.height:g}H0ZM{x0:.1f},{y0:.1f}V{y1:.1f}H{x1:.1f}V{y0:.1f}Z"
@@ -242,9 +235,10 @@ class IntrinsicsView(View):
         K = self.intrinsics
         at = self._as_taken((K.cx, K.cy))
         arms = np.array([(12, 0), (0, 12)])
-        cross = svg.segments(at - arms, at + arms, "paper-line") + svg.segments(at - arms, at + arms, "orange thick")
-        side = " end" if at[0] > 300 else ""
-        name = svg.text(at + (-14 if side else 14, -9), f"(cx, cy) = ({K.cx:.2f}, {K.cy:.2f})", f"orange halo{side}")
+        back = svg.segments(at - arms, at + arms, "white", style="stroke:#fff;stroke-width:6px")
+        cross = back + svg.segments(at - arms, at + arms, "orange thick")
+        side, dx = ("end", -14) if at[0] > 170 else ("", 14)
+        name = _tag(at + (dx, 22), f"(cx, cy) = ({K.cx:.2f}, {K.cy:.2f})", side)
         hand = svg.element("circle", cx=at[0], cy=at[1], r=16, fill_opacity=0, class_="card")
         label = f"Principal point at column {K.cx:.1f}, row {K.cy:.1f}; arrow keys move it"
         handle = {"data_drag": "principal", "tabindex": 0, "role": "group", "aria_label": label}
@@ -252,25 +246,38 @@ class IntrinsicsView(View):
 
     def _behind(self) -> str:
         """Where the balloon is, whether or not it can be seen."""
-        rim = self.taken.to_pixels(Camera(self.taken, world_from_cam=self._pose).lens.project(self._rim_cam()))
-        outline = self._picture.place(rim)
-        words = "balloon" if self.in_sight() > 0.5 else "a balloon, behind the wall"
-        top = outline[np.argmin(outline[:, 1])] - (0, 6)
-        return svg.line(outline, "red dashed") + svg.text(top, words, "red halo middle")
+        outline = self._seen(balloon_rim(self.camera.centre))
+        hidden = self.in_sight() < 0.5
+        top = outline[np.argmin(outline[:, 1])] - (0, 11)
+        ring = svg.line(outline, "white", style="stroke:#fff;stroke-width:4.5px") if hidden else ""
+        words = "a balloon, behind the wall" if hidden else "the balloon"
+        return ring + svg.line(outline, f"red thick{' dotted' if hidden else ''}") + _tag(top, words, "middle")
 
-    def _rim_cam(self) -> Array:
-        return _rim(self.camera.centre) - self.camera.centre
+    def _globe(self) -> str:
+        """How wide the globe is, in the pixels of the picture after the operation."""
+        ends = GLOBE + np.array([(-GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0), (GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0)])
+        left, right = self._seen(ends)
+        pixels = self.intrinsics.fx * 2 * GLOBE_RADIUS / self.distance
+        half = np.array((0, 5))
+        bar = svg.segments([left, left - half, right - half], [right, left + half, right + half], "green thick")
+        return bar + _tag((left + right) / 2 - (0, 11), f"{pixels:.0f} px", "middle")
+
+    def _seen(self, points: Array) -> Array:
+        """Panel coordinates (..., 2) of points (..., 3) in the garden."""
+        return self._as_taken(self.camera.project(points))
 
     # The rays --------------------------------------------------------------------------------------------------------
 
     def _space_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("space", 480, 34, 460, 330)
-        items = [*scene_items(_garden(), "wire"), *self._frustum(), *self._line_of_sight()]
-        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer="wire")
+        items = [*scene_items(balloon_scene(), "wire"), *self._frustum(), *self._line_of_sight()]
+        span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
+        target = (0.0, 0.2, float(BALLOON[2] - 0.49 * span))
+        eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
+        content, photographs = draw_space(panel, items, eye, draft=draft, renderer="wire")
         label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
-        return panel.show(
-            content, title="The rays it picks out", note="drag to turn", drag="orbit", label=label
-        ), photographs
+        heading = {"title": "The rays it picks out", "note": "drag to turn"}
+        return panel.show(content, drag="orbit", label=label, **heading), photographs
 
     def _frustum(self) -> list[Item]:
         items = camera_body(self.camera, 1.4, colour="blue")
@@ -285,24 +292,23 @@ class IntrinsicsView(View):
 
     def _line_of_sight(self) -> list[Item]:
         """To the balloon: broken where something stands in the way."""
-        stopped = _stopped(float(self.camera.centre[2]))
+        stopped = towards_balloon(self.camera.centre)
         ends = np.array([self.camera.centre, BALLOON])
-        if stopped is None:
-            return [Line(ends, "red", 1.8), *_balloon_drawn("")]
+        if not np.isfinite(stopped).all():
+            return [Line(ends, "red", 1.8), *_balloon_drawn()]
         wall = np.array([self.camera.centre, stopped])
-        return [Line(wall, "red", 1.8), Line(np.array([stopped, BALLOON]), "red dotted", 1.4), *_balloon_drawn(" hidden")]
+        return [Line(wall, "red", 1.8), Line(np.array([stopped, BALLOON]), "red dotted", 1.4), *_balloon_drawn()]
 
     # The matrices ----------------------------------------------------------------------------------------------------
 
     def _matrices(self, x: float, y: float) -> str:
         before, after = self.taken.K, self.intrinsics.K
-        same = np.zeros((3, 3), dtype=bool)
-        left = _matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before, same)
+        left = matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before)
         if self.operation == "as taken":
-            right = _matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.linalg.inv(before), same)
+            right = matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
         else:
             changed = ~np.isclose(before, after, rtol=0, atol=1e-9)
-            right = _matrix(x + 248, y, f"K, {self.operation}", after, changed)
+            right = matrix(x + 248, y, f"K, {self.operation}", after, changed)
         K = self.intrinsics
         u = f"u = {K.fx:.2f} x {_signed(K.skew)} y {_signed(K.cx)}"
         v = f"v = {K.fy:.2f} y {_signed(K.cy)}"
@@ -362,23 +368,12 @@ class IntrinsicsView(View):
         return self.dragged(handle, float("nan"), float("nan"), float(dx), float(dy))
 
 
-def _matrix(x: float, y: float, title: str, values: Array, changed: np.ndarray) -> str:
-    """A 3×3 matrix in brackets, 208 wide, its changed entries marked."""
-    parts = [svg.text((x, y - 22), title, "title")]
-    for (row, column), value in np.ndenumerate(values):
-        right, base = x + 66 + 66 * column, y + 26 * row + 10
-        if changed[row, column]:
-            parts.append(svg.rectangle(right - 58, base - 16, 62, 23, "wash fill-orange", rx=3))
-        structural = (row, column) in ((1, 0), (2, 0), (2, 1), (2, 2))
-        class_ = "number end orange" if changed[row, column] else f"number end{' half' if structural else ''}"
-        parts.append(svg.text((right, base), _plain(value) if not structural else f"{round(value / values[2, 2])}", class_))
-    for edge, inward in ((x, 6), (x + 208, -6)):
-        parts.append(svg.line([(edge + inward, y - 10), (edge, y - 10), (edge, y + 72), (edge + inward, y + 72)], "ink"))
-    return "".join(parts)
-
-
-def _plain(value: float) -> str:
-    return f"{value + 0.0:.2f}".replace("-", "−")
+def _tag(at: Any, words: str, anchor: str = "") -> str:
+    """Words on a photograph: white on a dark ground, whatever the theme."""
+    wide = 7.2 * len(words) + 8
+    left = at[0] + 4 - wide if anchor == "end" else at[0] - (wide / 2 if anchor else 4)
+    ground = svg.rectangle(left, at[1] - 12.5, wide, 17, "tag", rx=4, style="fill:#10151c;fill-opacity:.72")
+    return ground + svg.text(at, words, f"tick {anchor}", style="fill:#fff")
 
 
 def _signed(value: float) -> str:
@@ -397,58 +392,14 @@ def _ray(camera: Camera, uv: Array, length: float) -> Array:
     return camera.centre + np.array([0 * ray, length * ray / ray[2]])
 
 
-# The garden with a balloon behind its wall ---------------------------------------------------------------------------
-
-
-@cache
-def _garden() -> Scene:
-    skin = Texture(paint.lit_round(paint.plain(32, 64, (0.85, 0.08, 0.12))))
-    string = Texture(paint.lit_round(paint.plain(1, 32, (0.3, 0.3, 0.3)), upright=True))
-    balloon = Sphere(BALLOON, BALLOON_RADIUS, skin, "balloon")
-    foot = np.array([BALLOON[0], 1.25, BALLOON[2]])
-    garden = textured_scene()
-    return Scene([*garden.surfaces, balloon, Column(foot, 1.25 - BALLOON[1], 0.012, string, "balloon")], garden.sky)
-
-
-def _rim(eye: Array, size: float = 1.0, samples: int = 48) -> Array:
-    """The outline (samples, 3) of the balloon as seen from `eye` (3,), or a smaller circle within it."""
-    towards = BALLOON - eye
-    distance = np.linalg.norm(towards)
-    sine = BALLOON_RADIUS / distance
-    across = unit(np.cross(towards, (0.0, 1.0, 0.0)))
-    turn = np.linspace(0, 2 * np.pi, samples)[:, None]
-    around = np.cos(turn) * across + np.sin(turn) * unit(np.cross(across, towards))
-    return eye + (1 - sine**2) * towards + size * BALLOON_RADIUS * np.sqrt(1 - sine**2) * around
-
-
-@lru_cache(maxsize=256)
-def _share_in_sight(z: float) -> float:
-    """How much of the balloon's disc nothing hides from (0, 0, z): rings of rays, each for an equal area."""
-    eye = np.array([0.0, 0.0, z])
-    rings = np.concatenate([_rim(eye, np.sqrt((i + 0.5) / 8), 33)[:-1] for i in range(8)])
-    _, depth = textured_scene().trace(eye, unit(rings - eye))
-    return float(np.mean(~(depth < np.linalg.norm(rings - eye, axis=-1))))
-
-
-@lru_cache(maxsize=256)
-def _stopped(z: float) -> tuple[float, float, float] | None:
-    """Where the line from (0, 0, z) to the balloon's middle meets something before it, if it does."""
-    eye = np.array([0.0, 0.0, z])
-    towards = unit(BALLOON - eye)
-    _, depth = textured_scene().trace(eye, towards)
-    x, y, z = (eye + float(depth) * towards).tolist()
-    return (x, y, z) if depth < np.linalg.norm(BALLOON - eye) else None
-
-
 @lru_cache(maxsize=4)
 def _photographed(intrinsics: Intrinsics, z: float, supersample: int) -> np.ndarray:
-    picture = to_display(
-        render(_garden(), Camera(intrinsics, world_from_cam=RigidTransform.from_translation([0, 0, z])), supersample)
-    )
+    camera = Camera(intrinsics, world_from_cam=RigidTransform.from_translation([0, 0, z]))
+    picture = to_display(render(balloon_scene(), camera, supersample))
     picture.flags.writeable = False
     return picture
 
 
-def _balloon_drawn(hidden: str) -> list[Item]:
-    eye = np.array([BALLOON[0] - 6, BALLOON[1] - 6, BALLOON[2] - 6])
-    return [Line(_rim(eye), "red thick", 2.4), Label(BALLOON - (0, 0.4, 0), f"balloon{',' if hidden else ''}{hidden}", "red halo")]
+def _balloon_drawn() -> list[Item]:
+    eye = BALLOON - 6.0
+    return [Line(balloon_rim(eye), "red thick", 2.4), Label(BALLOON - (0, 0.4, 0), "balloon", "red halo")]
