@@ -294,10 +294,12 @@ class IntrinsicsView(View):
         """To the balloon: broken where something stands in the way."""
         stopped = towards_balloon(self.camera.centre)
         ends = np.array([self.camera.centre, BALLOON])
+        rim = balloon_rim(BALLOON - 6.0)
+        balloon: list[Item] = [Line(rim, "red thick", 2.4), Label(BALLOON - (0, 0.4, 0), "balloon", "red halo")]
         if not np.isfinite(stopped).all():
-            return [Line(ends, "red", 1.8), *_balloon_drawn()]
+            return [Line(ends, "red", 1.8), *balloon]
         wall = np.array([self.camera.centre, stopped])
-        return [Line(wall, "red", 1.8), Line(np.array([stopped, BALLOON]), "red dotted", 1.4), *_balloon_drawn()]
+        return [Line(wall, "red", 1.8), Line(np.array([stopped, BALLOON]), "red dotted", 1.4), *balloon]
 
     # The matrices ----------------------------------------------------------------------------------------------------
 
@@ -370,7 +372,7 @@ class IntrinsicsView(View):
 
 def _tag(at: Any, words: str, anchor: str = "") -> str:
     """Words on a photograph: white on a dark ground, whatever the theme."""
-    wide = 7.2 * len(words) + 8
+    wide = 5.9 * len(words) + 10
     left = at[0] + 4 - wide if anchor == "end" else at[0] - (wide / 2 if anchor else 4)
     ground = svg.rectangle(left, at[1] - 12.5, wide, 17, "tag", rx=4, style="fill:#10151c;fill-opacity:.72")
     return ground + svg.text(at, words, f"tick {anchor}", style="fill:#fff")
@@ -398,8 +400,3 @@ def _photographed(intrinsics: Intrinsics, z: float, supersample: int) -> np.ndar
     picture = to_display(render(balloon_scene(), camera, supersample))
     picture.flags.writeable = False
     return picture
-
-
-def _balloon_drawn() -> list[Item]:
-    eye = BALLOON - 6.0
-    return [Line(balloon_rim(eye), "red thick", 2.4), Label(BALLOON - (0, 0.4, 0), "balloon", "red halo")]
