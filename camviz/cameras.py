@@ -213,7 +213,7 @@ def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:
     return as_points(vectors, 3, "vectors") @ rotation.as_matrix().T
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def _rays_cam(intrinsics: Intrinsics, lens: Lens) -> Array:
     rays = lens.unproject(intrinsics.from_pixels(intrinsics.grid()))
     rays.flags.writeable = False

@@ -94,7 +94,8 @@ def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
 def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
     """True for every `step_px`-th pixel, (rows, columns), at which a ray arrives."""
     intrinsics = camera.intrinsics
-    pixels = intrinsics.grid()[::step_px, ::step_px]
+    u, v = (np.arange(0, size, step_px, dtype=float) for size in (intrinsics.width, intrinsics.height))
+    pixels = np.stack(np.meshgrid(u, v), axis=-1)
     return np.isfinite(camera.lens.unproject(intrinsics.from_pixels(pixels))[..., 0])
 
 

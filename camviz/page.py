@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 from html import escape
 from itertools import combinations
 from pathlib import Path
@@ -14,6 +15,7 @@ from camviz import __version__
 from camviz.cameras import Camera
 from camviz.draw.picture import Picture, style
 from camviz.files import Calibration
+from camviz.lenses import Lens
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
@@ -28,8 +30,8 @@ h1 { font-size: 1.5rem; margin: 0; } h2 { font-size: 1.15rem; margin: 2.2rem 0 .
 p { margin: .3rem 0 .8rem; max-width: 75ch; } figure { margin: .5rem 0 1.5rem; }
 figcaption { font-weight: 600; margin-bottom: .2rem; }
 .scroll { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid light-dark(#d9dde4, #39424f); }
-.note { border-left: 4px solid #c05300; padding-left: .8rem; }
+th, td { text-align: left; vertical-align: top; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid light-dark(#d9dde4, #39424f); }
+td:nth-child(-n+6) { white-space: nowrap; } .note { border-left: 4px solid #c05300; padding-left: .8rem; }
 footer { margin-top: 2rem; opacity: .7; font-size: .85rem; } svg.camviz-svg { width: 100%; height: auto; display: block; }
 """
 
@@ -61,8 +63,20 @@ def _numbers(calibration: Calibration) -> str:
 
 def _row(name: str, camera: Camera) -> str:
     K = camera.intrinsics
-    cells = [name, f"{K.width} × {K.height}", *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)), repr(camera.lens)]
+    cells = [
+        name,
+        f"{K.width} × {K.height}",
+        *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)),
+        repr(camera.lens),
+    ]
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+
+
+def _lens(lens: Lens) -> str:
+    """The lens's kind and those of its parameters that are not at rest."""
+    moved = [f for f in fields(lens) if getattr(lens, f.name) != f.default]  # type: ignore[arg-type]
+    parameters = ", ".join(f"{f.name} = {getattr(lens, f.name):.6g}" for f in moved)
+    return type(lens).__name__ + (f": {parameters}" if parameters else "")
 
 
 def _frusta(calibration: Calibration) -> Iterator[str]:

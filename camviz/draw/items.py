@@ -118,7 +118,13 @@ def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") 
 
 
 def camera_body(
-    camera: Camera, depth: float, *, image: NDArray[np.uint8] | None = None, colour: str = "blue", name: str = "", near: float = 0
+    camera: Camera,
+    depth: float,
+    *,
+    image: NDArray[np.uint8] | None = None,
+    colour: str = "blue",
+    name: str = "",
+    near: float = 0,
 ) -> list[Item]:
     """A camera as seen from outside: its centre, the volume it sees out to `depth` metres, its up side, its picture.
 
@@ -152,7 +158,7 @@ def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid"
 
 
 def _reach(camera: Camera, uv: Array) -> Array:
-    """Vectors from the centre along the rays of pixels `uv`, to the plane z = 1 or, for a wide lens, the unit sphere."""
+    """Vectors from the centre along the rays of pixels `uv`, to z = 1 or, for a wide lens, to the unit sphere."""
     rays = camera.unproject(uv)
     forward = camera.world_from_cam.rotation.as_matrix()[:, 2]
     z = camera.unproject(camera.intrinsics.border(SIDE)) @ forward

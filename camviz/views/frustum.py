@@ -15,7 +15,17 @@ from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import (
-    Dots, Eye, Item, Label, Line, axes_triad, camera_body, chosen_renderer, draw_space, scene_items, space_panel,
+    Dots,
+    Eye,
+    Item,
+    Label,
+    Line,
+    axes_triad,
+    camera_body,
+    chosen_renderer,
+    draw_space,
+    scene_items,
+    space_panel,
 )  # fmt: skip
 from camviz.lenses import Lens, Perspective
 from camviz.lenses.base import Array
@@ -23,27 +33,33 @@ from camviz.scenes import board_corners, render, textured_scene, to_display
 from camviz.views.base import View, choice, slider, switch
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
-_METRES = {"low": -6.0, "high": 6.0, "step": 0.05, "unit": "m"}
-_TURN = {"low": -180.0, "high": 180.0, "step": 1.0, "unit": "°"}
+
+
+def _metres(default: float, help: str) -> Any:
+    return slider(default, -6.0, 6.0, 0.05, unit="m", help=help)
+
+
+def _degrees(default: float, reach: float, label: str, help: str) -> Any:
+    return slider(default, -reach, reach, 1.0, label=label, unit="°", help=help)
 
 
 @dataclass(frozen=True)
 class FrustumView(View):
     """Where a camera stands, which way it looks, and what of the world it therefore sees.
 
-    x, y, z are what `mode` says: the camera's centre C ("edit C"), the vector t of its extrinsics [R | t] ("edit t"), or
-    where the camera has the middle of the scene ("orbit"). Changing the mode leaves the camera where it is.
+    x, y, z are what `mode` says: the camera's centre C ("edit C"), the t of its extrinsics [R | t] ("edit t"), or where
+    the camera has the middle of the scene ("orbit"). Changing the mode leaves the camera where it is.
     """
 
     title: ClassVar[str] = "A camera in its world"
 
     mode: str = choice("edit C", "edit t", "orbit", help="what x, y, z are: the centre C, the vector t, or the subject")
-    x: float = slider(-0.6, **_METRES, help="right")
-    y: float = slider(-0.5, **_METRES, help="down")
-    z: float = slider(0.2, **_METRES, help="forward")
-    yaw_deg: float = slider(12.0, **_TURN, label="yaw", help="to the right, about y")
-    pitch_deg: float = slider(-8.0, -90.0, 90.0, 1.0, label="pitch", unit="°", help="up, about x")
-    roll_deg: float = slider(0.0, **_TURN, label="roll", help="clockwise, about z")
+    x: float = _metres(-0.6, "right")
+    y: float = _metres(-0.5, "down")
+    z: float = _metres(0.2, "forward")
+    yaw_deg: float = _degrees(12.0, 180.0, "yaw", "to the right, about y")
+    pitch_deg: float = _degrees(-8.0, 90.0, "pitch", "up, about x")
+    roll_deg: float = _degrees(0.0, 180.0, "roll", "clockwise, about z")
     hfov_deg: float = slider(60.0, 20.0, 120.0, 1.0, label="field of view", unit="°", help="2 atan(width / 2 fx)")
     near: float = slider(0.3, 0.1, 1.0, 0.05, unit="m", help="where the drawn volume begins")
     far: float = slider(1.2, 0.3, 6.0, 0.1, unit="m", help="where the drawn volume ends")
@@ -126,8 +142,9 @@ class FrustumView(View):
         panel = space_panel("world", 20, 34, 540, 400)
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else RigidTransform.identity()
-        items = [*scene_items(textured_scene(), chosen_renderer()), *self._items(image)]
-        content, photographs = draw_space(panel, items, self.eye, draft=draft, frame=frame)
+        renderer = chosen_renderer(draft=draft)
+        items = [*scene_items(textured_scene(), renderer), *self._items(image)]
+        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer=renderer, frame=frame)
         title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
         return panel.show(content, title=title, note="drag to turn", drag="eye", label=label), photographs

@@ -94,7 +94,7 @@ def test_questions_answer_every_choice(lesson) -> None:
                 break
             choice.check()
             form.locator("button").click()
-            form.locator("[role=status] strong").wait_for()
+            form.locator("button:disabled").wait_for(state="attached")  # the answer is in, the reply has come
             assert len(form.locator("[role=status]").inner_text()) > 20
 
 
