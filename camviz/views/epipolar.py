@@ -156,7 +156,8 @@ class EpipolarView(TwoCameras):
             ]
         )
         label = f"The {panel.name} picture; drag or press the arrow keys to {action}"
-        return panel.show(content, title=f"The {panel.name} picture", note=note, drag=panel.name, label=label)
+        said = {"hint": note} if note.startswith("drag") else {"note": note}
+        return panel.show(content, title=f"The {panel.name} picture", drag=panel.name, label=label, **said)
 
     def _pencil(self, panel: Panel, camera: Camera) -> str:
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
@@ -237,7 +238,7 @@ class EpipolarView(TwoCameras):
         panel = space_panel("space", 20, 409, 500, 200)
         content, sheets = draw_space(panel, self._space_items(images), self._onlooker, draft=draft, renderer="wire")
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
-        shown = panel.show(content, title="The epipolar plane", note="drag to turn", drag="orbit", label=label)
+        shown = panel.show(content, title="The epipolar plane", hint="drag to turn", drag="orbit", label=label)
         return shown, sheets
 
     @property

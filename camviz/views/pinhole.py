@@ -174,7 +174,7 @@ class PinholeView(View):
         eye = replace(self.eye, target=aim, distance=self.eye.distance * (extent + 2))
         content, photographs = draw_space(panel, self._box_items(upright), eye, draft=draft, renderer="wire")
         label = "The box and the garden in space; drag or press the arrow keys to walk around"
-        note = f"the box is drawn {ENLARGED} times as large · drag to turn"
+        note = f"the box is drawn {ENLARGED} times as large"
         return panel.show(content, title="Light in a box", note=note, drag="orbit", label=label), photographs
 
     def _box_items(self, upright: np.ndarray) -> list[Item]:
@@ -229,7 +229,7 @@ class PinholeView(View):
         )
         label = "Blur against the hole's diameter; drag or press the arrow keys to change the hole"
         return _log_ticks(panel) + panel.show(
-            content, title="Blur on the wall", note="drag to change the hole", drag="hole", label=label
+            content, title="Blur on the wall", hint="drag to change the hole", drag="hole", label=label
         )
 
     def _best_mark(self, panel: Panel) -> str:
