@@ -1,10 +1,7 @@
 # For those who work on camviz; a reader needs only start.py.
 BIN := .venv/bin
 
-.PHONY: setup test lint browser bench lock
-
-setup:
-	python3 start.py --version
+.PHONY: test lint browser bench lock
 
 test:
 	python3 start.py test

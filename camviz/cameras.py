@@ -69,10 +69,10 @@ class Intrinsics:
             raise ValueError(f"K must have shape (3, 3), got {K.shape}")
         if not np.array_equal(K[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
             raise ValueError(f"K must be upper triangular with K[2, 2] = 1, got {K.tolist()}")
-        return cls(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], K[0, 1])
+        return cls(width, height, *K[[0, 1, 0, 1, 0], [0, 1, 2, 2, 1]].tolist())
 
     @property
-    def K(self) -> Array:  # noqa: N802
+    def K(self) -> Array:
         """The 3×3 camera matrix."""
         return np.array([[self.fx, self.skew, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
@@ -195,10 +195,10 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> R
     """
     eye, target, down = (np.asarray(v, dtype=float) for v in (eye, target, down))
     forward = unit(target - eye)
-    right = unit(np.cross(unit(down), forward))
-    sideways = np.linalg.norm(np.cross(unit(down), forward))
-    if not sideways > 1e-9:
+    sideways = np.cross(unit(down), forward)
+    if not np.linalg.norm(sideways) > 1e-9:  # NaN, or parallel but for rounding
         raise ValueError(f"cannot look from {eye.tolist()} at {target.tolist()} with down = {down.tolist()}")
+    right = unit(sideways)
     axes = np.stack([right, np.cross(forward, right), forward], axis=-1)
     return RigidTransform.from_components(eye, Rotation.from_matrix(axes))
 
@@ -213,7 +213,7 @@ def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:
     return as_points(vectors, 3, "vectors") @ rotation.as_matrix().T
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def _rays_cam(intrinsics: Intrinsics, lens: Lens) -> Array:
     rays = lens.unproject(intrinsics.from_pixels(intrinsics.grid()))
     rays.flags.writeable = False

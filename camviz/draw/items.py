@@ -102,6 +102,8 @@ class Label:
         object.__setattr__(self, "point", as_points(self.point, 3, "point").reshape(3))
 
 
+SIDE = 16  # points along each side of a camera's rim
+
 Item = Line | Face | Sheet | Dots | Label
 
 
@@ -112,11 +114,17 @@ def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") 
     for letter, colour, tip in zip("xyz", ("orange", "green", "blue"), tips, strict=True):
         items.append(Line(np.array([origin, tip]), colour, 2.4, head=True))
         items.append(Label(origin + 1.12 * (tip - origin), letter, f"label {colour}"))
-    return [*items, Label(origin, name, "note")] if name else items
+    return [*items, Label(1.3 * origin - 0.3 * tips[1], name, "note")] if name else items
 
 
 def camera_body(
-    camera: Camera, depth: float, *, image: NDArray[np.uint8] | None = None, colour: str = "blue", name: str = "", near: float = 0
+    camera: Camera,
+    depth: float,
+    *,
+    image: NDArray[np.uint8] | None = None,
+    colour: str = "blue",
+    name: str = "",
+    near: float = 0,
 ) -> list[Item]:
     """A camera as seen from outside: its centre, the volume it sees out to `depth` metres, its up side, its picture.
 
@@ -124,18 +132,18 @@ def camera_body(
     all point well forward end on a plane, as a pinhole's image does, those of a wider lens on a sphere. `image`, uint8
     RGB, is shown there; `near` adds a second rim.
     """
-    reach = _reach(camera, camera.intrinsics.border(12))
+    reach = _reach(camera, camera.intrinsics.border(SIDE))
     rim = camera.centre + depth * reach
-    corners = rim[::12]
+    corners = rim[::SIDE]
     items: list[Item] = [Line(_closed(rim), colour, 2.2), Dots(camera.centre, colour, 8)]
     items += [Line(np.array([camera.centre, corner]), colour, 1.5) for corner in corners]
-    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(_closed(rim), 12)]
+    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(_closed(rim))]
     if near > 0:
         items.append(Line(_closed(camera.centre + near * reach), colour, 1.2))
     if image is not None:
-        mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 7, 9)
+        mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 10, 13)
         items.append(Sheet.over(camera.centre + depth * _reach(camera, mesh), image))
-    items += _up_marker(rim[0], rim[12], rim[6], rim[30], colour)
+    items.append(_up_marker(camera, rim[SIDE // 2], depth, colour))
     return [*items, Label(camera.centre, name, f"label {colour}")] if name else items
 
 
@@ -150,10 +158,10 @@ def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid"
 
 
 def _reach(camera: Camera, uv: Array) -> Array:
-    """Vectors from the centre along the rays of pixels `uv`, to the plane z = 1 or, for a wide lens, the unit sphere."""
+    """Vectors from the centre along the rays of pixels `uv`, to z = 1 or, for a wide lens, to the unit sphere."""
     rays = camera.unproject(uv)
     forward = camera.world_from_cam.rotation.as_matrix()[:, 2]
-    z = camera.unproject(camera.intrinsics.border(12)) @ forward
+    z = camera.unproject(camera.intrinsics.border(SIDE)) @ forward
     flat = np.isfinite(z).all() and z.min() > 0.25
     return rays / (rays @ forward)[..., None] if flat else rays
 
@@ -164,15 +172,15 @@ def _mesh(camera: Camera, rows: int, columns: int) -> Array:
     return np.stack(np.meshgrid(u, v), axis=-1)
 
 
-def _up_marker(left: Array, right: Array, top: Array, bottom: Array, colour: str) -> list[Item]:
-    """A small triangle above the rim's upper edge."""
-    middle, half, up = top, (right - left) / 12, (top - bottom) / 7
-    return [Face(np.array([middle - half, middle + up, middle + half]), colour, 0.9)]
+def _up_marker(camera: Camera, top: Array, depth: float, colour: str) -> Item:
+    """A small triangle above the middle of the rim's upper edge."""
+    right, down, _ = 0.1 * depth * camera.world_from_cam.rotation.as_matrix().T
+    return Face(top - [0.2 * down + right, 0.2 * down - right, 1.5 * down], colour, 0.9)
 
 
 def _closed(outline: Array) -> Array:
     return np.vstack([outline, outline[:1]])
 
 
-def _sides(outline: Array, count: int) -> list[Array]:
-    return [outline[i : i + count + 1] for i in range(0, len(outline) - 1, count)]
+def _sides(outline: Array) -> list[Array]:
+    return [outline[i : i + SIDE + 1] for i in range(0, len(outline) - 1, SIDE)]

@@ -15,7 +15,7 @@ Window = tuple[tuple[float, float, float, float], np.ndarray]
 
 
 def warp(px: Array, sheet: Sheet, view: Intrinsics, scale: float) -> Window | None:
-    """The sheet as seen, with its vertices at picture units `px` (n, 2): a rectangle (x, y, width, height) and RGBA pixels.
+    """The sheet as seen, its vertices at picture units `px` (n, 2): a rectangle (x, y, width, height) and RGBA pixels.
 
     `scale` is pixels per picture unit. None where nothing of it is in view.
     """

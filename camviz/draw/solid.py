@@ -6,11 +6,13 @@ rather than through a plotter: that takes a second and 100 MB less to start.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from math import degrees, atan
+from math import atan, degrees
+from time import perf_counter
 from typing import Any
 from zlib import crc32
 
@@ -29,15 +31,17 @@ COLOURS = {
     "blue": "#2b8cd0", "orange": "#e0752e", "green": "#12a57e", "red": "#e0407f", "sky": "#58aee6", "yellow": "#d6a520",
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
+FINE = 1.5
+SLOW = 0.08  # seconds that a draft may take before wireframes take its place
 _BACKGROUND = 128
 
 
 def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> tuple[str, dict[str, bytes]]:
     """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
 
-    The photograph has two pixels per picture unit, as a draft one.
+    The photograph has FINE pixels per picture unit, as a draft one.
     """
-    shot = _stage().submit(_shoot, sight, items, 1 if draft else 2).result()
+    shot = _stage().submit(_shoot, sight, items, 1.0 if draft else FINE).result()
     fragment, photographs = _cut_out(shot, sight, name)
     fragment += "".join(draw_lines(sight, items, hidden=shot.hides).values()) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
@@ -86,11 +90,20 @@ def _studio() -> Studio:
 
 
 def _shoot(sight: Sight, items: Sequence[Item], scale: float) -> Shot:
-    return _studio().shoot(sight, items, scale)
+    studio, start = _studio(), perf_counter()
+    shot = studio.shoot(sight, items, scale)
+    studio.pace.append((perf_counter() - start) / scale**2)
+    return shot
+
+
+def too_slow() -> bool:
+    """Whether even the fastest of the last few solid pictures took too long to be dragged."""
+    pace = _studio().pace if _studio.cache_info().currsize else ()
+    return len(pace) == 5 and min(pace) > SLOW
 
 
 def rehearse(window: str) -> None:
-    """Draw a square with the named window class, as opengl_works does in a process of its own. Exits 0 if it is there."""
+    """Draw a square with the named window class and exit, 0 if it can be seen: for a process of its own."""
     from camviz.draw.space import Eye
 
     def square() -> bool:
@@ -107,10 +120,12 @@ class Studio:
     def __init__(self, window: str) -> None:
         from vtkmodules import vtkRenderingCore, vtkRenderingOpenGL2
 
-        self.window: Any = getattr(vtkRenderingOpenGL2, window, vtkRenderingCore.vtkRenderWindow)()
+        windows: Any = vtkRenderingCore if window == "vtkRenderWindow" else vtkRenderingOpenGL2
+        self.window = getattr(windows, window)()
         self.window.SetOffScreenRendering(True)
         self.window.SetMultiSamples(0)
         self.window.SetAlphaBitPlanes(True)
+        self.window.SetFrameBlitModeToNoBlit()
         self.renderer: Any = vtkRenderingCore.vtkRenderer()
         self.renderer.SetBackground(*[_BACKGROUND / 255] * 3)
         self.renderer.SetBackgroundAlpha(0)
@@ -123,8 +138,8 @@ class Studio:
         self.renderer.SetAutomaticLightCreation(False)
         self.opaque, self.clear = self._actor(), self._actor()
         self.sheets: dict[Sheet, Any] = {}
-        self.spare: list[Any] = []
         self.size = np.zeros(2, dtype=int)
+        self.pace: deque[float] = deque(maxlen=5)
 
     def shoot(self, sight: Sight, items: Sequence[Item], scale: float) -> Shot:
         """A picture of the faces and sheets."""
@@ -149,25 +164,29 @@ class Studio:
         return actor
 
     def _hang(self, sheets: Sequence[Sheet]) -> None:
-        """One textured actor per sheet. A sheet that hangs already stays as it is; actors without one are reused."""
-        spare = [self.sheets.pop(sheet) for sheet in set(self.sheets) - set(sheets)] + self.spare
+        """One textured actor per sheet; a sheet that hangs already stays as it is, one that is gone frees its actor."""
+        for sheet in set(self.sheets) - set(sheets):
+            self.renderer.RemoveActor(self.sheets.pop(sheet))
         for sheet in sheets:
             if sheet not in self.sheets:
-                self.sheets[sheet] = spare.pop() if spare else self._textured()
-                _paper(self.sheets[sheet], sheet)
-            self.sheets[sheet].SetVisibility(True)
-        for actor in spare:
-            actor.SetVisibility(False)
-        self.spare = spare
+                self.sheets[sheet] = self._paper(sheet)
 
-    def _textured(self) -> Any:
-        from vtkmodules.vtkRenderingCore import vtkTexture
+    def _paper(self, sheet: Sheet) -> Any:
+        """An actor of the sheet's shape and picture, unlit, for pictures bring their own light."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk
 
-        actor, texture = self._actor(), vtkTexture()
-        texture.InterpolateOn()
-        texture.MipmapOn()
-        actor.SetTexture(texture)
+        actor = self._actor()
+        there = np.isfinite(sheet.vertices.sum(axis=-1))
+        quads = sheet.quads[there[sheet.quads].all(axis=-1)]
+        data = _surface(np.where(there[:, None], sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
+        data.GetPointData().SetTCoords(numpy_to_vtk(sheet.uv * (1, -1) + (0, 1), deep=True))
+        actor.GetMapper().SetInputData(data)
+        actor.GetProperty().SetOpacity(sheet.opacity)
         actor.GetProperty().LightingOff()
+        actor.GetProperty().SetAmbient(1)
+        actor.GetProperty().SetDiffuse(0)
+        alike = (hung.GetTexture() for other, hung in self.sheets.items() if other.picture is sheet.picture)
+        actor.SetTexture(next(alike, None) or _texture(sheet.picture))
         return actor
 
     def _aim(self, sight: Sight, items: Sequence[Item]) -> None:
@@ -210,7 +229,7 @@ class Studio:
 
 
 def _unmixed(rgba: np.ndarray) -> np.ndarray:
-    """Colours (h, w, 3) without the background, which shows through as c = alpha * colour + (1 - alpha) * background."""
+    """Colours (h, w, 3) without the background that shows through: c = alpha * colour + (1 - alpha) * background."""
     rgb = np.ascontiguousarray(rgba[..., :3])
     mixed = (rgba[..., 3] > 0) & (rgba[..., 3] < 255)
     alpha = rgba[mixed][:, 3:] / 255
@@ -233,21 +252,19 @@ def _dress(actor: Any, faces: Sequence[Face]) -> None:
     actor.SetVisibility(bool(faces))
 
 
-def _paper(actor: Any, sheet: Sheet) -> None:
-    """Give an actor this sheet's shape and picture."""
+def _texture(picture: np.ndarray) -> Any:
+    """A picture (height, width, 3) as a texture whose v runs downwards, like the picture's rows."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkRenderingCore import vtkTexture
 
-    there = np.isfinite(sheet.vertices).all(axis=-1)
-    quads = sheet.quads[there[sheet.quads].all(axis=-1)]
-    data = _surface(np.where(there[:, None], sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
-    data.GetPointData().SetTCoords(numpy_to_vtk(sheet.uv, deep=True))
-    actor.GetMapper().SetInputData(data)
-    actor.GetProperty().SetOpacity(sheet.opacity)
-    image = vtkImageData()
-    image.SetDimensions(sheet.picture.shape[1], sheet.picture.shape[0], 1)
-    image.GetPointData().SetScalars(numpy_to_vtk(sheet.picture[::-1].reshape(-1, 3), deep=True))
-    actor.GetTexture().SetInputData(image)
+    image, texture = vtkImageData(), vtkTexture()
+    image.SetDimensions(picture.shape[1], picture.shape[0], 1)
+    image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(picture).reshape(-1, 3)))
+    texture.SetInputData(image)
+    texture.InterpolateOn()
+    texture.MipmapOn()
+    return texture
 
 
 def _surface(points: Array, triangles: np.ndarray) -> Any:

@@ -86,7 +86,9 @@ def draw_lines(
     lines = [item for item in items if isinstance(item, Line)]
     pieces = cut(sight, lines, hidden, fine=hidden is not nothing_hides)
     depths = np.empty(0) if fills is None else fills
-    slot = np.searchsorted(-depths, -0.98 * pieces.depth, side="left") if len(depths) else np.zeros(len(pieces.depth), int)
+    slot = (
+        np.searchsorted(-depths, -0.98 * pieces.depth, side="left") if len(depths) else np.zeros(len(pieces.depth), int)
+    )
     level = np.where(pieces.hidden, -1, sight.strength(pieces.depth))
     pens = {pen: i for i, pen in enumerate(dict.fromkeys((line.class_, line.width) for line in lines))}
     pen = np.array([pens[line.class_, line.width] for line in lines], dtype=int)[pieces.line]
@@ -187,7 +189,7 @@ def _data(pieces: Pieces, chosen: np.ndarray) -> str:
     strokes = np.concatenate([pieces.ends[firsts, 0], pieces.ends[lasts, 1]], axis=-1).round(1)
     touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1)])
     return "".join(
-        ("L%g,%g" % (c, d)) if touch else ("M%g,%gL%g,%g" % (a, b, c, d))
+        f"L{c:g},{d:g}" if touch else f"M{a:g},{b:g}L{c:g},{d:g}"
         for (a, b, c, d), touch in zip(strokes.tolist(), touches.tolist(), strict=True)
     )
 
@@ -203,7 +205,9 @@ def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
                 along *= min(4.2 * line.width, length) / length
                 across = 0.38 * np.array([-along[1], along[0]])
                 colour = line.class_.split()[0]
-                yield svg.polygon([tip + 0.3 * along, tip - 0.7 * along + across, tip - 0.7 * along - across], f"fill-{colour}")
+                yield svg.polygon(
+                    [tip + 0.3 * along, tip - 0.7 * along + across, tip - 0.7 * along - across], f"fill-{colour}"
+                )
 
 
 def _fills(

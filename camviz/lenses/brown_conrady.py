@@ -13,6 +13,7 @@ from camviz.lenses.base import Array, RayLens, as_points, blockwise, check_param
 from camviz.lenses.roots import first_positive_root
 
 STEEPEST = np.deg2rad(89.5)  # the tables end here where the polynomial itself has no end
+UNBOUNDED = 1e150  # a radius beyond all images whose square is still a number
 CLOSE = 1e-13  # focal lengths, relative beyond 1: how well an inverse must return
 
 
@@ -73,7 +74,8 @@ class BrownConrady(RayLens):
         """The derivative (..., 2, 2) of `distort` at ideal points (..., 2)."""
         xy = as_points(xy, 2, "xy")
         bent = blockwise(lambda x, y: self._bend_and_slopes(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
-        return self._tilt_jacobian(blockwise(self._polynomial, xy, 2)) @ bent
+        with np.errstate(all="ignore"):
+            return self._tilt_jacobian(blockwise(self._polynomial, xy, 2)) @ bent
 
     # Its domain.
 
@@ -126,11 +128,15 @@ class BrownConrady(RayLens):
     def straighten(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Ideal coordinates (n,) of distorted ones (n,), by Newton's method; NaN where there are none."""
         u, v = self._untilt(x, y)
-        u = np.where(u * u + v * v <= self._limits[2] ** 2, u, np.nan)
+        azimuth, farthest = self._rim
+        u = np.where(u * u + v * v <= farthest.max() ** 2, u, np.nan)
         x, y, error = self._newton(u, v)
-        found = (error <= CLOSE * (1 + np.abs(u) + np.abs(v))) & self._valid(x, y)
-        if not found.all():
-            x[~found], y[~found] = self._newton_inside(u[~found], v[~found])
+        lost = np.flatnonzero(~(self._valid(x, y) & (error <= CLOSE * (1 + np.abs(u) + np.abs(v)))))
+        if len(lost):
+            x[lost] = y[lost] = np.nan
+            rim = np.interp(np.arctan2(v[lost], u[lost]), azimuth, farthest, period=2 * pi)
+            lost = lost[np.hypot(u[lost], v[lost]) <= rim]
+            x[lost], y[lost] = self._newton_inside(u[lost], v[lost])
         return x, y
 
     # Forwards. With m = N/D + 2 (p1 y + p2 x): x' = x m + (p2 + s1) r² + s2 r⁴, y' = y m + (p1 + s3) r² + s4 r⁴.
@@ -228,23 +234,43 @@ class BrownConrady(RayLens):
         return upright if self._tilt is None else upright & (_homography(self._tilt, u, v)[2] > 0)
 
     @cached_property
-    def _limits(self) -> tuple[float, float, float]:
-        """Radii: ideal points below the first are valid, beyond the second are not; no image lies beyond the third."""
+    def _limits(self) -> tuple[float, float]:
+        """Radii: ideal points up to the first are valid, beyond the second they are not."""
         outer = min(self.fold_radius, self.pole_radius)
         if self._symmetric and self._tilt is None:
-            return outer, outer, inf if self.pole_radius <= self.fold_radius else float(self.radial(outer))
-        azimuth = np.linspace(0, 2 * pi, 65)[1:]
-        r = np.tan(min(atan(outer), STEEPEST) * _fractions(128)[:, None])
-        x, y = r * np.cos(azimuth), r * np.sin(azimuth)
+            return outer, outer
+        r, _, upright = self._spokes
+        return 0.99 * float(np.where(upright, r, 0).max(axis=0).min()), outer
+
+    @cached_property
+    def _spokes(self) -> tuple[Array, Array, np.ndarray]:
+        """Radii (n, 1) along 64 lines from the axis, their azimuths, and how far (n, 64) the map is upright there."""
+        end = min(atan(min(self.fold_radius, self.pole_radius)), STEEPEST)
+        r, azimuth = np.tan(end * _fractions(128)[:, None]), np.linspace(0, 2 * pi, 65)[1:]
         with np.errstate(all="ignore"):
-            upright = np.logical_and.accumulate(self._upright(x, y))
-            images = np.hypot(*self._polynomial(x, y))
-        endless = (outer == inf and upright[-1].any()) or not upright[0].all()
-        farthest = inf if endless else 1.1 * float(images[upright].max())
-        return 0.99 * float(np.where(upright, r, 0).max(axis=0).min()), outer, farthest
+            return r, azimuth, np.logical_and.accumulate(self._upright(r * np.cos(azimuth), r * np.sin(azimuth)))
+
+    @cached_property
+    def _rim(self) -> tuple[Array, Array]:
+        """Azimuths in the image before its tilt, and radii that no image exceeds there, or UNBOUNDED."""
+        outer = min(self.fold_radius, self.pole_radius)
+        if self._symmetric and self._tilt is None:
+            return np.zeros(1), np.array([self.radial(outer) if outer == self.fold_radius < inf else UNBOUNDED])
+        r, azimuth, upright = self._spokes
+        if not upright[0].all():
+            return azimuth, np.full_like(azimuth, UNBOUNDED)
+        last = upright.sum(axis=0) - 1
+        ends = np.stack([r[last, 0], r[np.minimum(last + 1, len(r) - 1), 0]])
+        with np.errstate(all="ignore"):
+            x, y = self._polynomial(ends * np.cos(azimuth), ends * np.sin(azimuth))
+        endless = upright[-1] & (outer > 1.001 * r[-1, 0])
+        radii = np.where(endless, UNBOUNDED, 1.005 * np.hypot(x, y).max(axis=0))
+        order = np.argsort(np.arctan2(y[0], x[0]))
+        neighbours = [np.roll(radii[order], shift) for shift in (-2, -1, 0, 1, 2)]
+        return np.arctan2(y[0], x[0])[order], np.max(neighbours, axis=0)
 
     def _valid(self, x: Array, y: Array) -> np.ndarray:
-        inner, outer, _ = self._limits
+        inner, outer = self._limits
         s = x * x + y * y
         valid = s <= inner * inner
         doubtful = ~valid & (s < outer * outer)
@@ -293,23 +319,23 @@ class BrownConrady(RayLens):
         return x, y, self._step(x, y, u, v)[2]
 
     def _newton_inside(self, u: Array, v: Array) -> tuple[Array, Array]:
-        """Newton's method that halves a step which comes no closer or leaves the domain; NaN where it gets nowhere."""
-        inner, outer, _ = self._limits
+        """Newton's method that shortens a step which comes no closer or leaves the domain; NaN where that fails."""
+        inner, outer = self._limits
         close = CLOSE * (1 + np.abs(u) + np.abs(v))
         x, y = self._guess(u, v)
         inwards = np.minimum(1, 0.999 * inner / np.maximum(np.hypot(x, y), 1e-300))
         state = np.stack([inwards * x, inwards * y, u, v])
         state = np.stack([*state, *self._step(*state)[:3], np.ones_like(u)])
         for _ in range(60):
-            moving = (state[6] > close) & (state[7] > 1e-4)
+            moving = (state[6] > close) & (state[7] > 1e-3)
             if not moving.any():
                 break
             x, y, u, v, dx, dy, error, factor = old = state[:, moving]
             new_x, new_y = x + factor * dx, y + factor * dy
             new_dx, new_dy, new_error, determinant = self._step(new_x, new_y, u, v)
             better = (new_error < error) & (determinant > 0) & (np.hypot(new_x, new_y) < outer)
-            new = np.stack([new_x, new_y, u, v, new_dx, new_dy, new_error, np.minimum(1, 2 * factor)])
-            old[7] /= 2
+            new = np.stack([new_x, new_y, u, v, new_dx, new_dy, new_error, np.minimum(1, 4 * factor)])
+            old[7] /= 4
             state[:, moving] = np.where(better, new, old)
         x, y, error = state[0], state[1], state[6]
         found = (error <= close) & self._valid(x, y)

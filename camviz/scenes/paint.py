@@ -95,8 +95,8 @@ def paving(columns: int, rows: int, texels: int = 40) -> Picture:
 def checkerboard(columns: int, rows: int, texels: int = 40, margin: int = 20) -> Picture:
     """columns × rows squares, `texels` wide, the first one black, on white paper with a margin."""
     dark = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0
-    squares = np.kron(np.where(dark, 18, 242), np.ones((texels, texels))).astype(np.uint8)
-    return np.repeat(np.pad(squares, margin, constant_values=242)[..., None], 3, axis=2)
+    squares = np.kron(np.where(dark, 42, 238), np.ones((texels, texels))).astype(np.uint8)
+    return np.repeat(np.pad(squares, margin, constant_values=238)[..., None], 3, axis=2)
 
 
 def planks(size: int = 256) -> Picture:

@@ -26,8 +26,9 @@ class Bounds:
     @classmethod
     def around(cls, balls: Sequence[tuple[Array, float, Array]]) -> Bounds:
         """From a centre, a radius and a normal for each surface."""
-        centre, radius, normal = zip(*balls, strict=True)
-        return cls(*(np.array(values, dtype=np.float32) for values in (centre, radius, normal)))
+        rows = np.array([[*centre, radius, *normal] for centre, radius, normal in balls], dtype=np.float32)
+        rows = rows.reshape(-1, 7)
+        return cls(rows[:, :3], rows[:, 3], rows[:, 4:])
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,7 @@ class Runs:
         np.nan_to_num(directions_in_runs, copy=False, nan=0.0)
         origins_in_runs = np.asarray(_in_runs(origins) if len(origins) > 1 else origins.T[..., None], dtype=float)
         axis = directions_in_runs.sum(axis=2)
-        with np.errstate(invalid="ignore"):  # a run without rays has no axis
-            axis /= np.sqrt((axis * axis).sum(axis=0))
+        axis /= np.maximum(np.sqrt((axis * axis).sum(axis=0)), np.float32(1e-6))
         along = (axis[..., None] * directions_in_runs).sum(axis=0)
         cosine = np.minimum(along.min(axis=1), np.float32(1))
         sine = np.sqrt(1 - cosine * cosine)

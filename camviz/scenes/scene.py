@@ -37,10 +37,12 @@ class Scene:
         Returns linear light (..., 3) and the distance along the ray (...) in metres, both float32. A ray that meets
         nothing shows the sky at distance NaN; a NaN direction is no ray: NEUTRAL grey, NaN. `spread` is the angle in
         radians between neighbouring rays, over which textures are averaged (Amanatides 1984, "Ray tracing with
-        cones"); 0 averages nothing. Raises ValueError when the directions are not of unit length.
+        cones"); 0 averages nothing. Raises ValueError for directions that are not of unit length and for origins that
+        are not finite.
         """
         origins, directions = as_points(origins, 3, "origins"), as_points(directions, 3, "directions")
         shape = np.broadcast_shapes(origins.shape, directions.shape)
+        _require_rays(origins, directions)
         if 0 in shape:
             return np.zeros(shape, np.float32), np.zeros(shape[:-1], np.float32)
         origins, directions = _flat(origins, shape), np.broadcast_to(directions, shape).reshape(-1, 3)
@@ -116,6 +118,16 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
 def _flat(origins: Array, shape: tuple[int, ...]) -> Array:
     """(1, 3) for a single origin, otherwise one (n, 3) for each ray."""
     return origins.reshape(1, 3) if origins.size == 3 else np.broadcast_to(origins, shape).reshape(-1, 3)
+
+
+def _require_rays(origins: Array, directions: Array) -> None:
+    """Of the directions one in RUN is looked at: a wrong scale is seldom wrong once."""
+    if not np.isfinite(origins).all():
+        raise ValueError("origins must be finite points, got NaN or infinity among them")
+    lengths = np.linalg.norm(directions.reshape(-1, 3)[::RUN], axis=-1)
+    wrong = lengths[np.abs(lengths - 1) > 1e-3]
+    if wrong.size:
+        raise ValueError(f"directions must be unit vectors, got one of length {wrong[0]:g}")
 
 
 def _spread(rays: Array) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from math import atan, degrees, isfinite
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -23,8 +23,8 @@ from camviz.lenses.base import unit
 from camviz.scenes import Scene, render, textured_scene, to_display
 from camviz.views.base import View, choice, slider, switch
 
-_RADIAL = {"low": -1.0, "high": 1.0, "step": 0.005}
-_SIDE = {"low": -0.1, "high": 0.1, "step": 0.001}
+_RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
+_SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
 _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
 _WIDTH = 380
 
@@ -86,7 +86,7 @@ class DistortionView(View):
             "image corner": f"r = {_with_angle(corner)}",
             "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
             "fold": f"r = {_with_angle(fold)}" if isfinite(fold) else "none",
-            "rays reach r =": f"{self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
+            "farthest a ray lands": f"r = {self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
         }
 
     def equation(self) -> str:
@@ -94,7 +94,7 @@ class DistortionView(View):
         if self.lens:
             return type(self.lens).__name__
         above, below = (_polynomial(self.k1, self.k2, self.k3), _polynomial(self.k4, self.k5, self.k6))
-        return f"g(r) = r ({above})" + (f" / ({below})" if below != "1" else "")
+        return "g(r) = r" + (f" ({above})" if above != "1" else "") + (f" / ({below})" if below != "1" else "")
 
     def description(self) -> str:
         """The state in words and numbers."""
@@ -192,12 +192,12 @@ class DistortionView(View):
         return panel.show(content, title="Where each point goes", note="contours: shift in px")
 
     def _contours(self, panel: Panel) -> str:
-        uv = _pixel_grid(self.intrinsics, 49)
+        uv = _pixel_grid(self.intrinsics, 65)
         contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self.moved(uv)))
         lines = {level: [panel.place(line) for line in contours.lines(level)] for level in _LEVELS}
         names = [
-            svg.text(line[len(line) // 8], f"{level}", "tick halo middle")
-            for level, drawn in lines.items()
+            svg.text(line[int((0.1 + 0.07 * i) * len(line))], f"{level}", "tick halo middle")
+            for i, (level, drawn) in enumerate(lines.items())
             for line in drawn[:1]
         ]
         return svg.path([line for drawn in lines.values() for line in drawn], "muted thin") + "".join(names)
@@ -243,7 +243,7 @@ class DistortionView(View):
     def _fold_mark(self, panel: Panel, fold: float) -> str:
         if not fold < panel.right:
             return ""
-        at = panel.place((fold, self._radial(np.array(fold))))
+        at = panel.place([fold, float(self._radial(np.array(fold)))])
         side = "end" if at[0] > panel.width / 2 else ""
         words = f"folds at r = {_with_angle(fold)}"
         return svg.dots([at], "red", 9) + svg.text(at + (-8 if side else 8, -12), words, f"red halo {side}")
@@ -255,7 +255,7 @@ class DistortionView(View):
         content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
         return panel.show(
-            content, title="Its rays in space", note="drag to turn", drag="orbit", label=label
+            content, title="Its rays in space", hint="drag to turn", drag="orbit", label=label
         ), photographs
 
     def _bent_frustum(self) -> list[Item]:
@@ -286,9 +286,9 @@ class DistortionView(View):
         for i, (name, value) in enumerate(self._coefficients().items()):
             class_ = "number" if value else "number faint"
             rows.append(svg.text((x, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
-        for i, (name, value) in enumerate(self.numbers().items()):
+        for i, (name, figure) in enumerate(self.numbers().items()):
             rows.append(svg.text((x, 296 + 40 * i), name, "note"))
-            rows.append(svg.text((x, 313 + 40 * i), value, "label"))
+            rows.append(svg.text((x, 313 + 40 * i), figure, "label"))
         return "".join(rows)
 
 

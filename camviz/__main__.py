@@ -1,0 +1,8 @@
+"""`python -m camviz` is the command `camviz`."""
+
+import sys
+
+from camviz.command import main
+
+if __name__ == "__main__":
+    sys.exit(main())

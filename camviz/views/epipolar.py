@@ -1,0 +1,342 @@
+"""The epipolar visualizer: one point, two cameras, and the line on which the second picture must show it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from camviz import twoview
+from camviz.cameras import Camera, Intrinsics, transform
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, space_panel
+from camviz.lenses import Perspective
+from camviz.lenses.base import Array, unit
+from camviz.views import garden
+from camviz.views.marks import border_arrow, camera_outline, crop, on_photograph, ring
+from camviz.views.two_cameras import TwoCameras
+
+_DISTANCES = np.concatenate([np.geomspace(0.02, 400, 240), [np.inf]])
+_NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point
+_PATCH = 48  # pixels on a side of the details that are compared
+_PLANES = 48  # epipolar planes in a full turn around the baseline
+_WIDTH = 455
+
+
+@dataclass(frozen=True)
+class EpipolarView(TwoCameras):
+    """Where a point of the left picture can appear in the right one, and what a fundamental matrix knows of it."""
+
+    title: ClassVar[str] = "Epipolar geometry"
+
+    eye: Eye = Eye(target=(-0.1, 0.25, 1.7), distance=4.6, yaw_deg=-62, pitch_deg=22, vfov_deg=30)
+
+    # Words -----------------------------------------------------------------------------------------------------------
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        return dict(self._figures)
+
+    @cached_property
+    def _figures(self) -> dict[str, str]:
+        nowhere = "none" if not self.baseline else "at infinity" if self.F is not None else "beyond the lens’s field"
+        figures = {
+            "baseline": f"{self.baseline:.3f} m",
+            "left epipole": _pixel(_epipole(self.left, self.right), nowhere),
+            "right epipole": _pixel(_epipole(self.right, self.left), nowhere),
+            "point, right": _pixel(self.uv_right, "no image") + ("" if self.right.sees(self.point) else ", outside"),
+        }
+        if self.F is not None:
+            away = twoview.line_distance(self.line, self.uv_right)
+            figures["off its line"] = f"{away:.2f} px:  xᵀFx = {self.residual:.6f}"
+        if self.estimate is not None:
+            figures["estimated lines"] = f"off by {self.estimate_error:.3g} px ({len(self.pairs[0])} matches)"
+            figures["its epipole"] = f"turned by {self.epipole_error:.3g}°"
+        elif self.F is not None and self.noise:
+            figures["no estimate"] = f"only {len(self.pairs[0])} points in both"
+        return figures
+
+    def equation(self) -> str:
+        """x_rightᵀ (F x_left) = 0 with this state's epipolar line filled in."""
+        if not self.baseline:
+            return "no baseline: no epipolar line"
+        if self.F is None:
+            return "a lens that bends: no F, a curve"
+        a, b, c = self.line
+        return (
+            f"{a:+.3f} u {b:+.3f} v {c:+.1f} = 0".replace("-", "−") if np.isfinite(a) else "the left epipole: no line"
+        )
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        where = f"The point at ({self.u:.0f}, {self.v:.0f}) in the left picture lies {self.depth:.2f} m along its ray"
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        return f"{where}. {figures}. Right epipolar line: {self.equation()}."
+
+    # Hands -----------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> EpipolarView:
+        if handle == "left":
+            return self._with_point(self._left_panel, x, y, dx, dy)
+        if handle == "right":
+            return self._with_depth(self._right_panel, x, y, dx, dy)
+        return self.but(eye=self.eye.orbited(dx, dy))
+
+    def pressed(self, handle: str, key: str) -> EpipolarView:
+        if handle == "left":
+            return super().pressed(handle, key)
+        if handle == "right":
+            farther = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
+            return self.but(depth=float(np.clip(self.depth * 1.05**farther, _NEAREST, _FARTHEST)))
+        return self.but(eye=self.eye.key(key))
+
+    def _with_point(self, panel: Panel, x: float, y: float, dx: float, dy: float) -> EpipolarView:
+        """The point under the pointer, or moved by (dx, dy) where there is no pointer."""
+        at = panel.place([self.u, self.v]) + (panel.x + dx, panel.y + dy) if np.isnan(x) else np.array([x, y])
+        u, v = panel.data(at - (panel.x, panel.y))
+        size = self.left.intrinsics
+        return self.but(u=float(np.clip(u, 0, size.width - 1)), v=float(np.clip(v, 0, size.height - 1)))
+
+    def _with_depth(self, panel: Panel, x: float, y: float, dx: float, dy: float) -> EpipolarView:
+        """The depth whose image in the right picture is nearest to the pointer."""
+        depths = np.geomspace(_NEAREST, _FARTHEST, 1500)
+        curve = panel.place(twoview.epipolar_curve(self.left, self.right, [self.u, self.v], depths))
+        away = np.linalg.norm(curve + (panel.x, panel.y) - (x, y), axis=-1)
+        return self.but(depth=float(depths[np.nanargmin(away)])) if np.isfinite(away).any() else self
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        images, attached = self._pictures(draft)
+        space, sheets = self._space_panel(images, draft)
+        details, crops = self._details(images)
+        panels = [
+            self._picture_panel(self._left_panel, self.left, self.right, "drag the point", "move the point"),
+            self._picture_panel(self._right_panel, self.right, self.left, self.equation(), "move it along its ray"),
+        ]
+        body = "".join([svg.rectangle(0, 0, 960, 622, "paper"), *panels, space, self._numbers_block(), details])
+        return Picture(body, 960, 622, self.title, self.description(), attached | sheets | crops)
+
+    def _pictures(self, draft: bool) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
+        """What the two cameras see, as pixels and as JPEG."""
+        if self.photographs is None:
+            cameras = {"left": self.left, "right": self.right}
+            taken = {name: garden.taken(camera, 320 if draft else 480) for name, camera in cameras.items()}
+        else:
+            taken = {
+                name: (image, jpeg(image)) for name, image in zip(("left", "right"), self.photographs, strict=True)
+            }
+        return {name: image for name, (image, _) in taken.items()}, {name: data for name, (_, data) in taken.items()}
+
+    # The two pictures ------------------------------------------------------------------------------------------------
+
+    @property
+    def _left_panel(self) -> Panel:
+        return image_panel("left", 20, 34, _WIDTH, self.left.intrinsics.width, self.left.intrinsics.height)
+
+    @property
+    def _right_panel(self) -> Panel:
+        return image_panel("right", 485, 34, _WIDTH, self.right.intrinsics.width, self.right.intrinsics.height)
+
+    def _picture_panel(self, panel: Panel, camera: Camera, other: Camera, note: str, action: str) -> str:
+        content = "".join(
+            [
+                photograph(panel, panel.name, camera.intrinsics.width, camera.intrinsics.height),
+                self._pencil(panel, camera),
+                self._match_dots(panel),
+                self._own_line(panel, camera),
+                self._estimated_line(panel, camera),
+                self._other_camera(panel, camera, other),
+                self._epipole_mark(panel, camera, other),
+                self._point_mark(panel, camera),
+            ]
+        )
+        label = f"The {panel.name} picture; drag or press the arrow keys to {action}"
+        said = {"hint": note} if note.startswith("drag") else {"note": note}
+        return panel.show(content, title=f"The {panel.name} picture", drag=panel.name, label=label, **said)
+
+    def _pencil(self, panel: Panel, camera: Camera) -> str:
+        """Epipolar lines all around the baseline: the images of planes that meet in it."""
+        if not self.baseline:
+            return ""
+        forward = self.left.world_from_cam.rotation.as_matrix()
+        along, first = self._plane_axes(forward[:, 2] if abs(self._along @ forward[:, 2]) < 0.9 else forward[:, 0])
+        turn = np.arange(_PLANES) * (2 * np.pi / _PLANES)
+        across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(along, first)
+        lines = _near(camera.project(camera.centre + _half_planes(along, across, 60)), camera.intrinsics)
+        lines = lines[np.isfinite(lines).any(axis=(1, 2))]
+        return svg.path(panel.place(lines), "yellow thin half")
+
+    def _own_line(self, panel: Panel, camera: Camera) -> str:
+        """The epipolar line of the chosen point, and in the right picture strong where its ray can be seen."""
+        if not self.baseline:
+            return ""
+        along, across = self._plane_axes(self.point - self.left.centre)
+        whole = camera.project(camera.centre + _half_planes(along, np.stack([across, -across]), 160))
+        lines = on_photograph(panel.place(_near(whole, camera.intrinsics)), "green thin")
+        if panel.name == "right":
+            ray = panel.place(twoview.epipolar_curve(self.left, self.right, [self.u, self.v], _DISTANCES))
+            lines += on_photograph([ray], "green thick") + _infinity(ray[-1])
+        return lines
+
+    def _estimated_line(self, panel: Panel, camera: Camera) -> str:
+        if self.estimate is None:
+            return ""
+        F, uv = (self.estimate, [self.u, self.v]) if panel.name == "right" else (self.estimate.T, self.uv_right)
+        line = panel.place(twoview.clip_lines(twoview.epipolar_lines(F, uv), camera.intrinsics))
+        epipole = panel.place(twoview.from_homogeneous(twoview.epipoles(F)[1]))
+        return on_photograph([line], "purple dashed") + svg.dots([epipole], "purple", 9)
+
+    def _match_dots(self, panel: Panel) -> str:
+        if not self.noise:
+            return ""
+        seen = self.noisy_pairs[panel.name == "right"]
+        return svg.dots(panel.place(seen), "paper-dot", 7) + svg.dots(panel.place(seen), "purple", 5)
+
+    def _epipole_mark(self, panel: Panel, camera: Camera, other: Camera) -> str:
+        if not self.baseline:
+            return ""
+        uv = _epipole(camera, other)
+        at = panel.place(uv)
+        if camera.intrinsics.contains(uv):
+            words = "epipole: the other camera’s centre"
+            side = "end" if at[0] > panel.width / 2 else ""
+            return ring(at, "yellow", 8) + svg.text(at + (-14 if side else 14, -8), words, f"yellow halo {side}")
+        toward = at - (panel.width / 2, panel.height / 2) if np.isfinite(uv).all() else _heading(camera, other)
+        return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}, this way")
+
+    def _other_camera(self, panel: Panel, camera: Camera, other: Camera) -> str:
+        return (
+            camera_outline(panel, camera, other, "orange" if panel.name == "left" else "blue") if self.baseline else ""
+        )
+
+    def _point_mark(self, panel: Panel, camera: Camera) -> str:
+        at = panel.place([self.u, self.v] if panel.name == "left" else self.uv_right)
+        marks = ring(at, "red", 8) + svg.dots([at], "red", 5)
+        if self.truth and np.isfinite(self.surface).all():
+            true = panel.place(camera.project(self.surface))
+            marks = ring(true, "sky", 13) + svg.text(true + (17, 5), "the surface", "sky halo") + marks
+        return marks
+
+    @cached_property
+    def _along(self) -> Array:
+        """The direction (3,) of the baseline, from the left camera to the right one."""
+        return unit(self.right.centre - self.left.centre)
+
+    def _plane_axes(self, toward: Array) -> tuple[Array, Array]:
+        """Unit axes (3,) of the epipolar plane that holds the direction `toward`: along the baseline and across it."""
+        return self._along, unit(toward - (toward @ self._along) * self._along)
+
+    # The space -------------------------------------------------------------------------------------------------------
+
+    def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("space", 20, 409, 500, 200)
+        content, sheets = draw_space(panel, self._space_items(images), self._onlooker, draft=draft, renderer="wire")
+        label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
+        shown = panel.show(content, title="The epipolar plane", hint="drag to turn", drag="orbit", label=label)
+        return shown, sheets
+
+    @property
+    def _nearness(self) -> float:
+        """1 in the garden; smaller for a calibrated pair with a short baseline."""
+        return min(1.0, max(0.05, self.baseline / 0.3)) if self.pair else 1.0
+
+    @property
+    def _onlooker(self) -> Eye:
+        """The eye, as near to a small rig as it is to a large one."""
+        left, s = self.left.centre, self._nearness
+        target = tuple((left + s * (np.array(self.eye.target) - left)).tolist())
+        return replace(self.eye, target=target, distance=s * self.eye.distance)
+
+    def _space_items(self, images: dict[str, np.ndarray]) -> list[Item]:
+        left, right, point, s = self.left.centre, self.right.centre, self.point, self._nearness
+        ray = np.array([left, left + max(8.0 * s, self.depth) * self.left.unproject([self.u, self.v])])
+        return [
+            *(Line(line, "muted", 1.0) for line in garden.outlines() if self.photographs is None),
+            *camera_body(self.left, 0.6 * s, image=images["left"], colour="blue"),
+            *camera_body(self.right, 0.6 * s, image=images["right"], colour="orange"),
+            Label(left + (0, 0.22 * s, 0), "left", "label blue"),
+            Label(right + (0, 0.22 * s, 0), "right", "label orange"),
+            Face(np.array([left, right, point]), "green", 0.3),
+            Line(ray, "blue", 1.8),
+            Line(np.array([right, point]), "orange", 1.8),
+            Line(np.array([left, right]), "green", 2.6),
+            Dots(point, "red", 9),
+        ]
+
+    # The numbers -----------------------------------------------------------------------------------------------------
+
+    def _numbers_block(self) -> str:
+        x, y = 540, 401
+        rows = [svg.text((x, y), "F, of unit norm" if self.F is not None else "No F here", "title")]
+        for i, row in enumerate(self.F if self.F is not None else ()):
+            rows.append(svg.text((x, y + 22 + 18 * i), _row(row), "number"))
+        for i, (name, value) in enumerate(self.numbers().items()):
+            rows.append(svg.text((x, y + 92 + 19 * i), name, "note"))
+            rows.append(svg.text((x + 112, y + 92 + 19 * i), value, "label"))
+        return "".join(rows)
+
+    def _details(self, images: dict[str, np.ndarray]) -> tuple[str, dict[str, bytes]]:
+        """What the pictures show around the point, side by side: alike where the depth is that of the surface."""
+        drawn, crops = "", {}
+        for i, (name, camera, uv) in enumerate(
+            (("left", self.left, np.array([self.u, self.v])), ("right", self.right, self.uv_right))
+        ):
+            panel = Panel(f"{name} detail", 796 + 75 * i, 409, 69, 69, 0, 69, 0, 69)
+            content = svg.text((34, 38), "outside", "note middle")
+            if camera.intrinsics.contains(uv):
+                crops[panel.name] = jpeg(crop(images[name], camera.intrinsics, uv, _PATCH))
+                content = svg.image(panel.name, 0, 0, 69, 69) + ring(np.array([34.5, 34.5]), "red", 5)
+            drawn += panel.show(content) + svg.text((panel.x + 34, 494), f"{name}, here", "note middle")
+        return svg.text((796, 401), "Do they match?", "title") + drawn, crops
+
+
+def _half_planes(along: Array, across: Array, samples: int) -> Array:
+    """Directions (n, samples, 3) in the half planes that start at the line `along` (3,) towards `across` (n, 3)."""
+    angle = np.linspace(0, np.pi, samples)[:, None]
+    return np.cos(angle) * along + np.sin(angle) * across[:, None, :]
+
+
+def _epipole(camera: Camera, other: Camera) -> Array:
+    """The pixel (2,) at which `camera` sees the centre of `other`, or the point opposite; NaN where it sees neither."""
+    seen, opposite = camera.project([other.centre, 2 * camera.centre - other.centre])
+    return seen if np.isfinite(seen).all() else opposite
+
+
+def _heading(camera: Camera, other: Camera) -> Array:
+    """The direction (2,) in the picture in which the other camera lies, though it has no image."""
+    towards = transform(camera.cam_from_world, other.centre)[:2]
+    return towards if np.any(towards) else np.array([1.0, 0.0])
+
+
+def _far(uv: Array, camera: Camera) -> str:
+    if np.isnan(uv).any():
+        return "at infinity" if isinstance(camera.lens, Perspective) else "beyond the lens’s field"
+    away = float(np.linalg.norm(uv - np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2))
+    return f"{away:,.0f} px" if away < 1e6 else "at infinity"
+
+
+def _infinity(at: Array) -> str:
+    return svg.dots([at], "green", 8) + svg.text(at + (0, -9), "∞", "green halo middle")
+
+
+def _near(uv: Array, intrinsics: Intrinsics) -> Array:
+    """Pixels (..., 2) as far as they lie in the picture or no more than a picture away from it, else NaN."""
+    size = np.array([intrinsics.width, intrinsics.height])
+    with np.errstate(invalid="ignore"):
+        return np.where((np.abs(uv - size / 2) < 1.5 * size).all(axis=-1, keepdims=True), uv, np.nan)
+
+
+def _row(entries: Array) -> str:
+    """Numbers in columns; rounding errors of zero as zero."""
+    return "  ".join(f"{entry:+.2e}" if abs(entry) > 1e-12 else "        0" for entry in entries).replace("-", "−")
+
+
+def _pixel(uv: Array, missing: str) -> str:
+    if not np.isfinite(uv).all() or np.abs(uv).max() > 1e6:
+        return missing
+    return f"({uv[0]:.1f}, {uv[1]:.1f})".replace("-", "−")

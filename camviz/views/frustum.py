@@ -1,0 +1,263 @@
+"""The frustum visualizer: a camera in its world, the picture it takes, and the numbers that say where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from math import atan, degrees, radians, tan
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.cameras import Camera, Intrinsics, transform
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import (
+    Dots,
+    Eye,
+    Item,
+    Label,
+    Line,
+    axes_triad,
+    camera_body,
+    chosen_renderer,
+    draw_space,
+    scene_items,
+    space_panel,
+)  # fmt: skip
+from camviz.lenses import Lens, Perspective
+from camviz.lenses.base import Array
+from camviz.scenes import board_corners, render, textured_scene, to_display
+from camviz.views.base import View, choice, slider, switch
+
+SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
+
+
+def _metres(default: float, help: str) -> Any:
+    return slider(default, -6.0, 6.0, 0.05, unit="m", help=help)
+
+
+def _degrees(default: float, reach: float, label: str, help: str) -> Any:
+    return slider(default, -reach, reach, 1.0, label=label, unit="°", help=help)
+
+
+@dataclass(frozen=True)
+class FrustumView(View):
+    """Where a camera stands, which way it looks, and what of the world it therefore sees.
+
+    x, y, z are what `mode` says: the camera's centre C ("edit C"), the t of its extrinsics [R | t] ("edit t"), or where
+    the camera has the middle of the scene ("orbit"). Changing the mode leaves the camera where it is.
+    """
+
+    title: ClassVar[str] = "A camera in its world"
+
+    mode: str = choice("edit C", "edit t", "orbit", help="what x, y, z are: the centre C, the vector t, or the subject")
+    x: float = _metres(-0.6, "right")
+    y: float = _metres(-0.5, "down")
+    z: float = _metres(0.2, "forward")
+    yaw_deg: float = _degrees(12.0, 180.0, "yaw", "to the right, about y")
+    pitch_deg: float = _degrees(-8.0, 90.0, "pitch", "up, about x")
+    roll_deg: float = _degrees(0.0, 180.0, "roll", "clockwise, about z")
+    hfov_deg: float = slider(60.0, 20.0, 120.0, 1.0, label="field of view", unit="°", help="2 atan(width / 2 fx)")
+    near: float = slider(0.3, 0.1, 1.0, 0.05, unit="m", help="where the drawn volume begins")
+    far: float = slider(1.2, 0.3, 6.0, 0.1, unit="m", help="where the drawn volume ends")
+    seen_from: str = choice("world view", "camera view", label="seen from", help="what stands still: world or camera")
+    points: bool = switch(True, help="the board's corners and the world's axes, projected over the picture")
+    intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 60))
+    lens: Lens = field(default_factory=Perspective)
+    eye: Eye = Eye(target=(0.0, 0.3, 2.2), distance=8.0, yaw_deg=-38, pitch_deg=24)
+
+    @classmethod
+    def of(cls, camera: Camera, **state: Any) -> Self:
+        """The view of a given camera's intrinsics and lens, put where the view begins."""
+        return cls(intrinsics=camera.intrinsics, lens=camera.lens, hfov_deg=_hfov_deg(camera.intrinsics), **state)
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The camera shown."""
+        rotation = Rotation.from_euler("YXZ", [self.yaw_deg, self.pitch_deg, self.roll_deg], degrees=True)
+        p = np.array([self.x, self.y, self.z])
+        centre = p if self.mode == "edit C" else self._pivot - rotation.apply(p)
+        return Camera(self._zoomed(), self.lens, RigidTransform.from_components(centre, rotation))
+
+    @property
+    def _pivot(self) -> Array:
+        """The point that stays at (x, y, z) before the camera: the world's origin, for t is where the camera has it."""
+        return np.array(SUBJECT if self.mode == "orbit" else (0.0, 0.0, 0.0))
+
+    def _zoomed(self) -> Intrinsics:
+        k = self.intrinsics
+        zoom = tan(radians(_hfov_deg(k)) / 2) / tan(radians(self.hfov_deg) / 2)
+        return k if abs(zoom - 1) < 1e-12 else replace(k, fx=zoom * k.fx, fy=zoom * k.fy, skew=zoom * k.skew)
+
+    def but(self, **changes: Any) -> Self:
+        """The same view with some fields changed; a change of mode alone rewrites x, y, z and moves nothing."""
+        if changes.get("mode", self.mode) == self.mode or changes.keys() & {"x", "y", "z"}:
+            return super().but(**changes)
+        changed = super().but(mode=changes.pop("mode"))
+        camera = self.camera
+        p = camera.centre if changed.mode == "edit C" else transform(camera.cam_from_world, changed._pivot)
+        x, y, z = (p.round(9) + 0.0).tolist()
+        return super(FrustumView, changed).but(x=x, y=y, z=z).but(**changes)
+
+    # The numbers -----------------------------------------------------------------------------------------------------
+
+    def numbers(self) -> dict[str, Array]:
+        """R (3, 3) and t (3,) of the extrinsics, the centre C (3,), and K (3, 3)."""
+        extrinsics = self.camera.cam_from_world
+        return {
+            "R": extrinsics.rotation.as_matrix(),
+            "t": np.asarray(extrinsics.translation),
+            "C": self.camera.centre,
+            "K": self.camera.intrinsics.K,
+        }
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        n = self.numbers()
+        seen = int(self.camera.sees(board_corners()).sum())
+        return (
+            f"The camera stands at C = {_row(n['C'])} m, turned {_signed(self.yaw_deg, 0)}° right, "
+            f"{_signed(self.pitch_deg, 0)}° up, {_signed(self.roll_deg, 0)}° clockwise; t = {_row(n['t'])} m; "
+            f"field of view {self.hfov_deg:.0f}°; it sees {seen} of the board's 54 corners. Mode: {self.mode}."
+        )
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        image = self._image(draft)
+        world, photographs = self._world_panel(image, draft)
+        body = svg.rectangle(0, 0, 960, 580, "paper") + world + self._picture_panel() + self._numbers_panel()
+        return Picture(body, 960, 580, self.title, self.description(), {**photographs, "camera": jpeg(image)})
+
+    def _image(self, draft: bool) -> np.ndarray:
+        k, pose = self.camera.intrinsics, self.camera.world_from_cam
+        width = 320 if draft else 480
+        small = k.resized(width, max(1, round(width * k.height / k.width)))
+        return _taken(small, self.lens, tuple(pose.translation), tuple(pose.rotation.as_quat()))
+
+    def _world_panel(self, image: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("world", 20, 34, 540, 400)
+        from_camera = self.seen_from == "camera view"
+        frame = self.camera.world_from_cam if from_camera else RigidTransform.identity()
+        renderer = chosen_renderer(draft=draft)
+        items = [*scene_items(textured_scene(), renderer), *self._items(image)]
+        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer=renderer, frame=frame)
+        title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
+        label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
+        return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs
+
+    def _items(self, image: np.ndarray) -> list[Item]:
+        near = self.near if self.near < self.far else 0
+        items = camera_body(self.camera, self.far, image=image, colour="orange", near=near)
+        items += axes_triad(RigidTransform.identity(), 0.7, "world")
+        items += axes_triad(self.camera.world_from_cam, 0.35)
+        items.append(Label(self.camera.centre + 0.25 * _up(self.camera), "C", "label orange"))
+        if self.mode != "edit C":
+            items.append(Line(np.array([self.camera.centre, self._pivot]), "purple dashed", 1.8))
+            items.append(Dots(self._pivot, "purple", 8))
+        return items
+
+    def _picture_panel(self) -> str:
+        k = self.camera.intrinsics
+        width = min(360, 270 * k.width / k.height)
+        panel = image_panel("picture", 580, 34, width, k.width, k.height)
+        content = photograph(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
+        label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
+        return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)
+
+    def _projected(self, panel: Panel) -> str:
+        uv = panel.place(self.camera.project(board_corners()))
+        spacing = float(np.linalg.norm(uv[1] - uv[0]))
+        corners = svg.dots(uv, "red", float(np.clip(0.35 * spacing, 1, 5)) if np.isfinite(spacing) else 4)
+        reach = np.linspace(0, 0.7, 33)[:, None]
+        axes = [svg.line(panel.place(self.camera.project(reach * axis)), f"{colour} thick")
+                for axis, colour in zip(np.eye(3), ("orange", "green", "blue"), strict=True)]  # fmt: skip
+        return corners + "".join(axes)
+
+    def _numbers_panel(self) -> str:
+        n, from_sliders = self.numbers(), " ← x, y, z"
+        return "".join(
+            [
+                _matrix((580, 360), "K, intrinsics [px]", n["K"], 1),
+                _matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
+                _matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
+                _matrix((450, 486), "C = −Rᵀt [m]" + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
+                self._chain(),
+            ]
+        )
+
+    def _chain(self) -> str:
+        """One point, step by step."""
+        point = board_corners()[0]
+        seen_at = self.camera.project(point)
+        pixel = f"{_row(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
+        rows = [
+            ("X, first corner of the board [m]", _row(point)),
+            ("R X + t, before the camera [m]", _row(transform(self.camera.cam_from_world, point))),
+            ("through lens and K", pixel),
+        ]
+        return "".join(
+            svg.text((640, 484 + 33 * i), name, "note") + svg.text((640, 500 + 33 * i), value, "number")
+            for i, (name, value) in enumerate(rows)
+        )
+
+    # Touch -----------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        if handle == "eye":
+            return self.but(eye=self.eye.orbited(dx, dy))
+        turn = self.hfov_deg / 360
+        return self._turned(-turn * dx, turn * dy)
+
+    def pressed(self, handle: str, key: str) -> Self:
+        if handle == "eye":
+            return self.but(eye=self.eye.key(key))
+        turns = {"ArrowLeft": (-2, 0), "ArrowRight": (2, 0), "ArrowUp": (0, 2), "ArrowDown": (0, -2)}
+        zooms = {"+": -2.0, "=": -2.0, "-": 2.0}
+        if key in turns:
+            return self._turned(*turns[key])
+        return self.but(hfov_deg=min(120.0, max(20.0, self.hfov_deg + zooms[key]))) if key in zooms else self
+
+    def _turned(self, right_deg: float, up_deg: float) -> Self:
+        yaw = (self.yaw_deg + right_deg + 180) % 360 - 180
+        return self.but(yaw_deg=round(yaw, 2), pitch_deg=round(min(90.0, max(-90.0, self.pitch_deg + up_deg)), 2))
+
+
+@lru_cache(maxsize=4)
+def _taken(intrinsics: Intrinsics, lens: Lens, centre: tuple[float, ...], quaternion: tuple[float, ...]) -> np.ndarray:
+    """The picture of the scene; kept, for the onlooker may walk around while the camera stands."""
+    pose = RigidTransform.from_components(np.array(centre), Rotation.from_quat(quaternion))
+    return to_display(render(textured_scene(), Camera(intrinsics, lens, pose)))
+
+
+def _up(camera: Camera) -> Array:
+    return -camera.world_from_cam.rotation.as_matrix()[:, 1]
+
+
+def _hfov_deg(intrinsics: Intrinsics) -> float:
+    return degrees(2 * atan(intrinsics.width / (2 * intrinsics.fx)))
+
+
+def _matrix(corner: tuple[float, float], name: str, values: Array, decimals: int) -> str:
+    """A matrix (m, n) in brackets, its name above."""
+    x, y = corner
+    rows = [[_signed(value, decimals) for value in row] for row in values]
+    wide = max(len(word) for row in rows for word in row)
+    lines = ["  ".join(word.rjust(wide) for word in row) for row in rows]
+    width, height = 7.6 * len(lines[0]) + 16, 20 * len(lines)
+    brackets = [[(x + 5, y + 8), (x, y + 8), (x, y + 8 + height), (x + 5, y + 8 + height)]]
+    brackets.append([(2 * x + width - px, py) for px, py in brackets[0]])
+    words = [svg.text((x + 8, y + 23 + 20 * i), line, "number") for i, line in enumerate(lines)]
+    return svg.text((x, y - 2), name, "note") + svg.path(brackets, "muted") + "".join(words)
+
+
+def _row(values: Array, decimals: int = 2) -> str:
+    return f"({', '.join(_signed(value, decimals) for value in values)})"
+
+
+def _signed(value: float, decimals: int) -> str:
+    """A number with a true minus sign, and no minus before zero."""
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−")

@@ -1,0 +1,58 @@
+"""The garden as cameras see it: pictures kept until the camera changes, and points to match between pictures."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.draw.picture import jpeg
+from camviz.lenses import Lens
+from camviz.lenses.base import Array
+from camviz.scenes import render, textured_scene, to_display
+
+Pose = tuple[float, ...]
+
+
+def taken(camera: Camera, width: int) -> tuple[np.ndarray, bytes]:
+    """The picture that a camera takes of the garden at `width` pixels, uint8 RGB, and the same as JPEG."""
+    height = width * camera.intrinsics.height // camera.intrinsics.width
+    return _taken(camera.intrinsics.resized(width, height), camera.lens, _pose(camera))
+
+
+def landmarks(camera: Camera) -> Array:
+    """Points (n, 3) of the garden's surfaces, none farther than 12 m, all over a camera's picture."""
+    return _landmarks(camera.intrinsics, camera.lens, _pose(camera))
+
+
+@lru_cache(maxsize=1)
+def outlines() -> tuple[Array, ...]:
+    """The lines (n, 3) of the things on the terrace and of the wall behind them."""
+    names = ("board", "crate", "globe", "ball", "picture", "wall", "pot", "bush", "easel")
+    return textured_scene().outlines().only(*names).lines
+
+
+@lru_cache(maxsize=8)
+def _taken(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> tuple[np.ndarray, bytes]:
+    image = to_display(render(textured_scene(), Camera(intrinsics, lens, _placed(pose))))
+    image.flags.writeable = False
+    return image, jpeg(image)
+
+
+@lru_cache(maxsize=4)
+def _landmarks(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> Array:
+    camera = Camera(intrinsics, lens, _placed(pose))
+    pixels = np.random.default_rng(11).uniform(0.03, 0.97, (800, 2)) * (intrinsics.width, intrinsics.height)
+    rays = camera.unproject(pixels)
+    _, distance = textured_scene().trace(camera.centre, rays)
+    return (camera.centre + distance[:, None] * rays)[distance < 12]
+
+
+def _pose(camera: Camera) -> Pose:
+    return (*camera.world_from_cam.translation.tolist(), *camera.world_from_cam.rotation.as_quat().tolist())
+
+
+def _placed(pose: Pose) -> RigidTransform:
+    return RigidTransform.from_components(pose[:3], Rotation.from_quat(pose[3:]))

@@ -1,0 +1,90 @@
+"""A working copy of the lessons: laid out where a reader wants it, and never over what the reader wrote."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
+import camviz
+
+MANIFEST = ".camviz-lessons.json"
+_SKIPPED = {".ipynb_checkpoints", "__pycache__"}
+
+
+def checkout_lessons() -> Path | None:
+    """The lessons folder of the source checkout that this package runs from; None when it is installed."""
+    root = Path(camviz.__file__).parents[1]
+    lessons = root / "lessons"
+    return lessons if lessons.is_dir() and (root / "pyproject.toml").is_file() else None
+
+
+def lessons_source() -> Path | None:
+    """Where the lessons come from: the checkout, or the folder inside an installed package."""
+    inside = Path(camviz.__file__).parent / "_lessons"
+    return checkout_lessons() or (inside if inside.is_dir() else None)
+
+
+def lay_out(source: Path, folder: Path, version: str) -> list[str]:
+    """Copy the lessons into `folder`, and return what a reader should know, in sentences.
+
+    A file is written where there is none and where it still is what was laid out before. One that the reader changed
+    stays, and a new version of it is put beside it as NAME.new-VERSION.SUFFIX.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    laid_out = _read_manifest(folder)
+    sentences = [f"The lessons are in {folder}."] if not laid_out else []
+    for path in sorted(source.rglob("*")):
+        if path.is_file() and not _SKIPPED & set(path.relative_to(source).parts):
+            name = path.relative_to(source)
+            sentences += _lay_out_one(path.read_bytes(), folder, name, version, laid_out)
+    _write(folder / MANIFEST, json.dumps({"version": version, "files": laid_out}, indent=1).encode())
+    return sentences
+
+
+def _lay_out_one(content: bytes, folder: Path, name: Path, version: str, laid_out: dict[str, str]) -> list[str]:
+    new, before = _sha256(content), laid_out.get(name.as_posix())
+    if _place(content, folder, name, laid_out) or new == before:
+        return []
+    beside = name.with_name(f"{name.stem}.new-{version}{name.suffix}")
+    known = (folder / beside).exists()
+    if not _place(content, folder, beside, laid_out) or known:
+        return []
+    return [f"You changed {name}: it stays as it is, and its new version is beside it as {beside.name}."]
+
+
+def _place(content: bytes, folder: Path, name: Path, laid_out: dict[str, str]) -> bool:
+    """Write one file unless that would lose what a reader wrote; whether the content is there now."""
+    target, new = folder / name, _sha256(content)
+    if os.path.lexists(target):
+        held = _sha256(target.read_bytes()) if target.is_file() and not target.is_symlink() else None
+        if held != new and (held is None or held != laid_out.get(name.as_posix())):
+            return False
+    target.parent.mkdir(parents=True, exist_ok=True)
+    _write(target, content)
+    laid_out[name.as_posix()] = new
+    return True
+
+
+def _read_manifest(folder: Path) -> dict[str, str]:
+    """name → sha256 of what was laid out; nothing when there is no manifest or it makes no sense."""
+    try:
+        files = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
+        return {str(name): str(digest) for name, digest in files.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+
+
+def _write(path: Path, content: bytes) -> None:
+    if path.is_file() and path.read_bytes() == content:
+        return
+    with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as part:
+        part.write(content)
+    os.chmod(part.name, 0o644)
+    os.replace(part.name, path)
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
