@@ -144,7 +144,7 @@ CENTRE = Exercise(
     name="04.centre",
     reference=centre,
     cases=_centre_cases,
-    shown=((np.eye(3), np.array([0.0, 0.0, 1.5])),),
+    shown=((np.eye(3), np.array([0.0, 0.0, 1.0])),),
     hints=(
         "The camera's centre is the one point of the world that has camera coordinates (0, 0, 0).",
         "Solve R C + t = 0 for C. R is a rotation, so that its inverse is its transpose, `R.T`.",

@@ -37,7 +37,7 @@ class BoardPosesView(View):
     still: str = choice("board", "camera", label="what stands still", help="the board, or the camera")
     picture: int = slider(1, 1, 13, 1, label="picture", help="which of the pictures is picked out, in orange")
     photographs: tuple[NDArray[np.uint8], ...] = field(default=(), compare=False, repr=False)
-    eye: Eye = Eye(distance=1.0, yaw_deg=-50, pitch_deg=20)
+    eye: Eye = Eye(distance=0.9, yaw_deg=-50, pitch_deg=20)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -138,8 +138,8 @@ class BoardPosesView(View):
         """A camera that is not picked out: its four corner rays and the square they end on."""
         a, b, c, d = transform(pose, self._corner_rays)
         centre = np.asarray(pose.translation)
-        return [Line(np.array([centre, a, b, centre, c, d, centre, b, c, d, a]), "sky", 1.2),
-                Label(centre, str(number), "label sky")]  # fmt: skip
+        return [Line(np.array([centre, a, b, centre, c, d, centre, b, c, d, a]), "blue", 1.2),
+                Label(centre, str(number), "label blue")]  # fmt: skip
 
     @cached_property
     def _corner_rays(self) -> Array:
