@@ -72,7 +72,7 @@ class Intrinsics:
         return cls(width, height, *K[[0, 1, 0, 1, 0], [0, 1, 2, 2, 1]].tolist())
 
     @property
-    def K(self) -> Array:  # noqa: N802
+    def K(self) -> Array:
         """The 3×3 camera matrix."""
         return np.array([[self.fx, self.skew, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 

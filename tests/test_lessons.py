@@ -262,19 +262,8 @@ def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp
     assert lessons.main(["check"]) == 0
     assert lessons.main(["fresh"]) == 1
     assert "05_distortion.ipynb is stale" in capsys.readouterr().out
-    assert lessons.main(["teacher", str(tmp_path / "out")]) == 0
     assert lessons.main(["fresh", "06"]) == 2
     assert "begins with 06" in capsys.readouterr().err
-
-
-def test_metadata_survives_jupytext_s_percent_format():
-    jupytext = pytest.importorskip("jupytext")
-    percent = (
-        '# %% tags=["stub"] camviz={"exercise": "05.distort", "teacher": "5 minutes.\\nAsk."}\ndef distort(): ...\n'
-    )
-    notebook = jupytext.reads(percent, fmt="py:percent")
-    assert lessons.stubs(notebook) == {"05.distort": "def distort(): ..."}
-    assert notebook.cells[0].metadata["camviz"]["teacher"] == "5 minutes.\nAsk."
 
 
 @EACH

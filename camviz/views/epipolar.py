@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -14,6 +14,7 @@ from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, space_panel
+from camviz.lenses import Perspective
 from camviz.lenses.base import Array, unit
 from camviz.views import garden
 from camviz.views.marks import border_arrow, camera_outline, crop, on_photograph, ring
@@ -42,7 +43,7 @@ class EpipolarView(TwoCameras):
 
     @cached_property
     def _figures(self) -> dict[str, str]:
-        nowhere = "at infinity" if self.baseline else "none"
+        nowhere = "none" if not self.baseline else "at infinity" if self.F is not None else "beyond the lens’s field"
         figures = {
             "baseline": f"{self.baseline:.3f} m",
             "left epipole": _pixel(_epipole(self.left, self.right), nowhere),
@@ -155,7 +156,8 @@ class EpipolarView(TwoCameras):
             ]
         )
         label = f"The {panel.name} picture; drag or press the arrow keys to {action}"
-        return panel.show(content, title=f"The {panel.name} picture", note=note, drag=panel.name, label=label)
+        said = {"hint": note} if note.startswith("drag") else {"note": note}
+        return panel.show(content, title=f"The {panel.name} picture", drag=panel.name, label=label, **said)
 
     def _pencil(self, panel: Panel, camera: Camera) -> str:
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
@@ -205,7 +207,7 @@ class EpipolarView(TwoCameras):
             side = "end" if at[0] > panel.width / 2 else ""
             return ring(at, "yellow", 8) + svg.text(at + (-14 if side else 14, -8), words, f"yellow halo {side}")
         toward = at - (panel.width / 2, panel.height / 2) if np.isfinite(uv).all() else _heading(camera, other)
-        return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}")
+        return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}, this way")
 
     def _other_camera(self, panel: Panel, camera: Camera, other: Camera) -> str:
         return (
@@ -233,20 +235,32 @@ class EpipolarView(TwoCameras):
 
     def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("space", 20, 409, 500, 200)
-        content, sheets = draw_space(panel, self._space_items(images), self.eye, draft=draft, renderer="wire")
+        content, sheets = draw_space(panel, self._space_items(images), self._onlooker, draft=draft, renderer="wire")
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
-        shown = panel.show(content, title="The epipolar plane", note="drag to turn", drag="orbit", label=label)
+        shown = panel.show(content, title="The epipolar plane", hint="drag to turn", drag="orbit", label=label)
         return shown, sheets
 
+    @property
+    def _nearness(self) -> float:
+        """1 in the garden; smaller for a calibrated pair with a short baseline."""
+        return min(1.0, max(0.05, self.baseline / 0.3)) if self.pair else 1.0
+
+    @property
+    def _onlooker(self) -> Eye:
+        """The eye, as near to a small rig as it is to a large one."""
+        left, s = self.left.centre, self._nearness
+        target = tuple((left + s * (np.array(self.eye.target) - left)).tolist())
+        return replace(self.eye, target=target, distance=s * self.eye.distance)
+
     def _space_items(self, images: dict[str, np.ndarray]) -> list[Item]:
-        left, right, point = self.left.centre, self.right.centre, self.point
-        ray = np.array([left, left + max(8.0, self.depth) * self.left.unproject([self.u, self.v])])
+        left, right, point, s = self.left.centre, self.right.centre, self.point, self._nearness
+        ray = np.array([left, left + max(8.0 * s, self.depth) * self.left.unproject([self.u, self.v])])
         return [
-            *(Line(line, "muted", 1.0) for line in garden.outlines()),
-            *camera_body(self.left, 0.6, image=images["left"], colour="blue"),
-            *camera_body(self.right, 0.6, image=images["right"], colour="orange"),
-            Label(left + (0, 0.22, 0), "left", "label blue"),
-            Label(right + (0, 0.22, 0), "right", "label orange"),
+            *(Line(line, "muted", 1.0) for line in garden.outlines() if self.photographs is None),
+            *camera_body(self.left, 0.6 * s, image=images["left"], colour="blue"),
+            *camera_body(self.right, 0.6 * s, image=images["right"], colour="orange"),
+            Label(left + (0, 0.22 * s, 0), "left", "label blue"),
+            Label(right + (0, 0.22 * s, 0), "right", "label orange"),
             Face(np.array([left, right, point]), "green", 0.3),
             Line(ray, "blue", 1.8),
             Line(np.array([right, point]), "orange", 1.8),
@@ -300,9 +314,10 @@ def _heading(camera: Camera, other: Camera) -> Array:
 
 
 def _far(uv: Array, camera: Camera) -> str:
-    middle = np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2
-    away = float(np.linalg.norm(uv - middle))
-    return f"{away:,.0f} px this way" if away < 1e6 else "at infinity, this way"
+    if np.isnan(uv).any():
+        return "at infinity" if isinstance(camera.lens, Perspective) else "beyond the lens’s field"
+    away = float(np.linalg.norm(uv - np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2))
+    return f"{away:,.0f} px" if away < 1e6 else "at infinity"
 
 
 def _infinity(at: Array) -> str:
