@@ -13,17 +13,18 @@ from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, space_panel
+from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array, unit
+from camviz.scenes import textured_scene
 from camviz.views import garden
 from camviz.views.marks import border_arrow, camera_outline, clipped, crop, on_photograph, ring
 from camviz.views.two_cameras import TwoCameras
 
-_DISTANCES = np.concatenate([np.geomspace(0.02, 400, 240), [np.inf]])
+_DISTANCES = np.concatenate([np.geomspace(0.02, 400, 120), [np.inf]])
 _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point
 _PATCH = 48  # pixels on a side of the details that are compared
-_PLANES = 48  # epipolar planes in a full turn around the baseline
+_PLANES = 40  # epipolar planes in a full turn around the baseline
 _WIDTH = 455
 
 
@@ -167,7 +168,7 @@ class EpipolarView(TwoCameras):
         along, first = self._plane_axes(forward[:, 2] if abs(self._along @ forward[:, 2]) < 0.9 else forward[:, 0])
         turn = np.arange(_PLANES) * (2 * np.pi / _PLANES)
         across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(along, first)
-        lines = clipped(panel, panel.place(camera.project(camera.centre + _half_planes(along, across, 60))))
+        lines = clipped(panel, panel.place(camera.project(camera.centre + _half_planes(along, across, 40))))
         return svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
 
     def _own_line(self, panel: Panel, camera: Camera) -> str:
@@ -175,7 +176,7 @@ class EpipolarView(TwoCameras):
         if not self.baseline:
             return ""
         along, across = self._plane_axes(self.point - self.left.centre)
-        whole = camera.project(camera.centre + _half_planes(along, np.stack([across, -across]), 160))
+        whole = camera.project(camera.centre + _half_planes(along, np.stack([across, -across]), 90))
         lines = on_photograph(clipped(panel, panel.place(whole)), "green thin")
         if panel.name == "right":
             ray = twoview.epipolar_curve(self.left, self.right, [self.u, self.v], _DISTANCES)
@@ -257,7 +258,7 @@ class EpipolarView(TwoCameras):
         left, right, point, s = self.left.centre, self.right.centre, self.point, self._nearness
         ray = np.array([left, left + max(8.0 * s, self.depth) * self.left.unproject([self.u, self.v])])
         return [
-            *(Line(line, "muted", 1.0) for line in garden.outlines() if self.photographs is None),
+            *(() if self.photographs else scene_items(textured_scene(), "wire")),
             *camera_body(self.left, 0.6 * s, image=images["left"], colour="blue"),
             *camera_body(self.right, 0.6 * s, image=images["right"], colour="orange"),
             Label(left + (0, 0.22 * s, 0), "left", "label blue"),
