@@ -155,7 +155,7 @@ RESIZED = Exercise(
     cases=_resized_cases,
     bug=True,
     hints=(
-        "Resizing keeps the *edges* of the image in place: −0.5 must go to −0.5. Where does this function send it?",
+        "Resizing keeps the image's *edges* where they are: −0.5 must go to −0.5. Where does this function send it?",
         "c + ½ is the distance from the image's edge, and that is what scales: c′ + ½ = s (c + ½). Does everything "
         "else in the first row scale as well?",
     ),
@@ -163,7 +163,7 @@ RESIZED = Exercise(
     misconceptions=(
         Misconception(
             _scaled,
-            "This scales K as a whole, c′ = s c. Then the middle of 640 pixels, 319.5, becomes 159.75 when halved, "
+            "This scales K as a whole, c′ = s c. The middle of a 640-pixel row, 319.5, becomes 159.75 when halved, "
             "but the middle of 320 pixels is 159.5: every ray is off by (s − 1)/2 pixels.",
         ),
         Misconception(
@@ -192,7 +192,7 @@ CROPPED_THEN_BINNED = Exercise(
         Misconception(_binned_first, "This bins first and crops then. x0 and y0 count the pixels *before* binning."),
         Misconception(
             lambda K, x0, y0, n: _scaled(np.array([[1, 0, -x0], [0, 1, -y0], [0, 0, 1]]) @ K, 1 / n),
-            "The half-pixel term of the binning is missing: the first block of n pixels has its middle at (n − 1)/2.",
+            "The half-pixel term of the binning is missing: the middle of the first n pixels lies at (n − 1)/2.",
         ),
         Misconception(
             lambda K, x0, y0, n: resized(K, 1 / n), "Only the binning is there: the crop moves the principal point."

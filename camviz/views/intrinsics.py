@@ -291,14 +291,13 @@ class IntrinsicsView(View):
 
     def _line_of_sight(self) -> list[Item]:
         """To the balloon: broken where something stands in the way."""
-        stopped = towards_balloon(self.camera.centre)
-        ends = np.array([self.camera.centre, BALLOON])
+        stopped, ends = towards_balloon(self.camera.centre), np.array([self.camera.centre, BALLOON])
         rim = balloon_rim(BALLOON - 6.0)
         balloon: list[Item] = [Line(rim, "red thick", 2.4), Label(BALLOON - (0, 0.4, 0), "balloon", "red halo")]
         if not np.isfinite(stopped).all():
             return [Line(ends, "red", 1.8), *balloon]
-        wall = np.array([self.camera.centre, stopped])
-        return [Line(wall, "red", 1.8), Line(np.array([stopped, BALLOON]), "red dotted", 1.4), *balloon]
+        to_wall, beyond = np.array([self.camera.centre, stopped]), np.array([stopped, BALLOON])
+        return [Line(to_wall, "red", 1.8), Line(beyond, "red dotted", 1.4), *balloon]
 
     # The matrices ----------------------------------------------------------------------------------------------------
 
