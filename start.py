@@ -44,7 +44,9 @@ def set_up():
         sys.exit(f"{VENV} was not made by start.py. Move it away, or delete it, and start again.")
     print(f"Setting up camviz in {VENV}: once, some minutes and about 1.7 GB.", flush=True)
     make_venv()
-    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install")
+    pip = [PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install"]
+    if not sys.stdout.isatty():
+        pip.append("--quiet")  # a log needs no progress bars
     if run(*pip, "--require-hashes", "-r", ROOT / "requirements.lock") or run(*pip, "--no-deps", "--editable", ROOT):
         sys.exit("The set-up did not finish: pip says why above. With no network it cannot; otherwise start again.")
     STAMP.write_text(fingerprint())

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import camviz
@@ -31,6 +31,7 @@ examples:
   camviz doctor                              see what this machine can do, and how to mend it
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
+  camviz teacher for-me                      write the lessons with solutions and timings into ./for-me
 
 exit status:
   0    done
@@ -53,6 +54,12 @@ bend straight lines, and how their pictures are tied together. The page holds ev
 
 Reads OpenCV FileStorage (.yml, .xml, .json; one camera or a pair), ROS CameraInfo (.yaml) and Kalibr camchains
 (.yaml). The file is only read: nothing in it is run, and it is not changed.
+"""
+
+
+TEACHER = """\
+Writes the lessons with the solutions in their places, timings and prompts for discussion, made from the very
+notebooks that students get. The solutions carry nbgrader's marks, so that exercises can be handed out and graded.
 """
 
 
@@ -90,7 +97,7 @@ def parser() -> argparse.ArgumentParser:
     )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
     commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_Parser)
-    for add in (_add_lab, _add_doctor, _add_show):
+    for add in (_add_lab, _add_doctor, _add_show, _add_teacher):
         add(commands)
     return everything
 
@@ -112,6 +119,11 @@ def _add_show(commands: Any) -> None:
     command.add_argument("file", metavar="FILE", type=Path, help="the calibration")
     command.add_argument("-o", "--output", metavar="OUT.html", type=Path, help="the page (default: FILE's name, .html)")
     command.add_argument("--size", metavar="WxH", type=_size, help="image size in pixels, where FILE does not hold it")
+
+
+def _add_teacher(commands: Any) -> None:
+    command = _add(commands, "teacher", teacher, "write the teacher's edition of the lessons", TEACHER)
+    command.add_argument("out", metavar="OUT_DIR", type=Path, help="where to; made when it is not there")
 
 
 def lab(options: argparse.Namespace, beyond: list[str]) -> int:
@@ -150,6 +162,19 @@ def show(options: argparse.Namespace) -> int:
     for note in calibration.notes:
         print(note)
     print(f"{output}: open it in a browser.")
+    return OK
+
+
+def teacher(options: argparse.Namespace) -> int:
+    """Write the teacher's edition, and never over what a teacher has changed in it."""
+    from camviz.lessons import lessons_folder, write_teacher_edition
+
+    if options.out.exists() and (not options.out.is_dir() or options.out.samefile(lessons_folder())):
+        raise Refusal(f"{options.out}: expected a folder of its own for the teacher's edition.")
+    with TemporaryDirectory() as made:
+        write_teacher_edition(lessons_folder(), Path(made))
+        for sentence in lay_out(Path(made), options.out, camviz.__version__):
+            print(sentence)
     return OK
 
 

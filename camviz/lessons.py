@@ -3,7 +3,6 @@
     python -m camviz.lessons check            what departs from the pattern of a lesson
     python -m camviz.lessons refresh [05 …]   run and save with static outputs
     python -m camviz.lessons fresh            which saved outputs are older than their lesson
-    python -m camviz.lessons teacher FOLDER   write the teacher's edition
 
 A lesson's cells carry tags: `setup`, `build` (what exercises may rely on), `stub`, `check`, `solution`, `glossary`
 (filled by `refresh`), `nbval-check-output`. A stub's metadata names its exercise, {"camviz": {"exercise":
@@ -19,6 +18,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
@@ -165,7 +165,7 @@ def teacher_edition(notebook: Notebook) -> Notebook:
 
 
 def write_teacher_edition(source: Path, out: Path) -> list[Path]:
-    """Writes the teacher's edition of every lesson in `source` into `out`, under the same names.
+    """Writes the teacher's edition of every lesson in `source` into `out`, under the same names, with their pictures.
 
     Raises ValueError when `out` is the lessons' own folder.
     """
@@ -176,6 +176,9 @@ def write_teacher_edition(source: Path, out: Path) -> list[Path]:
     for path in sorted(source.glob("*.ipynb")):
         write(teacher_edition(read(path)), out / path.name)
         written.append(out / path.name)
+    for path in (*source.glob("images/*"), *source.glob("*.md")):
+        (out / path.relative_to(source)).parent.mkdir(exist_ok=True)
+        shutil.copyfile(path, out / path.relative_to(source))
     return written
 
 
@@ -289,17 +292,6 @@ def _steady_id(cell: Cell, taken: set[str]) -> str:
 # Command line -------------------------------------------------------------------------------------------------------
 
 
-def add_teacher_command(subparsers: Any) -> None:
-    """Adds `teacher OUT_DIR` to a command line; its `run(arguments)` returns the exit status."""
-    parser = subparsers.add_parser(
-        "teacher",
-        help="write the teacher's edition of the lessons",
-        description="Writes the lessons with solutions in place, timings and discussion prompts into a folder.",
-    )
-    parser.add_argument("out", type=Path, metavar="OUT_DIR", help="the folder to write to; made when it is not there")
-    parser.set_defaults(run=_run_teacher)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """`python -m camviz.lessons`; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m camviz.lessons", description="Tools for those who write lessons.")
@@ -308,7 +300,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command = subparsers.add_parser(name, help=text)
         command.add_argument("names", nargs="*", metavar="NAME", help="how a lesson's file name begins; default: all")
         command.set_defaults(run=run)
-    add_teacher_command(subparsers)
     given = parser.parse_args(arguments)
     try:
         return given.run(given)
@@ -323,12 +314,6 @@ def _paths(names: Sequence[str]) -> list[Path]:
     if not chosen:
         raise ValueError(f"no lesson in {lessons_folder()} begins with {' or '.join(names) or 'anything'}")
     return chosen
-
-
-def _run_teacher(given: argparse.Namespace) -> int:
-    written = write_teacher_edition(lessons_folder(), given.out)
-    print(f"{len(written)} lessons written to {given.out}")
-    return 0
 
 
 def _run_refresh(given: argparse.Namespace) -> int:

@@ -450,3 +450,20 @@ def test_the_doctor_examines_this_machine():
     names = {finding["name"] for finding in report["findings"]}
     assert {"Python", "numpy", "OpenGL", "memory", "sample data", "widgets: anywidget"} <= names
     assert all(finding["remedy"] or finding["status"] == "ok" for finding in report["findings"])
+
+
+# The teacher's edition ----------------------------------------------------------------------------------------------
+
+
+def test_the_teachers_edition_has_every_lesson_and_keeps_a_teachers_notes(room, capsys):
+    assert main(["teacher", "mine"]) == 0
+    lessons = {path.name for path in (ROOT / "lessons").glob("*.ipynb")}
+    assert {path.name for path in (room / "mine").glob("*.ipynb")} == lessons
+    first = room / "mine" / sorted(lessons)[0]
+    first.write_text("my notes")
+    assert main(["teacher", "mine"]) == 0
+    assert first.read_text() == "my notes"
+
+
+def test_the_teachers_edition_is_not_written_over_the_lessons(room, capsys):
+    assert "a folder of its own" in refused(capsys, room, "teacher", str(ROOT / "lessons"))

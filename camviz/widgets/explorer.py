@@ -26,7 +26,7 @@ class Explorer(anywidget.AnyWidget):
     _esm = (_HERE / "explorer.js").read_text(encoding="utf-8")
     _css = style() + (_HERE / "explorer.css").read_text(encoding="utf-8")
 
-    controls = traitlets.List().tag(sync=True)
+    controls: traitlets.List[Any] = traitlets.List().tag(sync=True)
     values = traitlets.Dict().tag(sync=True)
     frame = traitlets.Dict().tag(sync=True)
 
@@ -70,7 +70,7 @@ class Explorer(anywidget.AnyWidget):
         still = self.view.figure()._repr_mimebundle_()
         if os.environ.get("CAMVIZ_STATIC"):
             return still
-        data, metadata = super()._repr_mimebundle_(**options)
+        data, metadata = super()._repr_mimebundle_(**options) or ({}, {})
         return {**still, **data, "text/plain": still["text/plain"]}, metadata
 
 
