@@ -129,13 +129,17 @@ class BrownConrady(RayLens):
     def straighten(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Ideal coordinates (n,) of distorted ones (n,), by Newton's method; NaN where there are none."""
         u, v = self._untilt(x, y)
-        azimuth, farthest = self._rim
-        u = np.where(u * u + v * v <= farthest.max() ** 2, u, np.nan)
+        within = u * u + v * v <= self._rim[1].max() ** 2
+        x, y = np.full((2, len(u)), np.nan)
+        x[within], y[within] = self._straighten(u[within], v[within])
+        return x, y
+
+    def _straighten(self, u: Array, v: Array) -> tuple[Array, Array]:
         x, y, error = self._newton(u, v)
         lost = np.flatnonzero(~(self._valid(x, y) & (error <= CLOSE * (1 + np.abs(u) + np.abs(v)))))
         if len(lost):
             x[lost] = y[lost] = np.nan
-            rim = np.interp(np.arctan2(v[lost], u[lost]), azimuth, farthest, period=2 * pi)
+            rim = np.interp(np.arctan2(v[lost], u[lost]), *self._rim, period=2 * pi)
             lost = lost[np.hypot(u[lost], v[lost]) <= rim]
             x[lost], y[lost] = self._newton_inside(u[lost], v[lost])
         return x, y
@@ -316,7 +320,14 @@ class BrownConrady(RayLens):
         return np.maximum.accumulate(np.square(self.radial(r))), 1 / self._ratio(s)
 
     def _guess(self, u: Array, v: Array) -> tuple[Array, Array]:
-        """The ideal point of an image point, for the radial part alone."""
+        """Nearly the ideal point of an image point: exactly so for the radial part alone."""
+        scale = np.interp(u * u + v * v, *self._inverse_table)
+        x, y = u * scale, v * scale
+        if self._symmetric:
+            return x, y
+        # What the other parts would add to that point is taken from the image first.
+        bent_x, bent_y = self._polynomial(x, y)
+        u, v = 2 * u - bent_x, 2 * v - bent_y
         scale = np.interp(u * u + v * v, *self._inverse_table)
         return u * scale, v * scale
 
@@ -346,7 +357,7 @@ class BrownConrady(RayLens):
         inwards = np.minimum(1, 0.999 * inner / np.maximum(np.hypot(x, y), 1e-300))
         state = np.stack([inwards * x, inwards * y, u, v])
         state = np.stack([*state, *self._step(*state)[:3], np.ones_like(u)])
-        for _ in range(60):
+        for _ in range(24):
             moving = (state[6] > close) & (state[7] > 1e-3)
             if not moving.any():
                 break
