@@ -66,8 +66,8 @@ class BoardPosesView(View):
 
     def corners(self) -> Array:
         """The inner corners (rows * columns, 3) in the board's frame, in metres."""
-        column, row = np.meshgrid(np.arange(self.board.columns), np.arange(self.board.rows))
-        return self.board.square_size * np.stack([column, row, 0 * row], axis=-1).reshape(-1, 3)
+        column, row = np.meshgrid(np.arange(float(self.board.columns)), np.arange(float(self.board.rows)))
+        return np.asarray(self.board.square_size * np.stack([column, row, 0 * row], axis=-1)).reshape(-1, 3)
 
     def pixels(self) -> Array:
         """Where the chosen picture has the corners, (rows * columns, 2), by pose, lens and camera matrix."""
