@@ -13,7 +13,10 @@ from camviz.views.base import Control, View
 from camviz.widgets.still import StillWidget
 
 _HERE = files("camviz.widgets")
-_CAPTION = '<figcaption style="font-size:12px;opacity:.75">A still picture: run this cell (Shift + Enter), and it moves.</figcaption>'
+_CAPTION = (
+    '<figcaption style="font-size:12px;opacity:.75">'
+    "A still picture: run this cell (Shift + Enter), and it moves.</figcaption>"
+)
 
 
 class Explorer(StillWidget):
