@@ -111,7 +111,7 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
         pictures: dict[bytes, np.ndarray] = {}
-        shared = [pictures.setdefault(mesh.picture.tobytes(), mesh.picture) for mesh in meshes]
+        shared = [pictures.setdefault(p.tobytes(), p) for p in (mesh.picture for mesh in meshes)]
         return tuple(Sheet(m.vertices, m.quads, m.uv, p) for m, p in zip(meshes, shared, strict=True))
     flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
     fills = [Face(mesh.vertices[mesh.quads[0]], f"#{bytes(mesh.rgb).hex()}", 0.25) for mesh in flat]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +17,8 @@ _FULL = 65535  # linear light 0…1 is kept in 16 bits: half the memory of float
 
 
 class Texture:
-    """A picture on a surface: linear light 0…1 (height, width, 3), looked up by s (to the right) and r (down), 0…1.
+    """A picture on a surface: linear light 0…1, or sRGB bytes, (height, width, 3), looked up by s (to the right) and
+    r (down), 0…1.
 
     It keeps halved copies of itself down to a single texel, side by side in one mosaic, and mixes the two whose texels
     come nearest to the distance between rays (Williams 1983, "Pyramidal parametrics"). With `repeat` it tiles the
@@ -28,9 +31,9 @@ class Texture:
             raise ValueError(f"light must have shape (height, width, 3), got {picture.shape}")
         self.height, self.width = picture.shape[:2]
         self.repeat = repeat
-        self.mean = picture.mean(axis=(0, 1), dtype=np.float64)
-        steps = np.multiply(picture, _FULL, dtype=np.float32)
-        self._mosaic, self._places = _pyramid(np.clip(np.rint(steps, out=steps), 0, _FULL).astype(np.uint16), repeat)
+        steps = _in_steps(picture)
+        self.mean = steps.mean(axis=(0, 1), dtype=np.float64) / _FULL
+        self._mosaic, self._places = _pyramid(steps, repeat)
 
     @classmethod
     def plain(cls, rgb: ArrayLike) -> Texture:
@@ -61,6 +64,13 @@ class Texture:
         x = _texel(s, width, self.repeat)
         y = _texel(r, height, self.repeat)
         return _remap(self._mosaic, x + left, y + top)
+
+
+def _in_steps(light: NDArray[Any]) -> Steps:
+    if light.dtype == np.uint8:
+        return _in_steps(to_linear(np.arange(256, dtype=np.uint8)))[light]
+    steps = np.multiply(light, _FULL, dtype=np.float32)
+    return np.clip(np.rint(steps, out=steps), 0, _FULL).astype(np.uint16)
 
 
 def _texel(s: Floats, size: Floats, repeat: bool) -> Floats:

@@ -66,7 +66,7 @@ class BoardPosesView(View):
 
     def corners(self) -> Array:
         """The inner corners (rows * columns, 3) in the board's frame, in metres."""
-        column, row = np.meshgrid(np.arange(self.board.columns), np.arange(self.board.rows))
+        column, row = np.meshgrid(np.arange(self.board.columns, dtype=float), np.arange(self.board.rows, dtype=float))
         return self.board.square_size * np.stack([column, row, 0 * row], axis=-1).reshape(-1, 3)
 
     def pixels(self) -> Array:

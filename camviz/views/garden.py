@@ -27,13 +27,6 @@ def landmarks(camera: Camera) -> Array:
     return _landmarks(camera.intrinsics, camera.lens, _pose(camera))
 
 
-@lru_cache(maxsize=1)
-def outlines() -> tuple[Array, ...]:
-    """The lines (n, 3) of the things on the terrace and of the wall behind them."""
-    names = ("board", "crate", "globe", "ball", "picture", "wall", "pot", "bush", "easel")
-    return textured_scene().outlines().only(*names).lines
-
-
 @lru_cache(maxsize=8)
 def _taken(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> tuple[np.ndarray, bytes]:
     image = to_display(render(textured_scene(), Camera(intrinsics, lens, _placed(pose))))

@@ -24,7 +24,7 @@ GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the cam
 BINS = 4
 _NEAREST, _FARTHEST = 1.5, 12.0  # metres between camera and globe
 _FOCAL: dict[str, Any] = {"low": 150.0, "high": 2000.0, "step": 1.0, "unit": "px"}
-_LEAN_DRAWN = 3
+_LEAN_DRAWN = 3  # times
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class IntrinsicsView(View):
     cx: float = slider(319.5, -100.0, 740.0, 0.5, unit="px", help="column of the principal point")
     cy: float = slider(239.5, -100.0, 580.0, 0.5, unit="px", help="row of the principal point")
     skew: float = slider(0.0, -150.0, 150.0, 1.0, unit="px", help="shear of the pixel axes; 0 in nearly every camera")
-    distance: float = slider(3.0, _NEAREST, _FARTHEST, 0.05, label="camera distance", unit="m", help="to the globe")
+    distance: float = slider(3.0, _NEAREST, _FARTHEST, 0.05, unit="m", help="from the camera to the globe")
     dolly_zoom: bool = switch(False, label="dolly-zoom lock", help="move the camera so that the globe keeps its size")
     operation: str = choice("as taken", "cropped", "resized", "binned", help="what is done to the picture afterwards")
     x0: float = slider(256, 0, 320, 1, label="crop x0", unit="px", help="first column kept")
@@ -83,8 +83,7 @@ class IntrinsicsView(View):
             controls[name].checked(name, changes[name])
         zoom = changes.pop("focal_mm", self.focal_mm) / self.focal_mm
         aspect = changes.pop("aspect", None)
-        if zoom != 1:
-            changes = {"fx": zoom * self.fx, "fy": zoom * self.fy, **changes}
+        changes = {"fx": zoom * self.fx, "fy": zoom * self.fy, **changes} if zoom != 1 else changes
         if aspect is not None:
             changes["fy"] = aspect * changes.get("fx", self.fx)
         changed = super().but(**changes)
@@ -234,11 +233,11 @@ class IntrinsicsView(View):
     def _principal_point(self) -> str:
         K = self.intrinsics
         at = self._as_taken((K.cx, K.cy))
-        arms = np.array([(12, 0), (0, 12)])
-        back = svg.segments(at - arms, at + arms, "white", style="stroke:#fff;stroke-width:6px")
-        cross = back + svg.segments(at - arms, at + arms, "orange thick")
+        ends = at - np.diag((12, 12)), at + np.diag((12, 12))
+        cross = svg.segments(*ends, "white", style="stroke:#fff;stroke-width:6px") + svg.segments(*ends, "orange thick")
         side, dx = ("end", -14) if at[0] > 170 else ("", 14)
-        name = _tag(at + (dx, 22), f"(cx, cy) = ({K.cx:.2f}, {K.cy:.2f})", side)
+        inside = np.clip(at + (dx, 22), (8, 36), np.array([self._picture.width, self._picture.height]) - (8, 30))
+        name = _tag(inside, f"(cx, cy) = ({K.cx:.2f}, {K.cy:.2f})", side)
         hand = svg.element("circle", cx=at[0], cy=at[1], r=16, fill_opacity=0, class_="card")
         label = f"Principal point at column {K.cx:.1f}, row {K.cy:.1f}; arrow keys move it"
         handle = {"data_drag": "principal", "tabindex": 0, "role": "group", "aria_label": label}
@@ -276,8 +275,8 @@ class IntrinsicsView(View):
         eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
         content, photographs = draw_space(panel, items, eye, draft=draft, renderer="wire")
         label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
-        heading = {"title": "The rays it picks out", "note": "drag to turn"}
-        return panel.show(content, drag="orbit", label=label, **heading), photographs
+        drawn = panel.show(content, title="The rays it picks out", hint="drag to turn", drag="orbit", label=label)
+        return drawn, photographs
 
     def _frustum(self) -> list[Item]:
         items = camera_body(self.camera, 1.4, colour="blue")
@@ -292,14 +291,13 @@ class IntrinsicsView(View):
 
     def _line_of_sight(self) -> list[Item]:
         """To the balloon: broken where something stands in the way."""
-        stopped = towards_balloon(self.camera.centre)
-        ends = np.array([self.camera.centre, BALLOON])
+        stopped, ends = towards_balloon(self.camera.centre), np.array([self.camera.centre, BALLOON])
         rim = balloon_rim(BALLOON - 6.0)
         balloon: list[Item] = [Line(rim, "red thick", 2.4), Label(BALLOON - (0, 0.4, 0), "balloon", "red halo")]
         if not np.isfinite(stopped).all():
             return [Line(ends, "red", 1.8), *balloon]
-        wall = np.array([self.camera.centre, stopped])
-        return [Line(wall, "red", 1.8), Line(np.array([stopped, BALLOON]), "red dotted", 1.4), *balloon]
+        to_wall, beyond = np.array([self.camera.centre, stopped]), np.array([stopped, BALLOON])
+        return [Line(to_wall, "red", 1.8), Line(beyond, "red dotted", 1.4), *balloon]
 
     # The matrices ----------------------------------------------------------------------------------------------------
 

@@ -37,9 +37,9 @@ class TwoCameras(View):
     they see.
     """
 
-    right_x: float = slider(0.7, -1.5, 1.5, 0.01, label="right camera x", unit="m", help="to the right of the left one")
-    right_y: float = slider(0.0, -1.0, 1.0, 0.01, label="right camera y", unit="m", help="below the left one")
-    right_z: float = slider(0.0, -1.0, 1.5, 0.01, label="right camera z", unit="m", help="in front of the left one")
+    right_x: float = slider(0.7, -1.5, 1.5, 0.01, label="right x", unit="m", help="to the right of the left camera")
+    right_y: float = slider(0.0, -1.0, 1.0, 0.01, label="right y", unit="m", help="below the left camera")
+    right_z: float = slider(0.0, -1.0, 1.5, 0.01, label="right z", unit="m", help="in front of the left camera")
     yaw: float = slider(-10.0, **_TURN, help="of the right camera: positive turns it to the right")
     pitch: float = slider(0.0, **_TURN, help="of the right camera: positive turns it up")
     roll: float = slider(0.0, **_TURN, help="of the right camera about its axis")
