@@ -57,7 +57,7 @@ class BoardPosesView(View):
     @cached_property
     def centres(self) -> Array:
         """Where the camera stood in each picture, (n, 3) in the board's frame: C = -Rᵀ t."""
-        return np.asarray(self.cam_from_board.inv().translation)
+        return np.asarray(self.cam_from_board.inv().translation, dtype=np.float64)
 
     @property
     def chosen(self) -> RigidTransform:
@@ -66,7 +66,7 @@ class BoardPosesView(View):
 
     def corners(self) -> Array:
         """The inner corners (rows * columns, 3) in the board's frame, in metres."""
-        column, row = np.meshgrid(np.arange(self.board.columns), np.arange(self.board.rows))
+        column, row = np.meshgrid(np.arange(self.board.columns, dtype=float), np.arange(self.board.rows, dtype=float))
         return self.board.square_size * np.stack([column, row, 0 * row], axis=-1).reshape(-1, 3)
 
     def pixels(self) -> Array:
@@ -111,7 +111,7 @@ class BoardPosesView(View):
         content, attached = draw_space(panel, items, eye, draft=draft)
         title = "Where the camera stood" if before_board else "Where the board was held"
         label = "The poses in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        return panel.show(content, title=title, note="drag to turn", drag="eye", label=label), attached
+        return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), attached
 
     def _cameras(self) -> list[Item]:
         """The board, and every picture's camera around it."""
