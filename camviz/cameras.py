@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from math import isfinite, radians, tan
 
 import numpy as np
@@ -72,7 +71,7 @@ class Intrinsics:
         return cls(width, height, *K[[0, 1, 0, 1, 0], [0, 1, 2, 2, 1]].tolist())
 
     @property
-    def K(self) -> Array:  # noqa: N802
+    def K(self) -> Array:
         """The 3×3 camera matrix."""
         return np.array([[self.fx, self.skew, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
@@ -152,7 +151,7 @@ class Camera:
 
     def rays(self) -> Array:
         """The unit ray (height, width, 3) in the world of every pixel."""
-        return rotate(self.world_from_cam.rotation, _rays_cam(self.intrinsics, self.lens))
+        return self.unproject(self.intrinsics.grid())
 
     def sees(self, points_world: ArrayLike) -> np.ndarray:
         """True where a world point (..., 3) has an image inside the picture."""
@@ -211,10 +210,3 @@ def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
 def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:
     """Vectors (..., 3) turned by a rotation."""
     return as_points(vectors, 3, "vectors") @ rotation.as_matrix().T
-
-
-@lru_cache(maxsize=4)
-def _rays_cam(intrinsics: Intrinsics, lens: Lens) -> Array:
-    rays = lens.unproject(intrinsics.from_pixels(intrinsics.grid()))
-    rays.flags.writeable = False
-    return rays

@@ -95,13 +95,14 @@ def pinhole_kernel(
     airy = float(diffraction_blur_mm(diameter_mm, focal_mm, wavelength_nm))
     plain = fresnel_number(diameter_mm, focal_mm, object_mm, wavelength_nm) > many
     reach = 0.5 * shadow if plain else 0.5 * shadow + 1.6 * airy
-    half, fine = int(np.ceil(reach / pitch_mm)), 5
+    half = int(np.ceil(reach / pitch_mm))
+    fine = 5 if half < 24 else 2
     steps = (np.arange((2 * half + 1) * fine) + 0.5) / fine - half - 0.5
     radius = pitch_mm * np.hypot(steps[:, None], steps)
     if plain:
         light = (radius <= shadow / 2).astype(float)
     else:
-        table = np.linspace(0, reach, 40 + int(16 * reach / min(shadow, airy)))
+        table = np.linspace(0, reach, 40 + int(24 * reach / airy))
         args = (diameter_mm, focal_mm, object_mm, wavelength_nm)
         light = np.interp(radius, table, pinhole_spread(table, *args), right=0)
     pixels = light.reshape(2 * half + 1, fine, 2 * half + 1, fine).sum(axis=(1, 3))
@@ -117,7 +118,7 @@ def f_number(diameter_mm: ArrayLike, focal_mm: ArrayLike) -> Array:
 def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: ArrayLike) -> Array:
     """Light gathered from a sunlit scene, relative to a correct exposure at ISO 100: ∝ t d² / f².
 
-    By the "sunny 16" rule f/16 and 1/100 s are correct (ISO 2720:1974 gives much the same).
+    By photographers' "sunny 16" rule, f/16 and 1/100 s are correct.
     """
     return 100 * np.asarray(exposure_s) * (16 / f_number(diameter_mm, focal_mm)) ** 2
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 from html import escape
+from importlib.resources import files
 from itertools import combinations
 from pathlib import Path
 
@@ -14,24 +16,12 @@ from camviz import __version__
 from camviz.cameras import Camera
 from camviz.draw.picture import Picture, style
 from camviz.files import Calibration
+from camviz.lenses import Lens
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
 
 SIDE_STEP = 0.1  # metres: how far a lone camera is moved to give it a partner
-
-_LAYOUT = """
-:root { color-scheme: light dark; }
-body { margin: 0 auto; max-width: 1040px; padding: 1.5rem; font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto,
-  "DejaVu Sans", sans-serif; background: light-dark(#ffffff, #14181f); color: light-dark(#1c2330, #e8ebf0); }
-h1 { font-size: 1.5rem; margin: 0; } h2 { font-size: 1.15rem; margin: 2.2rem 0 .3rem; }
-p { margin: .3rem 0 .8rem; max-width: 75ch; } figure { margin: .5rem 0 1.5rem; }
-figcaption { font-weight: 600; margin-bottom: .2rem; }
-.scroll { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid light-dark(#d9dde4, #39424f); }
-.note { border-left: 4px solid #c05300; padding-left: .8rem; }
-footer { margin-top: 2rem; opacity: .7; font-size: .85rem; } svg.camviz-svg { width: 100%; height: auto; display: block; }
-"""
 
 
 def write_page(calibration: Calibration, path: str | Path) -> None:
@@ -45,11 +35,16 @@ def page(calibration: Calibration) -> str:
     sections = [_numbers(calibration), *_frusta(calibration), *_distortions(calibration), *_epipolar(calibration)]
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name} · camviz</title>'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style()}{_LAYOUT}</style></head>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<style>{style()}{_layout()}</style></head>"
         f"<body><h1>{name}</h1><p>{escape(calibration.format)}</p>{''.join(sections)}"
         f"<footer>Made by camviz {__version__}. Pixels count from the centre of the first one; metres; "
         f"x right, y down, z forward.</footer></body></html>\n"
     )
+
+
+def _layout() -> str:
+    return (files("camviz") / "page.css").read_text(encoding="utf-8")
 
 
 def _numbers(calibration: Calibration) -> str:
@@ -61,8 +56,20 @@ def _numbers(calibration: Calibration) -> str:
 
 def _row(name: str, camera: Camera) -> str:
     K = camera.intrinsics
-    cells = [name, f"{K.width} × {K.height}", *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)), repr(camera.lens)]
+    cells = [
+        name,
+        f"{K.width} × {K.height}",
+        *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)),
+        repr(camera.lens),
+    ]
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+
+
+def _lens(lens: Lens) -> str:
+    """The lens's kind and those of its parameters that are not at rest."""
+    moved = [f for f in fields(lens) if getattr(lens, f.name) != f.default]  # type: ignore[arg-type]
+    parameters = ", ".join(f"{f.name} = {getattr(lens, f.name):.6g}" for f in moved)
+    return type(lens).__name__ + (f": {parameters}" if parameters else "")
 
 
 def _frusta(calibration: Calibration) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from typing import Any
 
@@ -10,6 +9,15 @@ from camviz import glossary, lessons, questions
 from camviz.exercises import exercises
 
 Notebook = Any
+
+SETUP = """\
+import numpy as np
+
+from camviz.exercises import Tutor
+from camviz.widgets import ask, explore, quiz
+
+check = Tutor()"""
+"""The first code of every lesson; what only one lesson needs is imported where it is used."""
 
 LONGEST_CELL = 30
 """Lines of code a reader can take in at once."""
@@ -38,22 +46,12 @@ def _header(notebook: Notebook, number: str) -> list[str]:
 
 
 def _setup(notebook: Notebook) -> list[str]:
-    """One setup cell, the first code: imports by name, and `check = Tutor()` where there are exercises."""
+    """One setup cell, the first code, and the same in every lesson."""
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     setup = lessons.tagged(notebook, "setup")
     if len(setup) != 1 or not code or code[0] is not setup[0]:
         return [f"the first code cell, and no other, must be tagged setup; {len(setup)} are"]
-    statements = ast.parse(setup[0].source).body
-    found = [f"setup holds more than imports: {ast.unparse(one)}" for one in statements if not _is_setup(one)]
-    if lessons.tagged(notebook, "stub") and "check = Tutor()" not in setup[0].source.splitlines():
-        found.append("setup must end with check = Tutor()")
-    return found
-
-
-def _is_setup(statement: ast.stmt) -> bool:
-    if isinstance(statement, ast.ImportFrom):
-        return all(alias.name != "*" for alias in statement.names)
-    return isinstance(statement, ast.Import) or ast.unparse(statement) == "check = Tutor()"
+    return [] if setup[0].source == SETUP else [f"setup must be the same as everywhere:\n{SETUP}"]
 
 
 def _cells(notebook: Notebook) -> list[str]:

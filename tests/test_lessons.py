@@ -10,7 +10,7 @@ import pytest
 
 from camviz import lessons
 from camviz.exercises import exercises, lesson05
-from camviz.pattern import complaints
+from camviz.pattern import SETUP, complaints
 
 ROOT = Path(__file__).parents[1]
 LESSONS = sorted((ROOT / "lessons").glob("*.ipynb"))
@@ -20,11 +20,6 @@ HEADER = """# 05 Lens distortion
 *What does a polynomial do beyond its last data point?* [launch](https://mybinder.org/v2)
 
 **60 minutes.** **Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""
-
-SETUP = """import numpy as np
-from camviz.exercises import Tutor
-from camviz.widgets.question import ask, quiz
-check = Tutor()"""
 
 ENDING = """## Recap
 A [fold](00_start_here.ipynb#fold), the [principal point](00_start_here.ipynb#principal-point) and
@@ -115,9 +110,7 @@ def drop_notes(notebook):
         (replace("minutes.**", "hours**"), "minutes"),
         (replace("mybinder.org", "elsewhere.org"), "mybinder.org"),
         (drop("setup"), "tagged setup"),
-        (replace("import Tutor", "import *"), "more than imports"),
-        (replace("import numpy as np", "import numpy as np\nsize = 3"), "size = 3"),
-        (replace("check = Tutor()", ""), "check = Tutor()"),
+        (replace("import numpy as np", "import numpy as np\nsize = 3"), "the same as everywhere"),
         (replace('ask("05.fold")', ""), "05.fold is never asked"),
         (replace('ask("05.fold")', 'ask("05.quiz_fold")'), "no such predict question"),
         (replace('quiz("05")', ""), "one quiz"),
@@ -262,19 +255,8 @@ def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp
     assert lessons.main(["check"]) == 0
     assert lessons.main(["fresh"]) == 1
     assert "05_distortion.ipynb is stale" in capsys.readouterr().out
-    assert lessons.main(["teacher", str(tmp_path / "out")]) == 0
     assert lessons.main(["fresh", "06"]) == 2
     assert "begins with 06" in capsys.readouterr().err
-
-
-def test_metadata_survives_jupytext_s_percent_format():
-    jupytext = pytest.importorskip("jupytext")
-    percent = (
-        '# %% tags=["stub"] camviz={"exercise": "05.distort", "teacher": "5 minutes.\\nAsk."}\ndef distort(): ...\n'
-    )
-    notebook = jupytext.reads(percent, fmt="py:percent")
-    assert lessons.stubs(notebook) == {"05.distort": "def distort(): ..."}
-    assert notebook.cells[0].metadata["camviz"]["teacher"] == "5 minutes.\nAsk."
 
 
 @EACH

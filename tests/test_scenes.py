@@ -20,12 +20,15 @@ from camviz.scenes import (
     board_corners,
     box,
     render,
+    snapshot,
     textured_scene,
     to_display,
     to_encoded,
     to_linear,
     wireframe_scene,
 )
+from camviz.scenes.bake import painted
+from camviz.scenes.standard import baked
 
 RED, GREEN, BLUE = (Texture(np.eye(3)[i].reshape(1, 1, 3)) for i in range(3))
 AHEAD = np.array([0.0, 0.0, 1.0])
@@ -365,6 +368,12 @@ def test_supersampling_is_the_mean_of_the_finer_picture():
     np.testing.assert_allclose(render(scene, camera, supersample=3), expected, atol=1e-5)
 
 
+def test_a_snapshot_is_the_rendered_light_on_a_screen():
+    """301 × 211 pixels do not fill the last strip of rays."""
+    camera = Camera(Intrinsics.from_fov(301, 211, 70))
+    assert np.array_equal(snapshot(textured_scene(), camera), to_display(render(textured_scene(), camera)))
+
+
 @pytest.mark.parametrize("supersample", [0, -1, 1.5])
 def test_supersampling_takes_whole_numbers(supersample):
     with pytest.raises(ValueError, match="supersample must be a whole number"):
@@ -431,6 +440,24 @@ def test_the_sky_is_a_map_whose_middle_lies_ahead():
     rays = unit(np.array([[0.9, -0.6, 0.1], [-0.9, -0.6, 0.1], [0.9, 0.6, 0.1]]))
     light, _ = Scene([], Texture(sky)).trace(np.zeros(3), rays)
     assert (light > 0.5).tolist() == [[True, False, True], [False, False, True], [True, False, False]]
+
+
+def test_the_garden_is_baked_from_what_paints_it():
+    """JPEG at quality 93 is a level or two off; another planet or a moved shadow is more (mend: bake, see its head)."""
+    for name, picture in painted():
+        kept = baked(name).photograph
+        assert kept.shape == picture.shape, name
+        assert np.abs(kept.astype(int) - picture).mean() < 4, name
+
+
+def test_a_sky_that_ends_below_the_horizon_goes_on_with_its_last_row():
+    """Two rows of a sky eight texels wide are 45° high each and end at the horizon."""
+    sky = np.zeros((2, 8, 3))
+    sky[1] = 1
+    elevations = np.deg2rad([67.5, 22.5, -45, -89])
+    rays = np.stack([0 * elevations, -np.sin(elevations), np.cos(elevations)], axis=-1)
+    light, _ = Scene([], Texture(sky, repeat=True)).trace(np.zeros(3), rays)
+    np.testing.assert_allclose(light[:, 0], [0, 1, 1, 1], atol=1e-3)
 
 
 # The same world as lines and as meshes

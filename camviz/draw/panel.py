@@ -1,6 +1,7 @@
 """Panels: rectangles of a picture with coordinates of their own."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,13 +36,18 @@ class Panel:
         """Picture units per unit of data, (2,)."""
         return np.array([self.width / (self.right - self.left), self.height / (self.bottom - self.top)])
 
-    def show(self, content: str, *, title: str = "", note: str = "", drag: str | None = None, label: str = "") -> str:
-        """The content clipped to the panel, with its title above; with `drag`, a handle for pointer and arrow keys.
+    def show(
+        self, content: str, *, title: str = "", note: str = "", hint: str = "", drag: str | None = None, label: str = ""
+    ) -> str:
+        """The content clipped to the panel, with its title and a note above.
 
-        A handle covers the whole panel; `label` tells a screen reader what dragging it does.
+        With `drag` the whole panel becomes a handle of that name for pointer and arrow keys; `label` tells a screen
+        reader what it does, and `hint` a reader, where the picture is live.
         """
+        right = (self.x + self.width, self.y - 8)
         heading = svg.text((self.x, self.y - 8), title, "title") if title else ""
-        heading += svg.text((self.x + self.width, self.y - 8), note, "note end") if note else ""
+        heading += svg.text(right, note, "note end") if note else ""
+        heading += svg.text(right, hint, "note end hint") if hint else ""
         handle = {"data_drag": drag, "tabindex": 0, "role": "group", "aria_label": label or drag} if drag else {}
         backdrop = svg.rectangle(0, 0, self.width, self.height, "card")
         inner = svg.element(
@@ -60,7 +66,7 @@ def image_panel(
     return Panel(name, x, y, width, width * (bottom - top) / (right - left), left, right, top, bottom)
 
 
-def photograph(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: object) -> str:
+def photograph(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: Any) -> str:
     """The attached photograph where its pixels belong in an image panel."""
     (x0, y0), (x1, y1) = panel.place([(-0.5, -0.5), (image_width - 0.5, image_height - 0.5)])
     return svg.image(attached, x0, y0, x1 - x0, y1 - y0, **attributes)

@@ -71,7 +71,7 @@ def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top 
 
 
 def ticks(low: float, high: float, count: float) -> np.ndarray:
-    """Round numbers from `low` to `high`, at most about `count` of them: multiples of 1, 2 or 5 times a power of ten."""
+    """Round numbers from `low` to `high`, about `count` at most: multiples of 1, 2 or 5 times a power of ten."""
     rough = (high - low) / max(count, 1)
     power = 10.0 ** np.floor(np.log10(rough))
     step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))

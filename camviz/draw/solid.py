@@ -6,11 +6,13 @@ rather than through a plotter: that takes a second and 100 MB less to start.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from math import atan, degrees
+from time import perf_counter
 from typing import Any
 from zlib import crc32
 
@@ -30,6 +32,7 @@ COLOURS = {
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
 FINE = 1.5
+SLOW = 0.08  # seconds that a draft may take before wireframes take its place
 _BACKGROUND = 128
 
 
@@ -87,7 +90,16 @@ def _studio() -> Studio:
 
 
 def _shoot(sight: Sight, items: Sequence[Item], scale: float) -> Shot:
-    return _studio().shoot(sight, items, scale)
+    studio, start = _studio(), perf_counter()
+    shot = studio.shoot(sight, items, scale)
+    studio.pace.append((perf_counter() - start) / scale**2)
+    return shot
+
+
+def too_slow() -> bool:
+    """Whether even the fastest of the last few solid pictures took too long to be dragged."""
+    pace = _studio().pace if _studio.cache_info().currsize else ()
+    return len(pace) == 5 and min(pace) > SLOW
 
 
 def rehearse(window: str) -> None:
@@ -127,6 +139,7 @@ class Studio:
         self.opaque, self.clear = self._actor(), self._actor()
         self.sheets: dict[Sheet, Any] = {}
         self.size = np.zeros(2, dtype=int)
+        self.pace: deque[float] = deque(maxlen=5)
 
     def shoot(self, sight: Sight, items: Sequence[Item], scale: float) -> Shot:
         """A picture of the faces and sheets."""
@@ -163,13 +176,15 @@ class Studio:
         from vtkmodules.util.numpy_support import numpy_to_vtk
 
         actor = self._actor()
-        there = np.isfinite(sheet.vertices).all(axis=-1, keepdims=True)
-        quads = sheet.quads[there[sheet.quads, 0].all(axis=-1)]
-        data = _surface(np.where(there, sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
+        there = np.isfinite(sheet.vertices.sum(axis=-1))
+        quads = sheet.quads[there[sheet.quads].all(axis=-1)]
+        data = _surface(np.where(there[:, None], sheet.vertices, 0), quads[:, [0, 1, 2, 0, 2, 3]])
         data.GetPointData().SetTCoords(numpy_to_vtk(sheet.uv * (1, -1) + (0, 1), deep=True))
         actor.GetMapper().SetInputData(data)
         actor.GetProperty().SetOpacity(sheet.opacity)
         actor.GetProperty().LightingOff()
+        actor.GetProperty().SetAmbient(1)
+        actor.GetProperty().SetDiffuse(0)
         alike = (hung.GetTexture() for other, hung in self.sheets.items() if other.picture is sheet.picture)
         actor.SetTexture(next(alike, None) or _texture(sheet.picture))
         return actor

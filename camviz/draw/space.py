@@ -95,7 +95,7 @@ def draw_space(
     if frame is not None:
         camera = camera.at(frame * camera.world_from_cam)
     sight = Sight(camera, eye.distance)
-    if chosen_renderer(renderer) == "solid":
+    if chosen_renderer(renderer, draft) == "solid":
         from camviz.draw.solid import draw_solid
 
         return draw_solid(sight, items, panel.name, draft)
@@ -111,12 +111,14 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
         pictures: dict[bytes, np.ndarray] = {}
-        shared = [pictures.setdefault(mesh.picture.tobytes(), mesh.picture) for mesh in meshes]
+        shared = [pictures.setdefault(p.tobytes(), p) for p in (mesh.picture for mesh in meshes)]
         return tuple(Sheet(m.vertices, m.quads, m.uv, p) for m, p in zip(meshes, shared, strict=True))
     flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
     fills = [Face(mesh.vertices[mesh.quads[0]], f"#{bytes(mesh.rgb).hex()}", 0.25) for mesh in flat]
     lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
-    drawn = [Line(line, "muted" if name in ("wall", "lamp", "easel") else "ink", 1.2) for name, line in lines]
+    drawn = [
+        Line(line, "muted" if name in ("wall", "lamp", "easel", "terrace") else "ink", 1.2) for name, line in lines
+    ]
     squares = [Line(line, "ink", 0.7) for _, line in wireframe_scene().only("board")]
     ground = [Line(line, "grid", 1.2) for _, line in wireframe_scene().only("ground")]
     return (*ground, *fills, *drawn, *squares)
@@ -126,13 +128,17 @@ def _near(name: str, points: Array) -> bool:
     return name not in ("ground", "lawn") and bool(np.nanmax(np.abs(points)) < 12)
 
 
-def chosen_renderer(renderer: str | None = None) -> str:
-    """ "solid" or "wire": what was asked for, as far as this machine can do it."""
-    renderer = renderer or os.environ.get("CAMVIZ_RENDERER") or "solid"
-    if renderer not in ("solid", "wire"):
-        raise ValueError(f"renderer must be 'solid' or 'wire', got {renderer!r}")
-    if renderer == "wire":
+def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
+    """ "solid" or "wire": what was asked for, as far as this machine can do it.
+
+    Where nobody asked, a draft is a wireframe once solid pictures have proved too slow to be dragged.
+    """
+    asked = renderer or os.environ.get("CAMVIZ_RENDERER") or ""
+    if asked not in ("solid", "wire", ""):
+        raise ValueError(f"renderer must be 'solid' or 'wire', got {asked!r}")
+    if asked == "wire":
         return "wire"
     from camviz.draw.opengl import opengl_works
+    from camviz.draw.solid import too_slow
 
-    return "solid" if opengl_works()[0] else "wire"
+    return "wire" if not opengl_works()[0] or (draft and not asked and too_slow()) else "solid"

@@ -5,12 +5,13 @@ NaN interrupts a line and hides a mark, as everywhere in camviz: "no such point"
 
 from collections.abc import Iterable
 from html import escape
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 
-def element(tag: str, content: str = "", **attributes: object) -> str:
+def element(tag: str, content: str = "", **attributes: Any) -> str:
     """`<tag attributes>content</tag>`. Underscores in attribute names become dashes; a trailing one is dropped."""
     written = "".join(
         f' {name.rstrip("_").replace("_", "-")}="{escape(_number(value))}"'
@@ -20,44 +21,45 @@ def element(tag: str, content: str = "", **attributes: object) -> str:
     return f"<{tag}{written}>{content}</{tag}>" if content else f"<{tag}{written}/>"
 
 
-def group(content: str, **attributes: object) -> str:
+def group(content: str, **attributes: Any) -> str:
     return element("g", content or " ", **attributes)
 
 
-def path(lines: Iterable[ArrayLike], class_: str, *, closed: bool = False, **attributes: object) -> str:
+def path(lines: Iterable[ArrayLike], class_: str, *, closed: bool = False, **attributes: Any) -> str:
     """One path element through all `lines`, each (n, 2); NaN interrupts a line."""
     data = "".join(_pieces(np.asarray(line, dtype=float), closed) for line in lines)
     return element("path", d=data, class_=class_, **attributes) if data else ""
 
 
-def line(points: ArrayLike, class_: str, **attributes: object) -> str:
+def line(points: ArrayLike, class_: str, **attributes: Any) -> str:
     """A line through points (n, 2)."""
     return path([points], class_, **attributes)
 
 
-def polygon(points: ArrayLike, class_: str, **attributes: object) -> str:
+def polygon(points: ArrayLike, class_: str, **attributes: Any) -> str:
     """A closed, filled outline through points (n, 2); drawn only when every point exists."""
     points = np.asarray(points, dtype=float)
     return path([points], class_, closed=True, **attributes) if np.isfinite(points).all() else ""
 
 
-def segments(starts: ArrayLike, ends: ArrayLike, class_: str, **attributes: object) -> str:
+def segments(starts: ArrayLike, ends: ArrayLike, class_: str, **attributes: Any) -> str:
     """Straight segments between starts (n, 2) and ends (n, 2), as one element."""
     pairs = np.stack([np.asarray(starts, float).reshape(-1, 2), np.asarray(ends, float).reshape(-1, 2)], axis=1)
-    pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))].reshape(-1, 4)
-    data = "".join(map("M%.1f,%.1fL%.1f,%.1f".__mod__, map(tuple, pairs.tolist())))
+    drawn = pairs[np.isfinite(pairs).all(axis=(1, 2))].reshape(-1, 4)
+    data = "".join(map("M%.1f,%.1fL%.1f,%.1f".__mod__, map(tuple, drawn.tolist())))
     return element("path", d=data, class_=class_, **attributes) if data else ""
 
 
-def dots(points: ArrayLike, class_: str, diameter: float = 5, **attributes: object) -> str:
+def dots(points: ArrayLike, class_: str, diameter: float = 5, **attributes: Any) -> str:
     """Round marks at points (n, 2), as one element."""
-    points = np.asarray(points, dtype=float).reshape(-1, 2)
-    points = points[np.isfinite(points).all(axis=1)]
-    data = "".join(map("M%.1f,%.1fh0".__mod__, map(tuple, points.tolist())))
-    return element("path", d=data, class_=f"{class_} dots", style=f"stroke-width:{diameter:g}px", **attributes) if data else ""
+    marks = np.asarray(points, dtype=float).reshape(-1, 2)
+    marks = marks[np.isfinite(marks).all(axis=1)]
+    data = "".join(map("M%.1f,%.1fh0".__mod__, map(tuple, marks.tolist())))
+    style = f"stroke-width:{diameter:g}px"
+    return element("path", d=data, class_=f"{class_} dots", style=style, **attributes) if data else ""
 
 
-def text(point: ArrayLike, words: str, class_: str = "label", **attributes: object) -> str:
+def text(point: ArrayLike, words: str, class_: str = "label", **attributes: Any) -> str:
     """Words at a point (2,); nothing where the point does not exist."""
     x, y = np.asarray(point, dtype=float)
     if not np.isfinite([x, y]).all():
@@ -65,11 +67,11 @@ def text(point: ArrayLike, words: str, class_: str = "label", **attributes: obje
     return element("text", escape(words, quote=False), x=x, y=y, class_=class_, **attributes)
 
 
-def rectangle(x: float, y: float, width: float, height: float, class_: str, **attributes: object) -> str:
+def rectangle(x: float, y: float, width: float, height: float, class_: str, **attributes: Any) -> str:
     return element("rect", x=x, y=y, width=width, height=height, class_=class_, **attributes)
 
 
-def image(name: str, x: float, y: float, width: float, height: float, **attributes: object) -> str:
+def image(name: str, x: float, y: float, width: float, height: float, **attributes: Any) -> str:
     """The picture's attached photograph `name`, stretched over a rectangle."""
     return element(
         "image", href=f"attached:{name}", x=x, y=y, width=width, height=height, preserveAspectRatio="none", **attributes

@@ -35,7 +35,7 @@ EXERCISES = (
         cases=_cases,
         hints=(
             "You need an array of ones with the same shape as `points`, except for its last axis, which has length 1.",
-            "`np.ones_like(points[..., :1])` has that shape; `np.concatenate([…, …], axis=-1)` puts the two side by side.",
+            "`np.ones_like(points[..., :1])` has that shape; `np.concatenate([…, …], axis=-1)` joins the two.",
         ),
         praise="That is all there is to a checker: it tries fresh random points of several shapes each time.",
         misconceptions=(

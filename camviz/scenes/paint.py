@@ -72,13 +72,13 @@ def bricks(columns: int = 8, courses: int = 24) -> Picture:
 
 def lawn() -> Picture:
     """Grass that tiles: the grey photograph beside its mirror images, tinted."""
-    grey = cv2.resize(photograph("grass")[..., 0], (256, 256), interpolation=cv2.INTER_AREA) / 255
+    grey = cv2.resize(photograph("grass")[..., 0], (160, 160), interpolation=cv2.INTER_AREA) / 255
     grey = np.block([[grey, grey[:, ::-1]], [grey[::-1], grey[::-1, ::-1]]])
     greens = [(0.16, 0.27, 0.08), (0.42, 0.56, 0.20), (0.68, 0.76, 0.38)]
     return in_bytes(tinted(0.5 + 1.1 * (grey - grey.mean()), greens))
 
 
-def paving(columns: int, rows: int, texels: int = 40) -> Picture:
+def paving(columns: int, rows: int, texels: int = 32) -> Picture:
     """Square flagstones, each with a tone of its own, and joints between them."""
     height, width = rows * texels, columns * texels
     rng = np.random.default_rng(3)
@@ -92,11 +92,11 @@ def paving(columns: int, rows: int, texels: int = 40) -> Picture:
     return in_bytes(stone)
 
 
-def checkerboard(columns: int, rows: int, texels: int = 40, margin: int = 20) -> Picture:
-    """columns × rows squares, `texels` wide, the first one black, on white paper with a margin."""
+def checkerboard(columns: int, rows: int, texels: int = 32) -> Picture:
+    """columns × rows squares, `texels` wide, the first one black, on white paper with a margin of half a square."""
     dark = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0
     squares = np.kron(np.where(dark, 42, 238), np.ones((texels, texels))).astype(np.uint8)
-    return np.repeat(np.pad(squares, margin, constant_values=238)[..., None], 3, axis=2)
+    return np.repeat(np.pad(squares, texels // 2, constant_values=238)[..., None], 3, axis=2)
 
 
 def planks(size: int = 256) -> Picture:
@@ -151,17 +151,22 @@ def framed(picture: Picture, border: float = 0.07) -> Picture:
     return framed
 
 
-def sky(height: int = 512) -> Picture:
-    """Equirectangular sky: pale at the horizon, deep blue above, fair-weather clouds, two ridges of hills."""
-    width = 2 * height
-    elevation = 90 - 180 * (np.arange(height)[:, None] + 0.5) / height
+def sky(width: int = 1024) -> Picture:
+    """Equirectangular sky: pale at the horizon, deep blue above, fair-weather clouds, two ridges of hills.
+
+    It ends 6° below the horizon: nobody sees through the lawn.
+    """
+    texel = 360 / width
+    height = round(96 / texel)
+    elevation = 90 - texel * (np.arange(height)[:, None] + 0.5)
     blues = [(0.89, 0.93, 0.93), (0.70, 0.85, 0.94), (0.45, 0.69, 0.89), (0.30, 0.55, 0.82), (0.22, 0.45, 0.74)]
     picture = tinted(np.broadcast_to(np.maximum(elevation / 55, 0) ** 0.75, (height, width)), blues)
-    puffs = cv2.resize(noise(2 * height, width, 64, seed=21, octaves=6), (width, height), interpolation=cv2.INTER_AREA)
+    puffs = cv2.resize(noise(width, width, 64, seed=21, octaves=6), (width, width // 2), interpolation=cv2.INTER_AREA)
+    puffs = puffs[:height]
     layers = [(np.clip(puffs - 0.7, 0, 0.85) * np.clip((elevation - 5) / 8, 0, 1), (1.0, 0.99, 0.97))]
     ridges = noise(128, width, 128, seed=2, octaves=5)[::64]
     for ridge, rise, swing, colour in zip(ridges, (3.6, 1.9), (1.2, 0.7), ((0.62, 0.73, 0.80), HILLS), strict=True):
-        layers.append((np.clip((rise + swing * ridge - elevation) / (180 / height) + 0.5, 0, 1), colour))
+        layers.append((np.clip((rise + swing * ridge - elevation) / texel + 0.5, 0, 1), colour))
     for cover, colour in layers:
         for channel, value in enumerate(colour):
             picture[..., channel] += cover * (value - picture[..., channel])

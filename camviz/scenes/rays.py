@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
 
 from camviz.lenses.base import Array
 
@@ -63,6 +64,24 @@ class Runs:
         slack = np.sqrt(((origins_in_runs - centre[..., None]) ** 2).sum(axis=0).max(axis=1))
         return cls(
             origins_in_runs, directions_in_runs, axis, cosine, sine, centre.astype(np.float32), slack.astype(np.float32)
+        )
+
+    @property
+    def count(self) -> int:
+        """How many rays there are, those included that only fill up the last run."""
+        return self.directions[0].size
+
+    def moved(self, world_from_cam: RigidTransform) -> Runs:
+        """The same rays of a camera whose centre was the origin, where the camera stands now."""
+        turn = world_from_cam.rotation.as_matrix().astype(np.float32)
+        centre = np.asarray(world_from_cam.translation, dtype=float)[:, None]
+        directions = (turn @ self.directions.reshape(3, -1)).reshape(self.directions.shape)
+        return replace(
+            self,
+            origins=centre[..., None],
+            directions=directions,
+            axis=turn @ self.axis,
+            centre=centre.astype(np.float32),
         )
 
     def pick(self, runs: NDArray[np.intp]) -> tuple[Array, Floats]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.cameras import Camera
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import Lens
 from camviz.lenses.base import Array, as_points
+from camviz.scenes.light import to_display
 from camviz.scenes.rays import RUN, Bounds, Floats, Runs
 from camviz.scenes.surfaces import Meeting, Mesh, Surface, on_sphere
 from camviz.scenes.texture import Texture
@@ -25,7 +27,8 @@ NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be 
 class Scene:
     """Surfaces under a sky. List them near to far: what is hidden then costs nothing.
 
-    The sky is an equirectangular texture infinitely far away, its middle towards +z and its first row straight up.
+    The sky is an equirectangular texture infinitely far away, its texels square, its middle towards +z and its first
+    row straight up. Where it ends before the nadir, its last row goes on.
     """
 
     surfaces: Sequence[Surface]
@@ -50,15 +53,16 @@ class Scene:
         for start in range(0, len(directions), BLOCK):
             block = slice(start, start + BLOCK)
             runs = Runs.gather(origins[block] if len(origins) > 1 else origins, directions[block])
-            light[block], depth[block] = self._trace(runs, spread, len(directions[block]))
+            light[block], depth[block] = self.follow(runs, spread, len(directions[block]))
         return light.reshape(shape), depth.reshape(shape[:-1])
 
     @cached_property
     def _bounds(self) -> Bounds:
         return Bounds.around([surface.ball() for surface in self.surfaces])
 
-    def _trace(self, runs: Runs, spread: float, count: int) -> tuple[Floats, Floats]:
-        depth = np.full(runs.directions[0].size, np.inf, dtype=np.float32)
+    def follow(self, runs: Runs, spread: float, count: int) -> tuple[Floats, Floats]:
+        """As `trace` does, light (count, 3) and distance (count,) of the first `count` of the rays in `runs`."""
+        depth = np.full(runs.count, np.inf, dtype=np.float32)
         light = np.empty((depth.size, 3), dtype=np.float32)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             for surface, may_meet in zip(self.surfaces, runs.may_meet(self._bounds), strict=True):
@@ -86,7 +90,10 @@ class Scene:
             return
         x, y, z = runs.directions.reshape(3, -1)[:, missed]
         depth[missed] = np.nan
-        light[missed] = self.sky.sample(*on_sphere(x, y, -z), spread * self.sky.height / np.pi)
+        s, r = on_sphere(x, y, -z)
+        rows = self.sky.width / 2  # of a whole sphere
+        r = np.minimum(r * np.float32(rows / self.sky.height), np.float32(1 - 0.5 / self.sky.height))
+        light[missed] = self.sky.sample(s, r, spread * rows / np.pi)
         light[missed[(x == 0) & (y == 0) & (z == 0)]] = NEUTRAL
 
     def outlines(self) -> Wireframe:
@@ -108,11 +115,30 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
         raise ValueError(f"supersample must be a whole number, at least 1, got {supersample}")
     pixels = camera.intrinsics
     fine = pixels.resized(pixels.width * supersample, pixels.height * supersample)
-    rays = replace(camera, intrinsics=fine).rays()
-    light, _ = scene.trace(camera.centre, rays, _spread(rays))
+    light = np.empty((fine.height, fine.width, 3), dtype=np.float32)
+    for rows, strip in _traced(scene, replace(camera, intrinsics=fine)):
+        light[rows] = strip
     if supersample == 1:
         return light
     return np.asarray(cv2.resize(light, (pixels.width, pixels.height), interpolation=cv2.INTER_AREA), dtype=np.float32)
+
+
+def snapshot(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
+    """The picture (height, width, 3) that the camera takes as sRGB bytes: to_display(render(scene, camera))."""
+    picture = np.empty((camera.intrinsics.height, camera.intrinsics.width, 3), dtype=np.uint8)
+    for rows, strip in _traced(scene, camera):
+        picture[rows] = to_display(strip)
+    return picture
+
+
+def _traced(scene: Scene, camera: Camera) -> Iterator[tuple[slice, Floats]]:
+    """The picture in strips: which rows, and their linear light (rows, width, 3)."""
+    pixels = camera.intrinsics
+    strips, spread = _strips(pixels, camera.lens)
+    for i, runs in enumerate(strips):
+        top, bottom = i * _rows(pixels), min((i + 1) * _rows(pixels), pixels.height)
+        light, _ = scene.follow(runs.moved(camera.world_from_cam), spread, (bottom - top) * pixels.width)
+        yield slice(top, bottom), light.reshape(-1, pixels.width, 3)
 
 
 def _flat(origins: Array, shape: tuple[int, ...]) -> Array:
@@ -130,8 +156,23 @@ def _require_rays(origins: Array, directions: Array) -> None:
         raise ValueError(f"directions must be unit vectors, got one of length {wrong[0]:g}")
 
 
-def _spread(rays: Array) -> float:
-    """The typical angle in radians between the rays of neighbouring pixels."""
-    steps = np.linalg.norm(np.diff(rays[::8], axis=1), axis=-1)
-    steps = steps[np.isfinite(steps)]
-    return float(np.median(steps)) if steps.size else 0.0
+@lru_cache(maxsize=2)
+def _strips(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Runs, ...], float]:
+    """A camera's rays, as seen by itself, in strips of `_rows` rows, and the typical angle between neighbours.
+
+    Kept while the camera only moves: in single precision, and few of them, for a class shares one machine's memory.
+    """
+    strips, steps = [], []
+    for top in range(0, pixels.height, _rows(pixels)):
+        strip = pixels.cropped(0, top, pixels.width, min(_rows(pixels), pixels.height - top))
+        rays = lens.unproject(strip.from_pixels(strip.grid()))
+        steps.append(np.linalg.norm(np.diff(rays[::8], axis=1), axis=-1).ravel())
+        strips.append(Runs.gather(np.zeros((1, 3)), rays.reshape(-1, 3)))
+    apart = np.concatenate(steps)
+    apart = apart[np.isfinite(apart)]
+    return tuple(strips), float(np.median(apart)) if apart.size else 0.0
+
+
+def _rows(pixels: Intrinsics) -> int:
+    """How many rows of a picture are traced together."""
+    return max(BLOCK // pixels.width, 1)

@@ -6,15 +6,15 @@ Metres, x right, y down, z forward: a camera with an identity pose stands 1.25 m
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib.resources import files
 from typing import Any
 
 import cv2
 import numpy as np
 
 from camviz.lenses.base import Array
-from camviz.photographs import photograph
 from camviz.scenes import paint
-from camviz.scenes.light import SKYLIGHT, SUN, sunlight, to_linear
+from camviz.scenes.light import to_linear
 from camviz.scenes.scene import Scene
 from camviz.scenes.surfaces import Column, Ground, Rectangle, Sphere, Surface, box
 from camviz.scenes.texture import Texture
@@ -38,11 +38,25 @@ def board_corners() -> Array:
 @lru_cache(maxsize=1)
 def textured_scene() -> Scene:
     """The garden: a calibration board, a crate with a globe, a ball, a brick wall, and lamps into the distance."""
-    sky = Texture(to_linear(paint.sky()), repeat=True)
-    things = [*_board(), *_still_life(), *_lamps(), *_wall()]
-    grass = Texture(to_linear(paint.lawn()) * sunlight((0, -1, 0)), repeat=True)
-    lawn = Ground(FLOOR + 0.005, grass, tile=3.2, haze=to_linear(paint.HILLS), sight=90)
-    return Scene([*things, _terrace(things), lawn], sky)
+    terrace = Rectangle(*terrace_edges(), baked("terrace"), name="terrace")
+    lawn = Ground(FLOOR + 0.005, baked("lawn", repeat=True), tile=3.2, haze=to_linear(paint.HILLS), sight=90)
+    return Scene([*things(), terrace, lawn], baked("sky", repeat=True))
+
+
+def baked(name: str, repeat: bool = False) -> Texture:
+    """One of the pictures that `camviz.scenes.bake` has painted."""
+    data = np.frombuffer((files("camviz.scenes") / "pictures" / f"{name}.jpg").read_bytes(), dtype=np.uint8)
+    return Texture(np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))[..., ::-1], repeat)
+
+
+def terrace_edges() -> tuple[Array, Array, Array]:
+    """The terrace's corner, and its edges across and down its texture."""
+    return np.array([-4.5, FLOOR, 9.0]), np.array([7.5, 0, 0]), np.array([0, 0, -12.0])
+
+
+def things() -> list[Surface]:
+    """What stands on the terrace, and throws its shadow there."""
+    return [*_board(), *_still_life(), *_lamps(), *_wall()]
 
 
 def _board() -> list[Surface]:
@@ -50,7 +64,7 @@ def _board() -> list[Surface]:
     corner = _BOARD_CORNER - margin * (_BOARD_ACROSS + _BOARD_DOWN)
     across = (SQUARE * (BOARD_COLUMNS + 1) + 2 * margin) * _BOARD_ACROSS
     down = (SQUARE * (BOARD_ROWS + 1) + 2 * margin) * _BOARD_DOWN
-    picture = Texture(to_linear(paint.checkerboard(BOARD_COLUMNS + 1, BOARD_ROWS + 1)))
+    picture = Texture(paint.checkerboard(BOARD_COLUMNS + 1, BOARD_ROWS + 1))
     wood = Texture(paint.lit_round(paint.plain(1, 32, (0.55, 0.36, 0.20)), upright=True))
     back = 0.03 * np.cross(_BOARD_ACROSS, _BOARD_DOWN)
     legs = [corner + down * 0.2 + across * s + back for s in (0.12, 0.88)]
@@ -59,13 +73,12 @@ def _board() -> list[Surface]:
 
 
 def _still_life() -> list[Surface]:
-    wood = Texture(to_linear(paint.planks()))
-    crate = box([0.68, FLOOR, 3.3], [0.62, 0.62, 0.62], wood, yaw=0.5, name="crate")
-    globe = Sphere(np.array([0.68, FLOOR - 0.62 - 0.27, 3.3]), 0.27, Texture(paint.lit_round(paint.globe())), "globe")
+    crate = box([0.68, FLOOR, 3.3], [0.62, 0.62, 0.62], baked("planks"), yaw=0.5, name="crate")
+    globe = Sphere(np.array([0.68, FLOOR - 0.62 - 0.27, 3.3]), 0.27, baked("globe"), "globe")
     ball = Sphere(np.array([0.13, FLOOR - 0.16, 3.0]), 0.16, Texture(paint.lit_round(paint.beach_ball())), "ball")
     clay = Texture(paint.lit_round(paint.plain(1, 32, (0.74, 0.42, 0.28)), upright=True))
     pot = Column(np.array([1.42, FLOOR, 4.7]), 0.36, 0.2, clay, "pot")
-    bush = Sphere(np.array([1.42, FLOOR - 0.58, 4.7]), 0.33, Texture(paint.lit_round(paint.leaves())), "bush")
+    bush = Sphere(np.array([1.42, FLOOR - 0.58, 4.7]), 0.33, baked("leaves"), "bush")
     return [ball, globe, *crate, bush, pot]
 
 
@@ -80,25 +93,14 @@ def _lamps() -> list[Surface]:
 
 
 def _wall() -> list[Surface]:
-    bricks = Texture(to_linear(paint.bricks()), repeat=True)
-    cat = paint.framed(photograph("chelsea"))
     corner, across, down = np.array([[-0.75, -0.65, 6.47], [1.35, 0, 0], [0, 0.95, 0]])
-    picture = Rectangle(corner, across, down, Texture(to_linear(cat)), name="picture")
+    picture = Rectangle(corner, across, down, baked("cat"), name="picture")
     coping = box([-1.5, FLOOR - 2.5, 6.65], [5.3, 0.09, 0.4], Texture.plain((0.86, 0.82, 0.75)), name="wall")
-    return [picture, *coping, *box([-1.5, FLOOR, 6.65], [5.2, 2.5, 0.3], bricks, tile=2.4, name="wall")]
-
-
-def _terrace(things: list[Surface]) -> Rectangle:
-    """Flagstones with the shadows of the things that stand on them, soft as half of its texels are."""
-    corner, across, down = np.array([-4.5, FLOOR, 9.0]), np.array([7.5, 0, 0]), np.array([0, 0, -12.0])
-    light = to_linear(paint.paving(15, 24))
-    height, width = light.shape[:2]
-    s, r = (np.arange(0, width, 2) + 1) / width, (np.arange(0, height, 2) + 1) / height
-    points = corner + s[None, :, None] * across + r[:, None, None] * down
-    _, depth = Scene(things).trace(points, SUN / np.linalg.norm(SUN))
-    lit = cv2.resize(np.isnan(depth).astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
-    light *= (SKYLIGHT + (sunlight((0, -1, 0)) - SKYLIGHT) * lit)[..., None]
-    return Rectangle(corner, across, down, Texture(light), name="terrace")
+    return [
+        picture,
+        *coping,
+        *box([-1.5, FLOOR, 6.65], [5.2, 2.5, 0.3], baked("bricks", repeat=True), tile=2.4, name="wall"),
+    ]
 
 
 @lru_cache(maxsize=1)

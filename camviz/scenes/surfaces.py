@@ -19,18 +19,29 @@ _FAR, _HALF = np.float32(np.inf), np.float32(0.5)
 
 @dataclass(frozen=True)
 class Mesh:
-    """A surface as quadrilaterals, for a solid renderer: vertices (n, 3) in metres, quads (m, 4) of their indices.
+    """A surface as quadrilaterals: vertices (n, 3) in metres, quads (m, 4) of their indices.
 
-    `uv` (n, 2) places the vertices on `picture` (sRGB bytes), u to the right and v upwards; `rgb` is the picture's
-    mean, 0…255, for a renderer without textures.
+    `uv` (n, 2) places the vertices on the texture's picture, u to the right and v upwards; `shade` is the light that
+    the surface receives.
     """
 
     name: str
     vertices: Array
     quads: NDArray[np.intp]
     uv: Array
-    picture: NDArray[np.uint8]
-    rgb: tuple[int, int, int]
+    texture: Texture
+    shade: float = 1.0
+
+    @property
+    def picture(self) -> NDArray[np.uint8]:
+        """sRGB bytes (height, width, 3), for a renderer with textures."""
+        return to_display(to_linear(np.arange(256) / 255) * self.shade)[self.texture.photograph]
+
+    @property
+    def rgb(self) -> tuple[int, int, int]:
+        """The picture's mean, 0…255, for a renderer without them."""
+        red, green, blue = to_display(self.texture.mean * self.shade).tolist()
+        return red, green, blue
 
 
 class Meeting(NamedTuple):
@@ -368,6 +379,4 @@ def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.i
 
 
 def _mesh(name: str, vertices: Array, quads: NDArray[np.intp], uv: Array, texture: Texture, shade: float = 1.0) -> Mesh:
-    picture = to_display(to_linear(np.arange(256) / 255) * shade)[texture.photograph]
-    red, green, blue = to_display(texture.mean * shade).tolist()
-    return Mesh(name, np.asarray(vertices, dtype=float), quads, uv, picture, (red, green, blue))
+    return Mesh(name, np.asarray(vertices, dtype=float), quads, uv, texture, shade)

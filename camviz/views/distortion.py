@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from math import atan, degrees, isfinite
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -20,11 +20,11 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import unit
-from camviz.scenes import Scene, render, textured_scene, to_display
+from camviz.scenes import Scene, snapshot, textured_scene
 from camviz.views.base import View, choice, slider, switch
 
-_RADIAL = {"low": -1.0, "high": 1.0, "step": 0.005}
-_SIDE = {"low": -0.1, "high": 0.1, "step": 0.001}
+_RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
+_SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
 _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
 _WIDTH = 380
 
@@ -134,7 +134,7 @@ class DistortionView(View):
             self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
         )
         if self.photograph is None:
-            picture = to_display(render(_scene(), small))
+            picture = snapshot(_scene(), small)
         else:
             picture = cv2.resize(
                 self.photograph, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA
@@ -243,7 +243,7 @@ class DistortionView(View):
     def _fold_mark(self, panel: Panel, fold: float) -> str:
         if not fold < panel.right:
             return ""
-        at = panel.place((fold, self._radial(np.array(fold))))
+        at = panel.place([fold, float(self._radial(np.array(fold)))])
         side = "end" if at[0] > panel.width / 2 else ""
         words = f"folds at r = {_with_angle(fold)}"
         return svg.dots([at], "red", 9) + svg.text(at + (-8 if side else 8, -12), words, f"red halo {side}")
@@ -255,7 +255,7 @@ class DistortionView(View):
         content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
         return panel.show(
-            content, title="Its rays in space", note="drag to turn", drag="orbit", label=label
+            content, title="Its rays in space", hint="drag to turn", drag="orbit", label=label
         ), photographs
 
     def _bent_frustum(self) -> list[Item]:
@@ -286,9 +286,9 @@ class DistortionView(View):
         for i, (name, value) in enumerate(self._coefficients().items()):
             class_ = "number" if value else "number faint"
             rows.append(svg.text((x, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
-        for i, (name, value) in enumerate(self.numbers().items()):
+        for i, (name, figure) in enumerate(self.numbers().items()):
             rows.append(svg.text((x, 296 + 40 * i), name, "note"))
-            rows.append(svg.text((x, 313 + 40 * i), value, "label"))
+            rows.append(svg.text((x, 313 + 40 * i), figure, "label"))
         return "".join(rows)
 
 

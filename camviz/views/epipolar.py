@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from camviz import twoview
-from camviz.cameras import Camera, Intrinsics, transform
+from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, space_panel
+from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
+from camviz.lenses import Perspective
 from camviz.lenses.base import Array, unit
+from camviz.scenes import textured_scene
 from camviz.views import garden
-from camviz.views.marks import border_arrow, camera_outline, crop, on_photograph, ring
+from camviz.views.marks import border_arrow, camera_outline, clipped, crop, on_photograph, ring
 from camviz.views.two_cameras import TwoCameras
 
-_DISTANCES = np.concatenate([np.geomspace(0.02, 400, 240), [np.inf]])
+_DISTANCES = np.concatenate([np.geomspace(0.02, 400, 120), [np.inf]])
 _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point
 _PATCH = 48  # pixels on a side of the details that are compared
-_PLANES = 48  # epipolar planes in a full turn around the baseline
+_PLANES = 40  # epipolar planes in a full turn around the baseline
 _WIDTH = 455
 
 
@@ -42,7 +44,7 @@ class EpipolarView(TwoCameras):
 
     @cached_property
     def _figures(self) -> dict[str, str]:
-        nowhere = "at infinity" if self.baseline else "none"
+        nowhere = "none" if not self.baseline else "at infinity" if self.F is not None else "beyond the lens’s field"
         figures = {
             "baseline": f"{self.baseline:.3f} m",
             "left epipole": _pixel(_epipole(self.left, self.right), nowhere),
@@ -155,7 +157,8 @@ class EpipolarView(TwoCameras):
             ]
         )
         label = f"The {panel.name} picture; drag or press the arrow keys to {action}"
-        return panel.show(content, title=f"The {panel.name} picture", note=note, drag=panel.name, label=label)
+        said = {"hint": note} if note.startswith("drag") else {"note": note}
+        return panel.show(content, title=f"The {panel.name} picture", drag=panel.name, label=label, **said)
 
     def _pencil(self, panel: Panel, camera: Camera) -> str:
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
@@ -165,20 +168,20 @@ class EpipolarView(TwoCameras):
         along, first = self._plane_axes(forward[:, 2] if abs(self._along @ forward[:, 2]) < 0.9 else forward[:, 0])
         turn = np.arange(_PLANES) * (2 * np.pi / _PLANES)
         across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(along, first)
-        lines = _near(camera.project(camera.centre + _half_planes(along, across, 60)), camera.intrinsics)
-        lines = lines[np.isfinite(lines).any(axis=(1, 2))]
-        return svg.path(panel.place(lines), "yellow thin half")
+        lines = clipped(panel, panel.place(camera.project(camera.centre + _half_planes(along, across, 40))))
+        return svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
 
     def _own_line(self, panel: Panel, camera: Camera) -> str:
         """The epipolar line of the chosen point, and in the right picture strong where its ray can be seen."""
         if not self.baseline:
             return ""
         along, across = self._plane_axes(self.point - self.left.centre)
-        whole = camera.project(camera.centre + _half_planes(along, np.stack([across, -across]), 160))
-        lines = on_photograph(panel.place(_near(whole, camera.intrinsics)), "green thin")
+        whole = camera.project(camera.centre + _half_planes(along, np.stack([across, -across]), 90))
+        lines = on_photograph(clipped(panel, panel.place(whole)), "green thin")
         if panel.name == "right":
-            ray = panel.place(twoview.epipolar_curve(self.left, self.right, [self.u, self.v], _DISTANCES))
-            lines += on_photograph([ray], "green thick") + _infinity(ray[-1])
+            ray = twoview.epipolar_curve(self.left, self.right, [self.u, self.v], _DISTANCES)
+            lines += on_photograph(clipped(panel, panel.place(ray)), "green thick")
+            lines += _infinity(panel.place(_inside(camera, ray[-1])))
         return lines
 
     def _estimated_line(self, panel: Panel, camera: Camera) -> str:
@@ -186,7 +189,7 @@ class EpipolarView(TwoCameras):
             return ""
         F, uv = (self.estimate, [self.u, self.v]) if panel.name == "right" else (self.estimate.T, self.uv_right)
         line = panel.place(twoview.clip_lines(twoview.epipolar_lines(F, uv), camera.intrinsics))
-        epipole = panel.place(twoview.from_homogeneous(twoview.epipoles(F)[1]))
+        epipole = panel.place(_inside(camera, twoview.from_homogeneous(twoview.epipoles(F)[1])))
         return on_photograph([line], "purple dashed") + svg.dots([epipole], "purple", 9)
 
     def _match_dots(self, panel: Panel) -> str:
@@ -205,18 +208,19 @@ class EpipolarView(TwoCameras):
             side = "end" if at[0] > panel.width / 2 else ""
             return ring(at, "yellow", 8) + svg.text(at + (-14 if side else 14, -8), words, f"yellow halo {side}")
         toward = at - (panel.width / 2, panel.height / 2) if np.isfinite(uv).all() else _heading(camera, other)
-        return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}")
+        return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}, this way")
 
     def _other_camera(self, panel: Panel, camera: Camera, other: Camera) -> str:
-        return (
-            camera_outline(panel, camera, other, "orange" if panel.name == "left" else "blue") if self.baseline else ""
-        )
+        if not self.baseline or not camera.sees(other.centre):
+            return ""
+        depth = min(0.12, self.baseline / 4)
+        return camera_outline(panel, camera, other, depth, "orange" if panel.name == "left" else "blue")
 
     def _point_mark(self, panel: Panel, camera: Camera) -> str:
-        at = panel.place([self.u, self.v] if panel.name == "left" else self.uv_right)
+        at = panel.place([self.u, self.v] if panel.name == "left" else _inside(camera, self.uv_right))
         marks = ring(at, "red", 8) + svg.dots([at], "red", 5)
         if self.truth and np.isfinite(self.surface).all():
-            true = panel.place(camera.project(self.surface))
+            true = panel.place(_inside(camera, camera.project(self.surface)))
             marks = ring(true, "sky", 13) + svg.text(true + (17, 5), "the surface", "sky halo") + marks
         return marks
 
@@ -233,20 +237,32 @@ class EpipolarView(TwoCameras):
 
     def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("space", 20, 409, 500, 200)
-        content, sheets = draw_space(panel, self._space_items(images), self.eye, draft=draft, renderer="wire")
+        content, sheets = draw_space(panel, self._space_items(images), self._onlooker, draft=draft, renderer="wire")
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
-        shown = panel.show(content, title="The epipolar plane", note="drag to turn", drag="orbit", label=label)
+        shown = panel.show(content, title="The epipolar plane", hint="drag to turn", drag="orbit", label=label)
         return shown, sheets
 
+    @property
+    def _nearness(self) -> float:
+        """1 in the garden; smaller for a calibrated pair with a short baseline."""
+        return min(1.0, max(0.05, self.baseline / 0.3)) if self.pair else 1.0
+
+    @property
+    def _onlooker(self) -> Eye:
+        """The eye, as near to a small rig as it is to a large one."""
+        left, s = self.left.centre, self._nearness
+        target = tuple((left + s * (np.array(self.eye.target) - left)).tolist())
+        return replace(self.eye, target=target, distance=s * self.eye.distance)
+
     def _space_items(self, images: dict[str, np.ndarray]) -> list[Item]:
-        left, right, point = self.left.centre, self.right.centre, self.point
-        ray = np.array([left, left + max(8.0, self.depth) * self.left.unproject([self.u, self.v])])
+        left, right, point, s = self.left.centre, self.right.centre, self.point, self._nearness
+        ray = np.array([left, left + max(8.0 * s, self.depth) * self.left.unproject([self.u, self.v])])
         return [
-            *(Line(line, "muted", 1.0) for line in garden.outlines()),
-            *camera_body(self.left, 0.6, image=images["left"], colour="blue"),
-            *camera_body(self.right, 0.6, image=images["right"], colour="orange"),
-            Label(left + (0, 0.22, 0), "left", "label blue"),
-            Label(right + (0, 0.22, 0), "right", "label orange"),
+            *(() if self.photographs else scene_items(textured_scene(), "wire")),
+            *camera_body(self.left, 0.6 * s, image=images["left"], colour="blue"),
+            *camera_body(self.right, 0.6 * s, image=images["right"], colour="orange"),
+            Label(left + (0, 0.22 * s, 0), "left", "label blue"),
+            Label(right + (0, 0.22 * s, 0), "right", "label orange"),
             Face(np.array([left, right, point]), "green", 0.3),
             Line(ray, "blue", 1.8),
             Line(np.array([right, point]), "orange", 1.8),
@@ -300,20 +316,19 @@ def _heading(camera: Camera, other: Camera) -> Array:
 
 
 def _far(uv: Array, camera: Camera) -> str:
-    middle = np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2
-    away = float(np.linalg.norm(uv - middle))
-    return f"{away:,.0f} px this way" if away < 1e6 else "at infinity, this way"
+    away = float(np.linalg.norm(uv - np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2))
+    if away < 1e6:
+        return f"{away:,.0f} px"
+    return "at infinity" if isinstance(camera.lens, Perspective) else "beyond the lens’s field"
 
 
 def _infinity(at: Array) -> str:
     return svg.dots([at], "green", 8) + svg.text(at + (0, -9), "∞", "green halo middle")
 
 
-def _near(uv: Array, intrinsics: Intrinsics) -> Array:
-    """Pixels (..., 2) as far as they lie in the picture or no more than a picture away from it, else NaN."""
-    size = np.array([intrinsics.width, intrinsics.height])
-    with np.errstate(invalid="ignore"):
-        return np.where((np.abs(uv - size / 2) < 1.5 * size).all(axis=-1, keepdims=True), uv, np.nan)
+def _inside(camera: Camera, uv: Array) -> Array:
+    """A pixel (2,), or NaN where it is not in the camera's picture."""
+    return np.where(camera.intrinsics.contains(uv), uv, np.nan)
 
 
 def _row(entries: Array) -> str:

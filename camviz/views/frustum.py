@@ -29,7 +29,7 @@ from camviz.draw.space import (
 )  # fmt: skip
 from camviz.lenses import Lens, Perspective
 from camviz.lenses.base import Array
-from camviz.scenes import board_corners, render, textured_scene, to_display
+from camviz.scenes import board_corners, snapshot, textured_scene
 from camviz.views.base import View, choice, slider, switch
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
@@ -142,11 +142,12 @@ class FrustumView(View):
         panel = space_panel("world", 20, 34, 540, 400)
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else RigidTransform.identity()
-        items = [*scene_items(textured_scene(), chosen_renderer()), *self._items(image)]
-        content, photographs = draw_space(panel, items, self.eye, draft=draft, frame=frame)
+        renderer = chosen_renderer(draft=draft)
+        items = [*scene_items(textured_scene(), renderer), *self._items(image)]
+        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer=renderer, frame=frame)
         title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
-        return panel.show(content, title=title, note="drag to turn", drag="eye", label=label), photographs
+        return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs
 
     def _items(self, image: np.ndarray) -> list[Item]:
         near = self.near if self.near < self.far else 0
@@ -165,7 +166,7 @@ class FrustumView(View):
         panel = image_panel("picture", 580, 34, width, k.width, k.height)
         content = photograph(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
         label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
-        return panel.show(content, title="What it sees", note="drag to look around", drag="picture", label=label)
+        return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)
 
     def _projected(self, panel: Panel) -> str:
         uv = panel.place(self.camera.project(board_corners()))
@@ -225,11 +226,11 @@ class FrustumView(View):
         return self.but(yaw_deg=round(yaw, 2), pitch_deg=round(min(90.0, max(-90.0, self.pitch_deg + up_deg)), 2))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _taken(intrinsics: Intrinsics, lens: Lens, centre: tuple[float, ...], quaternion: tuple[float, ...]) -> np.ndarray:
     """The picture of the scene; kept, for the onlooker may walk around while the camera stands."""
     pose = RigidTransform.from_components(np.array(centre), Rotation.from_quat(quaternion))
-    return to_display(render(textured_scene(), Camera(intrinsics, lens, pose)))
+    return snapshot(textured_scene(), Camera(intrinsics, lens, pose))
 
 
 def _up(camera: Camera) -> Array:

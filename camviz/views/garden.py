@@ -11,7 +11,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
 from camviz.lenses import Lens
 from camviz.lenses.base import Array
-from camviz.scenes import render, textured_scene, to_display
+from camviz.scenes import snapshot, textured_scene
 
 Pose = tuple[float, ...]
 
@@ -27,16 +27,9 @@ def landmarks(camera: Camera) -> Array:
     return _landmarks(camera.intrinsics, camera.lens, _pose(camera))
 
 
-@lru_cache(maxsize=1)
-def outlines() -> tuple[Array, ...]:
-    """The lines (n, 3) of the things on the terrace and of the wall behind them."""
-    names = ("board", "crate", "globe", "ball", "picture", "wall", "pot", "bush", "easel")
-    return textured_scene().outlines().only(*names).lines
-
-
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def _taken(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> tuple[np.ndarray, bytes]:
-    image = to_display(render(textured_scene(), Camera(intrinsics, lens, _placed(pose))))
+    image = snapshot(textured_scene(), Camera(intrinsics, lens, _placed(pose)))
     image.flags.writeable = False
     return image, jpeg(image)
 

@@ -24,12 +24,25 @@ def border_arrow(panel: Panel, toward: Array, words: str) -> str:
     return arrow + svg.text(tip + (-14 * np.sign(toward[0]) * (side != "middle"), below), words, f"yellow halo {side}")
 
 
-def camera_outline(panel: Panel, camera: Camera, other: Camera, class_: str) -> str:
-    """The body of another camera, 12 cm deep, where it is in this one's picture."""
-    _, rim = other.frustum(0, 0.12, 1)
-    gap, tip = np.full((4, 3), np.nan), np.broadcast_to(other.centre, (4, 3))
-    spokes = np.stack([tip, rim, gap], axis=1).reshape(-1, 3)
-    return on_photograph(panel.place(camera.project([np.vstack([spokes, rim, rim[:1]])])), class_)
+def camera_outline(panel: Panel, camera: Camera, other: Camera, depth: float, class_: str) -> str:
+    """The body of another camera, `depth` metres deep, where it is in this one's picture."""
+    _, rim = other.frustum(0, depth, 1)
+    spokes = np.stack([np.broadcast_to(other.centre, (4, 3)), rim], axis=1)
+    edges = np.stack([rim, np.roll(rim, -1, axis=0)], axis=1)
+    return on_photograph(clipped(panel, panel.place(camera.project(np.concatenate([spokes, edges])))), class_)
+
+
+def clipped(panel: Panel, lines: ArrayLike) -> Array:
+    """The parts of lines (..., n, 2) inside the panel, as segments (m, 2, 2) (Liang & Barsky 1984)."""
+    lines = np.asarray(lines, dtype=float)
+    starts, ends = (part.reshape(-1, 2) for part in (lines[..., :-1, :], lines[..., 1:, :]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = -starts / (ends - starts), ((panel.width, panel.height) - starts) / (ends - starts)
+    enter = np.fmax(np.fmin(low, high).max(axis=-1), 0)
+    leave = np.fmin(np.fmax(low, high).min(axis=-1), 1)
+    kept = (enter < leave) & np.isfinite(starts).all(axis=-1) & np.isfinite(ends).all(axis=-1)
+    starts, along, parts = starts[kept], (ends - starts)[kept], np.stack([enter, leave], axis=-1)[kept]
+    return starts[:, None] + parts[..., None] * along[:, None]
 
 
 def on_photograph(lines: ArrayLike, class_: str) -> str:

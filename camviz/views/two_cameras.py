@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -17,7 +17,7 @@ from camviz.scenes import textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
 
-_TURN = {"low": -40.0, "high": 40.0, "step": 0.5, "unit": "°"}
+_TURN: dict[str, Any] = {"low": -40.0, "high": 40.0, "step": 0.5, "unit": "°"}
 _STAND = RigidTransform.from_translation([-0.4, 0.0, 0.0])  # of the left camera in the garden
 _CAMERAS = {
     "perspective": Camera(Intrinsics.from_fov(640, 480, 65), Perspective()),
@@ -37,9 +37,9 @@ class TwoCameras(View):
     they see.
     """
 
-    right_x: float = slider(0.7, -1.5, 1.5, 0.01, label="right camera x", unit="m", help="to the right of the left one")
-    right_y: float = slider(0.0, -1.0, 1.0, 0.01, label="right camera y", unit="m", help="below the left one")
-    right_z: float = slider(0.0, -1.0, 1.5, 0.01, label="right camera z", unit="m", help="in front of the left one")
+    right_x: float = slider(0.7, -1.5, 1.5, 0.01, label="right x", unit="m", help="to the right of the left camera")
+    right_y: float = slider(0.0, -1.0, 1.0, 0.01, label="right y", unit="m", help="below the left camera")
+    right_z: float = slider(0.0, -1.0, 1.5, 0.01, label="right z", unit="m", help="in front of the left camera")
     yaw: float = slider(-10.0, **_TURN, help="of the right camera: positive turns it to the right")
     pitch: float = slider(0.0, **_TURN, help="of the right camera: positive turns it up")
     roll: float = slider(0.0, **_TURN, help="of the right camera about its axis")
@@ -70,8 +70,8 @@ class TwoCameras(View):
                 "the two cameras stand in the same place: does this calibration lack the pose of the right camera?"
             )
         yaw, pitch, roll = left_from_right.rotation.as_euler("YXZ", degrees=True).tolist()
-        middle = {"u": (left.intrinsics.width - 1) / 2, "v": (left.intrinsics.height - 1) / 2}
-        placed = {"right_x": x, "right_y": y, "right_z": z, "yaw": yaw, "pitch": pitch, "roll": roll}
+        middle: dict[str, Any] = {"u": (left.intrinsics.width - 1) / 2, "v": (left.intrinsics.height - 1) / 2}
+        placed: dict[str, Any] = {"right_x": x, "right_y": y, "right_z": z, "yaw": yaw, "pitch": pitch, "roll": roll}
         return cls(pair=(left, right), photographs=photographs, **placed, **middle)
 
     # The geometry ----------------------------------------------------------------------------------------------------
@@ -122,7 +122,7 @@ class TwoCameras(View):
         """x_rightᵀ F x_left of the chosen point; NaN without an F or an image."""
         if self.F is None:
             return float("nan")
-        left, right = twoview.to_homogeneous([[self.u, self.v], self.uv_right])
+        left, right = twoview.to_homogeneous(np.array([[self.u, self.v], self.uv_right]))
         return abs(float(right @ self.F @ left))
 
     @cached_property
@@ -136,7 +136,12 @@ class TwoCameras(View):
 
     @cached_property
     def pairs(self) -> tuple[Array, Array]:
-        """Points of the scene that lie in both pictures: true pixels (n, 2) in the left and in the right one."""
+        """Points of the scene that lie in both pictures: true pixels (n, 2) in the left and in the right one.
+
+        None in photographs, where nobody knows them.
+        """
+        if self.photographs is not None:
+            return np.empty((0, 2)), np.empty((0, 2))
         points = garden.landmarks(self.left)
         points = points[self.right.sees(points)][: int(self.matches)]
         return self.left.project(points), self.right.project(points)

@@ -1,0 +1,34 @@
+"""Matrices, written in brackets."""
+
+import numpy as np
+
+from camviz.draw import svg
+
+_STEP, _ROW = 66, 26
+
+
+def matrix(x: float, y: float, title: str, values: np.ndarray, changed: np.ndarray | None = None) -> str:
+    """A matrix (m, n) to two decimals, its first row's middle at `y`; entries that are `changed` (m, n) stand out.
+
+    Zeros below the diagonal, and the last number, are what every such matrix has: they are written short and faintly.
+    """
+    rows, columns = values.shape
+    changed = np.zeros(values.shape, dtype=bool) if changed is None else changed
+    entries = [
+        _entry(x, y, row, column, values, bool(changed[row, column])) for row, column in np.ndindex(rows, columns)
+    ]
+    top, bottom = y - 10, y + _ROW * (rows - 1) + 20
+    brackets = [
+        svg.line([(edge + inward, top), (edge, top), (edge, bottom), (edge + inward, bottom)], "ink")
+        for edge, inward in ((x, 6), (x + _STEP * columns + 10, -6))
+    ]
+    return svg.text((x, y - 22), title, "title") + "".join(entries) + "".join(brackets)
+
+
+def _entry(x: float, y: float, row: int, column: int, values: np.ndarray, changed: bool) -> str:
+    right, base = x + _STEP * (column + 1), y + _ROW * row + 10
+    if row > column or (row, column) == (values.shape[0] - 1, values.shape[1] - 1):
+        return svg.text((right, base), "1" if row == column else "0", "number end half")
+    back = svg.rectangle(right - 58, base - 16, 62, 23, "wash fill-orange", rx=3) if changed else ""
+    words = f"{values[row, column] + 0.0:.2f}".replace("-", "−")
+    return back + svg.text((right, base), words, "number end orange" if changed else "number end")

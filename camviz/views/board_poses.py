@@ -1,0 +1,210 @@
+"""One camera, one board, many pictures: where the camera stood before the board, or the board before the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from camviz.cameras import Camera, transform
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import Eye, Item, Label, Line, Sheet, axes_triad, camera_body, draw_space, space_panel
+from camviz.files.calibration import Board
+from camviz.lenses.base import Array
+from camviz.views.base import View, choice, slider
+
+_NINE_BY_SIX = Board(9, 6, 0.025)
+
+
+@dataclass(frozen=True)
+class BoardPosesView(View):
+    """The poses of a calibration's pictures in space, one of them picked out, and the board as that picture has it.
+
+    `cam_from_board` holds one pose per picture. The board's frame has its origin at the first inner corner, x along the
+    rows of corners, y along the columns and z away from the camera. `photographs`, uint8 RGB, are the pictures
+    themselves where they are at hand.
+    """
+
+    camera: Camera = field(compare=False)
+    cam_from_board: RigidTransform = field(compare=False, repr=False)
+    board: Board = _NINE_BY_SIX
+    still: str = choice("board", "camera", label="what stands still", help="the board, or the camera")
+    picture: int = slider(1, 1, 13, 1, label="picture", help="which of the pictures is picked out, in orange")
+    photographs: tuple[NDArray[np.uint8], ...] = field(default=(), compare=False, repr=False)
+    eye: Eye = Eye(distance=0.9, yaw_deg=-50, pitch_deg=20)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.cam_from_board.single or not len(self.cam_from_board):
+            raise ValueError(f"cam_from_board must hold one pose per picture, got {self.cam_from_board!r}")
+        if self.photographs and len(self.photographs) != len(self.cam_from_board):
+            got = len(self.photographs)
+            raise ValueError(f"photographs must be as many as the {len(self.cam_from_board)} poses, got {got}")
+
+    # The numbers -----------------------------------------------------------------------------------------------------
+
+    @property
+    def index(self) -> int:
+        """The place of the chosen picture in the list of poses."""
+        return min(max(round(self.picture), 1), len(self.cam_from_board)) - 1
+
+    @cached_property
+    def centres(self) -> Array:
+        """Where the camera stood in each picture, (n, 3) in the board's frame: C = -Rᵀ t."""
+        return np.asarray(self.cam_from_board.inv().translation, dtype=np.float64)
+
+    @property
+    def chosen(self) -> RigidTransform:
+        """cam_from_board of the chosen picture."""
+        return self.cam_from_board[self.index]
+
+    def corners(self) -> Array:
+        """The inner corners (rows * columns, 3) in the board's frame, in metres."""
+        column, row = np.meshgrid(np.arange(self.board.columns, dtype=float), np.arange(self.board.rows, dtype=float))
+        return self.board.square_size * np.stack([column, row, 0 * row], axis=-1).reshape(-1, 3)
+
+    def pixels(self) -> Array:
+        """Where the chosen picture has the corners, (rows * columns, 2), by pose, lens and camera matrix."""
+        return self.camera.at(self.chosen.inv()).project(self.corners())
+
+    def numbers(self) -> dict[str, float]:
+        """The camera's distance from the board's middle in metres, and its axis against the board's normal in °."""
+        cosine = self.chosen.rotation.as_matrix()[2, 2]
+        distance = np.linalg.norm(self.centres[self.index] - self._middle)
+        return {"distance": float(distance), "tilt_deg": float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))}
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        n, chosen = self.numbers(), self.chosen
+        return (
+            f"{len(self.cam_from_board)} pictures of one board; the {self.still} stands still. "
+            f"Picture {self.index + 1}: t = {_row(chosen.translation)} m, the camera stood at "
+            f"C = {_row(self.centres[self.index])} m in the board's frame, {n['distance']:.2f} m from its middle, "
+            f"its axis {n['tilt_deg']:.0f}° from the board's normal."
+        )
+
+    @property
+    def _middle(self) -> Array:
+        return self.corners().mean(axis=0)
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        space, attached = self._space(draft)
+        body = svg.rectangle(0, 0, 960, 500, "paper") + space + self._image() + self._equation()
+        if self.photographs:
+            attached = attached | {"photograph": jpeg(self.photographs[self.index])}
+        return Picture(body, 960, 500, "Camera and board", self.description(), attached)
+
+    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("poses", 20, 34, 540, 452)
+        before_board = self.still == "board"
+        target = (self._middle + self.centres.mean(0)) / 2 if before_board else transform(self.chosen, self._middle) / 2
+        eye = replace(self.eye, target=tuple(target.tolist()))
+        items = self._cameras() if before_board else self._boards()
+        content, attached = draw_space(panel, items, eye, draft=draft)
+        title = "Where the camera stood" if before_board else "Where the board was held"
+        label = "The poses in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
+        return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), attached
+
+    def _cameras(self) -> list[Item]:
+        """The board, and every picture's camera around it."""
+        still = RigidTransform.identity()
+        items = [*self._board(still, True), *axes_triad(still, 3 * self.board.square_size)]
+        for i, board_from_cam in enumerate(self.cam_from_board.inv()):
+            items += self._body(board_from_cam, str(i + 1)) if i == self.index else self._pyramid(board_from_cam, i + 1)
+        return items
+
+    def _boards(self) -> list[Item]:
+        """The camera, and every picture's board before it."""
+        still = RigidTransform.identity()
+        items = [*self._body(still, "C"), *axes_triad(still, 2 * self.board.square_size)]
+        for i, cam_from_board in enumerate(self.cam_from_board):
+            items += self._board(cam_from_board, i == self.index)
+            where = transform(cam_from_board, self._outline()[0])
+            items.append(Label(where, str(i + 1), "label orange" if i == self.index else "note"))
+        return items
+
+    def _body(self, pose: RigidTransform, name: str) -> list[Item]:
+        return camera_body(self.camera.at(pose), 2 * self.board.square_size, colour="orange", name=name)
+
+    def _pyramid(self, pose: RigidTransform, number: int) -> list[Item]:
+        """A camera that is not picked out: its four corner rays and the square they end on."""
+        a, b, c, d = transform(pose, self._corner_rays)
+        centre = np.asarray(pose.translation)
+        return [Line(np.array([centre, a, b, centre, c, d, centre, b, c, d, a]), "blue", 1.2),
+                Label(centre, str(number), "label blue")]  # fmt: skip
+
+    @cached_property
+    def _corner_rays(self) -> Array:
+        """The corners (4, 3) of a drawn camera's rim in its own frame."""
+        return (
+            2
+            * self.board.square_size
+            * self.camera.lens.unproject(self.camera.intrinsics.from_pixels(self.camera.intrinsics.border(1)))
+        )
+
+    def _board(self, frame_from_board: RigidTransform, chosen: bool) -> list[Item]:
+        outline = transform(frame_from_board, self._outline())
+        rim = Line(np.vstack([outline, outline[:1]]), "orange" if chosen else "muted", 1.8 if chosen else 1)
+        if not chosen:
+            return [rim]
+        return [rim, Sheet.over(outline[[0, 1, 3, 2]].reshape(2, 2, 3), self._checkers(), 0.9)]
+
+    def _outline(self) -> Array:
+        """The four corners (4, 3) of the board's squares, one square beyond the inner corners."""
+        right, below = self.board.columns, self.board.rows
+        return self.board.square_size * np.array([[-1, -1, 0], [right, -1, 0], [right, below, 0], [-1, below, 0]])
+
+    def _checkers(self) -> NDArray[np.uint8]:
+        column, row = np.meshgrid(np.arange(self.board.columns + 1), np.arange(self.board.rows + 1))
+        squares = np.where((column + row) % 2, 245, 40).astype(np.uint8)
+        return np.repeat(np.kron(squares, np.ones((12, 12), np.uint8))[..., None], 3, axis=-1)
+
+    def _image(self) -> str:
+        k = self.camera.intrinsics
+        width = min(360, 270 * k.width / k.height)
+        panel = image_panel("picture", 580, 34, width, k.width, k.height)
+        content = photograph(panel, "photograph", k.width, k.height) if self.photographs else self._drawn(panel)
+        title = f"Picture {self.index + 1}, and the corners computed"
+        return panel.show(content + svg.dots(panel.place(self.pixels()), "red", 5), title=title)
+
+    def _drawn(self, panel: Panel) -> str:
+        """The board's squares as lines, for want of a photograph."""
+        grid = panel.place(self.pixels()).reshape(self.board.rows, self.board.columns, 2)
+        return svg.path([*grid, *grid.swapaxes(0, 1)], "muted")
+
+    def _equation(self) -> str:
+        n, chosen = self.numbers(), self.chosen
+        rows = [
+            ("rotation vector, axis times angle [rad]", _row(chosen.rotation.as_rotvec())),
+            ("t, the board's first corner before the camera [m]", _row(chosen.translation)),
+            ("C = −Rᵀt, the camera before the board [m]", _row(self.centres[self.index])),
+            (
+                "from the board's middle; axis against the board's normal",
+                f"{n['distance']:.3f} m; {n['tilt_deg']:.1f}°",
+            ),
+        ]
+        return "".join(
+            svg.text((580, 338 + 41 * i), name, "note") + svg.text((580, 356 + 41 * i), value, "number")
+            for i, (name, value) in enumerate(rows)
+        )
+
+    # Touch -----------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        return self.but(eye=self.eye.orbited(dx, dy))
+
+    def pressed(self, handle: str, key: str) -> Self:
+        return self.but(eye=self.eye.key(key))
+
+
+def _row(values: Array) -> str:
+    words = ", ".join(f"{round(float(value), 3) + 0.0:.3f}" for value in values)
+    return f"({words})".replace("-", "−")

@@ -1,0 +1,400 @@
+"""The intrinsics visualizer: K beside the picture it numbers, the rays it picks out, and what no K can show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.draw import svg
+from camviz.draw.matrix import matrix
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import Eye, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
+from camviz.lenses.base import Array, unit
+from camviz.scenes import render, to_display
+from camviz.scenes.balloon import BALLOON, balloon_in_sight, balloon_rim, balloon_scene, towards_balloon
+from camviz.views.base import Control, View, choice, slider, switch
+
+GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the camera stands before it on the z axis
+BINS = 4
+_NEAREST, _FARTHEST = 1.5, 12.0  # metres between camera and globe
+_FOCAL: dict[str, Any] = {"low": 150.0, "high": 2000.0, "step": 1.0, "unit": "px"}
+_LEAN_DRAWN = 3  # times
+
+
+@dataclass(frozen=True)
+class IntrinsicsView(View):
+    """Nine numbers, the picture they make of the garden and the rays they choose.
+
+    The camera looks along z, `distance` metres from the globe. `focal_mm` and `aspect` are no state of their own: they
+    are read from fx, fy and the pixel pitch, and setting them with `but` sets fx and fy.
+    """
+
+    title: ClassVar[str] = "Intrinsics"
+
+    fx: float = slider(450.0, **_FOCAL, help="focal length in widths of a pixel")
+    fy: float = slider(450.0, **_FOCAL, help="focal length in heights of a pixel")
+    cx: float = slider(319.5, -100.0, 740.0, 0.5, unit="px", help="column of the principal point")
+    cy: float = slider(239.5, -100.0, 580.0, 0.5, unit="px", help="row of the principal point")
+    skew: float = slider(0.0, -150.0, 150.0, 1.0, unit="px", help="shear of the pixel axes; 0 in nearly every camera")
+    distance: float = slider(3.0, _NEAREST, _FARTHEST, 0.05, unit="m", help="from the camera to the globe")
+    dolly_zoom: bool = switch(False, label="dolly-zoom lock", help="move the camera so that the globe keeps its size")
+    operation: str = choice("as taken", "cropped", "resized", "binned", help="what is done to the picture afterwards")
+    x0: float = slider(256, 0, 320, 1, label="crop x0", unit="px", help="first column kept")
+    y0: float = slider(96, 0, 240, 1, label="crop y0", unit="px", help="first row kept")
+    scale: float = slider(0.5, 0.1, 2.0, 0.05, label="resize by", help="new width divided by old width")
+    pitch_um: float = slider(6.0, 1.0, 12.0, 0.1, label="pixel width", unit="µm", help="K does not know it")
+    width: int = 640
+    height: int = 480
+    eye: Eye = Eye(distance=20.5, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
+
+    @classmethod
+    def of(cls, camera: Camera, **state: Any) -> Self:
+        """The view of a given camera's intrinsics, taking its picture in the garden; further fields by name."""
+        K = camera.intrinsics
+        return cls(K.fx, K.fy, K.cx, K.cy, K.skew, width=K.width, height=K.height, **state)
+
+    @classmethod
+    def controls(cls) -> dict[str, Control]:
+        """The fields' controls, and those of the two readings that can be set."""
+        lens = Control("focal length", "mm", 0.9, 12.0, 0.01, help="the lens: fx and fy together")
+        shape = Control("pixel aspect", "", 0.5, 2.0, 0.01, help="width of a pixel / its height = fy / fx")
+        return {**super().controls(), "focal_mm": lens, "aspect": shape}
+
+    @property
+    def focal_mm(self) -> float:
+        """Focal length in millimetres, which takes the width of a pixel to know."""
+        return self.fx * self.pitch_um / 1000
+
+    @property
+    def aspect(self) -> float:
+        """The width of a pixel divided by its height: fy / fx."""
+        return self.fy / self.fx
+
+    def but(self, **changes: Any) -> Self:
+        """The same view with some fields changed; `focal_mm` and `aspect` change fx and fy, the lock the rest."""
+        controls = self.controls()
+        for name in changes.keys() & {"focal_mm", "aspect"}:
+            controls[name].checked(name, changes[name])
+        zoom = changes.pop("focal_mm", self.focal_mm) / self.focal_mm
+        aspect = changes.pop("aspect", None)
+        changes = {"fx": zoom * self.fx, "fy": zoom * self.fy, **changes} if zoom != 1 else changes
+        if aspect is not None:
+            changes["fy"] = aspect * changes.get("fx", self.fx)
+        changed = super().but(**changes)
+        return self._locked(changed) if self.dolly_zoom and changed.dolly_zoom and aspect is None else changed
+
+    def _locked(self, changed: Self) -> Self:
+        """fx / distance stays: whichever of the two was changed, the other follows, within the garden."""
+        wanted = changed.distance / self.distance
+        if wanted == 1:
+            wanted = changed.fx / self.fx if changed.fx != self.fx else changed.fy / self.fy
+        if wanted == 1:
+            return changed
+        distance = min(max(wanted * self.distance, _NEAREST), _FARTHEST)
+        zoom = distance / self.distance
+        return replace(changed, distance=distance, fx=zoom * self.fx, fy=zoom * self.fy)
+
+    # The camera ------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def taken(self) -> Intrinsics:
+        """The intrinsics of the picture as it was taken."""
+        return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy, self.skew)
+
+    @cached_property
+    def intrinsics(self) -> Intrinsics:
+        """The intrinsics of the picture after the operation."""
+        K = self.taken
+        if self.operation == "cropped":
+            return K.cropped(*self._corner, K.width // 2, K.height // 2)
+        if self.operation == "resized":
+            return K.resized(max(1, round(self.scale * K.width)), max(1, round(self.scale * K.height)))
+        return K.binned(BINS) if self.operation == "binned" else K
+
+    @property
+    def _corner(self) -> tuple[int, int]:
+        """The first pixel that a crop keeps."""
+        column = min(max(round(self.x0), 0), self.width - self.width // 2)
+        return column, min(max(round(self.y0), 0), self.height - self.height // 2)
+
+    @property
+    def _pose(self) -> RigidTransform:
+        return RigidTransform.from_translation([0, 0, GLOBE[2] - self.distance])
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The camera, with the intrinsics of the picture after the operation."""
+        return Camera(self.intrinsics, world_from_cam=self._pose)
+
+    def field_of_view_deg(self) -> tuple[float, float]:
+        """The angles from edge to edge of the picture along the row and the column of the principal point."""
+        K = self.intrinsics
+        row = np.array([(-0.5, K.cy), (K.width - 0.5, K.cy)])
+        column = np.array([(K.cx, -0.5), (K.cx, K.height - 0.5)])
+        return _angle_deg(*self.camera.unproject(row)), _angle_deg(*self.camera.unproject(column))
+
+    def axes_angle_deg(self) -> float:
+        """The angle between the rows and the columns of pixels on the sensor."""
+        corner, along_u, along_v = self.intrinsics.from_pixels([(0, 0), (1, 0), (0, 1)])
+        return _angle_deg(unit(along_u - corner), unit(along_v - corner))
+
+    def in_sight(self) -> float:
+        """The share of the balloon that nothing stands before: a matter of the camera's place, not of K."""
+        return balloon_in_sight(self.camera.centre)
+
+    # The words -------------------------------------------------------------------------------------------------------
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        across, down = self.field_of_view_deg()
+        pitch = self.pitch_um * self.taken.fx / self.intrinsics.fx
+        return {
+            "field of view": f"{across:.1f}° × {down:.1f}°",
+            "focal length": f"{self.focal_mm:.2f} mm, if a pixel is {pitch:.3g} µm wide",
+            "pixel width / height": f"{self.aspect:.3f}, axes at {self.axes_angle_deg():.1f}°",
+            "camera to globe": f"{self.distance:.2f} m; there, 1 m is {self.intrinsics.fx / self.distance:.0f} px",
+            "red balloon": f"{100 * self.in_sight():.0f} % in sight",
+        }
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        K = self.intrinsics
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        return (
+            f"{self.operation}, {K.width} × {K.height} pixels: fx = {K.fx:.2f}, fy = {K.fy:.2f}, cx = {K.cx:.2f}, "
+            f"cy = {K.cy:.2f}, skew = {K.skew:.2f}; {figures}."
+        ).capitalize()
+
+    def rule(self) -> str:
+        """What the operation does to K, with its numbers."""
+        (x0, y0), s = self._corner, self.intrinsics.width / self.width
+        return {
+            "as taken": "K turns directions into pixels; its inverse turns pixels into directions.",
+            "cropped": f"cropped: c′ = c − (x0, y0) = c − ({x0}, {y0}); f and skew stay",
+            "resized": f"resized by {s:g}: f′ = {s:g} f,  c′ = {s:g} c {_signed((s - 1) / 2)}",
+            "binned": f"binned {BINS} × {BINS}: f′ = f / {BINS},  c′ = c / {BINS} {_signed((s - 1) / 2)}",
+        }[self.operation]
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        picture = self.image(draft=draft)
+        space, photographs = self._space_panel(draft)
+        body = svg.rectangle(0, 0, 960, 604, "paper") + self._picture_panel() + space + self._matrices(20, 414)
+        body += self._lattice_panel() + self._numbers_column(724, 398)
+        return Picture(body, 960, 604, self.title, self.description(), {**photographs, "camera": jpeg(picture)})
+
+    def image(self, *, draft: bool) -> np.ndarray:
+        """The picture (height, width, 3); a crop is shown within the whole, so it shows the picture as taken."""
+        K = self.taken if self.operation == "cropped" else self.intrinsics
+        wide = min(K.width, 320 if draft else 440)
+        grid = K if wide == K.width else K.resized(wide, max(1, round(wide * K.height / K.width)))
+        return _photographed(grid, float(self.camera.centre[2]), max(1, round(320 / wide)))
+
+    @cached_property
+    def _picture(self) -> Panel:
+        """In the pixels of the picture as taken."""
+        width = min(440.0, 330 * self.width / self.height)
+        return image_panel("picture", 20, 34, width, self.width, self.height)
+
+    def _picture_panel(self) -> str:
+        panel, K = self._picture, self.intrinsics
+        coarse = {"style": "image-rendering:pixelated"} if K.width < 200 else {}
+        content = photograph(panel, "camera", self.width, self.height, **coarse) + self._window()
+        content += self._behind() + self._globe()
+        note = f"{K.width} × {K.height} pixels"
+        return panel.show(content + self._principal_point(), title=f"The picture, {self.operation}", note=note)
+
+    def _window(self) -> str:
+        """The corners' names in the picture's own pixels; around a crop, what it leaves out."""
+        panel, K = self._picture, self.intrinsics
+        (x0, y0), (x1, y1) = self._as_taken([(-0.5, -0.5), (K.width - 0.5, K.height - 0.5)])
+        names = _tag((x0 + 8, y0 + 17), "(0, 0)") + _tag((x1 - 8, y1 - 9), f"({K.width - 1}, {K.height - 1})", "end")
+        if self.operation != "cropped":
+            return names
+        hole = f"M0,0H{panel.width:g}V{panel.height:g}H0ZM{x0:.1f},{y0:.1f}V{y1:.1f}H{x1:.1f}V{y0:.1f}Z"
+        shade = svg.element("path", d=hole, style="fill:#000;fill-opacity:.55;stroke:none")
+        label = f"The cropped window, from column {self._corner[0]} and row {self._corner[1]}; arrow keys move it"
+        handle = {"data_drag": "window", "tabindex": 0, "role": "group", "aria_label": label}
+        frame = svg.polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], "orange thick")
+        hand = svg.rectangle(x0, y0, x1 - x0, y1 - y0, "card", fill_opacity=0)
+        return shade + svg.group(hand + frame + names, **handle)
+
+    def _as_taken(self, uv: Any) -> Array:
+        """Panel coordinates (..., 2) of pixels (..., 2) of the picture after the operation: the same rays."""
+        return self._picture.place(self.taken.to_pixels(self.intrinsics.from_pixels(uv)))
+
+    def _principal_point(self) -> str:
+        K = self.intrinsics
+        at = self._as_taken((K.cx, K.cy))
+        ends = at - np.diag((12, 12)), at + np.diag((12, 12))
+        cross = svg.segments(*ends, "white", style="stroke:#fff;stroke-width:6px") + svg.segments(*ends, "orange thick")
+        side, dx = ("end", -14) if at[0] > 170 else ("", 14)
+        inside = np.clip(at + (dx, 22), (8, 36), np.array([self._picture.width, self._picture.height]) - (8, 30))
+        name = _tag(inside, f"(cx, cy) = ({K.cx:.2f}, {K.cy:.2f})", side)
+        hand = svg.element("circle", cx=at[0], cy=at[1], r=16, fill_opacity=0, class_="card")
+        label = f"Principal point at column {K.cx:.1f}, row {K.cy:.1f}; arrow keys move it"
+        handle = {"data_drag": "principal", "tabindex": 0, "role": "group", "aria_label": label}
+        return svg.group(hand + cross + name, **handle)
+
+    def _behind(self) -> str:
+        """Where the balloon is, whether or not it can be seen."""
+        outline = self._seen(balloon_rim(self.camera.centre))
+        hidden = self.in_sight() < 0.5
+        top = outline[np.argmin(outline[:, 1])] - (0, 11)
+        ring = svg.line(outline, "white", style="stroke:#fff;stroke-width:4.5px") if hidden else ""
+        words = "a balloon, behind the wall" if hidden else "the balloon"
+        return ring + svg.line(outline, f"red thick{' dotted' if hidden else ''}") + _tag(top, words, "middle")
+
+    def _globe(self) -> str:
+        """How wide the globe is, in the pixels of the picture after the operation."""
+        ends = GLOBE + np.array([(-GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0), (GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0)])
+        left, right = self._seen(ends)
+        pixels = self.intrinsics.fx * 2 * GLOBE_RADIUS / self.distance
+        half = np.array((0, 5))
+        bar = svg.segments([left, left - half, right - half], [right, left + half, right + half], "green thick")
+        return bar + _tag((left + right) / 2 - (0, 11), f"{pixels:.0f} px", "middle")
+
+    def _seen(self, points: Array) -> Array:
+        """Panel coordinates (..., 2) of points (..., 3) in the garden."""
+        return self._as_taken(self.camera.project(points))
+
+    # The rays --------------------------------------------------------------------------------------------------------
+
+    def _space_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("space", 480, 34, 460, 330)
+        items = [*scene_items(balloon_scene(), "wire"), *self._frustum(), *self._line_of_sight()]
+        span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
+        target = (0.0, 0.2, float(BALLOON[2] - 0.49 * span))
+        eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
+        content, photographs = draw_space(panel, items, eye, draft=draft, renderer="wire")
+        label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
+        drawn = panel.show(content, title="The rays it picks out", hint="drag to turn", drag="orbit", label=label)
+        return drawn, photographs
+
+    def _frustum(self) -> list[Item]:
+        items = camera_body(self.camera, 1.4, colour="blue")
+        corners = self.intrinsics.border(1)
+        items += [Line(_ray(self.camera, corner, 7.5), "blue faint", 1.0) for corner in corners]
+        centre = np.array([self.intrinsics.cx, self.intrinsics.cy])
+        items.append(Line(_ray(self.camera, centre, 2.2), "orange", 1.8, head=True))
+        if self.operation == "cropped":
+            whole = Camera(self.taken, world_from_cam=self._pose)
+            items += [Line(_ray(whole, corner, 1.4), "muted dashed", 1.0) for corner in self.taken.border(1)]
+        return items
+
+    def _line_of_sight(self) -> list[Item]:
+        """To the balloon: broken where something stands in the way."""
+        stopped, ends = towards_balloon(self.camera.centre), np.array([self.camera.centre, BALLOON])
+        rim = balloon_rim(BALLOON - 6.0)
+        balloon: list[Item] = [Line(rim, "red thick", 2.4), Label(BALLOON - (0, 0.4, 0), "balloon", "red halo")]
+        if not np.isfinite(stopped).all():
+            return [Line(ends, "red", 1.8), *balloon]
+        to_wall, beyond = np.array([self.camera.centre, stopped]), np.array([stopped, BALLOON])
+        return [Line(to_wall, "red", 1.8), Line(beyond, "red dotted", 1.4), *balloon]
+
+    # The matrices ----------------------------------------------------------------------------------------------------
+
+    def _matrices(self, x: float, y: float) -> str:
+        before, after = self.taken.K, self.intrinsics.K
+        left = matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before)
+        if self.operation == "as taken":
+            right = matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
+        else:
+            changed = ~np.isclose(before, after, rtol=0, atol=1e-9)
+            right = matrix(x + 248, y, f"K, {self.operation}", after, changed)
+        K = self.intrinsics
+        u = f"u = {K.fx:.2f} x {_signed(K.skew)} y {_signed(K.cx)}"
+        v = f"v = {K.fy:.2f} y {_signed(K.cy)}"
+        lines = [(128, u, "number"), (147, f"{v}     with x = X/Z, y = Y/Z", "number"), (173, self.rule(), "label")]
+        return left + right + "".join(svg.text((x, y + dy), words, class_) for dy, words, class_ in lines)
+
+    def _lattice_panel(self) -> str:
+        """A few pixels as they lie on the sensor, their lean drawn larger than it is."""
+        K = replace(self.intrinsics, skew=_LEAN_DRAWN * self.intrinsics.skew)
+        panel = Panel("lattice", 520, 400, 180, 180, -90, 90, -90, 90)
+        scale = 30 * np.sqrt(K.fx * K.fy)
+
+        def place(uv: Any) -> Array:
+            return panel.place(scale * K.from_pixels(np.asarray(uv) + (K.cx, K.cy)))
+
+        s = np.arange(-6, 7)
+        rows = [place([(-6, v), (6, v)]) for v in s]
+        columns = [place([(u, -6), (u, 6)]) for u in s]
+        u, v = place([(0, 0), (2, 0)]), place([(0, 0), (0, 2)])
+        upright = panel.place([(0, 0), (0, 80)])
+        content = (
+            svg.path([*rows, *columns], "muted thin")
+            + svg.line(upright, "ink dotted")
+            + svg.line(u, "orange thick")
+            + svg.line(v, "green thick")
+            + svg.text(u[1] + (6, 4), "u", "orange halo")
+            + svg.text(v[1] + (6, 6), "v", "green halo")
+        )
+        note = f"lean drawn {_LEAN_DRAWN} ×" if K.skew else ""
+        return panel.show(content, title="Its pixels", note=note)
+
+    def _numbers_column(self, x: float, y: float) -> str:
+        rows = []
+        for i, (name, value) in enumerate(self.numbers().items()):
+            rows.append(svg.text((x, y + 40 * i), name, "note"))
+            rows.append(svg.text((x, y + 17 + 40 * i), value, "label"))
+        return "".join(rows)
+
+    # The hands -------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        """The principal point and the crop follow the pointer on the picture; in space one walks around."""
+        du, dv = np.array([dx, dy]) / self._picture.scale
+        if handle == "principal":
+            return self.but(cx=float(self.cx + du), cy=float(self.cy + dv))
+        if handle == "window":
+            column = min(max(self.x0 + du, 0), self.width - self.width // 2)
+            return self.but(x0=float(column), y0=float(min(max(self.y0 + dv, 0), self.height - self.height // 2)))
+        return self.but(eye=self.eye.orbited(dx, dy))
+
+    def pressed(self, handle: str, key: str) -> Self:
+        """An arrow moves the principal point or the crop by eight pixels."""
+        if handle == "orbit":
+            return self.but(eye=self.eye.key(key))
+        steps = {"ArrowLeft": (-8, 0), "ArrowRight": (8, 0), "ArrowUp": (0, -8), "ArrowDown": (0, 8)}
+        dx, dy = np.array(steps.get(key, (0, 0))) * self._picture.scale
+        return self.dragged(handle, float("nan"), float("nan"), float(dx), float(dy))
+
+
+def _tag(at: Any, words: str, anchor: str = "") -> str:
+    """Words on a photograph: white on a dark ground, whatever the theme."""
+    wide = 5.9 * len(words) + 10
+    left = at[0] + 4 - wide if anchor == "end" else at[0] - (wide / 2 if anchor else 4)
+    ground = svg.rectangle(left, at[1] - 12.5, wide, 17, "tag", rx=4, style="fill:#10151c;fill-opacity:.72")
+    return ground + svg.text(at, words, f"tick {anchor}", style="fill:#fff")
+
+
+def _signed(value: float) -> str:
+    number = f"{abs(value):.4f}".rstrip("0").rstrip(".") if abs(value) < 1 else f"{abs(value):.2f}"
+    return f"{'−' if value < 0 else '+'} {number}"
+
+
+def _angle_deg(a: Array, b: Array) -> float:
+    """Between unit vectors, accurate for small angles too (Kahan)."""
+    return float(np.degrees(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b))))
+
+
+def _ray(camera: Camera, uv: Array, length: float) -> Array:
+    """From the centre along the ray of a pixel (2,), as a line (2, 3) that ends `length` metres deep."""
+    ray = camera.unproject(uv)
+    return camera.centre + np.array([0 * ray, length * ray / ray[2]])
+
+
+@lru_cache(maxsize=4)
+def _photographed(intrinsics: Intrinsics, z: float, supersample: int) -> np.ndarray:
+    camera = Camera(intrinsics, world_from_cam=RigidTransform.from_translation([0, 0, z]))
+    picture = to_display(render(balloon_scene(), camera, supersample))
+    picture.flags.writeable = False
+    return picture

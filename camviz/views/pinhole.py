@@ -1,0 +1,334 @@
+"""The pinhole visualizer: a box with a hole, the picture of the garden on its wall, and how sharp that can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import ClassVar
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from camviz import optics
+from camviz.cameras import Camera, Intrinsics
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.plot import curve, plot_panel
+from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, Sheet, draw_space, space_panel
+from camviz.scenes import render, textured_scene, to_display
+from camviz.views.base import View, slider, switch
+
+WALL_MM = np.array([36.0, 27.0])
+PIXELS = 480  # across the wall: 75 µm each
+WHITE_PHOTONS = 2000  # in a pixel that is just white
+ENLARGED = 30  # the box beside the garden, or nobody would see it
+TOWER = np.array([0.68, 0.67, 3.3])  # the middle of the crate and the globe on it, in the world
+TOWER_M = 1.16
+_GRID = np.array([[0, 1], [3, 2]])  # of an outline's corners, as a picture hangs on them
+_HOLES, _BLURS = (0.05, 2.0), (0.1, 4.0)  # the plot's range, mm
+_POINTS = {  # of the tower, from its middle, metres: what the rays start from
+    "blue": (0.0, -TOWER_M / 2, 0.0),
+    "orange": (0.0, TOWER_M / 2, 0.0),
+    "green": (-0.27, -TOWER_M / 2 + 0.27, 0.0),
+    "red": (0.27, -TOWER_M / 2 + 0.27, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class PinholeView(View):
+    """A light-tight box with a hole, `object_m` metres from a crate with a globe on it.
+
+    The picture is ray-traced, blurred by what waves make of the hole in green light, dimmed by the exposure and, with
+    `noise`, counted in photons. `match_exposure` exposes for as long as it takes instead of `exposure_s`. On the wall
+    the picture is turned by 180°, seen from behind; `turn_picture` puts it upright.
+    """
+
+    title: ClassVar[str] = "Pinhole camera"
+
+    hole_mm: float = slider(0.3, 0.05, 2.0, 0.01, label="hole d", unit="mm", help="diameter of the hole")
+    depth_mm: float = slider(50.0, 15.0, 120.0, 1.0, label="depth f", unit="mm", help="from the hole to the wall")
+    object_m: float = slider(3.0, 1.0, 6.0, 0.05, label="distance Z", unit="m", help="from the hole to the globe")
+    exposure_s: float = slider(1.0, 0.05, 10.0, 0.05, label="exposure", unit="s", help="how long the hole is open")
+    match_exposure: bool = switch(False, label="match exposure", help="expose as long as the brightness needs")
+    turn_picture: bool = switch(False, label="turn the picture", help="as it hangs on the wall, or upright")
+    noise: bool = switch(True, label="photon noise", help="light arrives in photons: dim pictures are grainy")
+    eye: Eye = Eye(distance=0.8, yaw_deg=46, pitch_deg=18)  # its distance counts in lengths of what there is to see
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("hole_mm", "depth_mm", "object_m", "exposure_s"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
+    # What is true ----------------------------------------------------------------------------------------------------
+
+    @property
+    def shadow_mm(self) -> float:
+        """Diameter of the hole's shadow on the wall."""
+        return float(optics.geometric_blur_mm(self.hole_mm, self.depth_mm, 1000 * self.object_m))
+
+    @property
+    def airy_mm(self) -> float:
+        """Diameter of the Airy disc on the wall."""
+        return float(optics.diffraction_blur_mm(self.hole_mm, self.depth_mm))
+
+    @property
+    def blur_mm(self) -> float:
+        """Diameter of a point's image on the wall."""
+        return float(optics.pinhole_blur_mm(self.hole_mm, self.depth_mm, 1000 * self.object_m))
+
+    @property
+    def exposed_s(self) -> float:
+        """How long the hole is open."""
+        matched = 1 / float(optics.sunny_exposure(self.hole_mm, self.depth_mm, 1.0))
+        return matched if self.match_exposure else self.exposure_s
+
+    @property
+    def brightness(self) -> float:
+        """Light gathered, 1 being a correct exposure."""
+        return float(optics.sunny_exposure(self.hole_mm, self.depth_mm, self.exposed_s))
+
+    def camera(self, width: int = PIXELS) -> Camera:
+        """The box as a camera: its wall `width` pixels across, `object_m` in front of the globe."""
+        pixels = Intrinsics.from_sensor(width, width * 3 // 4, self.depth_mm, 1000 * WALL_MM[0] / width)
+        return Camera(pixels, world_from_cam=RigidTransform.from_translation(TOWER - (0, 0, self.object_m)))
+
+    @cached_property
+    def _tower_image_mm(self) -> float:
+        return self.depth_mm * TOWER_M / self.object_m
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        pitch_mm = WALL_MM[0] / PIXELS
+        return {
+            "f-number": f"f/{float(optics.f_number(self.hole_mm, self.depth_mm)):.0f}",
+            "field of view": f"{optics.field_of_view_deg(WALL_MM[0], self.depth_mm):.1f}° across",
+            "hole's shadow": f"{1000 * self.shadow_mm:.0f} µm",
+            "Airy disc": f"{1000 * self.airy_mm:.0f} µm",
+            "blur on the wall": f"{1000 * self.blur_mm:.0f} µm = {self.blur_mm / pitch_mm:.1f} px",
+            "exposure": _seconds(self.exposed_s),
+            "brightness": f"{_times(self.brightness)} correct",
+        }
+
+    def equation(self) -> str:
+        """Similar triangles, with this state's numbers."""
+        given = f"{self.depth_mm:g} mm · {TOWER_M:g} m / {self.object_m:.2f} m"
+        return f"h = f H / Z = {given} = {self._tower_image_mm:.1f} mm"
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        shown = "upright" if self.turn_picture else "upside down, as on the wall"
+        return (
+            f"A hole of {self.hole_mm:g} mm, {self.depth_mm:g} mm before the wall, {self.object_m:g} m from the globe: "
+            f"{figures}; the crate and globe, {TOWER_M} m tall, are {self._tower_image_mm:.1f} mm tall on the wall. "
+            f"Picture shown {shown}."
+        )
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        upright = self.image(320 if draft else PIXELS)
+        box, photographs = self._box_panel(upright, draft)
+        body = "".join(
+            [svg.rectangle(0, 0, 960, 590, "paper"), box, self._picture_panel(), self._blur_panel(), self._numbers()]
+        )
+        photographs["wall"] = jpeg(upright if self.turn_picture else upright[::-1, ::-1].copy())
+        return Picture(body, 960, 590, self.title, self.description(), photographs)
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def image(self, width: int = PIXELS) -> np.ndarray:
+        """The picture, upright, as sRGB bytes (3/4 width, width, 3)."""
+        sharp = _sharp(self.depth_mm, self.object_m, width)
+        kernel = optics.pinhole_kernel(WALL_MM[0] / width, self.hole_mm, self.depth_mm, 1000 * self.object_m)
+        light = self.brightness * cv2.filter2D(sharp, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+        if self.noise:  # Poisson's: the variance of a count is its mean
+            light += np.sqrt(np.maximum(light, 0) / WHITE_PHOTONS) * _grain(light.shape)
+        return to_display(light)
+
+    def _picture_panel(self) -> str:
+        pixels = self.camera().intrinsics
+        panel = image_panel("wall", 560, 34, 380, pixels.width, pixels.height)
+        marks = "".join(
+            svg.dots([panel.place(self._pixel(point))], f"{colour} ringed", 8) for colour, point in _POINTS.items()
+        )
+        ends = panel.place([self._pixel(_POINTS["blue"]), self._pixel(_POINTS["orange"])])
+        title = "The picture, turned upright" if self.turn_picture else "The picture on the wall, from behind"
+        content = photograph(panel, "wall", pixels.width, pixels.height) + svg.line(ends, "yellow dashed thin") + marks
+        return panel.show(content, title=title, note=f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm")
+
+    def _pixel(self, point: tuple[float, float, float]) -> np.ndarray:
+        """Where a point of the tower is in the picture shown."""
+        pixels = self.camera().intrinsics
+        uv = self.camera().project(TOWER + point)
+        return uv if self.turn_picture else np.array([pixels.width - 1, pixels.height - 1]) - uv
+
+    # The box ---------------------------------------------------------------------------------------------------------
+
+    def _box_panel(self, upright: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("box", 20, 34, 520, 285)
+        behind = ENLARGED * self.depth_mm / 1000
+        extent = self.object_m + behind
+        aim = (0.0, 0.0, (self.object_m - behind) / 2 - 0.08 * extent)
+        eye = replace(self.eye, target=aim, distance=self.eye.distance * (extent + 2))
+        content, photographs = draw_space(panel, self._box_items(upright), eye, draft=draft, renderer="wire")
+        label = "The box and the garden in space; drag or press the arrow keys to walk around"
+        note = f"the box is drawn {ENLARGED} times as large"
+        return panel.show(content, title="Light in a box", note=note, drag="orbit", label=label), photographs
+
+    def _box_items(self, upright: np.ndarray) -> list[Item]:
+        """The garden as a picture in its place, the rays through the hole, and the picture they make."""
+        half, behind = ENLARGED * WALL_MM / 2000, ENLARGED * self.depth_mm / 1000
+        wall = np.array([(half[0], half[1]), (-half[0], half[1]), (-half[0], -half[1]), (half[0], -half[1])])
+        front, back = (np.insert(wall, 2, z, axis=1) for z in (0.0, -behind))
+        stage = np.array([(-0.95, -0.72), (0.95, -0.72), (0.95, 0.72), (-0.95, 0.72)])
+        scene = np.insert(stage, 2, self.object_m, axis=1)
+        items: list[Item] = [
+            Sheet.over(scene[_GRID], _stage()),
+            Sheet.over(back[_GRID], upright),
+            Line(_closed(scene), "muted", 1.2),
+            Face(front, "shade", 0.25),
+            *(Line(_closed(rim), "ink", 1.6) for rim in (front, back)),
+            *(Line(np.array([a, b]), "ink", 1.4) for a, b in zip(front, back, strict=True)),
+            Line(np.array([(0, 0, -behind), (0, 0, self.object_m)]), "muted dashed", 1.0),
+            Dots(np.zeros(3), "ink", 7),
+        ]
+        for colour, point in _POINTS.items():
+            start = np.array(point) + (0, 0, self.object_m)
+            end = -start * _reach(start, half, behind)
+            items += [Line(np.array([start, end]), colour, 1.9), Dots(np.array([start, end]), colour, 7)]
+        return [
+            *items,
+            Label(np.array([0, -half[1] - 0.12, 0]), "hole"),
+            Label(np.array([0, -0.9, self.object_m]), "scene"),
+        ]
+
+    # The blur --------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _plot(self) -> Panel:
+        return plot_panel("blur", 74, 368, 466, 164, _logs(_HOLES), _logs(_BLURS))
+
+    def _blur_panel(self) -> str:
+        panel = self._plot
+        hole = np.geomspace(*_HOLES, 121)
+        shadow = optics.geometric_blur_mm(hole, self.depth_mm, 1000 * self.object_m)
+        airy = optics.diffraction_blur_mm(hole, self.depth_mm)
+        total = optics.pinhole_blur_mm(hole, self.depth_mm, 1000 * self.object_m)
+        lines = [(shadow, "orange dashed"), (airy, "green dashed"), (total, "blue thick")]
+        right, left = (panel.place(_logs((hole[i], y[i]))) for i, y in ((104, shadow), (2, airy)))
+        content = (
+            _log_grid(panel)
+            + "".join(curve(panel, np.log10(hole), np.log10(y), class_) for y, class_ in lines)
+            + svg.text((panel.width - 10, right[1] + 36), "the hole's shadow", "orange halo end")
+            + svg.text(left + (0, 34), "diffraction", "green halo")
+            + svg.text(right + (-14, -8), "both together", "blue halo end")
+            + self._best_mark(panel)
+            + svg.dots([panel.place(_logs((self.hole_mm, self.blur_mm)))], "red", 11)
+        )
+        label = "Blur against the hole's diameter; drag or press the arrow keys to change the hole"
+        return _log_ticks(panel) + panel.show(
+            content, title="Blur on the wall", hint="drag to change the hole", drag="hole", label=label
+        )
+
+    def _best_mark(self, panel: Panel) -> str:
+        """Where the blur is least, and the holes that Rayleigh and Young recommend."""
+        best = float(optics.best_hole_mm(self.depth_mm))
+        young = float(optics.best_hole_mm(self.depth_mm, constant=optics.YOUNG))
+        left, right = (panel.place((np.log10(d), 0))[0] for d in (best, young))
+        words = f"sharpest: {best:.2f} to {young:.2f} mm"
+        at, side = ((left - 6, 16), "end") if right > panel.width / 2 else ((right + 6, 16), "")
+        band = svg.rectangle(left, 0, right - left, panel.height, "wash fill-blue")
+        return band + svg.text(at, words, f"blue halo {side}")
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> PinholeView:
+        if handle != "hole":
+            return self.but(eye=self.eye.orbited(dx, dy))
+        log = np.log10(self.hole_mm) + dx / self._plot.scale[0]
+        return self.but(hole_mm=float(np.clip(10**log, *_HOLES)))
+
+    def pressed(self, handle: str, key: str) -> PinholeView:
+        if handle != "hole":
+            return self.but(eye=self.eye.key(key))
+        step = {"ArrowLeft": -8, "ArrowDown": -8, "-": -8, "ArrowRight": 8, "ArrowUp": 8, "+": 8}.get(key, 0)
+        return self.dragged(handle, 0, 0, step, 0)
+
+    # The numbers -----------------------------------------------------------------------------------------------------
+
+    def _numbers(self) -> str:
+        rows = [svg.text((580, 360), "This box", "title")]
+        for i, (name, value) in enumerate(self.numbers().items()):
+            rows.append(svg.text((580, 386 + 21 * i), name, "note"))
+            rows.append(svg.text((700, 386 + 21 * i), value, "label"))
+        rows.append(svg.text((580, 546), "crate and globe, by similar triangles:", "note"))
+        rows.append(svg.text((580, 567), self.equation(), "label"))
+        return "".join(rows)
+
+
+@lru_cache(maxsize=6)
+def _sharp(depth_mm: float, object_m: float, width: int) -> np.ndarray:
+    """What an ideal point for a hole would see: linear light."""
+    light = render(textured_scene(), PinholeView(depth_mm=depth_mm, object_m=object_m).camera(width))
+    light.flags.writeable = False
+    return light
+
+
+@lru_cache(maxsize=1)
+def _stage() -> np.ndarray:
+    """The garden around the tower as it looks from three metres away: 1.9 × 1.44 m of it."""
+    pixels = Intrinsics(380, 288, 600, 600, 189.5, 143.5)
+    pose = RigidTransform.from_translation(TOWER - (0, 0, 3.0))
+    return to_display(render(textured_scene(), Camera(pixels, world_from_cam=pose)))
+
+
+@lru_cache(maxsize=2)
+def _grain(shape: tuple[int, ...]) -> np.ndarray:
+    """One fixed draw of standard normal numbers, so that the grain holds still while something else moves."""
+    return np.random.default_rng(1).standard_normal(shape, dtype=np.float32)
+
+
+def _reach(start: np.ndarray, half: np.ndarray, behind: float) -> float:
+    """How far a ray goes on behind the hole, as a share of the way before it: to the wall, or to the box's side."""
+    sides = np.divide(half, np.abs(start[:2]), out=np.full(2, np.inf), where=start[:2] != 0)
+    return float(min(behind / start[2], *sides))
+
+
+def _closed(outline: np.ndarray) -> np.ndarray:
+    return np.vstack([outline, outline[:1]])
+
+
+def _logs(pair: tuple[float, float]) -> tuple[float, float]:
+    low, high = np.log10(pair)
+    return float(low), float(high)
+
+
+_HOLE_TICKS, _BLUR_TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2), (0.1, 0.2, 0.5, 1, 2, 4)
+
+
+def _log_grid(panel: Panel) -> str:
+    across = [[(panel.left, y), (panel.right, y)] for y in np.log10(_BLUR_TICKS)]
+    upright = [[(x, panel.bottom), (x, panel.top)] for x in np.log10(_HOLE_TICKS)]
+    return svg.path([panel.place(line) for line in across + upright], "grid")
+
+
+def _log_ticks(panel: Panel) -> str:
+    bottom, left = panel.y + panel.height, panel.x
+    xs = left + panel.place([(x, panel.bottom) for x in np.log10(_HOLE_TICKS)])[:, 0]
+    ys = panel.y + panel.place([(panel.left, y) for y in np.log10(_BLUR_TICKS)])[:, 1]
+    middle, centre = left + panel.width / 2, panel.y + panel.height / 2
+    holes = [svg.text((x, bottom + 16), f"{d:g}", "tick middle") for x, d in zip(xs, _HOLE_TICKS, strict=True)]
+    blurs = [svg.text((left - 6, y + 4), f"{1000 * b:g}", "tick end") for y, b in zip(ys, _BLUR_TICKS, strict=True)]
+    names = [
+        svg.text((middle, bottom + 34), "hole diameter d [mm], logarithmic", "note middle"),
+        svg.text((left - 44, centre), "blur [µm]", "note middle", transform=f"rotate(-90 {left - 44:g} {centre:g})"),
+    ]
+    return "".join(holes + blurs + names)
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:.3g} s" if seconds >= 0.3 else f"1/{1 / seconds:.0f} s"
+
+
+def _times(factor: float) -> str:
+    return f"{factor:#.2g} ×" if factor < 10 else f"{factor:.0f} ×"

@@ -1,0 +1,147 @@
+"""The frustum visualizer: where the camera stands is what its numbers say."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady
+from camviz.scenes import board_corners
+from camviz.views.frustum import SUBJECT, FrustumView
+
+
+@pytest.fixture(autouse=True)
+def _wire(monkeypatch):
+    monkeypatch.setenv("CAMVIZ_RENDERER", "wire")
+
+
+def test_with_t_held_turning_the_camera_moves_it():
+    """C = -Rᵀ t: a turn by 90° about y takes C = (0, 0, -2) to (-2, 0, 0)."""
+    view = FrustumView(mode="edit t", x=0.0, y=0.0, z=2.0, yaw_deg=0.0, pitch_deg=0.0)
+    np.testing.assert_allclose(view.camera.centre, (0, 0, -2), atol=1e-12)
+    np.testing.assert_allclose(view.but(yaw_deg=90.0).camera.centre, (-2, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(view.but(yaw_deg=33.0).numbers()["t"], (0, 0, 2), atol=1e-12)
+
+
+def test_with_c_held_turning_the_camera_leaves_it_where_it_is():
+    view = FrustumView(mode="edit C", x=0.5, y=-0.2, z=-1.0)
+    np.testing.assert_allclose(view.but(yaw_deg=70.0, roll_deg=20.0).camera.centre, (0.5, -0.2, -1), atol=1e-12)
+
+
+def test_in_orbit_the_subject_stays_where_it_is_in_the_picture():
+    view = FrustumView(mode="orbit", x=0.0, y=0.0, z=3.0)
+    for yaw, pitch in ((0.0, 0.0), (80.0, -30.0), (-150.0, 60.0)):
+        camera = view.but(yaw_deg=yaw, pitch_deg=pitch).camera
+        np.testing.assert_allclose(camera.project(SUBJECT), (319.5, 239.5), atol=1e-9)
+        assert np.linalg.norm(camera.centre - SUBJECT) == pytest.approx(3)
+
+
+def test_the_numbers_are_the_extrinsics_that_opencv_projects_with():
+    view = FrustumView(mode="edit t", x=0.3, y=0.1, z=0.7, yaw_deg=-12.0, pitch_deg=5.0, roll_deg=8.0, hfov_deg=70.0)
+    n = view.numbers()
+    uv, _ = cv2.projectPoints(board_corners(), cv2.Rodrigues(n["R"])[0], n["t"], n["K"], None)
+    np.testing.assert_allclose(view.camera.project(board_corners()), uv.reshape(-1, 2), atol=1e-9)
+    np.testing.assert_allclose(n["C"], -n["R"].T @ n["t"], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("angle", "towards"), [("yaw_deg", (1, 0, 0)), ("pitch_deg", (0, -1, 0)), ("roll_deg", (0, 0, 0))]
+)
+def test_yaw_looks_right_and_pitch_looks_up(angle, towards):
+    level = FrustumView(yaw_deg=0.0, pitch_deg=0.0, roll_deg=0.0)
+    forward = level.but(**{angle: 10.0}).numbers()["R"][2]
+    np.testing.assert_allclose(forward, np.array(towards) * np.sin(np.radians(10)) + (0, 0, forward[2]), atol=1e-12)
+
+
+def test_roll_turns_the_camera_clockwise():
+    right = FrustumView(yaw_deg=0.0, pitch_deg=0.0, roll_deg=10.0).numbers()["R"][0]
+    assert right[1] > 0  # its right side sinks
+
+
+@pytest.mark.parametrize("before", ["edit C", "edit t", "orbit"])
+@pytest.mark.parametrize("after", ["edit C", "edit t", "orbit"])
+def test_changing_the_mode_moves_nothing(before, after):
+    view = FrustumView(mode=before, x=0.4, y=-0.3, z=0.8, yaw_deg=25.0, pitch_deg=-10.0, roll_deg=5.0)
+    changed = view.but(mode=after)
+    assert changed.mode == after
+    np.testing.assert_allclose(
+        changed.camera.world_from_cam.as_matrix(), view.camera.world_from_cam.as_matrix(), atol=1e-8
+    )
+
+
+def test_the_field_of_view_is_the_pinholes():
+    view = FrustumView(hfov_deg=90.0)
+    left, right = view.camera.unproject([(-0.5, 239.5), (639.5, 239.5)])
+    assert np.degrees(np.arccos(left @ right)) == pytest.approx(90)
+
+
+def test_a_given_camera_is_shown_with_its_own_intrinsics_and_lens():
+    given = Camera(Intrinsics(1280, 720, 900, 880, 610, 350, 2.0), BrownConrady(k1=-0.2))
+    camera = FrustumView.of(given).camera
+    assert camera.intrinsics == given.intrinsics
+    assert camera.lens == given.lens
+
+
+def test_zooming_a_given_camera_keeps_its_pixels_shape():
+    given = Camera(Intrinsics(1280, 720, 900, 600, 610, 350))
+    k = FrustumView.of(given).but(hfov_deg=30.0).camera.intrinsics
+    assert k.fx / k.fy == pytest.approx(1.5)
+    assert 2 * np.degrees(np.arctan(640 / k.fx)) == pytest.approx(30)
+
+
+def test_dragging_the_picture_takes_the_scene_along():
+    view = FrustumView()
+    before = view.camera.project(board_corners()[20])
+    after = view.dragged("picture", 0, 0, 15, -10).camera.project(board_corners()[20])
+    assert after[0] > before[0] + 5
+    assert after[1] < before[1] - 5
+
+
+def test_dragging_space_turns_the_onlooker_and_not_the_camera():
+    view = FrustumView().dragged("eye", 0, 0, 30, 10)
+    assert view.eye == FrustumView().eye.orbited(30, 10)
+    np.testing.assert_array_equal(view.numbers()["R"], FrustumView().numbers()["R"])
+    assert FrustumView().pressed("eye", "+").eye.distance < FrustumView().eye.distance
+
+
+def test_arrow_keys_on_the_picture_look_that_way():
+    view = FrustumView()
+    assert view.pressed("picture", "ArrowRight").yaw_deg > view.yaw_deg
+    assert view.pressed("picture", "ArrowUp").pitch_deg > view.pitch_deg
+    assert view.pressed("picture", "+").hfov_deg < view.hfov_deg
+    assert view.pressed("picture", "q") == view
+
+
+def test_the_camera_view_stands_still_while_the_camera_moves():
+    """Seen from the camera's frame its own triad is drawn at the same place, wherever it goes."""
+
+    def centre(view):
+        return view.figure(draft=True).svg().split(">C</text>")[0].rsplit("<text ", 1)[1].split(" class")[0]
+
+    moving = [FrustumView(x=x, yaw_deg=yaw, seen_from="camera view") for x, yaw in ((0.0, 0.0), (2.0, 40.0))]
+    assert centre(moving[0]) == centre(moving[1])
+    moving = [view.but(seen_from="world view") for view in moving]
+    assert centre(moving[0]) != centre(moving[1])
+
+
+def test_the_description_counts_the_corners_in_view():
+    assert "sees 54 of the board's 54" in FrustumView().description()
+    away = FrustumView(yaw_deg=180.0)
+    assert "sees 0 of the board's 54" in away.description()
+    assert "has no image" in away.figure(draft=True).svg()
+
+
+def test_a_camera_tipped_straight_down_is_still_drawn():
+    down = FrustumView(pitch_deg=-90.0, yaw_deg=45.0, roll_deg=-30.0)
+    np.testing.assert_allclose(down.numbers()["R"][2], (0, 1, 0), atol=1e-12)
+    assert Rotation.from_matrix(down.numbers()["R"]).magnitude() > 0
+    down.figure(draft=True)
+
+
+@pytest.mark.parametrize("name", FrustumView.controls())
+def test_every_control_changes_the_picture_at_both_ends(name):
+    control = FrustumView.controls()[name]
+    ends = control.choices or ((control.low, control.high) if control.low is not None else (True, False))
+    pictures = [FrustumView().but(**{name: end}).figure(draft=True) for end in ends]
+    assert len({(picture.svg(), *picture.photographs.values()) for picture in pictures}) == len(ends)

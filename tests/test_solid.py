@@ -1,0 +1,174 @@
+"""Solid pictures agree with the camera, hide what is hidden, and never take the process down."""
+
+import re
+import signal
+import subprocess
+import sys
+import threading
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.draw import opengl, solid
+from camviz.draw.items import Dots, Face, Line, Sheet
+from camviz.draw.opengl import opengl_works, why_not_solid
+from camviz.draw.space import Eye, chosen_renderer, draw_space, space_panel
+from camviz.draw.wire import Sight
+
+EYE = Eye(target=(0, 0.2, 3), distance=6)
+PANEL = space_panel("space", 0, 0, 480, 360)
+SQUARE = np.array([(-1, -1, 3), (1, -1, 3), (1, 1, 3), (-1, 1, 3)], float)
+
+works, reason = opengl_works()
+needs_opengl = pytest.mark.skipif(not works, reason=reason)
+
+
+def shot_of(items, eye=EYE, scale=1.0):
+    """A solid picture, taken where all are taken."""
+    sight = Sight(eye.camera(480, 360), eye.distance)
+    return solid._stage().submit(solid._shoot, sight, items, scale).result()
+
+
+@needs_opengl
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("eye", [EYE, Eye((0, 0, 3), 4, 50, -30, 60)])
+def test_both_renderers_put_a_point_at_the_same_pixel(eye, scale):
+    """The centroid of a disc parallel to the picture is where the camera projects its middle."""
+    middle = np.array([0.6, -0.4, 2.6])
+    turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)[:, None]
+    right, down = 0.2 * eye.camera(480, 360).world_from_cam.rotation.as_matrix().T[:2]
+    alpha = shot_of([Face(middle + np.cos(turn) * right + np.sin(turn) * down)], eye, scale).alpha
+    v, u = np.nonzero(alpha)
+    centroid = (np.array([u.mean(), v.mean()]) + 0.5) / scale - 0.5
+    assert np.linalg.norm(centroid - eye.camera(480, 360).project(middle)) < 0.1
+
+
+@needs_opengl
+def test_the_depth_of_a_surface_is_its_distance_along_the_cameras_axis():
+    eye = Eye((0, 0, 3), 6, 0, 0)
+    shot = shot_of([Face(SQUARE), Face(SQUARE * (5, 5, 3), "red")], eye)
+    assert shot.depth[180, 240] == pytest.approx(6, rel=1e-3)
+    assert shot.depth[180, 400] == pytest.approx(12, rel=1e-3)
+    assert shot_of([Face(SQUARE)], eye).depth[5, 5] == np.inf
+
+
+@needs_opengl
+def test_lines_behind_a_surface_are_faint_and_lines_before_it_are_not():
+    eye = Eye((0, 0, 3), 6, 0, 0)
+    lines = [Line([(-0.5, 0.1, z), (0.5, 0.1, z)], f"line{z}") for z in (2, 5)]
+    fragment, _ = draw_space(PANEL, [Face(SQUARE), *lines], eye, renderer="solid")
+    opacity = {z: float(re.search(rf'class="line{z}" style="[^"]*opacity:([\d.]+)', fragment)[1]) for z in (2, 5)}
+    assert opacity[5] < 0.2 < 0.5 < opacity[2]
+    assert "faint" in draw_space(PANEL, [Face(SQUARE), Dots((0, 0, 5))], eye, renderer="solid")[0]
+
+
+@needs_opengl
+def test_the_outline_of_a_surface_is_not_hidden_by_it():
+    outline = Line(np.vstack([SQUARE, SQUARE[:1]]), "blue")
+    for eye in (EYE, EYE.orbited(60, 50), EYE.orbited(-90, -30)):
+        fragment, _ = draw_space(PANEL, [Face(SQUARE), outline], eye, renderer="solid")
+        assert "opacity:0.16" not in fragment
+
+
+@needs_opengl
+def test_only_what_is_solid_covers_the_background():
+    shot = shot_of([Face(SQUARE, "#ff8040"), Face(SQUARE + (3, 0, 0), "#ff8040", 0.5)], Eye((0, 0, 3), 6, 0, 0))
+    assert shot.alpha[180, 240] == 255
+    assert shot.alpha[5, 5] == 0
+    u, v = Eye((0, 0, 3), 6, 0, 0).camera(480, 360).project((2.3, 0, 3)).astype(int)
+    assert shot.alpha[v, u] == pytest.approx(128, abs=2)
+    np.testing.assert_allclose(shot.rgb[v, u], shot.rgb[180, 240], atol=6)
+
+
+@needs_opengl
+def test_a_picture_keeps_its_colours_and_stands_upright():
+    colours = np.array([[(200, 30, 30), (30, 200, 30)], [(30, 30, 200), (200, 200, 30)]], np.uint8)
+    picture = np.repeat(np.repeat(colours, 64, 0), 64, 1)
+    eye = Eye((0, 0, 3), 6, 0, 0)
+    rgb = shot_of([Sheet.over(SQUARE[[0, 1, 3, 2]].reshape(2, 2, 3), picture)], eye).rgb
+    for i, y in enumerate((-0.5, 0.5)):
+        for j, x in enumerate((-0.5, 0.5)):
+            u, v = eye.camera(480, 360).project((x, y, 3)).round().astype(int)
+            np.testing.assert_allclose(rgb[v, u], colours[i, j], atol=2)
+
+
+@needs_opengl
+def test_a_new_picture_replaces_the_old_one():
+    eye = Eye((0, 0, 3), 6, 0, 0)
+    for grey in (40, 200, 90):
+        sheet = Sheet.over(SQUARE[[0, 1, 3, 2]].reshape(2, 2, 3), np.full((8, 8, 3), grey, np.uint8))
+        np.testing.assert_allclose(shot_of([sheet], eye).rgb[180, 240], grey, atol=2)
+    assert shot_of([], eye).alpha.max() == 0
+
+
+@needs_opengl
+def test_pictures_asked_for_from_many_threads_are_all_right():
+    """An OpenGL context belongs to one thread; a notebook's messages arrive on several."""
+    seen = {}
+
+    def take(side):
+        panel = space_panel(f"p{side}", 0, 0, side, side)
+        seen[side] = draw_space(panel, [Face(SQUARE)], EYE, renderer="solid", draft=True)[1][f"p{side}-solid"]
+
+    threads = [threading.Thread(target=take, args=(side,)) for side in (100, 140, 180, 220)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for side, data in seen.items():
+        assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR).shape == (side, side, 3)
+
+
+@needs_opengl
+def test_a_draft_is_coarser_than_the_finished_picture():
+    sizes = []
+    for draft in (True, False):
+        _, photographs = draw_space(PANEL, [Face(SQUARE)], EYE, renderer="solid", draft=draft)
+        sizes.append(cv2.imdecode(np.frombuffer(photographs["space-solid"], np.uint8), cv2.IMREAD_COLOR).shape[1])
+    assert sizes == [480, 480 * solid.FINE]
+
+
+@needs_opengl
+def test_a_process_that_drew_solid_pictures_ends_well():
+    code = (
+        "import numpy as np; from camviz.draw.space import *; from camviz.draw.space import space_panel;"
+        "print(list(draw_space(space_panel('a', 0, 0, 48, 36), [Face(np.eye(3))], Eye(), renderer='solid')[1]))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "['a-solid', 'a-mask']", "")
+
+
+def test_wireframes_can_be_asked_for(monkeypatch):
+    monkeypatch.setenv("CAMVIZ_RENDERER", "wire")
+    assert chosen_renderer() == "wire"
+    assert "CAMVIZ_RENDERER" in why_not_solid()
+
+
+def test_a_crash_while_asking_for_opengl_is_survived_and_named(monkeypatch):
+    crash = f"import os; os.kill(os.getpid(), {int(signal.SIGSEGV)})"
+    run = subprocess.run
+    monkeypatch.setattr(opengl.subprocess, "run", lambda command, **how: run([*command[:2], crash], **how))
+    monkeypatch.setattr(opengl, "_windows", lambda: ["vtkEGLRenderWindow"])
+    works, reason = opengl.opengl_works.__wrapped__()
+    assert not works
+    assert "SIGSEGV" in reason
+    assert "libegl1" in reason
+
+
+def test_without_vtk_pictures_are_wireframes(monkeypatch):
+    monkeypatch.setattr(opengl, "find_spec", lambda name: None)
+    works, reason = opengl.opengl_works.__wrapped__()
+    assert not works
+    assert "pip install" in reason
+
+
+@needs_opengl
+def test_what_is_too_slow_to_drag_is_dragged_as_a_wireframe(monkeypatch):
+    monkeypatch.delenv("CAMVIZ_RENDERER", raising=False)
+    shot_of([])
+    studio = solid._stage().submit(solid._studio).result()
+    monkeypatch.setattr(studio, "pace", [0.2] * 5)
+    assert (chosen_renderer(draft=True), chosen_renderer(draft=False)) == ("wire", "solid")
+    monkeypatch.setattr(studio, "pace", [0.2, 0.2, 0.01, 0.2, 0.2])
+    assert chosen_renderer(draft=True) == "solid"
