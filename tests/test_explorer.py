@@ -86,13 +86,26 @@ def test_an_unknown_control_is_named_beside_those_there_are():
         explore(Toy(), "zoom")
 
 
-def test_without_a_widget_the_output_is_the_picture_alone(monkeypatch):
+@pytest.fixture
+def shown(monkeypatch):
+    bundles = []
+    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, raw: bundles.append(bundle))
+    return bundles
+
+
+def test_without_a_kernel_to_come_the_output_is_the_picture_alone(monkeypatch, shown):
     monkeypatch.setenv("CAMVIZ_STATIC", "1")
-    assert set(explore(Toy())._repr_mimebundle_()) == {"text/html", "text/plain"}
+    explore(Toy())._ipython_display_()
+    assert [set(bundle) for bundle in shown] == [{"text/html", "text/plain"}]
 
 
-def test_beside_the_widget_the_saved_output_holds_the_picture(monkeypatch):
+def test_beside_the_widget_the_notebook_keeps_the_present_picture(monkeypatch, shown):
+    """The picture and the live view know each other, so that the one can hide the other."""
     monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
-    data, _ = explore(Toy())._repr_mimebundle_()
-    assert "application/vnd.jupyter.widget-view+json" in data
-    assert "size 1" in data["text/html"]
+    explorer = explore(Toy()).set(size=2.0)
+    explorer._ipython_display_()
+    kept, live = shown
+    assert "size 2" in kept["text/html"]
+    assert live["application/vnd.jupyter.widget-view+json"]["model_id"] == explorer.model_id
+    assert f'data-camviz-still="{explorer.model_id}"' in kept["text/html"]
+    assert explorer.model_id in explorer.still_hidden

@@ -162,9 +162,13 @@ def test_in_a_kernel_the_widget_is_shown_and_the_page_beside_it(monkeypatch):
 
     monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
     monkeypatch.setattr("IPython.core.getipython.get_ipython", Shell)
-    live = quiz("05")
-    data, _ = live._repr_mimebundle_()
-    assert {"application/vnd.jupyter.widget-view+json", "text/html", "text/plain"} <= set(data)
+    shown = []
+    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, raw: shown.append(bundle))
+    quiz("05")._ipython_display_()
+    kept, live = shown
+    assert "application/vnd.jupyter.widget-view+json" in live
+    answers = [one.choices[one.answer].reply.split(".")[0] for one in quiz_questions("05")]
+    assert not any(prose.to_plain(answer) in kept["text/html"] for answer in answers)
     monkeypatch.setenv("CAMVIZ_STATIC", "1")
     assert isinstance(quiz("05"), Sheet)
 

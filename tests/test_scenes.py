@@ -20,6 +20,7 @@ from camviz.scenes import (
     board_corners,
     box,
     render,
+    snapshot,
     textured_scene,
     to_display,
     to_encoded,
@@ -365,6 +366,12 @@ def test_supersampling_is_the_mean_of_the_finer_picture():
     fine = render(scene, replace(camera, intrinsics=camera.intrinsics.resized(96, 72)))
     expected = fine.reshape(24, 3, 32, 3, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(render(scene, camera, supersample=3), expected, atol=1e-5)
+
+
+def test_a_snapshot_is_the_rendered_light_on_a_screen():
+    """301 × 211 pixels do not fill the last strip of rays."""
+    camera = Camera(Intrinsics.from_fov(301, 211, 70))
+    assert np.array_equal(snapshot(textured_scene(), camera), to_display(render(textured_scene(), camera)))
 
 
 @pytest.mark.parametrize("supersample", [0, -1, 1.5])

@@ -14,6 +14,7 @@ from camviz.lenses.roots import first_positive_root
 
 STEEPEST = np.deg2rad(89.5)  # the tables end here where the polynomial itself has no end
 UNBOUNDED = 1e150  # a radius beyond all images whose square is still a number
+NEARLY_FLAT = 0.01  # a determinant, 1 on the axis, below which the map may fold close by
 CLOSE = 1e-13  # focal lengths, relative beyond 1: how well an inverse must return
 
 
@@ -227,11 +228,11 @@ class BrownConrady(RayLens):
     def _symmetric(self) -> bool:
         return not any((self.p1, self.p2, self.s1, self.s2, self.s3, self.s4))
 
-    def _upright(self, x: Array, y: Array) -> np.ndarray:
-        """True where the map keeps its orientation and the tilted sensor is in front."""
+    def _orientation(self, x: Array, y: Array) -> Array:
+        """The Jacobian's determinant before the tilt; negative also where the tilted sensor is not in front."""
         u, v, u_x, u_y, v_x, v_y = self._bend_and_slopes(x, y)
-        upright = u_x * v_y - u_y * v_x > 0
-        return upright if self._tilt is None else upright & (_homography(self._tilt, u, v)[2] > 0)
+        determinant = u_x * v_y - u_y * v_x
+        return determinant if self._tilt is None else np.where(_homography(self._tilt, u, v)[2] > 0, determinant, -1)
 
     @cached_property
     def _limits(self) -> tuple[float, float]:
@@ -239,16 +240,16 @@ class BrownConrady(RayLens):
         outer = min(self.fold_radius, self.pole_radius)
         if self._symmetric and self._tilt is None:
             return outer, outer
-        r, _, upright = self._spokes
-        return 0.99 * float(np.where(upright, r, 0).max(axis=0).min()), outer
+        return float(self._reach[0].min()), outer
 
     @cached_property
-    def _spokes(self) -> tuple[Array, Array, np.ndarray]:
-        """Radii (n, 1) along 64 lines from the axis, their azimuths, and how far (n, 64) the map is upright there."""
+    def _spokes(self) -> tuple[Array, Array, Array]:
+        """Radii (n, 1) along 64 lines from the axis, their azimuths, and the least determinant (n, 64) so far."""
         end = min(atan(min(self.fold_radius, self.pole_radius)), STEEPEST)
         r, azimuth = np.tan(end * _fractions(128)[:, None]), np.linspace(0, 2 * pi, 65)[1:]
         with np.errstate(all="ignore"):
-            return r, azimuth, np.logical_and.accumulate(self._upright(r * np.cos(azimuth), r * np.sin(azimuth)))
+            determinant = self._orientation(r * np.cos(azimuth), r * np.sin(azimuth))
+        return r, azimuth, np.minimum.accumulate(np.nan_to_num(determinant, nan=-1))
 
     @cached_property
     def _rim(self) -> tuple[Array, Array]:
@@ -256,7 +257,8 @@ class BrownConrady(RayLens):
         outer = min(self.fold_radius, self.pole_radius)
         if self._symmetric and self._tilt is None:
             return np.zeros(1), np.array([self.radial(outer) if outer == self.fold_radius < inf else UNBOUNDED])
-        r, azimuth, upright = self._spokes
+        r, azimuth, least = self._spokes
+        upright = least > 0
         if not upright[0].all():
             return azimuth, np.full_like(azimuth, UNBOUNDED)
         last = upright.sum(axis=0) - 1
@@ -269,21 +271,39 @@ class BrownConrady(RayLens):
         neighbours = [np.roll(radii[order], shift) for shift in (-2, -1, 0, 1, 2)]
         return np.arctan2(y[0], x[0])[order], np.max(neighbours, axis=0)
 
+    @cached_property
+    def _reach(self) -> tuple[Array, Array]:
+        """Per sector between two spokes: ideal points up to the first radius are valid, beyond the second they are not.
+
+        Both with the next spokes on either side and a hundredth to spare; and up to the first radius no determinant
+        comes near 0, for between two spokes it may come nearer.
+        """
+        r, _, least = self._spokes
+        radii = np.concatenate([[0.0], r[:, 0], [inf]])
+        firm, upright = ((least > low).sum(axis=0) for low in (NEARLY_FLAT, 0))
+        firm, upright = (np.stack([np.roll(last, k) for k in (2, 1, 0, -1)]) for last in (firm, upright))
+        return 0.99 * radii[firm.min(axis=0)], 1.01 * radii[upright.max(axis=0) + 1]
+
     def _valid(self, x: Array, y: Array) -> np.ndarray:
         inner, outer = self._limits
         s = x * x + y * y
         valid = s <= inner * inner
-        doubtful = ~valid & (s < outer * outer)
-        if doubtful.any():
+        doubtful = np.flatnonzero(~valid & (s < outer * outer))
+        if len(doubtful):
             valid[doubtful] = self._upright_all_the_way(x[doubtful], y[doubtful])
         return valid
 
     def _upright_all_the_way(self, x: Array, y: Array) -> np.ndarray:
         """True where the map keeps its orientation all along the line from the axis to (x, y)."""
-        r = np.hypot(x, y)
-        steps = np.tan(_fractions(32)[:, None] * np.arctan(r)) / r
-        steps[-1] = 1
-        return np.all(self._upright(steps * x, steps * y), axis=0)
+        near, far = self._reach
+        sector = (np.arctan2(y, x) * (len(near) / (2 * pi))).astype(int) % len(near)
+        r, near, far = np.hypot(x, y), near[sector], far[sector]
+        upright = r <= near
+        edge = np.flatnonzero(~upright & (r <= far))
+        start = near[edge] / r[edge]
+        steps = start + np.linspace(0, 1, 17)[1:, None] * (1 - start)
+        upright[edge] = np.all(self._orientation(steps * x[edge], steps * y[edge]) > 0, axis=0)
+        return upright
 
     # Backwards.
 

@@ -1,7 +1,7 @@
 """Scenes: surfaces with textures, a tracer that photographs them through any lens, and the same world as lines."""
 
 from camviz.scenes.light import to_display, to_encoded, to_linear
-from camviz.scenes.scene import Scene, render
+from camviz.scenes.scene import Scene, render, snapshot
 from camviz.scenes.standard import board_corners, textured_scene, wireframe_scene
 from camviz.scenes.surfaces import Column, Ground, Mesh, Rectangle, Sphere, box
 from camviz.scenes.texture import Texture
@@ -19,6 +19,7 @@ __all__ = [
     "board_corners",
     "box",
     "render",
+    "snapshot",
     "textured_scene",
     "to_display",
     "to_encoded",

@@ -24,7 +24,7 @@ _OPTIONS = [cv2.IMWRITE_JPEG_QUALITY, 93, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.
 
 def painted() -> Iterator[tuple[str, paint.Picture]]:
     """Each picture's name and its sRGB bytes (height, width, 3). The terrace comes last: the other things shade it."""
-    yield "sky", paint.sky()
+    yield "sky", _smaller(paint.sky(), 3 / 4)
     yield "bricks", _smaller(paint.bricks(), 1 / 2)
     yield "planks", paint.planks()
     yield "cat", paint.framed(_smaller(photograph("chelsea"), 1 / 2))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import cv2
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens
 from camviz.lenses.base import Array, as_points
+from camviz.scenes.light import to_display
 from camviz.scenes.rays import RUN, Bounds, Floats, Runs
 from camviz.scenes.surfaces import Meeting, Mesh, Surface, on_sphere
 from camviz.scenes.texture import Texture
@@ -114,14 +115,30 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
         raise ValueError(f"supersample must be a whole number, at least 1, got {supersample}")
     pixels = camera.intrinsics
     fine = pixels.resized(pixels.width * supersample, pixels.height * supersample)
-    strips, spread = _strips(fine, camera.lens)
     light = np.empty((fine.height, fine.width, 3), dtype=np.float32)
-    for i, runs in enumerate(strips):
-        strip = light[i * _rows(fine) : (i + 1) * _rows(fine)].reshape(-1, 3)
-        strip[:], _ = scene.follow(runs.moved(camera.world_from_cam), spread, len(strip))
+    for rows, strip in _traced(scene, replace(camera, intrinsics=fine)):
+        light[rows] = strip
     if supersample == 1:
         return light
     return np.asarray(cv2.resize(light, (pixels.width, pixels.height), interpolation=cv2.INTER_AREA), dtype=np.float32)
+
+
+def snapshot(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
+    """The picture (height, width, 3) that the camera takes as sRGB bytes: to_display(render(scene, camera))."""
+    picture = np.empty((camera.intrinsics.height, camera.intrinsics.width, 3), dtype=np.uint8)
+    for rows, strip in _traced(scene, camera):
+        picture[rows] = to_display(strip)
+    return picture
+
+
+def _traced(scene: Scene, camera: Camera) -> Iterator[tuple[slice, Floats]]:
+    """The picture in strips: which rows, and their linear light (rows, width, 3)."""
+    pixels = camera.intrinsics
+    strips, spread = _strips(pixels, camera.lens)
+    for i, runs in enumerate(strips):
+        top, bottom = i * _rows(pixels), min((i + 1) * _rows(pixels), pixels.height)
+        light, _ = scene.follow(runs.moved(camera.world_from_cam), spread, (bottom - top) * pixels.width)
+        yield slice(top, bottom), light.reshape(-1, pixels.width, 3)
 
 
 def _flat(origins: Array, shape: tuple[int, ...]) -> Array:

@@ -46,7 +46,7 @@ def textured_scene() -> Scene:
 def baked(name: str, repeat: bool = False) -> Texture:
     """One of the pictures that `camviz.scenes.bake` has painted."""
     data = np.frombuffer((files("camviz.scenes") / "pictures" / f"{name}.jpg").read_bytes(), dtype=np.uint8)
-    return Texture(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1], repeat)
+    return Texture(np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))[..., ::-1], repeat)
 
 
 def terrace_edges() -> tuple[Array, Array, Array]:

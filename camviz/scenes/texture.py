@@ -31,9 +31,8 @@ class Texture:
             raise ValueError(f"light must have shape (height, width, 3), got {picture.shape}")
         self.height, self.width = picture.shape[:2]
         self.repeat = repeat
-        steps = _in_steps(picture)
-        self.mean = steps.mean(axis=(0, 1), dtype=np.float64) / _FULL
-        self._mosaic, self._places = _pyramid(steps, repeat)
+        self._mosaic, self._places = _pyramid(picture, repeat)
+        self.mean = self._mosaic[: self.height, : self.width].mean(axis=(0, 1), dtype=np.float64) / _FULL
 
     @classmethod
     def plain(cls, rgb: ArrayLike) -> Texture:
@@ -67,6 +66,7 @@ class Texture:
 
 
 def _in_steps(light: NDArray[Any]) -> Steps:
+    """Linear light 0…1, or sRGB bytes, in 16 bits."""
     if light.dtype == np.uint8:
         return _in_steps(to_linear(np.arange(256, dtype=np.uint8)))[light]
     steps = np.multiply(light, _FULL, dtype=np.float32)
@@ -80,31 +80,27 @@ def _texel(s: Floats, size: Floats, repeat: bool) -> Floats:
     return np.minimum(np.maximum(x, np.float32(0)), size - np.float32(1))
 
 
-def _pyramid(picture: Steps, repeat: bool) -> tuple[Steps, Floats]:
+def _pyramid(light: NDArray[Any], repeat: bool) -> tuple[Steps, Floats]:
     """All halved copies in one mosaic, and where they lie: (4, levels) as left, top, width, height.
 
     The finest is on the left and the others in a column beside it, each with a border of one texel on its right and
     below, which continues it.
     """
-    copies = _halved(picture)
-    left = picture.shape[1] + 1
-    tops = np.concatenate([[0, 0], np.cumsum([len(copy) + 1 for copy in copies[1:]])]).astype(int)
-    mosaic = np.zeros((max(len(picture) + 1, tops[-1]), left + picture.shape[1] // 2 + 2, 3), dtype=np.uint16)
-    places = np.zeros((4, len(copies)), dtype=np.float32)
-    for level, (copy, top) in enumerate(zip(copies, tops, strict=False)):
-        place = mosaic[top:, left * (level > 0) :][: len(copy) + 1, : copy.shape[1] + 1]
-        place[:] = np.pad(copy, ((0, 1), (0, 1), (0, 0)), mode="wrap" if repeat else "edge")
-        places[:, level] = left * (level > 0), top, copy.shape[1], len(copy)
+    (height, width), levels = light.shape[:2], max(light.shape[:2]).bit_length()
+    mosaic = np.zeros((height + 2 * levels, width + width // 2 + 3, 3), dtype=np.uint16)
+    places = np.zeros((4, levels), dtype=np.float32)
+    left = top = 0
+    copy = _in_steps(light)
+    for level in range(levels):
+        place = mosaic[top : top + height + 1, left : left + width + 1]
+        place[:-1, :-1] = copy
+        place[-1, :-1] = place[0 if repeat else -2, :-1]
+        place[:, -1] = place[:, 0 if repeat else -2]
+        places[:, level] = left, top, width, height
+        left, top = light.shape[1] + 1 if level == 0 else left, top + (height + 1 if level else 0)
+        height, width = max(height // 2, 1), max(width // 2, 1)
+        copy = np.asarray(cv2.resize(place[:-1, :-1], (width, height), interpolation=cv2.INTER_AREA))
     return mosaic, places
-
-
-def _halved(picture: Steps) -> list[Steps]:
-    copies = [picture]
-    while max(copies[-1].shape[:2]) > 1:
-        height, width = (max(size // 2, 1) for size in copies[-1].shape[:2])
-        smaller = cv2.resize(copies[-1], (width, height), interpolation=cv2.INTER_AREA)
-        copies.append(np.asarray(smaller, dtype=np.uint16))
-    return copies
 
 
 def _remap(picture: Steps, x: Floats, y: Floats, row: int = 1024) -> Floats:

@@ -20,7 +20,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import unit
-from camviz.scenes import Scene, render, textured_scene, to_display
+from camviz.scenes import Scene, snapshot, textured_scene
 from camviz.views.base import View, choice, slider, switch
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
@@ -134,7 +134,7 @@ class DistortionView(View):
             self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
         )
         if self.photograph is None:
-            picture = to_display(render(_scene(), small))
+            picture = snapshot(_scene(), small)
         else:
             picture = cv2.resize(
                 self.photograph, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA

@@ -29,7 +29,7 @@ from camviz.draw.space import (
 )  # fmt: skip
 from camviz.lenses import Lens, Perspective
 from camviz.lenses.base import Array
-from camviz.scenes import board_corners, render, textured_scene, to_display
+from camviz.scenes import board_corners, snapshot, textured_scene
 from camviz.views.base import View, choice, slider, switch
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
@@ -226,11 +226,11 @@ class FrustumView(View):
         return self.but(yaw_deg=round(yaw, 2), pitch_deg=round(min(90.0, max(-90.0, self.pitch_deg + up_deg)), 2))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _taken(intrinsics: Intrinsics, lens: Lens, centre: tuple[float, ...], quaternion: tuple[float, ...]) -> np.ndarray:
     """The picture of the scene; kept, for the onlooker may walk around while the camera stands."""
     pose = RigidTransform.from_components(np.array(centre), Rotation.from_quat(quaternion))
-    return to_display(render(textured_scene(), Camera(intrinsics, lens, pose)))
+    return snapshot(textured_scene(), Camera(intrinsics, lens, pose))
 
 
 def _up(camera: Camera) -> Array:

@@ -11,7 +11,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
 from camviz.lenses import Lens
 from camviz.lenses.base import Array
-from camviz.scenes import render, textured_scene, to_display
+from camviz.scenes import snapshot, textured_scene
 
 Pose = tuple[float, ...]
 
@@ -27,9 +27,9 @@ def landmarks(camera: Camera) -> Array:
     return _landmarks(camera.intrinsics, camera.lens, _pose(camera))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def _taken(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> tuple[np.ndarray, bytes]:
-    image = to_display(render(textured_scene(), Camera(intrinsics, lens, _placed(pose))))
+    image = snapshot(textured_scene(), Camera(intrinsics, lens, _placed(pose)))
     image.flags.writeable = False
     return image, jpeg(image)
 

@@ -7,7 +7,9 @@ function render({ model, el }) {
   const root = build(`<div class="camviz-explorer" data-busy="false" data-rendered="0">
     <div class="camviz-controls"></div><div class="camviz-error" role="alert" hidden></div><div class="camviz-picture"></div></div>`);
   const [controls, error, picture] = root.children;
-  el.replaceChildren(root);
+  const hidesStill = build("<style></style>");   // while this lives, the saved picture is not needed
+  hidesStill.textContent = model.get("still_hidden");
+  el.replaceChildren(hidesStill, root);
 
   const ask = asker(model, root);
   const inputs = model.get("controls").map((control) => makeControl(control, (value, draft) => {

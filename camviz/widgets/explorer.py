@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import traceback
 from importlib.resources import files
 from typing import Any
 
-import anywidget
 import traitlets
 
 from camviz.draw.picture import style
 from camviz.views.base import Control, View
+from camviz.widgets.still import StillWidget
 
 _HERE = files("camviz.widgets")
+_CAPTION = (
+    '<figcaption style="font-size:12px;opacity:.75">'
+    "A still picture: run this cell (Shift + Enter), and it moves.</figcaption>"
+)
 
 
-class Explorer(anywidget.AnyWidget):
+class Explorer(StillWidget):
     """A view under a reader's hands. `view` is the present state; `set` changes it from code.
 
     The browser asks for one picture at a time and always for its newest wish, so a slow picture never builds a queue.
@@ -66,12 +69,9 @@ class Explorer(anywidget.AnyWidget):
             view = view.pressed(handle, key)
         return view
 
-    def _repr_mimebundle_(self, **options: Any) -> Any:
-        still = self.view.figure()._repr_mimebundle_()
-        if os.environ.get("CAMVIZ_STATIC"):
-            return still
-        data, metadata = super()._repr_mimebundle_(**options) or ({}, {})
-        return {**still, **data, "text/plain": still["text/plain"]}, metadata
+    def still(self) -> dict[str, str]:
+        bundle = self.view.figure()._repr_mimebundle_()
+        return {**bundle, "text/html": bundle["text/html"].replace("</figure>", f"{_CAPTION}</figure>")}
 
 
 def explore(view: View, *names: str, **ranges: Any) -> Explorer:

@@ -86,7 +86,9 @@ function render({ model, el }) {
   const problem = element("div", "camviz-problem");
   problem.setAttribute("role", "alert");
   root.append(title, ...forms.map((one) => one.form), summary, problem);
-  el.append(root);
+  const hidesStill = element("style");   // while this lives, the saved page is not needed
+  hidesStill.textContent = model.get("still_hidden");
+  el.append(hidesStill, root);
 
   const update = () => {
     model.get("cards").forEach((card, number) => forms[number].show(card));

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import anywidget
 import traitlets
 
 from camviz import prose
 from camviz.questions import Question, question, quiz_questions
+from camviz.widgets.still import StillWidget
 
 Tries = tuple[int, ...]
 """The choices a reader has committed to, in order; () before the first."""
@@ -31,11 +31,16 @@ class Sheet:
     def __repr__(self) -> str:
         return "\n\n".join([self.title, *(_plain(one) for one in self.questions)])
 
+    def unanswered(self) -> str:
+        """The page without any reply, for a reader who has yet to choose."""
+        questions = "".join(_unanswered(one) for one in self.questions)
+        return f"<section><h4>{prose.inline(self.title)}</h4>{questions}<p>Run this cell to answer.</p></section>"
+
     def _repr_html_(self) -> str:
         return f"<section><h4>{prose.inline(self.title)}</h4>{''.join(_html(one) for one in self.questions)}</section>"
 
 
-class QuestionWidget(anywidget.AnyWidget):
+class QuestionWidget(StillWidget):
     """The live questions. Only what the reader may see is in `cards`; replies come when a choice has been made."""
 
     _esm = Path(__file__).with_name("question.js")
@@ -64,10 +69,9 @@ class QuestionWidget(anywidget.AnyWidget):
     def __repr__(self) -> str:
         return repr(self.sheet)
 
-    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        bundle = super()._repr_mimebundle_(**kwargs)
-        data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
-        return {**(data or {}), "text/plain": repr(self.sheet), "text/html": self.sheet._repr_html_()}, metadata
+    def still(self) -> dict[str, str]:
+        """The questions without their replies, which would give the answers away."""
+        return {"text/plain": repr(self.sheet), "text/html": self.sheet.unanswered()}
 
     def _receive(self, _widget: Any, message: Any, _buffers: Any) -> None:
         try:
@@ -128,6 +132,11 @@ def _card(one: Question, made: Tries) -> dict[str, Any]:
 def _plain(one: Question) -> str:
     choices = [f"  ({chr(97 + i)}) {prose.to_plain(choice.text)}" for i, choice in enumerate(one.choices)]
     return "\n".join([prose.to_plain(one.text), *choices])
+
+
+def _unanswered(one: Question) -> str:
+    choices = "".join(f"<li>{prose.inline(choice.text)}</li>" for choice in one.choices)
+    return f"<div>{prose.to_html(one.text)}<ul>{choices}</ul></div>"
 
 
 def _html(one: Question) -> str:

@@ -27,13 +27,17 @@ FLAGS = [
 ]
 QUIET = """{"@jupyterlab/apputils-extension:notification":
   {"checkForUpdates": false, "doNotDisturbMode": true, "fetchNews": "false"}}"""
-RUN_ALL = """async () => {
+RUN_ALL = """async (limit) => {
   const panel = jupyterapp.shell.currentWidget;
-  await panel.context.ready;
-  await panel.sessionContext.ready;
-  await jupyterapp.commands.execute("notebook:run-all-cells");
-  while (panel.sessionContext.session.kernel.status !== "idle") await hands.pause(50);
-  return panel.content.model.toJSON().cells;
+  const run = async () => {
+    await panel.context.ready;
+    await panel.sessionContext.ready;
+    await jupyterapp.commands.execute("notebook:run-all-cells");
+    while (panel.sessionContext.session.kernel.status !== "idle") await hands.pause(50);
+    return panel.content.model.toJSON().cells;
+  };
+  const late = async () => { await hands.pause(limit); throw new Error(`still running after ${limit} ms`); };
+  return Promise.race([run(), late()]);
 }"""
 
 
@@ -83,7 +87,7 @@ class Notebook:
 
     def run_all(self) -> list[dict[str, Any]]:
         """Run every cell, wait until the kernel and all visualizers rest, and return the cells as they are now."""
-        cells: list[dict[str, Any]] = self.page.evaluate(RUN_ALL)
+        cells: list[dict[str, Any]] = self.page.evaluate(RUN_ALL, 180_000)
         for explorer in self.page.query_selector_all(".camviz-explorer"):
             explorer.evaluate("root => hands.settled(root)")
         return cells
