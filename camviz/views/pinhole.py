@@ -17,7 +17,7 @@ from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import curve, plot_panel
 from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, Sheet, draw_space, space_panel
-from camviz.scenes import render, textured_scene, to_display
+from camviz.scenes import render, snapshot, textured_scene, to_display
 from camviz.views.base import View, slider, switch
 
 WALL_MM = np.array([36.0, 27.0])
@@ -279,7 +279,7 @@ def _stage() -> np.ndarray:
     """The garden around the tower as it looks from three metres away: 1.9 × 1.44 m of it."""
     pixels = Intrinsics(380, 288, 600, 600, 189.5, 143.5)
     pose = RigidTransform.from_translation(TOWER - (0, 0, 3.0))
-    return to_display(render(textured_scene(), Camera(pixels, world_from_cam=pose)))
+    return snapshot(textured_scene(), Camera(pixels, world_from_cam=pose))
 
 
 @lru_cache(maxsize=2)
