@@ -81,11 +81,13 @@ class DistortionView(View):
         """The state's key figures, as text."""
         corner = distortion.image_corner_radius(self.intrinsics)
         fold = distortion.fold_radius(self.camera.lens)
+        pole = distortion.pole_radius(self.camera.lens)
         moved = self.moved(self.intrinsics.border(1))
+        lost = "beyond the pole" if pole <= corner else "folded away"
         return {
             "image corner": f"r = {_with_angle(corner)}",
-            "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
-            "fold": f"r = {_with_angle(fold)}" if isfinite(fold) else "none",
+            "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else lost,
+            "fold": f"r = {_with_angle(fold)}" if isfinite(fold) else _none_but(pole),
             "farthest a ray lands": f"r = {self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
         }
 
@@ -309,6 +311,10 @@ def _polynomial(*coefficients: float) -> str:
 
 def _on_plane(xy: np.ndarray) -> np.ndarray:
     return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
+
+
+def _none_but(pole: float) -> str:
+    return f"none; pole {pole:.4f}" if isfinite(pole) else "none"
 
 
 def _with_angle(r: float) -> str:
