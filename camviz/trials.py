@@ -210,7 +210,13 @@ def _short(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.size > 9:
         return f"<array of shape {value.shape}>"
     if isinstance(value, np.ndarray):
-        return str(np.round(value, 6).tolist())
+        return _digits(value.tolist())
+    return _digits(value)
+
+
+def _digits(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_digits, value))}]"
     return f"{value:.6g}" if isinstance(value, float) else repr(value)
 
 

@@ -291,3 +291,7 @@ def test_a_map_of_single_precision_is_good_enough_for_remap_and_one_half_a_pixel
     reference = exercise("05.undistort_map").reference
     assert judge(exercise("05.undistort_map"), lambda *a: np.float32(reference(*a)))
     assert not judge(exercise("05.undistort_map"), lambda *a: reference(*a) + 0.5)
+
+
+def test_a_small_matrix_is_shown_in_full_with_digits_that_count():
+    assert DISTANCE.call((np.array([[1e-6, 0.0, -2.5e-7]]),)) == "``distance(points=[[1e-06, 0, -2.5e-07]])``"
