@@ -1,14 +1,8 @@
 """Tools for the lessons: what a lesson must have, its teacher's edition, and its saved outputs.
 
-    python -m camviz.lessons check            what departs from the pattern of a lesson
-    python -m camviz.lessons refresh [05 …]   run and save with static outputs
-    python -m camviz.lessons fresh            which saved outputs are older than their lesson
-
-A lesson's cells carry tags: `setup`, `build` (what exercises may rely on), `stub`, `check`, `solution`, `glossary`
-(filled by `refresh`), `nbval-check-output`. A stub's metadata names its exercise, {"camviz": {"exercise":
-"05.distort"}}; notes for the teacher are Markdown in the metadata of the cell they belong to, {"camviz": {"teacher":
-"10 minutes. Ask …"}}. A stub is followed, before the next one, by its check and its solution, a fenced block in
-<details>.
+python -m camviz.lessons check            what departs from the pattern of a lesson
+python -m camviz.lessons refresh [05 …]   run and save with static outputs
+python -m camviz.lessons fresh            which saved outputs are older than their lesson
 """
 
 from __future__ import annotations
@@ -20,18 +14,15 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 from camviz import glossary
-from camviz.checks import Verdict
+from camviz.notebooks import Cell, Notebook, exercise_cells, read, solution_code, tagged, write
+from camviz.pattern import complaints
 
-Notebook = Any
-Cell = Any
-
-_FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 _RANDOM_ID = re.compile(r"[0-9a-f]{8}")
 
 
@@ -39,103 +30,6 @@ def lessons_folder() -> Path:
     """Where the lessons are: inside an installed package, or beside it in the repository."""
     installed = Path(__file__).with_name("_lessons")
     return installed if installed.is_dir() else Path(__file__).parents[1] / "lessons"
-
-
-def read(path: Path) -> Notebook:
-    """A notebook, nbformat 4. Raises ValueError naming the file when it is not one."""
-    import nbformat
-
-    try:
-        return nbformat.read(path, as_version=4)
-    except (nbformat.reader.NotJSONError, nbformat.ValidationError) as error:
-        raise ValueError(f"{path} is not a notebook: {error}") from error
-
-
-def write(notebook: Notebook, path: Path) -> None:
-    """Writes a notebook, with its keys in order and a newline at its end."""
-    import nbformat
-
-    path.write_text(nbformat.writes(notebook).rstrip("\n") + "\n", encoding="utf-8")
-
-
-# What is in a lesson ------------------------------------------------------------------------------------------------
-
-
-def tagged(notebook: Notebook, tag: str) -> list[Cell]:
-    """The cells with a tag, in order."""
-    return [cell for cell in notebook.cells if tag in cell.metadata.get("tags", [])]
-
-
-def stubs(notebook: Notebook) -> dict[str, str]:
-    """The source of each exercise's stub, by the exercise's name."""
-    return {exercise_of(cell): cell.source for cell in tagged(notebook, "stub")}
-
-
-def solutions(notebook: Notebook) -> dict[str, str]:
-    """The code of each exercise's folded solution. Raises ValueError for a stub without one."""
-    return {name: _code(solution) for name, (_, _, solution) in _exercises(notebook).items()}
-
-
-def checks(notebook: Notebook) -> dict[str, str]:
-    """The source of the cell that checks each exercise. Raises ValueError for a stub without one."""
-    return {name: check.source for name, (_, check, _) in _exercises(notebook).items()}
-
-
-def exercise_of(stub: Cell) -> str:
-    """The exercise that a stub's metadata names. Raises ValueError when it names none."""
-    name = stub.metadata.get("camviz", {}).get("exercise")
-    if not name:
-        raise ValueError(f'a stub needs the metadata {{"camviz": {{"exercise": …}}}}: {stub.source[:60]!r}')
-    return name
-
-
-def verdicts(notebook: Notebook, solved: bool) -> dict[str, Verdict]:
-    """What the lesson's own checks say of its solutions, or of its stubs.
-
-    Runs the setup, `build` and exercise cells in order in an empty namespace, as a reader would, without Jupyter.
-    """
-    exercises = _exercises(notebook)
-    given: dict[str, Verdict] = {}
-    namespace: dict[str, Any] = {"__name__": "lesson"}
-    for cell in notebook.cells:
-        tags = cell.metadata.get("tags", [])
-        if "setup" in tags or "build" in tags:
-            exec(compile(cell.source, "<lesson>", "exec"), namespace)
-        elif "stub" in tags:
-            name = exercise_of(cell)
-            stub, check, solution = exercises[name]
-            exec(compile(_code(solution) if solved else stub.source, f"<{name}>", "exec"), namespace)
-            given[name] = eval(check.source.strip(), namespace)
-    return given
-
-
-def _exercises(notebook: Notebook) -> dict[str, tuple[Cell, Cell, Cell]]:
-    """The stub, check and solution cells of each exercise."""
-    found = {}
-    for stub, following in _stretches(notebook):
-        name = exercise_of(stub)
-        parts = {
-            tag: [cell for cell in following if tag in cell.metadata.get("tags", [])] for tag in ("check", "solution")
-        }
-        for tag, cells in parts.items():
-            if len(cells) != 1:
-                raise ValueError(f"exercise {name} needs one cell tagged {tag} after its stub, has {len(cells)}")
-        found[name] = (stub, parts["check"][0], parts["solution"][0])
-    return found
-
-
-def _stretches(notebook: Notebook) -> Iterator[tuple[Cell, list[Cell]]]:
-    """Each stub with the cells between it and the next."""
-    starts = [i for i, cell in enumerate(notebook.cells) if "stub" in cell.metadata.get("tags", [])]
-    for start, end in zip(starts, [*starts[1:], len(notebook.cells)], strict=True):
-        yield notebook.cells[start], notebook.cells[start + 1 : end]
-
-
-def _code(solution: Cell) -> str:
-    fenced = _FENCE.search(solution.source)
-    if fenced is None:
-        raise ValueError(f"a solution needs its code fenced by ```python: {solution.source[:60]!r}")
-    return fenced[1].rstrip("\n")
 
 
 # The teacher's edition ----------------------------------------------------------------------------------------------
@@ -147,8 +41,8 @@ def teacher_edition(notebook: Notebook) -> Notebook:
     Solutions and hidden tests stand between nbgrader's marks, so that `nbgrader generate_assignment` takes them out.
     """
     edition = deepcopy(notebook)
-    for name, (stub, check, solution) in _exercises(edition).items():
-        stub.source = mark_solution(stub.source, _code(solution))
+    for name, (stub, check, solution) in exercise_cells(edition).items():
+        stub.source = mark_solution(stub.source, solution_code(solution))
         stub.metadata["nbgrader"] = _nbgrader(name, solution=True)
         check.source = f"### BEGIN HIDDEN TESTS\nassert {check.source.strip()}\n### END HIDDEN TESTS\n{check.source}"
         check.metadata["nbgrader"] = {**_nbgrader(f"{name}-check", grade=True), "points": 1}
@@ -330,8 +224,6 @@ def _run_fresh(given: argparse.Namespace) -> int:
 
 
 def _run_check(given: argparse.Namespace) -> int:
-    from camviz.pattern import complaints
-
     found = [f"{path.name}: {one}" for path in _paths(given.names) for one in complaints(read(path), path.name)]
     print("\n".join(found) or "every lesson follows the pattern")
     return 1 if found else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from camviz import glossary, lessons, questions
+from camviz import glossary, notebooks, questions
 from camviz.exercises import exercises
 
 Notebook = Any
@@ -48,7 +48,7 @@ def _header(notebook: Notebook, number: str) -> list[str]:
 def _setup(notebook: Notebook) -> list[str]:
     """One setup cell, the first code, and the same in every lesson."""
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    setup = lessons.tagged(notebook, "setup")
+    setup = notebooks.tagged(notebook, "setup")
     if len(setup) != 1 or not code or code[0] is not setup[0]:
         return [f"the first code cell, and no other, must be tagged setup; {len(setup)} are"]
     return [] if setup[0].source == SETUP else [f"setup must be the same as everywhere:\n{SETUP}"]
@@ -65,7 +65,7 @@ def _cells(notebook: Notebook) -> list[str]:
         drawing = _DRAWING.search(cell.source)
         if drawing:
             found.append(f"cell {number} draws by itself ({drawing[0]}): drawing belongs in camviz.views")
-    if not lessons.tagged(notebook, "nbval-check-output"):
+    if not notebooks.tagged(notebook, "nbval-check-output"):
         found.append("no cell is tagged nbval-check-output, so no number of this lesson is held")
     return found
 
@@ -92,7 +92,7 @@ def _questions(notebook: Notebook, number: str) -> list[str]:
 
 def _exercises(notebook: Notebook, number: str) -> list[str]:
     try:
-        stubs, checks, solutions = lessons.stubs(notebook), lessons.checks(notebook), lessons.solutions(notebook)
+        stubs, checks, solutions = notebooks.stubs(notebook), notebooks.checks(notebook), notebooks.solutions(notebook)
     except ValueError as error:
         return [str(error)]
     known = exercises(number)
@@ -107,7 +107,7 @@ def _exercises(notebook: Notebook, number: str) -> list[str]:
             found.append(f'the check of {name} must call check("{name}", …)')
         if solutions[name].strip() == stubs[name].strip():
             found.append(f"the solution of {name} is its stub")
-    closed = [cell for cell in lessons.tagged(notebook, "solution") if "<details>" not in cell.source]
+    closed = [cell for cell in notebooks.tagged(notebook, "solution") if "<details>" not in cell.source]
     return [*found, *(f"a solution is not folded by <details>: {cell.source[:40]!r}" for cell in closed)]
 
 

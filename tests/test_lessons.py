@@ -8,7 +8,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from camviz import lessons
+from camviz import lessons, notebooks
 from camviz.exercises import exercises, lesson05
 from camviz.pattern import SETUP, complaints
 
@@ -135,7 +135,7 @@ def test_each_departure_from_the_pattern_is_named(lesson, change, complaint):
 
 
 def test_every_solution_passes_its_checker_and_no_stub_does(lesson):
-    solved, unsolved = lessons.verdicts(lesson, solved=True), lessons.verdicts(lesson, solved=False)
+    solved, unsolved = notebooks.verdicts(lesson, solved=True), notebooks.verdicts(lesson, solved=False)
     assert list(solved) == list(unsolved) == list(exercises("05"))
     assert all(solved.values()), solved
     assert not any(unsolved.values())
@@ -145,14 +145,14 @@ def test_every_solution_passes_its_checker_and_no_stub_does(lesson):
 def test_the_teacher_s_edition_has_solutions_in_place_notes_visible_and_hidden_tests(lesson):
     edition = lessons.teacher_edition(lesson)
     nbformat.validate(edition)
-    stub = lessons.stubs(edition)["05.fold_radius"]
+    stub = notebooks.stubs(edition)["05.fold_radius"]
     assert "### BEGIN SOLUTION" in stub
     assert "NotImplementedError" not in stub
     assert edition.cells[0].source.startswith("# 05 Lens distortion (teacher's edition)\n")
-    notes = [cell.source for cell in lessons.tagged(edition, "teacher")]
+    notes = [cell.source for cell in notebooks.tagged(edition, "teacher")]
     assert notes == ["> **For the teacher:** 10 minutes.\n> Ask for hands before the reveal."]
-    assert all("<details open>" in cell.source for cell in lessons.tagged(edition, "solution"))
-    assert 'assert check("05.distort", distort)' in lessons.checks(edition)["05.distort"]
+    assert all("<details open>" in cell.source for cell in notebooks.tagged(edition, "solution"))
+    assert 'assert check("05.distort", distort)' in notebooks.checks(edition)["05.distort"]
     assert not any(cell.get("outputs") for cell in edition.cells)
 
 
@@ -189,7 +189,7 @@ def test_what_stub_and_solution_share_stays_outside_the_solution_s_marks():
 
 
 def test_the_teacher_s_edition_is_never_written_over_the_lessons(tmp_path, lesson):
-    lessons.write(lesson, tmp_path / "05_distortion.ipynb")
+    notebooks.write(lesson, tmp_path / "05_distortion.ipynb")
     with pytest.raises(ValueError, match="over the lessons"):
         lessons.write_teacher_edition(tmp_path, tmp_path / ".." / tmp_path.name)
     (written,) = lessons.write_teacher_edition(tmp_path, tmp_path / "teacher")
@@ -229,11 +229,11 @@ def test_refreshing_runs_a_lesson_with_static_outputs_twice_alike(tmp_path):
         code('ask("05.fold")'),
         text("", "glossary"),
     ]
-    lessons.write(nbformat.v4.new_notebook(cells=cells), path)
-    assert not lessons.is_fresh(lessons.read(path))
+    notebooks.write(nbformat.v4.new_notebook(cells=cells), path)
+    assert not lessons.is_fresh(notebooks.read(path))
     lessons.refresh(path)
     first = path.read_text(encoding="utf-8")
-    notebook = lessons.read(path)
+    notebook = notebooks.read(path)
     assert lessons.is_fresh(notebook)
     assert notebook.cells[1].outputs[0].text == "1 wire\n"
     assert set(notebook.cells[2].outputs[0].data) == {"text/plain", "text/html"}
@@ -246,12 +246,12 @@ def test_a_file_that_is_no_notebook_is_named(tmp_path):
     path = tmp_path / "05_picture.ipynb"
     path.write_text("not json")
     with pytest.raises(ValueError, match=r"05_picture\.ipynb is not a notebook"):
-        lessons.read(path)
+        notebooks.read(path)
 
 
 def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp_path, lesson, monkeypatch, capsys):
     monkeypatch.setattr(lessons, "lessons_folder", lambda: tmp_path)
-    lessons.write(lesson, tmp_path / "05_distortion.ipynb")
+    notebooks.write(lesson, tmp_path / "05_distortion.ipynb")
     assert lessons.main(["check"]) == 0
     assert lessons.main(["fresh"]) == 1
     assert "05_distortion.ipynb is stale" in capsys.readouterr().out
@@ -262,21 +262,21 @@ def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp
 @EACH
 def test_every_lesson_follows_the_pattern(path):
     """Told also by: python -m camviz.lessons check"""
-    assert complaints(lessons.read(path), path.name) == []
+    assert complaints(notebooks.read(path), path.name) == []
 
 
 @EACH
 def test_every_lesson_s_solutions_pass_and_its_stubs_do_not(path, monkeypatch):
     monkeypatch.chdir(path.parent)
     monkeypatch.setitem(os.environ, "CAMVIZ_STATIC", "1")
-    notebook = lessons.read(path)
-    assert all(lessons.verdicts(notebook, solved=True).values())
-    assert not any(lessons.verdicts(notebook, solved=False).values())
+    notebook = notebooks.read(path)
+    assert all(notebooks.verdicts(notebook, solved=True).values())
+    assert not any(notebooks.verdicts(notebook, solved=False).values())
 
 
 @EACH
 def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
     """Mend with: python -m camviz.lessons refresh"""
-    notebook = lessons.read(path)
+    notebook = notebooks.read(path)
     assert lessons.is_fresh(notebook)
     assert "application/vnd.jupyter.widget-view+json" not in path.read_text(encoding="utf-8")

@@ -31,6 +31,7 @@ from camviz.lenses import Lens, Perspective
 from camviz.lenses.base import Array
 from camviz.scenes import board_corners, snapshot, textured_scene
 from camviz.views.base import View, choice, slider, switch
+from camviz.views.marks import clipped
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
 
@@ -173,7 +174,7 @@ class FrustumView(View):
         spacing = float(np.linalg.norm(uv[1] - uv[0]))
         corners = svg.dots(uv, "red", float(np.clip(0.35 * spacing, 1, 5)) if np.isfinite(spacing) else 4)
         reach = np.linspace(0, 0.7, 33)[:, None]
-        axes = [svg.line(panel.place(self.camera.project(reach * axis)), f"{colour} thick")
+        axes = [svg.path(clipped(panel, panel.place(self.camera.project(reach * axis))), f"{colour} thick")
                 for axis, colour in zip(np.eye(3), ("orange", "green", "blue"), strict=True)]  # fmt: skip
         return corners + "".join(axes)
 
