@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import NamedTemporaryFile, TemporaryDirectory
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import camviz
@@ -189,27 +189,26 @@ def _loaded(path: Path, size: tuple[int, int] | None) -> Calibration:
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Write a file by way of another beside it, so that there is never half a file under its name."""
-    with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False) as part:
-        temporary = Path(part.name)
+    target = path.resolve()  # a link is followed, not replaced
     try:
-        write(temporary)
-        temporary.chmod(0o666 & ~_umask())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+        with TemporaryDirectory(dir=target.parent, prefix=".camviz-") as beside:
+            temporary = Path(beside) / "page.part"
+            write(temporary)
+            os.replace(temporary, target)
+    except OSError as error:  # whose file name is that of the part
+        raise Refusal(f"{path}: cannot be written ({error.strerror or error}).") from error
 
 
 def _refuse_output(output: Path, source: Path) -> None:
+    if "\0" in str(output):
+        raise Refusal(f"{str(output)!r} is not a file name.")
     if output.is_dir():
         raise Refusal(f"{output}: expected the name of a page to write, this is a directory.")
-    if not output.parent.is_dir():
-        raise Refusal(f"{output}: there is no directory {output.parent} to write into.")
+    if output.exists() and not output.is_file():  # a device or a pipe, which the page would take the place of
+        raise Refusal(f"{output}: expected the name of a page to write, this is not a regular file.")
+    parent = (output.resolve() if output.is_symlink() else output).parent
+    if not parent.is_dir():
+        raise Refusal(f"{output}: there is no directory {parent} to write into.")
     if output.exists() and output.samefile(source):
         raise Refusal(f"{output}: the page would overwrite the calibration; choose another name with -o.")
 

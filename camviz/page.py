@@ -60,7 +60,7 @@ def _row(name: str, camera: Camera) -> str:
         name,
         f"{K.width} × {K.height}",
         *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)),
-        repr(camera.lens),
+        _lens(camera.lens),
     ]
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 

@@ -183,6 +183,39 @@ def test_show_refuses_a_place_it_cannot_write_to(capsys, room, page, output, sai
     assert said in refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", output)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
+def test_show_does_not_take_the_place_of_a_pipe_or_a_device(capsys, room, page):
+    """Written by way of another file, a page would replace /dev/null for everyone, root willing."""
+    os.mkfifo(room / "pipe")
+    assert "not a regular file" in refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", "pipe")
+    assert (room / "pipe").is_fifo()
+
+
+def test_show_refuses_an_output_that_is_no_name(capsys, room, page):
+    said = refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", "a\0b")
+    assert r"'a\x00b' is not a file name" in said
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")
+def test_show_follows_a_link_to_the_page_it_names(room, page):
+    (room / "place").mkdir()
+    (room / "link.html").symlink_to("place/page.html")
+    for _ in range(2):
+        assert main(["show", str(DATA / "opencv_stereo.xml"), "-o", "link.html"]) == 0
+    assert (room / "link.html").is_symlink()
+    assert (room / "place" / "page.html").read_text() == "page of opencv_stereo.xml"
+
+
+@pytest.mark.parametrize("error", [28, 30])  # ENOSPC, EROFS
+def test_a_page_that_cannot_be_written_is_named_as_it_was_asked_for(capsys, room, page, error):
+    def fail(calibration, path):
+        raise OSError(error, os.strerror(error), str(path))
+
+    page.write_page = fail
+    said = refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", "page.html")
+    assert said == f"camviz: page.html: cannot be written ({os.strerror(error)}).\n"
+
+
 def test_a_page_that_fails_half_way_leaves_the_old_one(room, page):
     (room / "page.html").write_text("the old page")
 
