@@ -129,7 +129,7 @@ class DistortionView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def image(self, *, draft: bool) -> np.ndarray:
-        width = 320 if draft else 480
+        width = 256 if draft else 480
         small = Camera(
             self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
         )

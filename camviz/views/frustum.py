@@ -135,7 +135,7 @@ class FrustumView(View):
 
     def _image(self, draft: bool) -> np.ndarray:
         k, pose = self.camera.intrinsics, self.camera.world_from_cam
-        width = 320 if draft else 480
+        width = 256 if draft else 480
         small = k.resized(width, max(1, round(width * k.height / k.width)))
         return _taken(small, self.lens, tuple(pose.translation), tuple(pose.rotation.as_quat()))
 

@@ -1,7 +1,7 @@
 // The pane of every visualizer: controls and a picture. It draws nothing itself and knows no mathematics:
 // it tells the kernel what the reader wants and shows the picture that comes back.
 
-const SETTLE_MS = 60;   // idle time after which a draft is replaced by the fine picture
+const SETTLE_MS = 40;   // idle time after which a draft is replaced by the fine picture
 
 function render({ model, el }) {
   const root = build(`<div class="camviz-explorer" data-busy="false" data-rendered="0">
