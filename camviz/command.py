@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import camviz
-from camviz.working_copy import checkout_lessons, lay_out, lessons_source
+from camviz.working_copy import checkout_lessons, edition, lay_out, lessons_source
 
 if TYPE_CHECKING:
     from camviz.files import Calibration
@@ -136,7 +136,7 @@ def lab(options: argparse.Namespace, beyond: list[str]) -> int:
     folder = options.directory or checkout_lessons() or Path("camviz-lessons")
     if folder.exists() and not folder.is_dir():
         raise Refusal(f"{folder}: expected a folder for the lessons, this is a file.")
-    if not (folder.exists() and folder.samefile(source)):
+    if not (folder.exists() and folder.samefile(source)) and edition(folder) != "teacher":
         for sentence in lay_out(source, folder, camviz.__version__):
             print(sentence)
     return _start_jupyter(folder.resolve(), ["--no-browser"] * options.no_browser + beyond)
@@ -153,6 +153,7 @@ def doctor(options: argparse.Namespace) -> int:
 
 def show(options: argparse.Namespace) -> int:
     """Write the page of a calibration, whole or not at all."""
+    _refuse_renderer()
     calibration = _loaded(options.file, options.size)
     output = options.output or Path(options.file.stem + ".html")
     _refuse_output(output, options.file)
@@ -171,9 +172,11 @@ def teacher(options: argparse.Namespace) -> int:
 
     if options.out.exists() and (not options.out.is_dir() or options.out.samefile(lessons_folder())):
         raise Refusal(f"{options.out}: expected a folder of its own for the teacher's edition.")
+    if edition(options.out) == "student":
+        raise Refusal(f"{options.out}: expected a folder of its own, the students' lessons are in this one.")
     with TemporaryDirectory() as made:
         write_teacher_edition(lessons_folder(), Path(made))
-        for sentence in lay_out(Path(made), options.out, camviz.__version__):
+        for sentence in lay_out(Path(made), options.out, camviz.__version__, "teacher"):
             print(sentence)
     return OK
 
@@ -197,6 +200,14 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
             os.replace(temporary, target)
     except OSError as error:  # whose file name is that of the part
         raise Refusal(f"{path}: cannot be written ({error.strerror or error}).") from error
+
+
+def _refuse_renderer() -> None:
+    from camviz.doctor import renderer
+
+    finding = renderer()
+    if finding.status != "ok":
+        raise Refusal(f"{finding.name}: {finding.detail}; {finding.remedy}.")
 
 
 def _refuse_output(output: Path, source: Path) -> None:

@@ -160,6 +160,18 @@ def test_a_size_that_is_missing_is_asked_for(capsys, room, page):
     assert (room / "bare.html").read_text() == "page of bare.yml"
 
 
+def test_show_says_what_is_wrong_with_the_renderer_asked_for(capsys, room, page, monkeypatch):
+    monkeypatch.setenv("CAMVIZ_RENDERER", "nonsense")
+    said = refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"))
+    assert "CAMVIZ_RENDERER: 'nonsense' is no renderer; set it to solid or wire" in said
+
+
+@pytest.mark.parametrize(("free", "status"), [(3 * 10**8, "warn"), (3 * 10**9, "ok"), (None, "ok")])
+def test_the_doctor_warns_where_a_lesson_has_no_room(monkeypatch, free, status):
+    monkeypatch.setattr(doctor, "_free_memory", lambda: free)
+    assert doctor.memory().status == status
+
+
 def test_show_names_the_page_after_the_file_or_as_told(room, page, capsys):
     assert main(["show", str(DATA / "opencv_stereo.xml")]) == 0
     assert main(["show", str(DATA / "opencv_stereo.xml"), "-o", "pair.html"]) == 0
@@ -401,6 +413,20 @@ def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatc
     copy = room / "camviz-lessons"
     assert jupyter == [[f"--ServerApp.root_dir={copy}", str(copy / "00_start.ipynb")]]
     assert "camviz-lessons" in capsys.readouterr().out
+
+
+def test_the_editions_do_not_overwrite_each_other(jupyter, room, lessons, monkeypatch, capsys):
+    """The teacher's edition is not laid out over students' lessons, and opening it does not make it theirs."""
+    monkeypatch.setattr(command, "checkout_lessons", lambda: None)
+    monkeypatch.setattr(command, "lessons_source", lambda: lessons)
+    assert main(["lab"]) == 0
+    capsys.readouterr()
+    assert "the students' lessons are in this one" in refused(capsys, room, "teacher", "camviz-lessons")
+    assert main(["teacher", "mine"]) == 0
+    before = contents(room / "mine")
+    assert main(["lab", "mine"]) == 0
+    assert contents(room / "mine") == before
+    assert main(["teacher", "mine"]) == 0
 
 
 def test_the_lessons_of_a_wheel_are_inside_the_package(tmp_path, monkeypatch):
