@@ -16,7 +16,10 @@ from camviz.files.loading import parse
 from camviz.files.text import MAX_BYTES
 
 DATA = Path(__file__).parent / "data"
-FILES = sorted(DATA.iterdir())
+FILES = sorted(path for path in DATA.rglob("*") if path.is_file())
+TREES = [path for path in FILES if path.suffix in (".yml", ".yaml", ".json")]
+WORDS = [path for path in FILES if path.suffix in (".txt", ".xml", ".cameramodel")]
+SIZES = {"kitti_calib.txt": (1242, 375)}
 MONO = """%YAML:1.0
 ---
 image_width: 640
@@ -324,12 +327,27 @@ def attempt(path, content):
     """Load whatever this is; anything but a calibration or a CalibrationError is a failure."""
     path.write_bytes(content)
     try:
-        calibration = camviz.load(path)
+        calibration = camviz.load(path, size=SIZES.get(path.name))
     except CalibrationError:
         return
     for camera in calibration.rig:
         assert camera.intrinsics.fx > 0
         assert np.isfinite(camera.world_from_cam.as_matrix()).all()
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory):
+    """Where the damaged copy of a file goes: under its own name, the other files of its folder beside it."""
+    rooms = {folder: tmp_path_factory.mktemp("fuzz") for folder in {path.parent for path in FILES}}
+
+    def place(original):
+        room = rooms[original.parent]
+        for path in FILES:
+            if path.parent == original.parent != DATA:
+                (room / path.name).write_bytes(path.read_bytes())
+        return room / original.name
+
+    return place
 
 
 @pytest.fixture(scope="module")
@@ -343,20 +361,20 @@ FUZZ = settings(max_examples=60, deadline=None)
 @pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
-def test_a_truncated_file_is_read_or_refused(anywhere, original, data):
+def test_a_truncated_file_is_read_or_refused(beside, original, data):
     content = original.read_bytes()
-    attempt(anywhere, content[: data.draw(st.integers(0, len(content) - 1))])
+    attempt(beside(original), content[: data.draw(st.integers(0, len(content) - 1))])
 
 
 @pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
-def test_a_file_with_bytes_overwritten_is_read_or_refused(anywhere, original, data):
+def test_a_file_with_bytes_overwritten_is_read_or_refused(beside, original, data):
     content = bytearray(original.read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(content) - 1))
         content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
-    attempt(anywhere, bytes(content))
+    attempt(beside(original), bytes(content))
 
 
 ODD = st.sampled_from(
@@ -379,15 +397,27 @@ ODD = st.sampled_from(
 )
 
 
-@pytest.mark.parametrize("original", [path for path in FILES if path.suffix != ".xml"], ids=lambda path: path.name)
+@pytest.mark.parametrize("original", TREES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
-def test_a_file_with_values_of_other_types_is_read_or_refused(anywhere, original, data):
+def test_a_file_with_values_of_other_types_is_read_or_refused(beside, original, data):
     """Any one value, list or mapping of the tree becomes something else."""
     tree = parse(original.read_text())
     parent, key = data.draw(st.sampled_from(list(places(tree))))
     parent[key] = parse(data.draw(ODD))
-    attempt(anywhere, flow(tree).encode())
+    attempt(beside(original), flow(tree).encode())
+
+
+@pytest.mark.parametrize("original", WORDS, ids=lambda path: path.name)
+@FUZZ
+@given(data=st.data())
+def test_a_file_with_other_words_is_read_or_refused(beside, original, data):
+    """Any one word becomes something else, is said twice, or is missing."""
+    text = original.read_text()
+    words = list(re.finditer(r"[-+.\w]+|[^-+.\w\s]", text))
+    at = data.draw(st.sampled_from(words))
+    word = data.draw(ODD | st.sampled_from(["", f"{at[0]} {at[0]}", "\n", "None", "b'x'", "(", "'", "<a>", "#"]))
+    attempt(beside(original), (text[: at.start()] + word + text[at.end() :]).encode())
 
 
 def places(tree):

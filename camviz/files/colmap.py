@@ -181,11 +181,14 @@ def _placed(cameras: dict[int, Camera], images: Iterable[Image]) -> dict[str, Ca
 
 
 def _inverted(poses: np.ndarray, names: list[str]) -> Iterable[RigidTransform]:
+    wild = np.flatnonzero(~(np.abs(poses) <= LARGEST).all(axis=1))
+    if len(wild):
+        raise CalibrationError(f"{shown(names[wild[0]])}: expected a pose of finite numbers below {LARGEST:g}")
     lengths = np.linalg.norm(poses[:, :4], axis=1)
-    bad = np.flatnonzero(~(np.abs(lengths - 1) < 1e-3) | ~(np.abs(poses) <= LARGEST).all(axis=1))
+    bad = np.flatnonzero(np.abs(lengths - 1) > 1e-3)
     if len(bad):
         name, length = shown(names[bad[0]]), lengths[bad[0]]
-        raise CalibrationError(f"{name}: expected a quaternion of length 1 and a finite place, got length {length:g}")
+        raise CalibrationError(f"{name}: expected a quaternion of length 1, got length {length:g}")
     rotations = Rotation.from_quat(poses[:, :4], scalar_first=True)
     return RigidTransform.from_components(poses[:, 4:], rotations).inv()
 

@@ -33,7 +33,9 @@ def write(calibration: Calibration, path: Path) -> bytes:
     refuse_own_world(calibration, TITLE)
     count = len(calibration.cameras)
     if count > 2:
-        raise CalibrationError(f"{TITLE} holds one camera or a pair, this calibration has {count} (--camera NAME)")
+        raise CalibrationError(
+            f"{TITLE} holds one camera or a pair, this calibration has {count}: choose one (--camera NAME)"
+        )
     values = _pair(calibration) if count == 2 else _one(calibration)
     return _stored(values, path.suffix.lower())
 

@@ -21,7 +21,6 @@ from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
 FIRST_PIXEL = 0.5
 OPENGL = RigidTransform.from_rotation(Rotation.from_matrix(np.diag([1.0, -1, -1])))  # y up, z backward
 MODELS = [
-    Model("PINHOLE", Perspective, "fx fy cx cy"),
     Model("OPENCV", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3"),
     Model("OPENCV_FISHEYE", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"),
 ]
