@@ -295,6 +295,10 @@ def test_entities_in_xml_are_not_unfolded(tmp_path, text):
         "".join(" " * n + "a:\n" for n in range(500)),
         "- " * 100_000,
         "<opencv_storage>" + "<a>" * 200_000,
+        "<document>" + "<a>" * 200_000,
+        "{'lensmodel': " + "[" * 200_000,
+        "{'lensmodel': " + "(" * 100_000 + ")" * 100_000 + "}",
+        "{'lensmodel': " * 100_000,
     ],
 )
 def test_deep_nesting_stays_shallow(tmp_path, text):
@@ -312,8 +316,17 @@ def test_deep_nesting_stays_shallow(tmp_path, text):
         "9" * (MAX_BYTES - 10),
         "# " + "x" * (MAX_BYTES - 10),
         '"' + "\\n" * (MAX_BYTES // 2 - 10),
+        "{'lensmodel': [" + "1," * (MAX_BYTES // 2 - 20) + "]}",
+        "{'lensmodel': '" + "\\x" * (MAX_BYTES // 2 - 20),
+        "#\r\n" * (MAX_BYTES // 3 - 10) + "x",
+        "1 PINHOLE 640 480 " + "1 " * (MAX_BYTES // 2 - 40),
+        "1 PINHOLE 640 480 1 1 1 1" + "\n" * (MAX_BYTES - 40),
+        "P0: " + "1 " * (MAX_BYTES // 2 - 40),
+        "P0: 1" + "\n" * (MAX_BYTES - 40),
+        "<document>" + "<a b='1'/>" * (MAX_BYTES // 10 - 20) + "</document>",
     ],
-    ids=["list", "xml words", "xml elements", "word", "plain text", "number", "comment", "open string"],
+    ids=["list", "xml words", "xml elements", "word", "plain text", "number", "comment", "open string"]
+    + ["literal", "open literal", "comments", "colmap line", "colmap lines", "kitti line", "kitti lines", "attributes"],
 )
 def test_the_largest_allowed_file_is_refused_in_seconds(tmp_path, text):
     refusal(tmp_path, text)
@@ -321,6 +334,36 @@ def test_the_largest_allowed_file_is_refused_in_seconds(tmp_path, text):
 
 def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):
     assert "\x1b" not in refusal(tmp_path, 'distortion_model: "\\e[31m\\n\\n red"\nK: [1]\nwidth: 1\nheight: 1')
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "what"),
+    [
+        ("cameras.bin", b"\xff" * 8, "announces 18,446,744,073,709,551,615"),
+        ("cameras.bin", b"\1" + b"\0" * 7, "ends before all"),
+        ("cameras.bin", b"\0" * 8, "at least one camera"),
+        ("cameras.bin", b"\1" + b"\0" * 11 + b"\x0a\0\0\0" + b"\0" * 16, "THIN_PRISM_FISHEYE"),
+        ("images.bin", b"\xff" * 8, "announces 18,446,744,073,709,551,615"),
+        ("images.bin", b"\1" + b"\0" * 7 + b"\0" * 64 + b"x" * 2000, "name of an image"),
+        ("images.bin", b"\1" + b"\0" * 7 + b"\0" * 64 + b"a\0" + b"\xff" * 8, "ends before all"),
+    ],
+)
+def test_a_binary_file_is_not_believed_when_it_announces_much(tmp_path, name, content, what):
+    for path in (DATA / "colmap_bin").iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / name).write_bytes(content)
+    assert what in complaint(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "value",
+    ["__import__('os').system('touch {mark}')", "open('{mark}', 'w')", "[x for x in ()]", "1 if 1 else 2", "f''"],
+)
+def test_a_literal_starts_nothing(tmp_path, value):
+    mark = tmp_path / "mark"
+    text = (DATA / "mrcal_stereographic.cameramodel").read_text().replace("[640, 480]", value.format(mark=mark))
+    assert "expected a" in refusal(tmp_path, text)
+    assert not mark.exists()
 
 
 def attempt(path, content):

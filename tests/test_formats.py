@@ -245,7 +245,7 @@ def test_metashapes_cameras_stand_where_their_transforms_put_them():
         ("colmap/cameras.txt", "PINHOLE 640 480", "THIN_PRISM_FISHEYE 640 480", "camera model THIN_PRISM_FISHEYE"),
         ("colmap/cameras.txt", "7 PINHOLE 640 480 500 510 320 240", "7 PINHOLE 640 480 5", r"line 6.params: expected"),
         ("colmap/cameras.txt", "3 OPENCV", "1 OPENCV", "line 5: the camera 1 appears twice"),
-        ("colmap/images.txt", "2 1 0 0 0 0.5", "2 1 1 0 0 0.5", "quaternion of length 1 .* got length 1.41"),
+        ("colmap/images.txt", "2 1 0 0 0 0.5", "2 1 1 0 0 0.5", "quaternion of length 1, got length 1.41"),
         ("colmap/images.txt", "0 4 1 P11", "0 4 9 P11", "got camera 9"),
         ("colmap/images.txt", "P1180142", "P1180141", "different names"),
         ("mrcal.cameramodel", "-0.01266096516, ", "", r"intrinsics: expected 12 numbers .* got 11"),

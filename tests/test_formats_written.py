@@ -390,6 +390,12 @@ def test_convert_does_not_overwrite_what_it_reads(tmp_path, capsys):
     assert path.read_bytes() == (DATA / "opencv_mono.json").read_bytes()
 
 
+def test_the_documentation_lists_every_format():
+    page = (Path(__file__).parents[1] / "docs" / "formats.md").read_text()
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `") and "--to" not in line]
+    assert [word.strip(" `,") for row in rows for word in row.split()] == list(FORMATS)
+
+
 def test_the_help_lists_every_format():
     listed = [line.split()[0] for line in command.FORMATS.split("examples:")[0].splitlines()[1:] if line.strip()]
     assert listed == list(FORMATS)

@@ -15,12 +15,13 @@ from camviz.files import colmap_binary
 from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.section import LARGEST, LARGEST_SIDE, Section
-from camviz.files.text import MAX_BYTES, open_bounded, read_text
+from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_text
 from camviz.files.trees import scalar, shown
 from camviz.lenses import BrownConrady, Equidistant, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
 
 FIRST_PIXEL = 0.5  # "the upper left corner is (0, 0), the centre of the first pixel (0.5, 0.5)"
 MAX_IMAGES = 100_000
+MOST_WORDS = 32  # more than any line of cameras.txt has
 MODELS = {  # by COLMAP's number for it, in COLMAP's order of parameters (colmap/sensor/models.h)
     0: Model("SIMPLE_PINHOLE", Perspective, "f cx cy"),
     1: Model("PINHOLE", Perspective, "fx fy cx cy"),
@@ -40,7 +41,7 @@ MODELS = {  # by COLMAP's number for it, in COLMAP's order of parameters (colmap
 WRITTEN = [model for number, model in MODELS.items() if number < 14] + [MODELS[16]]
 UNNAMED = {10: "THIN_PRISM_FISHEYE", 11: "RAD_TAN_THIN_PRISM_FISHEYE", 12: "SIMPLE_DIVISION", 13: "DIVISION"}
 UNNAMED |= {17: "EQUIRECTANGULAR"}
-_CAMERA_LINE = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\r?\n)*[ \t]*\d+[ \t]+[A-Z][A-Z0-9_]{2,40}[ \t]+\d+[ \t]+\d+[ \t]")
+_CAMERA_LINE = re.compile(r"(?:[ \t]*(?:#[^\r\n]*)?\r?\n)*[ \t]*\d+[ \t]+[A-Z][A-Z0-9_]{2,40}[ \t]+\d+[ \t]+\d+[ \t]")
 _FILES = ("cameras.txt", "images.txt", "cameras.bin", "images.bin")
 
 Image = tuple[str, int, list[float]]  # name, number of its camera, quaternion w x y z and translation
@@ -58,7 +59,7 @@ def model_of(path: Path) -> Path | None:
 
 def is_cameras(text: str) -> bool:
     """True for the text of a cameras.txt: a number, a camera model, a width, a height."""
-    return bool(_CAMERA_LINE.match(text))
+    return bool(_CAMERA_LINE.match(text[:HEAD]))
 
 
 def read(cameras_path: Path, path: Path) -> Calibration:
@@ -97,8 +98,10 @@ def _unknown(name: str) -> CalibrationError:
 def _cameras(text: str) -> dict[int, Camera]:
     """Lines of CAMERA_ID MODEL WIDTH HEIGHT PARAMS…"""
     cameras: dict[int, Camera] = {}
+    if text.count("\n") > MAX_IMAGES:
+        raise CalibrationError(f"expected at most {MAX_IMAGES:,} lines, got {text.count(chr(10)):,}")
     for number, line in enumerate(text.splitlines(), 1):
-        words = line.split()
+        words = line.split(maxsplit=MOST_WORDS)
         if not words or words[0].startswith("#"):
             continue
         where = f"line {number}"
@@ -131,10 +134,8 @@ def _images(path: Path) -> Iterator[Image]:
         while line := file.readline(MAX_BYTES):
             number += 1
             if skip or not line.strip() or line.lstrip().startswith(b"#"):
-                skip = False
+                skip = skip and len(line) == MAX_BYTES and not line.endswith(b"\n")
                 continue
-            if len(line) == MAX_BYTES:
-                raise CalibrationError(f"line {number}: expected an image or its points, the line does not end")
             yield _image(line, f"line {number}")
             skip = True
 

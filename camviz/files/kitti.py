@@ -19,6 +19,7 @@ from camviz.lenses import BrownConrady, Perspective
 RECTIFIED = [Model("P", Perspective, "fx fy cx cy skew")]
 RAW = [Model("K and D", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3")]
 MAX_LINES = 1000
+MOST_WORDS = 64  # more than any line has
 _START = re.compile(r"^(?:P[0-9]|P_rect_[0-9]{2}|K_[0-9]{2}):[ \t]+[-+.0-9]", re.MULTILINE)
 
 
@@ -37,11 +38,10 @@ def read(text: str, path: Path, size: tuple[int, int] | None) -> Calibration:
 def _section(text: str) -> Section:
     """Lines of a name and its values."""
     values: dict[str, list[object]] = {}
-    lines = text.splitlines()
-    if len(lines) > MAX_LINES:
-        raise CalibrationError(f"expected at most {MAX_LINES} lines, got {len(lines)}")
-    for number, line in enumerate(lines, 1):
-        name, *words = line.split() or [""]
+    if text.count("\n") > MAX_LINES:
+        raise CalibrationError(f"expected at most {MAX_LINES} lines, got {text.count(chr(10)):,}")
+    for number, line in enumerate(text.splitlines(), 1):
+        name, *words = line.split(maxsplit=MOST_WORDS) or [""]
         if name.rstrip(":") in values:
             raise CalibrationError(f"line {number}: {shown(name)} appears twice")
         if name:

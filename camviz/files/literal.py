@@ -7,7 +7,7 @@ import re
 from camviz.files.calibration import CalibrationError
 from camviz.files.trees import Tree, scalar, shown
 
-_QUOTED = r"""[bBuUrR]{0,2}(?:'[^'\\\n]*(?:\\.[^'\\\n]*)*'|"[^"\\\n]*(?:\\.[^"\\\n]*)*")"""
+_QUOTED = r"""[bBuUrR]{0,2}(?:'[^'\\\n]*+(?:\\.[^'\\\n]*+)*+'|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+")"""
 _TOKEN = re.compile(
     rf"(?P<space>[ \t\r\n\f]+|\#[^\n]*)|(?P<text>{_QUOTED})|(?P<open>[\[({{])|(?P<close>[\])}}])"
     r"|(?P<mark>[,:])|(?P<word>[-+.\w]+)"

@@ -12,6 +12,7 @@ from camviz.files.models import Model, expressed, model_named
 from camviz.files.output import only_camera
 from camviz.files.section import Section
 from camviz.files.sizes import pair_of_sides
+from camviz.files.text import HEAD
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, Equirectangular, Perspective, Stereographic
 
@@ -31,8 +32,8 @@ _KEY = re.compile(r"""(?:\s|#[^\n]*\n)*\{(?:\s|#[^\n]*\n)*['"](?:lensmodel|[a-z_
 
 def is_model(text: str, path: Path) -> bool:
     """True for a .cameramodel, and for a literal that names a lens model."""
-    named = path.suffix == ".cameramodel" or re.search(r"""['"]lensmodel['"]\s*:""", text[:65536])
-    return bool(named and _KEY.match(text))
+    named = path.suffix == ".cameramodel" or re.search(r"""['"]lensmodel['"]\s*:""", text[:HEAD])
+    return bool(named and _KEY.match(text[:HEAD]))
 
 
 def read(section: Section, path: Path) -> Calibration:

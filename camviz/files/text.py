@@ -11,6 +11,7 @@ from typing import BinaryIO
 from camviz.files.calibration import CalibrationError
 
 MAX_BYTES = 16 * 2**20
+HEAD = 2**16  # characters that must tell which format this is
 
 _SIGNATURES = {
     b"\x89PNG": "a PNG picture",
