@@ -166,6 +166,12 @@ def test_show_says_what_is_wrong_with_the_renderer_asked_for(capsys, room, page,
     assert "CAMVIZ_RENDERER: 'nonsense' is no renderer; set it to solid or wire" in said
 
 
+@pytest.mark.parametrize(("free", "status"), [(3 * 10**8, "warn"), (3 * 10**9, "ok"), (None, "ok")])
+def test_the_doctor_warns_where_a_lesson_has_no_room(monkeypatch, free, status):
+    monkeypatch.setattr(doctor, "_free_memory", lambda: free)
+    assert doctor.memory().status == status
+
+
 def test_show_names_the_page_after_the_file_or_as_told(room, page, capsys):
     assert main(["show", str(DATA / "opencv_stereo.xml")]) == 0
     assert main(["show", str(DATA / "opencv_stereo.xml"), "-o", "pair.html"]) == 0

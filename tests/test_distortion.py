@@ -123,6 +123,8 @@ def test_a_pole_is_a_root_of_the_denominator_and_a_near_pole_almost_one():
     assert weakest_denominator(near_pole, 3) == pytest.approx((sqrt(1 / 1.01), 1 - 1 / 1.01))
     assert weakest_denominator(near_pole, 0.5) == pytest.approx((0.5, 1 - 0.5 + 1.01 / 16))
     assert weakest_denominator(Perspective(), 3) == (0, 1)
+    # D = 1 - 8 s + 20 s² is least at s = 0.2, close to the axis: 0.2 there
+    assert weakest_denominator(BrownConrady(k4=-8, k5=20), 3) == pytest.approx((sqrt(0.2), 0.2))
 
 
 def test_the_edge_of_the_field_is_the_fold_or_the_published_limit():

@@ -7,7 +7,7 @@ import pytest
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.scenes import render, textured_scene, to_display
-from camviz.views.distortion import DistortionView
+from camviz.views.distortion import DistortionView, _grid_lines
 
 
 def test_the_fold_of_a_plain_barrel_is_named_where_it_is():
@@ -41,6 +41,14 @@ def test_a_fold_behind_the_camera_is_given_by_its_angle():
     view = DistortionView.of(Camera(Intrinsics(640, 480, 290, 290, 319.5, 239.5), KannalaBrandt(0, -0.015)))
     assert view.numbers()["fold"] == f"{np.rad2deg((1 / 0.075) ** 0.25):.1f}° off axis"
     assert view.numbers()["image corner"].endswith("°")
+
+
+@pytest.mark.parametrize("size", [(640, 480), (480, 640), (1000, 300)])
+def test_the_straight_lines_reach_beyond_every_corner_of_the_undistorted_picture(size):
+    intrinsics = Intrinsics.from_fov(*size, 80)
+    lines = intrinsics.to_pixels(_grid_lines(intrinsics))
+    assert (lines.reshape(-1, 2).min(axis=0) < -0.5).all()
+    assert (lines.reshape(-1, 2).max(axis=0) > np.array(size) - 0.5).all()
 
 
 def test_a_corner_moves_as_far_as_opencv_says():

@@ -195,6 +195,17 @@ def test_what_is_not_a_rotation_says_by_how_much(tmp_path, R, what):
     assert re.search(what, refusal(tmp_path, PAIR + f"R: {R}\nT: [-0.1, 0, 0]\n"))
 
 
+@pytest.mark.parametrize(("off", "taken"), [(4e-4, True), (1e-2, False)])
+def test_a_rotation_written_with_three_digits_is_one_and_with_one_digit_is_none(tmp_path, off, taken):
+    path = tmp_path / "camera.yml"
+    path.write_text(PAIR + f"R: [[{1 + off}, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.1, 0, 0]\n")
+    if taken:
+        rotation = camviz.load(path).cameras["right"].world_from_cam.rotation.as_matrix()
+        np.testing.assert_allclose(rotation, np.eye(3), atol=1e-12)
+    else:
+        assert "R: expected a rotation" in complaint(path)
+
+
 def test_half_a_pose_is_not_completed(tmp_path):
     assert "T: expected" in refusal(tmp_path, PAIR + "R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n")
     assert "R: expected" in refusal(tmp_path, PAIR + "T: [-0.1, 0, 0]\n")
