@@ -161,7 +161,7 @@ class DistortionView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def image(self, *, draft: bool) -> np.ndarray:
-        small = Camera(self.intrinsics.within(320 if draft else 480), self.camera.lens)
+        small = Camera(self.intrinsics.within(256 if draft else 480), self.camera.lens)
         if self.photograph is None:
             picture = snapshot(_scene(), small)
         else:

@@ -126,7 +126,7 @@ class EpipolarView(TwoCameras):
         """What the two cameras see, as pixels and as JPEG."""
         if self.photographs is None:
             cameras = {"left": self.left, "right": self.right}
-            taken = {name: garden.taken(camera, 320 if draft else 480) for name, camera in cameras.items()}
+            taken = {name: garden.taken(camera, 256 if draft else 480) for name, camera in cameras.items()}
         else:
             taken = {
                 name: (image, jpeg(image)) for name, image in zip(("left", "right"), self.photographs, strict=True)

@@ -136,7 +136,7 @@ class FrustumView(View):
     def _image(self, draft: bool) -> np.ndarray:
         k, pose = self.camera.intrinsics, self.camera.world_from_cam
         return _taken(
-            k.within(320 if draft else 480), self.lens, tuple(pose.translation), tuple(pose.rotation.as_quat())
+            k.within(256 if draft else 480), self.lens, tuple(pose.translation), tuple(pose.rotation.as_quat())
         )
 
     def _world_panel(self, image: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
