@@ -464,8 +464,8 @@ def test_a_package_is_held_against_its_range():
 
 
 def test_the_requirements_are_those_of_the_project():
-    listed = {(extra, requirement.name) for extra, requirement in doctor.requirements()}
-    assert {("", "numpy"), ("", "PyYAML"), ("lab", "jupyterlab")} <= listed
+    listed = {(extra, requirement.name.casefold()) for extra, requirement in doctor.requirements()}
+    assert {("", "numpy"), ("", "pyyaml"), ("lab", "jupyterlab")} <= listed
     assert "pytest" not in {name for _, name in listed}
 
 

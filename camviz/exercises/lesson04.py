@@ -83,17 +83,21 @@ def _chain_cases(rng: np.random.Generator) -> Iterator[Arguments]:
 
 
 def _is_rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    yield (_rotation(rng),)
-    yield (_rotation(rng) @ np.diag([1.0, -1.0, 1.0]),)  # a mirror
-    yield (-_rotation(rng),)
-    yield (float(rng.uniform(1.2, 3.0)) * _rotation(rng),)
     stretch = float(rng.uniform(1.2, 3.0))
-    yield (_rotation(rng) @ np.diag([stretch, 1 / stretch, 1.0]),)  # keeps volumes, not lengths
-    yield (np.eye(3)[[2, 0, 1]],)
-    yield (np.eye(3)[[1, 0, 2]],)
-    yield (_rotation(rng) + rng.uniform(-1e-12, 1e-12, (3, 3)),)
-    yield (_rotation(rng) + rng.uniform(0.02, 0.05, (3, 3)),)
-    yield (np.zeros((3, 3)),)
+    matrices = [
+        _rotation(rng),
+        _rotation(rng) @ np.diag([1.0, -1.0, 1.0]),  # a mirror
+        -_rotation(rng),
+        float(rng.uniform(1.2, 3.0)) * _rotation(rng),
+        _rotation(rng) @ np.diag([stretch, 1 / stretch, 1.0]),  # keeps volumes, not lengths
+        np.eye(3)[[2, 0, 1]],
+        np.eye(3)[[1, 0, 2]],
+        _rotation(rng) + rng.uniform(-1e-12, 1e-12, (3, 3)),
+        _rotation(rng) + rng.uniform(0.02, 0.05, (3, 3)),
+        np.zeros((3, 3)),
+    ]
+    for i in rng.permutation(len(matrices)):  # in no order that could be learnt
+        yield (matrices[i],)
 
 
 def _invert_cases(rng: np.random.Generator) -> Iterator[Arguments]:
