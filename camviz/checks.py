@@ -118,8 +118,9 @@ def _complaint(exercise: Exercise, function: Function, trials: Sequence[Trial], 
         or _usual_change(exercise, trials)
         or _factor(exercise, trials)
         or _misplaced_nan(exercise, wrong)
-        or _fits_only_shown(exercise, function)
-        or _only_for_some(exercise, trials) + _difference(exercise, wrong[0])
+        or _in_some_shapes(exercise, trials, wrong[0])
+        or _fits_only_shown(exercise, function, trials)
+        or _difference(exercise, wrong[0])
     )
 
 
@@ -179,7 +180,7 @@ def _factor(exercise: Exercise, trials: Sequence[Trial]) -> str:
     """Speaks when every answer is the right one times the same number."""
     actual, expected = _joined(t.actual for t in trials), _joined(t.expected for t in trials)
     usable = np.isfinite(actual) & np.isfinite(expected) & (np.abs(expected) > 1e-6)
-    if usable.sum() < 3 or not np.array_equal(np.isnan(actual), np.isnan(expected)):
+    if usable.sum() < 3 or not exercise.close(actual, expected)[~np.isfinite(actual) | ~np.isfinite(expected)].all():
         return ""
     ratios = actual[usable] / expected[usable]
     factor = float(np.median(ratios))
@@ -187,6 +188,8 @@ def _factor(exercise: Exercise, trials: Sequence[Trial]) -> str:
         return ""
     if abs(factor - 1) < 1e-5:
         return f"Close, but not to {exercise.tolerance:g}: is something rounded, or an iteration stopped too early?"
+    if abs(factor - 1) < 5e-3:
+        return f"Every answer is the right one times {factor:.6g}: close, but is a constant rounded in it?"
     return f"Every answer is the right one times {factor:.6g}: a constant factor is missing, or counted twice."
 
 
@@ -200,8 +203,10 @@ def _misplaced_nan(exercise: Exercise, wrong: Sequence[Trial]) -> str:
     return ""
 
 
-def _fits_only_shown(exercise: Exercise, function: Function) -> str:
-    if exercise.shown and all(run(exercise, function, arguments).fits for arguments in exercise.shown):
+def _fits_only_shown(exercise: Exercise, function: Function, trials: Sequence[Trial]) -> str:
+    if any(trial.fits for trial in trials) or not exercise.shown:
+        return ""
+    if all(run(exercise, function, arguments).fits for arguments in exercise.shown):
         return "It fits the numbers shown in the lesson, but not others: are some of them written into your function?"
     return ""
 
@@ -214,6 +219,11 @@ def _only_for_some(exercise: Exercise, trials: Sequence[Trial]) -> str:
     if not right or right & wrong:
         return ""
     return f"It is right when `{exercise.parameters[0]}` has shape {_listed(right)}, but not for {_listed(wrong)}. "
+
+
+def _in_some_shapes(exercise: Exercise, trials: Sequence[Trial], wrong: Trial) -> str:
+    shapes = _only_for_some(exercise, trials)
+    return shapes and shapes + _difference(exercise, wrong)
 
 
 def _difference(exercise: Exercise, trial: Trial) -> str:

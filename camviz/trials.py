@@ -207,7 +207,7 @@ def _mutated(exercise: Exercise, before: Arguments, after: Arguments) -> str:
 
 
 def _short(value: Any) -> str:
-    if isinstance(value, np.ndarray) and value.size > 4:
+    if isinstance(value, np.ndarray) and value.size > 9:
         return f"<array of shape {value.shape}>"
     if isinstance(value, np.ndarray):
         return str(np.round(value, 6).tolist())

@@ -269,3 +269,25 @@ def test_the_fold_of_k1_minus_0_3_is_the_published_one_and_the_inverse_ends_ther
     r = np.linspace(0, 0.99 * fold, 50)
     np.testing.assert_allclose(inverse(r - 0.3 * r**3, -0.3), r, atol=1e-7)
     assert np.isnan(inverse(np.array([0.71, 2.0, 9.0]), -0.3)).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "function", "word"),
+    [
+        ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 <= 0 else np.inf, "gave -inf"),
+        ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 < 0 else 7.0, "gave 7, where inf"),
+        ("05.distort", lambda xy, k1, k2, k3: exercise("05.distort").reference(xy, k1, k2, 0), "k3"),
+        ("01.best_hole", lambda focal_mm, wavelength_nm: 1.56 * np.sqrt(focal_mm * wavelength_nm * 1e-6), "rounded"),
+    ],
+)
+def test_an_honest_near_miss_is_not_called_rounding_or_written_in_numbers(name, function, word):
+    message = judge(exercise(name), function, np.random.default_rng(5)).message
+    assert word in message
+    assert "shown in the lesson" not in message
+    assert "stopped too early" not in message
+
+
+def test_a_map_of_single_precision_is_good_enough_for_remap_and_one_half_a_pixel_off_is_not():
+    reference = exercise("05.undistort_map").reference
+    assert judge(exercise("05.undistort_map"), lambda *a: np.float32(reference(*a)))
+    assert not judge(exercise("05.undistort_map"), lambda *a: reference(*a) + 0.5)

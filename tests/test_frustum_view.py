@@ -145,3 +145,10 @@ def test_every_control_changes_the_picture_at_both_ends(name):
     ends = control.choices or ((control.low, control.high) if control.low is not None else (True, False))
     pictures = [FrustumView().but(**{name: end}).figure(draft=True) for end in ends]
     assert len({(picture.svg(), *picture.photographs.values()) for picture in pictures}) == len(ends)
+
+
+@pytest.mark.parametrize("degrees", [-5.0, 0.0, 180.0, 500.0, 1000.0])
+def test_a_field_of_view_that_no_pinhole_has_is_answered_by_its_name(degrees):
+    """tan 250° is positive, so 500° would be drawn as if it were 140°."""
+    with pytest.raises(ValueError, match="field of view, must lie between 0 and 180"):
+        FrustumView(hfov_deg=degrees)

@@ -115,6 +115,14 @@ PROJECT = Exercise(
             "The principal point is added before the division. It is a place in the image, in pixels: add it last.",
         ),
         Misconception(
+            lambda points, f, cx, cy: f * points[..., :2] / points[..., 2:] - (cx, cy),
+            "The principal point is subtracted. That is the way back, from a pixel to its ray; here it is added.",
+        ),
+        Misconception(
+            lambda points, f, cx, cy: f * points[..., :2] / points[..., 2:] + (cy, cx),
+            "cx and cy have changed places: cx goes with u, which counts columns, and cy with v.",
+        ),
+        Misconception(
             lambda points, f, cx, cy: points[..., :2] / (f * points[..., 2:]) + (cx, cy),
             "You divide by f. A deeper box makes a larger picture: f multiplies.",
         ),
@@ -247,7 +255,7 @@ BEST_HOLE = Exercise(
         ),
         Misconception(
             lambda focal_mm, wavelength_nm: np.sqrt(2.44 * wavelength_nm * focal_mm),
-            "This mixes nanometres with millimetres: 550 nm are 0.00055 mm.",
+            "This is 1000 times too large. A nanometre is 10⁻⁶ mm, so 550 nm are 0.00055 mm; and the answer is in mm.",
         ),
         Misconception(
             lambda focal_mm, wavelength_nm: np.sqrt(2.44 * wavelength_nm * 1e-9 * focal_mm),
@@ -256,6 +264,10 @@ BEST_HOLE = Exercise(
         Misconception(
             lambda focal_mm, wavelength_nm: np.sqrt(1.22 * wavelength_nm * 1e-6 * focal_mm),
             "1.22 λ f / d is the *radius* of the Airy disc. d is a diameter: compare it with 2.44 λ f / d.",
+        ),
+        Misconception(
+            lambda focal_mm, wavelength_nm: 1.9 * np.sqrt(wavelength_nm * 1e-6 * focal_mm),
+            "This is Rayleigh's constant, 1.9, for another notion of sharpness. Here the hole equals its Airy disc.",
         ),
         Misconception(
             lambda focal_mm, wavelength_nm: 2 * np.sqrt(wavelength_nm * 1e-6 * focal_mm),

@@ -83,8 +83,14 @@ def _chain_cases(rng: np.random.Generator) -> Iterator[Arguments]:
 
 
 def _is_rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    matrices = _rotations_and_others(rng)
+    for index in rng.permutation(len(matrices)):
+        yield (matrices[index],)
+
+
+def _rotations_and_others(rng: np.random.Generator) -> list[Array]:
     stretch = float(rng.uniform(1.2, 3.0))
-    matrices = [
+    return [
         _rotation(rng),
         _rotation(rng) @ np.diag([1.0, -1.0, 1.0]),  # a mirror
         -_rotation(rng),
@@ -96,8 +102,6 @@ def _is_rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         _rotation(rng) + rng.uniform(0.02, 0.05, (3, 3)),
         np.zeros((3, 3)),
     ]
-    for i in rng.permutation(len(matrices)):  # in no order that could be learnt
-        yield (matrices[i],)
 
 
 def _invert_cases(rng: np.random.Generator) -> Iterator[Arguments]:
@@ -168,6 +172,9 @@ CENTRE = Exercise(
         Misconception(
             lambda R, t: R.T @ t, "Only the sign is missing: R C + t = 0 has C = *minus* Rᵀ t."
         ),
+        Misconception(
+            lambda R, t: R @ t, "This is R t. Solve R C + t = 0 for C: the sign changes, and R goes to the other side."
+        ),
     ),
 )  # fmt: skip
 
@@ -229,6 +236,10 @@ IS_ROTATION = Exercise(
             lambda M: bool(abs(abs(np.linalg.det(M)) - 1) < TOLERANCE),
             "A determinant of ±1 says that *volumes* are kept. A mirror passes, and so does a stretch along x with a "
             "squeeze along y.",
+        ),
+        Misconception(
+            lambda M: bool(np.array_equal(M.T @ M, np.eye(3)) and np.linalg.det(M) == 1),
+            "`==` allows no rounding: nearly every rotation fails. Ask whether the difference is less than 1e-6.",
         ),
         Misconception(
             lambda M: not is_rotation(M), "Every answer is the opposite of the right one."

@@ -86,6 +86,18 @@ def _squared_radius_missed(xy: Array, k1: float, k2: float, k3: float) -> Array:
     return xy * (1 + k1 * r + k2 * r**2 + k3 * r**3)
 
 
+def _with_one_radius(xy: Array, k1: float, k2: float, k3: float) -> Array:
+    r2 = np.sum(xy**2)
+    return xy * (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3)
+
+
+def _map_about(offset: float, width: int, height: int, f: float, k1: float) -> Array:
+    """The map with the principal point misplaced by `offset` pixels, to the right and down."""
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    centre = np.array([(width - 1) / 2, (height - 1) / 2]) + offset
+    return f * distort((np.stack([u, v], axis=-1) - centre) / f, k1, 0, 0) + centre
+
+
 def _inverse_map(width: int, height: int, f: float, k1: float) -> Array:
     centre = np.array([(width - 1) / 2, (height - 1) / 2])
     u, v = np.meshgrid(np.arange(width), np.arange(height))
@@ -112,7 +124,7 @@ DISTORT = Exercise(
     name="05.distort",
     reference=distort,
     cases=_distort_cases,
-    shown=((np.array([0.5, 0.25]), -0.3, 0.1, 0.0),),
+    shown=((np.array([0.5, 0.25]), -0.3, 0.1, 0.02),),
     hints=(
         "Compute r² once, from both coordinates, and multiply *both* of them by the same factor.",
         "`r2 = np.sum(xy**2, axis=-1, keepdims=True)` keeps a last axis of length 1, so that `xy * (1 + k1 * r2 + …)` "
@@ -142,6 +154,11 @@ DISTORT = Exercise(
         Misconception(
             lambda xy, k1, k2, k3: xy * (1 + k1 * xy**2 + k2 * xy**4 + k3 * xy**6),
             "Each coordinate is bent by its own square. The radius belongs to the point: r² = x² + y².",
+        ),
+        Misconception(lambda xy, k1, k2, k3: distort(xy, k1, k2, 0.0), "The term k3 r⁶ is missing."),
+        Misconception(
+            lambda xy, k1, k2, k3: _with_one_radius(xy, k1, k2, k3),
+            "Your r² is the sum over *all* points. Each point has its own: sum over the last axis only.",
         ),
     ),
 )
@@ -206,6 +223,10 @@ FOLD = Exercise(
             "For k1 < 0 this is right. Without a fold every radius is allowed: the answer is `np.inf`, not NaN.",
         ),
         Misconception(
+            lambda k1: 1 / np.sqrt(-3 * k1) if k1 < 0 else 0.0,
+            "For k1 < 0 this is right. Without a fold every radius is allowed: the answer is `np.inf`, not 0.",
+        ),
+        Misconception(
             lambda k1: 2 / 3 / np.sqrt(-3 * k1) if k1 < 0 else np.inf,
             "This is r_d at the fold, how far the image reaches. The question is at which r that happens.",
         ),
@@ -243,6 +264,7 @@ UNDISTORT_MAP = Exercise(
     name="05.undistort_map",
     reference=undistort_map,
     cases=_map_cases,
+    tolerance=1e-5,  # of a pixel: float32, which `cv2.remap` wants, is good enough
     hints=(
         "For each pixel of the *new* image ask where its ray went in the photograph: that is the forward model.",
         "pixels → normalised: subtract the centre ((width − 1)/2, (height − 1)/2), divide by f; distort; multiply by f "
@@ -258,6 +280,14 @@ UNDISTORT_MAP = Exercise(
         Misconception(
             lambda width, height, f, k1: undistort_map(width, height, f, k1).transpose(1, 0, 2),
             "Rows and columns have changed places: an image array is indexed [v, u], so its shape is (height, width).",
+        ),
+        Misconception(
+            lambda width, height, f, k1: _map_about(0.5, width, height, f, k1),
+            "Half a pixel off: pixels count from 0 to width − 1, so that their middle is (width − 1)/2, not width/2.",
+        ),
+        Misconception(
+            lambda width, height, f, k1: undistort_map(width, height, f, -k1),
+            "The sign of k1 is flipped. That is a rough *inverse*; here the model runs forwards, as it is.",
         ),
     ),
 )

@@ -70,6 +70,11 @@ class FrustumView(View):
     lens: Lens = field(default_factory=Perspective)
     eye: Eye = Eye(target=(0.0, 0.3, 2.2), distance=8.0, yaw_deg=-38, pitch_deg=24)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 < self.hfov_deg < 180:
+            raise ValueError(f"hfov_deg, the field of view, must lie between 0 and 180 degrees, got {self.hfov_deg:g}")
+
     @classmethod
     def of(cls, camera: Camera, **state: Any) -> Self:
         """The view of a given camera's intrinsics and lens, put where the view begins."""

@@ -2,6 +2,8 @@
 // it tells the kernel what the reader wants and shows the picture that comes back.
 
 const SETTLE_MS = 40;   // idle time after which a draft is replaced by the fine picture
+const LATE_MS = 6000;   // silence of the kernel after which the reader is told
+const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
 
 function render({ model, el }) {
   const root = build(`<div class="camviz-explorer" data-busy="false" data-rendered="0">
@@ -11,7 +13,8 @@ function render({ model, el }) {
   hidesStill.textContent = model.get("still_hidden");
   el.replaceChildren(hidesStill, root);
 
-  const ask = asker(model, root);
+  const say = (words) => { error.hidden = !words; error.textContent = words; };
+  const ask = asker(model, root, () => say(LATE));
   const inputs = model.get("controls").map((control) => makeControl(control, (value, draft) => {
     ask({ values: { [control.name]: value } }, draft);
   }));
@@ -33,8 +36,7 @@ function render({ model, el }) {
     while (newest) {
       const frame = newest;
       newest = null;
-      error.hidden = !frame.error;
-      error.textContent = frame.error ? `This state could not be drawn. ${frame.error}` : "";
+      say(frame.error ? `This state could not be drawn. ${frame.error}` : "");
       await swap(picture, frame);
       root.dataset.rendered = String(Number(root.dataset.rendered) + 1);
     }
@@ -56,12 +58,13 @@ function render({ model, el }) {
 }
 
 // At most one request is under way; wishes that come meanwhile merge into the next one, so the latest wins.
-function asker(model, root) {
-  let id = Date.now() % 1e9, flying = null, wish = null, settle = null;
+function asker(model, root, late) {
+  let id = Date.now() % 1e9, flying = null, wish = null, settle = null, patience = null;
   const send = () => {
     flying = wish; wish = null;
     flying.id = ++id;
     root.dataset.busy = "true";
+    patience = setTimeout(late, LATE_MS);
     model.send(flying);
   };
   const ask = (part, draft) => {
@@ -83,6 +86,7 @@ function asker(model, root) {
   ask.answered = (frame) => {
     if (flying && frame.answers !== flying.id) return;
     flying = null;
+    clearTimeout(patience);
     if (wish) return send();
     if (frame.draft) settle = setTimeout(() => ask({}, false), SETTLE_MS);
   };
@@ -176,19 +180,22 @@ function makeSlider({ label, low, high, step }, id, element, changed) {
   const range = build(`<input type="range" id="${id}" min="${low}" max="${high}" step="${step}">`);
   const number = build(`<input type="number" step="${step}" aria-label="number">`);
   number.setAttribute("aria-label", `${label}, as a number`);
-  range.addEventListener("input", () => { number.value = range.value; changed(range.valueAsNumber, true); });
-  const typed = () => {
-    if (Number.isNaN(number.valueAsNumber)) return;
-    range.value = number.value;
-    changed(number.valueAsNumber, false);
-  };
-  number.addEventListener("change", typed);
-  number.addEventListener("keydown", (event) => { if (event.key === "Enter") typed(); });   // inside JupyterLab Enter sends no change
-  element.append(range, number);
   const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+  const written = (value) => Number(value.toFixed(decimals + 2));
+  let shown = low;
+  const commit = () => {
+    if (Number.isNaN(number.valueAsNumber)) return void (number.value = written(shown));
+    if (number.valueAsNumber === written(shown)) return;
+    range.value = number.value;
+    changed(shown = number.valueAsNumber, false);
+  };
+  range.addEventListener("input", () => { number.value = range.value; changed(shown = range.valueAsNumber, true); });
+  number.addEventListener("change", commit);
+  number.addEventListener("keydown", (event) => { if (event.key === "Enter") commit(); });  // no change event in JupyterLab
+  element.append(range, number);
   return (value) => {
-    range.value = value;
-    if (document.activeElement !== number) number.value = Number(value.toFixed(decimals + 2));
+    range.value = shown = value;
+    if (document.activeElement !== number) number.value = written(value);
   };
 }
 

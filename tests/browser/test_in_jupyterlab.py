@@ -126,7 +126,7 @@ def test_questions_answer_every_choice(lesson) -> None:
 
 
 def test_a_visualizer_obeys_the_keyboard_alone(lesson) -> None:
-    """Tab reaches every control, arrows move it, typing a number does the same, Enter on Reset brings it back."""
+    """Tab reaches every control, arrows move it, a number and Enter do the same, Enter on Reset brings it back."""
     keys = lesson.page.keyboard
     for explorer in [one for one in explorers(lesson) if one.query_selector("input[type=range]")][:1]:
         explorer.scroll_into_view_if_needed()
