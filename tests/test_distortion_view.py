@@ -119,3 +119,10 @@ def test_the_description_states_the_state():
 def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
         DistortionView(**bad)
+
+
+def test_a_pole_is_named_where_a_rational_lens_has_one():
+    """1 + k4 r² is zero at r = 1/sqrt(-k4)."""
+    assert DistortionView(k1=0.0, k2=0.0, k4=-0.25).numbers()["fold"] == "none; pole 2.0000"
+    assert DistortionView(k1=0.0, k2=0.0, k4=-1.0).numbers()["corner moves"] == "beyond the pole"
+    assert DistortionView(k1=-0.3, k2=0.0, k4=0.0).numbers()["corner moves"] == "folded away"

@@ -42,7 +42,7 @@ def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None) -> C
     if colmap.is_cameras(text):
         return colmap.read(path, path)
     try:
-        return _read(text, path, size)
+        return _plausible(_read(text, path, size))
     except CalibrationError as error:
         raise CalibrationError(f"{path}: {error}") from error.__cause__
 
@@ -54,6 +54,16 @@ def _read(text: str, path: Path, size: tuple[int, int] | None) -> Calibration:
         return kitti.read(text, path, size)
     section = _mapping(parse(text))
     return _reader(section)(section, path, size)
+
+
+def _plausible(calibration: Calibration) -> Calibration:
+    """The calibration, unless a focal length is so far out that no drawing of it could mean anything."""
+    for name, camera in calibration.cameras.items():
+        for axis in ("fx", "fy"):
+            focal_length = getattr(camera.intrinsics, axis)
+            if not 1e-3 <= focal_length <= 1e9:
+                raise CalibrationError(f"{name}: expected {axis} from 0.001 to 1e9 pixels, got {focal_length:g}")
+    return calibration
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:

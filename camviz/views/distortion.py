@@ -82,11 +82,13 @@ class DistortionView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         corner = distortion.image_corner_radius(self.intrinsics)
+        pole = distortion.pole_radius(self.camera.lens)
+        lost = "beyond the pole" if pole <= corner else "folded away"
         moved, folds = self.moved(self.intrinsics.border(1)), isfinite(self._fold_angle)
         return {
             "image corner": f"r = {_with_angle(corner)}" if not self.lens else f"r = {corner:.4g}, {self._widest()}",
-            "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else "folded away",
-            "fold": self._fold_in_words() if folds else "none",
+            "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else lost,
+            "fold": self._fold_in_words() if folds else _none_but(pole),
             "farthest a ray lands": f"r = {np.hypot(*self._fold_rim(1)[0]):.4f}" if folds else "no limit",
         }
 
@@ -341,6 +343,10 @@ def _circle(samples: int) -> np.ndarray:
 
 def _on_plane(xy: np.ndarray) -> np.ndarray:
     return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
+
+
+def _none_but(pole: float) -> str:
+    return f"none; pole {pole:.4f}" if isfinite(pole) else "none"
 
 
 def _with_angle(r: float) -> str:
