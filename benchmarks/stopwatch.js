@@ -31,7 +31,7 @@ window.stopwatch = {
     const images = (records) => records.flatMap((r) => [...r.addedNodes]).flatMap((n) => (n.querySelectorAll ? [...n.querySelectorAll("img")] : []));
     return {
       change(i) {
-        const key = i % 80 < 40 ? "ArrowRight" : "ArrowLeft";
+        const key = i % 40 < 20 ? "ArrowRight" : "ArrowLeft";   // never as far as the end, where nothing would change
         handle.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
       },
       async shown() {

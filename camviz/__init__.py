@@ -13,14 +13,19 @@ _HOME = {
     "Camera": "camviz.cameras",
     "Intrinsics": "camviz.cameras",
     "Rig": "camviz.cameras",
+    "explore": "camviz.widgets",
     "load": "camviz.files",
     "look_at": "camviz.cameras",
 }
 
-__all__ = ["Calibration", "Camera", "Intrinsics", "Rig", "__version__", "load", "look_at"]
+_PARTS = ("cameras", "distortion", "lenses", "scenes", "twoview")
+
+__all__ = ["Calibration", "Camera", "Intrinsics", "Rig", "__version__", "explore", "load", "look_at", *_PARTS]
 
 
 def __getattr__(name: str) -> Any:
+    if name in _PARTS:
+        return import_module(f"camviz.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'camviz' has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

@@ -97,6 +97,11 @@ class Intrinsics:
         cx, cy = sx * self.cx + (sx - 1) / 2, sy * self.cy + (sy - 1) / 2
         return Intrinsics(width, height, sx * self.fx, sy * self.fy, cx, cy, sx * self.skew)
 
+    def within(self, side: int) -> Intrinsics:
+        """The same view on the grid of its aspect whose longer side has `side` pixels, and the shorter at least one."""
+        scale = side / max(self.width, self.height)
+        return self.resized(max(1, round(scale * self.width)), max(1, round(scale * self.height)))
+
     def cropped(self, x0: int, y0: int, width: int, height: int) -> Intrinsics:
         """The window whose first pixel was (x0, y0): only the principal point moves."""
         return replace(self, width=width, height=height, cx=self.cx - x0, cy=self.cy - y0)

@@ -10,11 +10,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import NamedTemporaryFile, TemporaryDirectory
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import camviz
-from camviz.working_copy import checkout_lessons, lay_out, lessons_source
+from camviz.working_copy import checkout_lessons, edition, lay_out, lessons_source
 
 if TYPE_CHECKING:
     from camviz.files import Calibration
@@ -31,6 +31,7 @@ examples:
   camviz doctor                              see what this machine can do, and how to mend it
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
+  camviz convert cam.yml model --to colmap   write the same camera for another program
   camviz teacher for-me                      write the lessons with solutions and timings into ./for-me
 
 exit status:
@@ -52,10 +53,41 @@ SHOW = """\
 Writes one HTML page that shows the cameras of a calibration: where they stand and what they see, how their lenses
 bend straight lines, and how their pictures are tied together. The page holds everything it needs and opens offline.
 
-Reads OpenCV FileStorage (.yml, .xml, .json; one camera or a pair), ROS CameraInfo (.yaml) and Kalibr camchains
-(.yaml). The file is only read: nothing in it is run, and it is not changed.
+Reads OpenCV FileStorage (one camera or a pair), ROS CameraInfo, Kalibr camchains, COLMAP models (their folder too),
+mrcal, nerfstudio, EuRoC, Basalt, KITTI, MATLAB (as JSON) and Metashape files; the content tells which it is. The file
+is only read: nothing in it is run, and it is not changed.
 """
 
+
+CONVERT = """\
+Writes a calibration for another program. Pixels, lens and poses are carried from one set of conventions to the other
+(half pixels, axes, order of coefficients, which way a transform goes), and what is written is read back and compared
+before it takes its name: it says the same, or it is not written. A format that has no place for something in the
+cameras is refused with the reason; what it cannot hold beside them (corners, board poses, names) is named and left
+out. The format of IN is told by its content. A COLMAP model is a folder.
+"""
+
+FORMATS = """\
+formats:
+  opencv      OpenCV FileStorage, by the ending of OUT: .yml, .xml or .json; one camera or a pair
+  ros         ROS CameraInfo (camera.yaml), one camera
+  kalibr      Kalibr camchain (camchain.yaml)
+  colmap      COLMAP model as text, a folder
+  colmap-bin  the same, binary
+  mrcal       mrcal (camera.cameramodel), one camera
+  nerfstudio  nerfstudio and instant-ngp (transforms.json)
+  euroc       EuRoC (sensor.yaml), one camera
+  basalt      Basalt (calibration.json), cameras around an IMU
+  kitti       KITTI (calib.txt), rectified cameras
+  kitti-raw   KITTI (calib_cam_to_cam.txt), the cameras before rectification
+  matlab      MATLAB's cameraParameters as JSON, one camera
+  metashape   Metashape XML
+
+examples:
+  camviz convert camera.yml camera.cameramodel --to mrcal
+  camviz convert stereo.yml chain.yaml --to kalibr --size 640x480
+  camviz convert sparse/0 left.yml --to opencv --camera left.jpg --first-as-world
+"""
 
 TEACHER = """\
 Writes the lessons with the solutions in their places, timings and prompts for discussion, made from the very
@@ -97,7 +129,7 @@ def parser() -> argparse.ArgumentParser:
     )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
     commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_Parser)
-    for add in (_add_lab, _add_doctor, _add_show, _add_teacher):
+    for add in (_add_lab, _add_doctor, _add_show, _add_convert, _add_teacher):
         add(commands)
     return everything
 
@@ -121,6 +153,19 @@ def _add_show(commands: Any) -> None:
     command.add_argument("--size", metavar="WxH", type=_size, help="image size in pixels, where FILE does not hold it")
 
 
+def _add_convert(commands: Any) -> None:
+    command = _add(commands, "convert", convert, "write a calibration for another program", CONVERT)
+    command.epilog = FORMATS
+    command.add_argument("file", metavar="IN", type=Path, help="the calibration, or the folder of a COLMAP model")
+    command.add_argument("output", metavar="OUT", type=Path, help="the file to write; for COLMAP a new folder")
+    command.add_argument("--to", metavar="FORMAT", required=True, help="one of the formats below")
+    command.add_argument("--size", metavar="WxH", type=_size, help="image size in pixels, where IN does not hold it")
+    command.add_argument("--camera", metavar="NAME", help="only this one of the cameras")
+    command.add_argument(
+        "--first-as-world", action="store_true", help="make the first camera's frame the world, as some formats must"
+    )
+
+
 def _add_teacher(commands: Any) -> None:
     command = _add(commands, "teacher", teacher, "write the teacher's edition of the lessons", TEACHER)
     command.add_argument("out", metavar="OUT_DIR", type=Path, help="where to; made when it is not there")
@@ -136,7 +181,7 @@ def lab(options: argparse.Namespace, beyond: list[str]) -> int:
     folder = options.directory or checkout_lessons() or Path("camviz-lessons")
     if folder.exists() and not folder.is_dir():
         raise Refusal(f"{folder}: expected a folder for the lessons, this is a file.")
-    if not (folder.exists() and folder.samefile(source)):
+    if not (folder.exists() and folder.samefile(source)) and edition(folder) != "teacher":
         for sentence in lay_out(source, folder, camviz.__version__):
             print(sentence)
     return _start_jupyter(folder.resolve(), ["--no-browser"] * options.no_browser + beyond)
@@ -153,6 +198,7 @@ def doctor(options: argparse.Namespace) -> int:
 
 def show(options: argparse.Namespace) -> int:
     """Write the page of a calibration, whole or not at all."""
+    _refuse_renderer()
     calibration = _loaded(options.file, options.size)
     output = options.output or Path(options.file.stem + ".html")
     _refuse_output(output, options.file)
@@ -165,15 +211,39 @@ def show(options: argparse.Namespace) -> int:
     return OK
 
 
+def convert(options: argparse.Namespace) -> int:
+    """Write a calibration in another format, whole or not at all."""
+    calibration = _loaded(options.file, options.size)
+    if options.output.exists() and options.output.samefile(options.file):
+        raise Refusal(f"{options.output}: this would overwrite the calibration; choose another name.")
+    from camviz.files import CalibrationError
+    from camviz.files.writing import alone, from_first_camera, write
+
+    try:
+        if options.camera is not None:
+            calibration = alone(calibration, options.camera)
+        if options.first_as_world:
+            calibration = from_first_camera(calibration)
+        left_out = write(calibration, options.output, options.to)
+    except CalibrationError as error:
+        raise Refusal(str(error)) from error
+    for sentence in (*calibration.notes, *left_out):
+        print(sentence)
+    print(f"{options.output}: written from {calibration.format}, read back and found the same.")
+    return OK
+
+
 def teacher(options: argparse.Namespace) -> int:
     """Write the teacher's edition, and never over what a teacher has changed in it."""
     from camviz.lessons import lessons_folder, write_teacher_edition
 
     if options.out.exists() and (not options.out.is_dir() or options.out.samefile(lessons_folder())):
         raise Refusal(f"{options.out}: expected a folder of its own for the teacher's edition.")
+    if edition(options.out) == "student":
+        raise Refusal(f"{options.out}: expected a folder of its own, the students' lessons are in this one.")
     with TemporaryDirectory() as made:
         write_teacher_edition(lessons_folder(), Path(made))
-        for sentence in lay_out(Path(made), options.out, camviz.__version__):
+        for sentence in lay_out(Path(made), options.out, camviz.__version__, "teacher"):
             print(sentence)
     return OK
 
@@ -189,27 +259,34 @@ def _loaded(path: Path, size: tuple[int, int] | None) -> Calibration:
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Write a file by way of another beside it, so that there is never half a file under its name."""
-    with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False) as part:
-        temporary = Path(part.name)
+    target = path.resolve()  # a link is followed, not replaced
     try:
-        write(temporary)
-        temporary.chmod(0o666 & ~_umask())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        with TemporaryDirectory(dir=target.parent, prefix=".camviz-") as beside:
+            temporary = Path(beside) / "page.part"
+            write(temporary)
+            os.replace(temporary, target)
+    except OSError as error:  # whose file name is that of the part
+        raise Refusal(f"{path}: cannot be written ({error.strerror or error}).") from error
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _refuse_renderer() -> None:
+    from camviz.doctor import renderer
+
+    finding = renderer()
+    if finding.status != "ok":
+        raise Refusal(f"{finding.name}: {finding.detail}; {finding.remedy}.")
 
 
 def _refuse_output(output: Path, source: Path) -> None:
+    if "\0" in str(output):
+        raise Refusal(f"{str(output)!r} is not a file name.")
     if output.is_dir():
         raise Refusal(f"{output}: expected the name of a page to write, this is a directory.")
-    if not output.parent.is_dir():
-        raise Refusal(f"{output}: there is no directory {output.parent} to write into.")
+    if output.exists() and not output.is_file():  # a device or a pipe, which the page would take the place of
+        raise Refusal(f"{output}: expected the name of a page to write, this is not a regular file.")
+    parent = (output.resolve() if output.is_symlink() else output).parent
+    if not parent.is_dir():
+        raise Refusal(f"{output}: there is no directory {parent} to write into.")
     if output.exists() and output.samefile(source):
         raise Refusal(f"{output}: the page would overwrite the calibration; choose another name with -o.")
 

@@ -1,6 +1,6 @@
 """What a distortion does to a picture: where it folds, how far it moves a pixel, how to take it back. For any lens."""
 
-from math import inf, pi, radians, tan
+from math import atan, inf, isfinite, pi, radians, tan
 
 import cv2
 import numpy as np
@@ -12,6 +12,11 @@ from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective, Unifie
 from camviz.lenses.base import Array, as_points
 
 WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more than stretch
+
+
+def bends(lens: Lens) -> bool:
+    """False for a perspective lens, also where it is written as another kind whose coefficients are all at rest."""
+    return lens not in (Perspective(), BrownConrady(), UnifiedSphere(0.0))
 
 
 def polynomial(lens: Lens) -> BrownConrady | None:
@@ -30,6 +35,17 @@ def fold_radius(lens: Lens) -> float:
         return lens.fold_angle
     bending = polynomial(lens)
     return bending.fold_radius if bending else inf
+
+
+def fold_angle(lens: Lens) -> float:
+    """The angle in radians between the axis and the ray at which a lens folds; infinity if it never does."""
+    fold = fold_radius(lens)
+    if isinstance(lens, KannalaBrandt):
+        return fold if fold < pi else inf
+    if isinstance(lens, UnifiedSphere):
+        x, _, z = UnifiedSphere(lens.xi).unproject([min(fold, 1e9), 0.0])
+        return float(np.arctan2(x, z)) if isfinite(fold) and isfinite(z) else inf
+    return atan(fold) if isfinite(fold) else inf
 
 
 def pole_radius(lens: Lens) -> float:

@@ -59,8 +59,8 @@ def _row(name: str, camera: Camera) -> str:
     cells = [
         name,
         f"{K.width} × {K.height}",
-        *(f"{value:.2f}" for value in (K.fx, K.fy, K.cx, K.cy)),
-        repr(camera.lens),
+        *(f"{value:.2f}" if abs(value) > 0.1 else f"{value:.3g}" for value in (K.fx, K.fy, K.cx, K.cy)),
+        _lens(camera.lens),
     ]
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 

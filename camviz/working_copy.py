@@ -27,20 +27,26 @@ def lessons_source() -> Path | None:
     return checkout_lessons() or (inside if inside.is_dir() else None)
 
 
-def lay_out(source: Path, folder: Path, version: str) -> list[str]:
+def edition(folder: Path) -> str | None:
+    """Whose lessons were laid out in a folder, "student" or "teacher"; None where none were."""
+    return str(_manifest(folder).get("edition", "student")) if (folder / MANIFEST).is_file() else None
+
+
+def lay_out(source: Path, folder: Path, version: str, edition: str = "student") -> list[str]:
     """Copy the lessons into `folder`, and return what a reader should know, in sentences.
 
     A file is written where there is none and where it still is what was laid out before. One that the reader changed
     stays, and a new version of it is put beside it as NAME.new-VERSION.SUFFIX.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    laid_out = _read_manifest(folder)
+    laid_out = _laid_out(folder)
     sentences = [f"The lessons are in {folder}."] if not laid_out else []
     for path in sorted(source.rglob("*")):
         if path.is_file() and not _SKIPPED & set(path.relative_to(source).parts):
             name = path.relative_to(source)
             sentences += _lay_out_one(path.read_bytes(), folder, name, version, laid_out)
-    _write(folder / MANIFEST, json.dumps({"version": version, "files": laid_out}, indent=1).encode())
+    manifest = {"version": version, "edition": edition, "files": laid_out}
+    _write(folder / MANIFEST, json.dumps(manifest, indent=1).encode())
     return sentences
 
 
@@ -68,13 +74,18 @@ def _place(content: bytes, folder: Path, name: Path, laid_out: dict[str, str]) -
     return True
 
 
-def _read_manifest(folder: Path) -> dict[str, str]:
+def _laid_out(folder: Path) -> dict[str, str]:
     """name → sha256 of what was laid out; nothing when there is no manifest or it makes no sense."""
+    files = _manifest(folder).get("files")
+    return {str(name): str(digest) for name, digest in files.items()} if isinstance(files, dict) else {}
+
+
+def _manifest(folder: Path) -> dict[str, object]:
     try:
-        files = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
-        return {str(name): str(digest) for name, digest in files.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        held = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
         return {}
+    return held if isinstance(held, dict) else {}
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -2,18 +2,25 @@
 
 from pathlib import Path
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
 from camviz.views.intrinsics import IntrinsicsView
 from camviz.views.pinhole import PinholeView
 
+# The left camera of OpenCV's samples/data/intrinsics.yml
+PUBLISHED = Camera(
+    Intrinsics(640, 480, 534.80326845, 534.80326845, 335.68643204, 240.66183054),
+    BrownConrady(k1=0.29589439552724328, k2=-1.0354662043042675),
+)
 PICTURES = {
     "pinhole": PinholeView(),
     "intrinsics": IntrinsicsView(),
     "frustum": FrustumView(),
     "distortion": DistortionView(k1=-0.28, k2=0.07),
-    "fold": DistortionView(k1=-0.3, k2=0.0),
+    "fold": DistortionView.of(PUBLISHED),
     "epipolar": EpipolarView(),
 }
 

@@ -21,6 +21,16 @@ def ramp(width, height):
     return 3 * u + 7 * v
 
 
+@pytest.mark.parametrize(
+    ("size", "within"), [((640, 480), (320, 240)), ((480, 640), (240, 320)), ((1, 4096), (1, 320))]
+)
+def test_a_grid_within_a_side_keeps_the_corners_of_the_view(size, within):
+    large = Intrinsics(*size, 530, 540, 3.5, 7.0)
+    small = large.within(320)
+    assert (small.width, small.height) == within
+    np.testing.assert_allclose(small.from_pixels(small.border(1)), large.from_pixels(large.border(1)), atol=1e-12)
+
+
 # Projection
 
 

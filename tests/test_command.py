@@ -160,6 +160,18 @@ def test_a_size_that_is_missing_is_asked_for(capsys, room, page):
     assert (room / "bare.html").read_text() == "page of bare.yml"
 
 
+def test_show_says_what_is_wrong_with_the_renderer_asked_for(capsys, room, page, monkeypatch):
+    monkeypatch.setenv("CAMVIZ_RENDERER", "nonsense")
+    said = refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"))
+    assert "CAMVIZ_RENDERER: 'nonsense' is no renderer; set it to solid or wire" in said
+
+
+@pytest.mark.parametrize(("free", "status"), [(3 * 10**8, "warn"), (3 * 10**9, "ok"), (None, "ok")])
+def test_the_doctor_warns_where_a_lesson_has_no_room(monkeypatch, free, status):
+    monkeypatch.setattr(doctor, "_free_memory", lambda: free)
+    assert doctor.memory().status == status
+
+
 def test_show_names_the_page_after_the_file_or_as_told(room, page, capsys):
     assert main(["show", str(DATA / "opencv_stereo.xml")]) == 0
     assert main(["show", str(DATA / "opencv_stereo.xml"), "-o", "pair.html"]) == 0
@@ -181,6 +193,39 @@ def test_show_replaces_its_own_page_but_not_the_calibration(capsys, room, page):
 @pytest.mark.parametrize(("output", "said"), [(".", "directory"), ("nowhere/page.html", "no directory nowhere")])
 def test_show_refuses_a_place_it_cannot_write_to(capsys, room, page, output, said):
     assert said in refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", output)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
+def test_show_does_not_take_the_place_of_a_pipe_or_a_device(capsys, room, page):
+    """Written by way of another file, a page would replace /dev/null for everyone, root willing."""
+    os.mkfifo(room / "pipe")
+    assert "not a regular file" in refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", "pipe")
+    assert (room / "pipe").is_fifo()
+
+
+def test_show_refuses_an_output_that_is_no_name(capsys, room, page):
+    said = refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", "a\0b")
+    assert r"'a\x00b' is not a file name" in said
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")
+def test_show_follows_a_link_to_the_page_it_names(room, page):
+    (room / "place").mkdir()
+    (room / "link.html").symlink_to("place/page.html")
+    for _ in range(2):
+        assert main(["show", str(DATA / "opencv_stereo.xml"), "-o", "link.html"]) == 0
+    assert (room / "link.html").is_symlink()
+    assert (room / "place" / "page.html").read_text() == "page of opencv_stereo.xml"
+
+
+@pytest.mark.parametrize("error", [28, 30])  # ENOSPC, EROFS
+def test_a_page_that_cannot_be_written_is_named_as_it_was_asked_for(capsys, room, page, error):
+    def fail(calibration, path):
+        raise OSError(error, os.strerror(error), str(path))
+
+    page.write_page = fail
+    said = refused(capsys, room, "show", str(DATA / "opencv_stereo.xml"), "-o", "page.html")
+    assert said == f"camviz: page.html: cannot be written ({os.strerror(error)}).\n"
 
 
 def test_a_page_that_fails_half_way_leaves_the_old_one(room, page):
@@ -370,6 +415,20 @@ def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatc
     assert "camviz-lessons" in capsys.readouterr().out
 
 
+def test_the_editions_do_not_overwrite_each_other(jupyter, room, lessons, monkeypatch, capsys):
+    """The teacher's edition is not laid out over students' lessons, and opening it does not make it theirs."""
+    monkeypatch.setattr(command, "checkout_lessons", lambda: None)
+    monkeypatch.setattr(command, "lessons_source", lambda: lessons)
+    assert main(["lab"]) == 0
+    capsys.readouterr()
+    assert "the students' lessons are in this one" in refused(capsys, room, "teacher", "camviz-lessons")
+    assert main(["teacher", "mine"]) == 0
+    before = contents(room / "mine")
+    assert main(["lab", "mine"]) == 0
+    assert contents(room / "mine") == before
+    assert main(["teacher", "mine"]) == 0
+
+
 def test_the_lessons_of_a_wheel_are_inside_the_package(tmp_path, monkeypatch):
     """Where there is no pyproject.toml beside the package, the lessons are in camviz/_lessons."""
     inside = tmp_path / "site-packages" / "camviz" / "_lessons"
@@ -405,8 +464,8 @@ def test_a_package_is_held_against_its_range():
 
 
 def test_the_requirements_are_those_of_the_project():
-    listed = {(extra, requirement.name) for extra, requirement in doctor.requirements()}
-    assert {("", "numpy"), ("", "PyYAML"), ("lab", "jupyterlab")} <= listed
+    listed = {(extra, requirement.name.casefold()) for extra, requirement in doctor.requirements()}
+    assert {("", "numpy"), ("", "pyyaml"), ("lab", "jupyterlab")} <= listed
     assert "pytest" not in {name for _, name in listed}
 
 

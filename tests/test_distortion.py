@@ -12,6 +12,7 @@ from camviz.distortion import (
     displacement,
     distort_maps,
     edge_of_field,
+    fold_angle,
     fold_radius,
     ideal_image_radius,
     image_corner_radius,
@@ -54,6 +55,21 @@ def test_barrel_distortion_folds_at_46_degrees():
     """g' = 1 + 3 k1 r² vanishes at r = 1/√0.9 for k1 = -0.3."""
     assert fold_radius(BrownConrady(-0.3)) == pytest.approx(1 / sqrt(0.9), rel=1e-14)
     assert round(fold_radius(BrownConrady(-0.3)), 4) == 1.0541
+
+
+@pytest.mark.parametrize(
+    "lens", [BrownConrady(-0.3), KannalaBrandt(-0.2), KannalaBrandt(0, -0.015), UnifiedSphere(0.8, -0.5)]
+)
+def test_a_radial_distance_grows_up_to_the_fold_angle_and_no_further(lens):
+    angles = fold_angle(lens) + np.array([-2e-3, -1e-3, -1e-6, 1e-6])
+    x = lens.project(np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=-1))[:, 0]
+    assert np.isfinite(x).tolist() == [True, True, True, False]
+    assert 0 < x[2] - x[1] < x[1] - x[0] < 1e-4  # flatter and flatter
+
+
+@pytest.mark.parametrize("lens", [Perspective(), Equidistant(), BrownConrady(0.3), UnifiedSphere(1), KannalaBrandt()])
+def test_a_lens_that_always_grows_has_no_fold_angle(lens):
+    assert fold_angle(lens) == inf
 
 
 @pytest.mark.parametrize(("number", "fold"), [(1, 0.7305), (2, 0.9785)])
@@ -107,6 +123,8 @@ def test_a_pole_is_a_root_of_the_denominator_and_a_near_pole_almost_one():
     assert weakest_denominator(near_pole, 3) == pytest.approx((sqrt(1 / 1.01), 1 - 1 / 1.01))
     assert weakest_denominator(near_pole, 0.5) == pytest.approx((0.5, 1 - 0.5 + 1.01 / 16))
     assert weakest_denominator(Perspective(), 3) == (0, 1)
+    # D = 1 - 8 s + 20 s² is least at s = 0.2, close to the axis: 0.2 there
+    assert weakest_denominator(BrownConrady(k4=-8, k5=20), 3) == pytest.approx((sqrt(0.2), 0.2))
 
 
 def test_the_edge_of_the_field_is_the_fold_or_the_published_limit():

@@ -31,6 +31,17 @@ def test_the_right_point_lies_on_the_line_of_its_left_one_at_every_depth_as_open
         assert view.residual < 1e-12
 
 
+def test_a_calibration_whose_coefficients_are_all_zero_has_its_fundamental_matrix():
+    """Files of rectified pairs hold five zeros: that lens does not bend, whatever it is called."""
+    left = Camera(Intrinsics(640, 480, 500, 500, 320, 240), BrownConrady())
+    right = left.at(RigidTransform.from_translation([0.3, 0, 0]))
+    plain = [Camera(camera.intrinsics, world_from_cam=camera.world_from_cam) for camera in (left, right)]
+    view = EpipolarView.of(left, right)
+    np.testing.assert_allclose(view.F, EpipolarView.of(*plain).F, atol=1e-12)
+    assert view.numbers()["left epipole"] == "at infinity"
+    assert EpipolarView.of(Camera(left.intrinsics, BrownConrady(1e-6)), right).F is None
+
+
 def test_the_epipole_is_the_image_of_the_other_camera():
     left, right = twoview.epipoles(FORWARD.F)
     np.testing.assert_allclose(twoview.from_homogeneous(left), FORWARD.left.project(FORWARD.right.centre), atol=1e-6)

@@ -51,6 +51,13 @@ def test_an_error_is_shown_and_the_last_good_state_kept():
     assert wish(explorer, 3, values={"size": 2.0})["error"] == ""
 
 
+def test_an_error_while_dragging_stays_until_the_next_wish():
+    """A frame that is no draft is not asked for again by itself, which would wipe the message away."""
+    explorer = explore(Toy())
+    wish(explorer, 2, values={"size": 4.0}, draft=True)
+    assert wish(explorer, 3, values={"size": 9.0}, draft=True)["draft"] is False
+
+
 def test_a_value_of_the_wrong_kind_is_refused_in_words():
     assert "size must be a finite number, got 'wide'" in wish(explore(Toy()), values={"size": "wide"})["error"]
 

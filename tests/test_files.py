@@ -1,5 +1,6 @@
 """What a calibration file says is what its camera does: OpenCV, given the same file, projects to the same pixels."""
 
+import json
 import os
 from pathlib import Path
 
@@ -277,3 +278,12 @@ def test_openvins_writes_the_inverse_of_kalibrs_imu_transform():
 def test_what_is_loaded_cannot_be_overwritten():
     with pytest.raises(ValueError, match="read-only"):
         camviz.load(DATA / "opencv_mono.json").detections["camera"][0] = 0
+
+
+@pytest.mark.parametrize("focal_length", [1e-300, 1e-4])
+def test_a_focal_length_that_no_camera_has_is_refused(tmp_path, focal_length):
+    file = tmp_path / "camera.json"
+    fields = {"fl_x": focal_length, "fl_y": 500.0, "cx": 320, "cy": 240, "w": 640, "h": 480, "frames": []}
+    file.write_text(json.dumps(fields))
+    with pytest.raises(camviz.files.CalibrationError, match=r"expected fx from 0.001 to 1e9 pixels"):
+        camviz.load(file)

@@ -16,7 +16,10 @@ from camviz.files.loading import parse
 from camviz.files.text import MAX_BYTES
 
 DATA = Path(__file__).parent / "data"
-FILES = sorted(DATA.iterdir())
+FILES = sorted(path for path in DATA.rglob("*") if path.is_file())
+TREES = [path for path in FILES if path.suffix in (".yml", ".yaml", ".json")]
+WORDS = [path for path in FILES if path.suffix in (".txt", ".xml", ".cameramodel")]
+SIZES = {"kitti_calib.txt": (1242, 375)}
 MONO = """%YAML:1.0
 ---
 image_width: 640
@@ -195,6 +198,17 @@ def test_what_is_not_a_rotation_says_by_how_much(tmp_path, R, what):
     assert re.search(what, refusal(tmp_path, PAIR + f"R: {R}\nT: [-0.1, 0, 0]\n"))
 
 
+@pytest.mark.parametrize(("off", "taken"), [(4e-4, True), (1e-2, False)])
+def test_a_rotation_written_with_three_digits_is_one_and_with_one_digit_is_none(tmp_path, off, taken):
+    path = tmp_path / "camera.yml"
+    path.write_text(PAIR + f"R: [[{1 + off}, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.1, 0, 0]\n")
+    if taken:
+        rotation = camviz.load(path).cameras["right"].world_from_cam.rotation.as_matrix()
+        np.testing.assert_allclose(rotation, np.eye(3), atol=1e-12)
+    else:
+        assert "R: expected a rotation" in complaint(path)
+
+
 def test_half_a_pose_is_not_completed(tmp_path):
     assert "T: expected" in refusal(tmp_path, PAIR + "R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n")
     assert "R: expected" in refusal(tmp_path, PAIR + "T: [-0.1, 0, 0]\n")
@@ -292,6 +306,10 @@ def test_entities_in_xml_are_not_unfolded(tmp_path, text):
         "".join(" " * n + "a:\n" for n in range(500)),
         "- " * 100_000,
         "<opencv_storage>" + "<a>" * 200_000,
+        "<document>" + "<a>" * 200_000,
+        "{'lensmodel': " + "[" * 200_000,
+        "{'lensmodel': " + "(" * 100_000 + ")" * 100_000 + "}",
+        "{'lensmodel': " * 100_000,
     ],
 )
 def test_deep_nesting_stays_shallow(tmp_path, text):
@@ -309,8 +327,17 @@ def test_deep_nesting_stays_shallow(tmp_path, text):
         "9" * (MAX_BYTES - 10),
         "# " + "x" * (MAX_BYTES - 10),
         '"' + "\\n" * (MAX_BYTES // 2 - 10),
+        "{'lensmodel': [" + "1," * (MAX_BYTES // 2 - 20) + "]}",
+        "{'lensmodel': '" + "\\x" * (MAX_BYTES // 2 - 20),
+        "#\r\n" * (MAX_BYTES // 3 - 10) + "x",
+        "1 PINHOLE 640 480 " + "1 " * (MAX_BYTES // 2 - 40),
+        "1 PINHOLE 640 480 1 1 1 1" + "\n" * (MAX_BYTES - 40),
+        "P0: " + "1 " * (MAX_BYTES // 2 - 40),
+        "P0: 1" + "\n" * (MAX_BYTES - 40),
+        "<document>" + "<a b='1'/>" * (MAX_BYTES // 10 - 20) + "</document>",
     ],
-    ids=["list", "xml words", "xml elements", "word", "plain text", "number", "comment", "open string"],
+    ids=["list", "xml words", "xml elements", "word", "plain text", "number", "comment", "open string"]
+    + ["literal", "open literal", "comments", "colmap line", "colmap lines", "kitti line", "kitti lines", "attributes"],
 )
 def test_the_largest_allowed_file_is_refused_in_seconds(tmp_path, text):
     refusal(tmp_path, text)
@@ -320,16 +347,61 @@ def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):
     assert "\x1b" not in refusal(tmp_path, 'distortion_model: "\\e[31m\\n\\n red"\nK: [1]\nwidth: 1\nheight: 1')
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "what"),
+    [
+        ("cameras.bin", b"\xff" * 8, "announces 18,446,744,073,709,551,615"),
+        ("cameras.bin", b"\1" + b"\0" * 7, "ends before all"),
+        ("cameras.bin", b"\0" * 8, "at least one camera"),
+        ("cameras.bin", b"\1" + b"\0" * 11 + b"\x0a\0\0\0" + b"\0" * 16, "THIN_PRISM_FISHEYE"),
+        ("images.bin", b"\xff" * 8, "announces 18,446,744,073,709,551,615"),
+        ("images.bin", b"\1" + b"\0" * 7 + b"\0" * 64 + b"x" * 2000, "name of an image"),
+        ("images.bin", b"\1" + b"\0" * 7 + b"\0" * 64 + b"a\0" + b"\xff" * 8, "ends before all"),
+    ],
+)
+def test_a_binary_file_is_not_believed_when_it_announces_much(tmp_path, name, content, what):
+    for path in (DATA / "colmap_bin").iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / name).write_bytes(content)
+    assert what in complaint(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "value",
+    ["__import__('os').system('touch {mark}')", "open('{mark}', 'w')", "[x for x in ()]", "1 if 1 else 2", "f''"],
+)
+def test_a_literal_starts_nothing(tmp_path, value):
+    mark = tmp_path / "mark"
+    text = (DATA / "mrcal_stereographic.cameramodel").read_text().replace("[640, 480]", value.format(mark=mark))
+    assert "expected a" in refusal(tmp_path, text)
+    assert not mark.exists()
+
+
 def attempt(path, content):
     """Load whatever this is; anything but a calibration or a CalibrationError is a failure."""
     path.write_bytes(content)
     try:
-        calibration = camviz.load(path)
+        calibration = camviz.load(path, size=SIZES.get(path.name))
     except CalibrationError:
         return
     for camera in calibration.rig:
         assert camera.intrinsics.fx > 0
         assert np.isfinite(camera.world_from_cam.as_matrix()).all()
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory):
+    """Where the damaged copy of a file goes: under its own name, the other files of its folder beside it."""
+    rooms = {folder: tmp_path_factory.mktemp("fuzz") for folder in {path.parent for path in FILES}}
+
+    def place(original):
+        room = rooms[original.parent]
+        for path in FILES:
+            if path.parent == original.parent != DATA:
+                (room / path.name).write_bytes(path.read_bytes())
+        return room / original.name
+
+    return place
 
 
 @pytest.fixture(scope="module")
@@ -343,20 +415,20 @@ FUZZ = settings(max_examples=60, deadline=None)
 @pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
-def test_a_truncated_file_is_read_or_refused(anywhere, original, data):
+def test_a_truncated_file_is_read_or_refused(beside, original, data):
     content = original.read_bytes()
-    attempt(anywhere, content[: data.draw(st.integers(0, len(content) - 1))])
+    attempt(beside(original), content[: data.draw(st.integers(0, len(content) - 1))])
 
 
 @pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
-def test_a_file_with_bytes_overwritten_is_read_or_refused(anywhere, original, data):
+def test_a_file_with_bytes_overwritten_is_read_or_refused(beside, original, data):
     content = bytearray(original.read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(content) - 1))
         content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
-    attempt(anywhere, bytes(content))
+    attempt(beside(original), bytes(content))
 
 
 ODD = st.sampled_from(
@@ -379,15 +451,27 @@ ODD = st.sampled_from(
 )
 
 
-@pytest.mark.parametrize("original", [path for path in FILES if path.suffix != ".xml"], ids=lambda path: path.name)
+@pytest.mark.parametrize("original", TREES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
-def test_a_file_with_values_of_other_types_is_read_or_refused(anywhere, original, data):
+def test_a_file_with_values_of_other_types_is_read_or_refused(beside, original, data):
     """Any one value, list or mapping of the tree becomes something else."""
     tree = parse(original.read_text())
     parent, key = data.draw(st.sampled_from(list(places(tree))))
     parent[key] = parse(data.draw(ODD))
-    attempt(anywhere, flow(tree).encode())
+    attempt(beside(original), flow(tree).encode())
+
+
+@pytest.mark.parametrize("original", WORDS, ids=lambda path: path.name)
+@FUZZ
+@given(data=st.data())
+def test_a_file_with_other_words_is_read_or_refused(beside, original, data):
+    """Any one word becomes something else, is said twice, or is missing."""
+    text = original.read_text()
+    words = list(re.finditer(r"[-+.\w]+|[^-+.\w\s]", text))
+    at = data.draw(st.sampled_from(words))
+    word = data.draw(ODD | st.sampled_from(["", f"{at[0]} {at[0]}", "\n", "None", "b'x'", "(", "'", "<a>", "#"]))
+    attempt(beside(original), (text[: at.start()] + word + text[at.end() :]).encode())
 
 
 def places(tree):

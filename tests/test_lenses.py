@@ -72,9 +72,8 @@ EXAMPLES = {
 PANORAMAS = {"equirectangular", "cylindrical"}
 
 every_lens = pytest.mark.parametrize(("lens", "widest_deg"), EXAMPLES.values(), ids=EXAMPLES)
-every_round_lens = pytest.mark.parametrize(
-    ("lens", "widest_deg"), [v for k, v in EXAMPLES.items() if k not in PANORAMAS], ids=set(EXAMPLES) - PANORAMAS
-)
+ROUND = {name: example for name, example in EXAMPLES.items() if name not in PANORAMAS}
+every_round_lens = pytest.mark.parametrize(("lens", "widest_deg"), ROUND.values(), ids=ROUND)
 
 
 def directions(theta, azimuth):

@@ -38,6 +38,13 @@ def test_every_public_name_of_camviz_can_be_had() -> None:
     assert python("import camviz; [getattr(camviz, name) for name in camviz.__all__]") == ""
 
 
+def test_the_first_floors_modules_are_had_from_the_package_itself() -> None:
+    assert (
+        python("import camviz; print(camviz.lenses.Perspective.__name__, 'explore' in dir(camviz))")
+        == "Perspective True\n"
+    )
+
+
 def test_the_lock_pins_every_dependency_with_hashes_and_names_no_host() -> None:
     lock = (ROOT / "requirements.lock").read_text()
     assert "://" not in lock

@@ -144,3 +144,11 @@ def test_importing_touches_neither_pooch_nor_the_network():
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
+
+
+def test_a_damaged_file_among_those_fetched_before_is_not_used(tmp_path):
+    (tmp_path / "cache" / "camviz").mkdir(parents=True)
+    (tmp_path / "cache" / "camviz" / "left01.jpg").write_bytes(b"half a picture")
+    assert samples.local_sample("left01.jpg") is None
+    with pytest.raises(SampleUnavailable):
+        sample("left01.jpg")

@@ -28,6 +28,7 @@ from camviz.scenes import (
     wireframe_scene,
 )
 from camviz.scenes.bake import painted
+from camviz.scenes.rays import RUN, Bounds, Runs
 from camviz.scenes.standard import baked
 
 RED, GREEN, BLUE = (Texture(np.eye(3)[i].reshape(1, 1, 3)) for i in range(3))
@@ -542,3 +543,12 @@ def test_subdividing_keeps_corners_and_length_and_leaves_no_long_piece(max_lengt
 def test_what_cannot_be_is_refused_by_name(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_pixels_without_a_ray_are_not_traced():
+    """A mirror's picture is round; what lies around it meets no surface, and that is known beforehand."""
+    directions = np.full((2 * RUN, 3), np.nan)
+    directions[RUN:] = (0, 0, 1)
+    runs = Runs.gather(np.zeros((1, 3)), directions)
+    ahead = Bounds.around([(np.array([0.0, 0, 5]), 1.0, np.zeros(3))])
+    assert runs.may_meet(ahead).tolist() == [[False, True]]

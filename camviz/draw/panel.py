@@ -1,6 +1,7 @@
 """Panels: rectangles of a picture with coordinates of their own."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,8 @@ class Panel:
         With `drag` the whole panel becomes a handle of that name for pointer and arrow keys; `label` tells a screen
         reader what it does, and `hint` a reader, where the picture is live.
         """
-        right = (self.x + self.width, self.y - 8)
+        # Beside the title, and beyond the end of a panel too narrow for both.
+        right = (self.x + max(self.width, 7.8 * len(title) + 6.8 * len(note or hint) + 10), self.y - 8)
         heading = svg.text((self.x, self.y - 8), title, "title") if title else ""
         heading += svg.text(right, note, "note end") if note else ""
         heading += svg.text(right, hint, "note end hint") if hint else ""
@@ -58,12 +60,24 @@ class Panel:
 
 
 def image_panel(
-    name: str, x: float, y: float, width: float, image_width: int, image_height: int, margin: float = 0
+    name: str,
+    x: float,
+    y: float,
+    width: float,
+    image_width: int,
+    image_height: int,
+    margin: float = 0,
+    tallest: float = inf,
 ) -> Panel:
-    """A panel `width` wide in the aspect of an image, in its pixel coordinates, with `margin` pixels around it."""
+    """A panel in the aspect of an image, in its pixel coordinates, with `margin` pixels around it.
+
+    It is `width` wide, or narrower where it would else be taller than `tallest`.
+    """
     left, right = -0.5 - margin, image_width - 0.5 + margin
     top, bottom = -0.5 - margin, image_height - 0.5 + margin
-    return Panel(name, x, y, width, width * (bottom - top) / (right - left), left, right, top, bottom)
+    aspect = (right - left) / (bottom - top)
+    width = min(width, tallest * aspect)
+    return Panel(name, x, y, width, width / aspect, left, right, top, bottom)
 
 
 def photograph(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: Any) -> str:

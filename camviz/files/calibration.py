@@ -36,8 +36,9 @@ class Board:
 class Calibration:
     """The cameras of one calibration file, by name and in place, and what else the file recorded.
 
-    The world is the frame of the first camera, the left one of a pair. Detections, board poses and errors are kept by
-    camera name and left out where the file has none. `notes` say in words what a reader should know about the file.
+    The world is the frame of the first camera, the left one of a pair, unless the file has a world of its own, as
+    COLMAP's, mrcal's, nerfstudio's and Metashape's do. Detections, board poses and errors are kept by camera name and
+    left out where the file has none. `notes` say in words what a reader should know about the file.
     """
 
     cameras: Mapping[str, Camera]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size
+from camviz.files.output import as_yaml, refuse_own_world, rows_of
 from camviz.files.section import Section, explained
 from camviz.files.trees import shown
 from camviz.lenses import (
@@ -40,6 +43,17 @@ LENSES = {
     ("eucm", "none"): ExtendedUnified,
     ("ds", "none"): DoubleSphere,
 }
+GRID = "fx fy cx cy"
+WRITTEN = [
+    Model("pinhole none", Perspective, GRID),
+    Model("pinhole radtan", BrownConrady, f"{GRID} k1 k2 p1 p2"),
+    Model("pinhole equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
+    Model("pinhole fov", FieldOfView, f"{GRID} omega"),
+    Model("omni none", UnifiedSphere, f"xi {GRID}"),
+    Model("omni radtan", UnifiedSphere, f"xi {GRID} k1 k2 p1 p2"),
+    Model("eucm none", ExtendedUnified, f"alpha beta {GRID}"),
+    Model("ds none", DoubleSphere, f"xi alpha {GRID}"),
+]
 
 
 def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
@@ -109,3 +123,35 @@ def _cam_from_imu(part: Section) -> RigidTransform | None:
     if "T_cam_imu" in part:
         return part.transform("T_cam_imu")
     return part.transform("T_imu_cam").inv() if "T_imu_cam" in part else None
+
+
+# Writing.
+
+
+def write(calibration: Calibration) -> bytes:
+    """cam0, cam1 …, each beside the one before and, where there is one, beside the IMU."""
+    refuse_own_world(calibration, "Kalibr")
+    chain: dict[str, Any] = {}
+    before = None
+    for index, (name, camera) in enumerate(calibration.cameras.items()):
+        part = _written(name, camera)
+        if calibration.world_from_imu is not None:
+            part["T_cam_imu"] = rows_of(camera.cam_from_world * calibration.world_from_imu)
+        if before is not None:
+            part["T_cn_cnm1"] = rows_of(camera.cam_from_world * before.world_from_cam)
+        chain[f"cam{index}"], before = part, camera
+    return as_yaml(chain)
+
+
+def _written(name: str, camera: Camera) -> dict[str, Any]:
+    model, same = expressed(name, camera, WRITTEN, "Kalibr")
+    projection, distortion = model.name.split()
+    values = model.values(same, 0.0)
+    count = len(PROJECTIONS[projection].split())
+    return {
+        "camera_model": projection,
+        "intrinsics": values[:count],
+        "distortion_model": distortion,
+        "distortion_coeffs": values[count:],
+        "resolution": [camera.intrinsics.width, camera.intrinsics.height],
+    }

@@ -8,8 +8,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from camviz.files import kalibr, opencv, ros
+from camviz.files import basalt, colmap, euroc, kalibr, kitti, matlab, metashape, mrcal, opencv, ros, transforms
 from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.literal import parse_literal
 from camviz.files.section import LARGEST_SIDE, Section
 from camviz.files.text import read_text
 from camviz.files.trees import parse, shown
@@ -17,28 +18,52 @@ from camviz.files.trees import parse, shown
 Reader = Callable[[Section, Path, tuple[int, int] | None], Calibration]
 
 LOOKED_FOR = (
-    "a camera matrix as OpenCV names it (camera_matrix, K, cameraMatrix, M1 …), "
-    "a ROS CameraInfo (distortion_model with camera_matrix or K) or a Kalibr camchain (cam0 …)"
+    "a camera matrix as OpenCV names it (camera_matrix, K, cameraMatrix, M1 …), a ROS CameraInfo (distortion_model "
+    "with camera_matrix or K), a Kalibr camchain (cam0 …), or what COLMAP, mrcal, nerfstudio, EuRoC, Basalt, KITTI, "
+    "MATLAB or Metashape write"
 )
 
 _KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}
 
 
 def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None) -> Calibration:
-    """Read a calibration that OpenCV (FileStorage, mono or stereo), ROS (CameraInfo) or Kalibr (camchain) wrote.
+    """Read a calibration: OpenCV, ROS, Kalibr, COLMAP, mrcal, nerfstudio, EuRoC, Basalt, KITTI, MATLAB or Metashape.
 
-    `size` is (width, height) in pixels for files that do not hold it. Raises CalibrationError, a ValueError whose
-    message is one sentence, for everything that is not such a calibration. The file is data: nothing in it is run.
+    The content tells which it is; COLMAP's may be named by its folder. `size` is (width, height) in pixels for files
+    that do not hold it. Raises CalibrationError, a ValueError whose message is one sentence, for everything that is
+    not such a calibration. The file is data: nothing in it is run.
     """
     path = Path(path)
     if size is not None:
         size = _checked_size(size)
+    if "\0" not in str(path) and (cameras := colmap.model_of(path)):
+        return colmap.read(cameras, path)
     text = read_text(path)
+    if colmap.is_cameras(text):
+        return colmap.read(path, path)
     try:
-        section = _mapping(parse(text))
-        return _reader(section)(section, path, size)
+        return _plausible(_read(text, path, size))
     except CalibrationError as error:
         raise CalibrationError(f"{path}: {error}") from error.__cause__
+
+
+def _read(text: str, path: Path, size: tuple[int, int] | None) -> Calibration:
+    if mrcal.is_model(text, path):
+        return mrcal.read(_mapping(parse_literal(text)), path)
+    if kitti.is_calib(text):
+        return kitti.read(text, path, size)
+    section = _mapping(parse(text))
+    return _reader(section)(section, path, size)
+
+
+def _plausible(calibration: Calibration) -> Calibration:
+    """The calibration, unless a focal length is so far out that no drawing of it could mean anything."""
+    for name, camera in calibration.cameras.items():
+        for axis in ("fx", "fy"):
+            focal_length = getattr(camera.intrinsics, axis)
+            if not 1e-3 <= focal_length <= 1e9:
+                raise CalibrationError(f"{name}: expected {axis} from 0.001 to 1e9 pixels, got {focal_length:g}")
+    return calibration
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -57,12 +82,21 @@ def _mapping(tree: Any) -> Section:
 
 
 def _reader(section: Section) -> Reader:
-    if any(re.fullmatch(r"cam\d+", key) for key in section.values):
-        return kalibr.read
-    if "distortion_model" in section or "projection_matrix" in section:
-        return ros.read
-    if opencv.camera_tags(section):
-        return opencv.read
+    for recognised, reader in READERS:
+        if recognised(section):
+            return reader
     keys = [shown(key) for key in list(section.values)[:6]]
     found = ", ".join(keys + ["…"] * (len(section.values) > 6)) or "nothing"
     raise CalibrationError(f"no camera found: looked for {LOOKED_FOR}, found {found}")
+
+
+READERS: list[tuple[Callable[[Section], object], Reader]] = [
+    (lambda section: any(re.fullmatch(r"cam\d+", key) for key in section.values), kalibr.read),
+    (lambda section: "value0" in section, lambda section, path, _: basalt.read(section, path)),
+    (lambda section: "<calibration>" in section or "<document>" in section, metashape.read),
+    (euroc.is_sensor, euroc.read),
+    (transforms.is_transforms, transforms.read),
+    (matlab.is_parameters, matlab.read),
+    (lambda section: "distortion_model" in section or "projection_matrix" in section, ros.read),
+    (opencv.camera_tags, opencv.read),
+]

@@ -11,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Board, Calibration, CalibrationError
 from camviz.files.section import LARGEST_SIDE, Section, explained
+from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
 
 # Spellings are compared without capitals and underscores: Camera_Matrix, cameraMatrix and camera_matrix are one.
@@ -74,24 +75,12 @@ def _read_pair(section: Section, path: Path, size: tuple[int, int] | None, left:
 
 def image_size(section: Section, given: tuple[int, int] | None) -> tuple[int, int]:
     """Width and height from the file, or as given where the file is silent; never one against the other."""
-    held = _held_size(section)
-    if held and given and held != given:
-        raise CalibrationError(
-            f"the file says {held[0]}×{held[1]} pixels, the size given is {given[0]}×{given[1]}: leave the size out"
-        )
-    if size := held or given:
-        return size
-    raise CalibrationError(
-        "the file holds no image size (image_width, image_height): add --size WIDTHxHEIGHT, such as --size 640x480 "
-        "(in Python size=(640, 480))"
-    )
+    return agreed_size(_held_size(section), given, "image_width, image_height")
 
 
 def _held_size(section: Section) -> tuple[int, int] | None:
     if key := _find(section, SIZE):
-        width, height = section.vector(key, [2], "width height")
-        pair = Section({"width": width, "height": height}, section.where(key))
-        return pair.whole("width", LARGEST_SIDE), pair.whole("height", LARGEST_SIDE)
+        return pair_of_sides(section, key)
     keys = _find(section, WIDTH), _find(section, HEIGHT)
     if keys == (None, None):
         return None

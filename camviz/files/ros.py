@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from camviz.cameras import Camera
 from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size, intrinsics
+from camviz.files.output import as_yaml, only_camera, refuse_own_world
 from camviz.files.section import Section, explained
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens
@@ -19,6 +24,12 @@ MEANINGS = {
 }
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
 RECTIFICATION, PROJECTION = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
+GRID = "fx fy cx cy"
+WRITTEN = [
+    Model("plumb_bob", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
+    Model("rational_polynomial", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
+    Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
+]
 
 
 def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
@@ -72,3 +83,29 @@ def _key(section: Section, names: tuple[str, ...]) -> str:
     if len(found) > 1:
         raise CalibrationError(f"expected one of the keys {' and '.join(found)}, got both")
     return found[0] if found else names[0]
+
+
+# Writing.
+
+
+def write(calibration: Calibration) -> bytes:
+    """The file of camera_calibration_parsers, for one camera that is not rectified: R = 1, P = [K 0]."""
+    name, camera = only_camera(calibration, "ROS CameraInfo")
+    refuse_own_world(calibration, "ROS CameraInfo")
+    model, same = expressed(name, camera, WRITTEN, "ROS CameraInfo")
+    grid = same.intrinsics
+    tree = {
+        "image_width": grid.width,
+        "image_height": grid.height,
+        "camera_name": name,
+        "camera_matrix": _matrix(grid.K),
+        "distortion_model": model.name,
+        "distortion_coefficients": _matrix(np.array([model.values(same, 0.0)[4:]])),
+        "rectification_matrix": _matrix(np.eye(3)),
+        "projection_matrix": _matrix(np.column_stack([grid.K, np.zeros(3)])),
+    }
+    return as_yaml(tree)
+
+
+def _matrix(values: np.ndarray) -> dict[str, Any]:
+    return {"rows": values.shape[0], "cols": values.shape[1], "data": [float(x) for x in values.ravel()]}

@@ -54,6 +54,13 @@ class Section:
             raise self.error(key, "a word", shown(value))
         return value
 
+    def choice(self, key: str, known: Sequence[str]) -> str:
+        """A word that is one of those known."""
+        value = self.text(key)
+        if value not in known:
+            raise self.error(key, " or ".join(known), shown(value))
+        return value
+
     def number(self, key: str) -> float:
         value = self.get(key, "a number")
         values = self.array(key) if isinstance(value, (list, dict)) else _as_array(value, self.where(key))

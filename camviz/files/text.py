@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from camviz.files.calibration import CalibrationError
 
 MAX_BYTES = 16 * 2**20
+HEAD = 2**16  # characters that must tell which format this is
 
 _SIGNATURES = {
     b"\x89PNG": "a PNG picture",
@@ -21,22 +25,29 @@ _SIGNATURES = {
     b"\x1f\x8b": "a gzip archive",
     b"\x93NUMPY": "a NumPy array",
     b"\x89HDF": "an HDF5 file",
-    b"MATLAB 5.0": "a MATLAB file",
+    b"MATLAB 5.0": "a MATLAB file; in MATLAB, writelines(jsonencode(toStruct(params)), 'camera.json') makes one",
 }
 
 
 def read_text(path: Path) -> str:
     """The text of a calibration file; CalibrationError for anything that cannot be one."""
-    try:
-        _refuse_unreadable(path)
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be read ({error.strerror})") from error
+    with open_bounded(path, MAX_BYTES) as file:
+        content = file.read(MAX_BYTES + 1)
     return _decoded(content, path)
 
 
-def _refuse_unreadable(path: Path) -> None:
+@contextmanager
+def open_bounded(path: Path, most: int) -> Iterator[BinaryIO]:
+    """A file of at most so many bytes, to be read piece by piece; CalibrationError for anything else."""
+    try:
+        _refuse_unreadable(path, most)
+        with path.open("rb") as file:
+            yield file
+    except OSError as error:
+        raise CalibrationError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _refuse_unreadable(path: Path, most: int) -> None:
     try:
         status = path.stat()
     except FileNotFoundError:
@@ -47,20 +58,20 @@ def _refuse_unreadable(path: Path) -> None:
         raise CalibrationError(f"{path}: expected a calibration file, this is a directory")
     if not stat.S_ISREG(status.st_mode):
         raise CalibrationError(f"{path}: expected a calibration file, this is not a regular file")
-    if status.st_size > MAX_BYTES:
-        raise CalibrationError(f"{path}: {_too_large(status.st_size)}")
+    if status.st_size > most:
+        raise CalibrationError(f"{path}: {_too_large(status.st_size, most)}")
 
 
-def _too_large(size: int) -> str:
-    return f"a calibration file has at most {MAX_BYTES // 2**20} MB, this one has {size / 2**20:.0f} MB"
+def _too_large(size: int, most: int) -> str:
+    return f"a calibration file has at most {most // 2**20} MB, this one has {size / 2**20:.0f} MB"
 
 
 def _decoded(content: bytes, path: Path) -> str:
     if len(content) > MAX_BYTES:
-        raise CalibrationError(f"{path}: {_too_large(len(content))}")
+        raise CalibrationError(f"{path}: {_too_large(len(content), MAX_BYTES)}")
     for signature, what in _SIGNATURES.items():
         if content.startswith(signature):
-            raise CalibrationError(f"{path}: expected a calibration as text (YAML, XML or JSON), this is {what}")
+            raise CalibrationError(f"{path}: expected a calibration as text (YAML, XML, JSON), this is {what}")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -17,6 +17,7 @@ from camviz.files.calibration import CalibrationError
 
 MAX_DEPTH = 32
 MAX_NODES = 1_000_000
+XML_ROOTS = ("opencv_storage", "calibration", "document")
 
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _YAML_TAG = "tag:yaml.org,2002:"
@@ -46,7 +47,7 @@ def scalar(word: str) -> Any:
     return _WORDS.get(word.lower(), word)
 
 
-class _Tree:
+class Tree:
     """A tree that grows by one event at a time, within its bounds. Mappings get a key before each value."""
 
     def __init__(self) -> None:
@@ -59,6 +60,10 @@ class _Tree:
     @property
     def wants_key(self) -> bool:
         return bool(self._open) and isinstance(self._open[-1][0], dict) and self._keys[-1] is None
+
+    @property
+    def awaits_value(self) -> bool:
+        return bool(self._open) and isinstance(self._open[-1][0], dict) and self._keys[-1] is not None
 
     def key(self, key: str) -> None:
         if key in self._open[-1][0]:
@@ -112,7 +117,7 @@ class _Tree:
 def parse_yaml(text: str) -> Any:
     """The one document of a YAML or JSON text, with or without OpenCV's `%YAML:1.0` first line."""
     text = re.sub(r"\A\s*%YAML[^\n]*", "", text)
-    tree, line = _Tree(), 0
+    tree, line = Tree(), 0
     try:
         for event in yaml.parse(text, Loader=_Loader):
             line = event.start_mark.line if event.start_mark else line
@@ -127,7 +132,7 @@ def parse_yaml(text: str) -> Any:
     return documents[0] if documents else None
 
 
-def _grow(tree: _Tree, event: yaml.Event) -> None:
+def _grow(tree: Tree, event: yaml.Event) -> None:
     tag = getattr(event, "tag", None)
     if tag not in _PLAIN_TAGS and not (tag in _OPENCV_TAGS and isinstance(event, yaml.MappingStartEvent)):
         raise CalibrationError(
@@ -157,7 +162,10 @@ def _yaml_problem(error: yaml.YAMLError) -> str:
 
 
 def parse_xml(text: str) -> Any:
-    """The tree inside `<opencv_storage>`. Document types and entities are refused before they can unfold."""
+    """The tree inside `<opencv_storage>`, or Metashape's `<calibration>` or `<document>` under its tag.
+
+    Document types and entities are refused before they can unfold.
+    """
     builder = _XmlBuilder()
     try:
         builder.parser.Parse(text.strip(), True)
@@ -170,11 +178,16 @@ def parse_xml(text: str) -> Any:
 
 
 class _XmlBuilder:
-    """OpenCV's XML: elements are keys, `<_>` are the items of a list, and a leaf's words are its numbers."""
+    """Elements as keys. A leaf's words are its numbers.
+
+    In OpenCV's XML `<_>` are the items of a list. In Metashape's, attributes are keys too, and an element that comes
+    more than once is a list.
+    """
 
     def __init__(self) -> None:
         self.root: Any = None
         self._nodes = 0
+        self._opencv = True
         self._open: list[tuple[str, dict[str, Any], list[Any], list[str]]] = []  # name, keys, items, text
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
@@ -188,11 +201,16 @@ class _XmlBuilder:
         raise CalibrationError("document types and entities are refused: a calibration has no use for them")
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
-        if not self._open and name != "opencv_storage":
-            raise CalibrationError(f"expected the element <opencv_storage>, got <{name[:60]}>")
+        if not self._open:
+            if name not in XML_ROOTS:
+                expected = ", ".join(f"<{root}>" for root in XML_ROOTS)
+                raise CalibrationError(f"expected the element {expected}, got <{name[:60]}>")
+            self._opencv = name == XML_ROOTS[0]
         if len(self._open) == MAX_DEPTH:
             raise CalibrationError(f"nested more than {MAX_DEPTH} levels deep, which no calibration is")
-        self._open.append((name, {}, [], []))
+        keys = {} if self._opencv else {key: _attribute(key, word) for key, word in attributes.items()}
+        self._nodes += len(keys)
+        self._open.append((name, keys, [], []))
 
     def _text(self, text: str) -> None:
         self._open[-1][3].append(text)
@@ -201,7 +219,9 @@ class _XmlBuilder:
         _, keys, items, text = self._open.pop()
         value = self._value(keys, items, "".join(text))
         if not self._open:
-            self.root = value
+            self.root = value if self._opencv else {f"<{name}>": value}
+        elif not self._opencv:
+            _add_element(self._open[-1][1], name, value)
         elif name == "_":
             self._open[-1][2].append(value)
         elif name in self._open[-1][1]:
@@ -214,9 +234,26 @@ class _XmlBuilder:
         self._nodes += len(words) + 1
         if self._nodes > MAX_NODES:
             raise CalibrationError(f"holds more than {MAX_NODES:,} values, which no calibration has")
+        if not self._opencv:
+            return keys or (words[0] if len(words) == 1 else words)
         if sum(map(bool, (keys, items, words))) > 1:
             raise CalibrationError("expected either elements or numbers inside an element, got both")
         return keys or items or (words[0] if len(words) == 1 else words)
+
+
+class Repeated(list[Any]):
+    """What an element holds each time it comes."""
+
+
+def _add_element(parent: dict[str, Any], name: str, value: Any) -> None:
+    if isinstance(parent.get(name), Repeated):
+        parent[name].append(value)
+    else:
+        parent[name] = Repeated([parent[name], value]) if name in parent else value
+
+
+def _attribute(name: str, word: str) -> Any:
+    return word if name == "label" else scalar(word)
 
 
 def _xml_word(match: re.Match[str]) -> Any:

@@ -60,6 +60,7 @@ class Runs:
         along = (axis[..., None] * directions_in_runs).sum(axis=0)
         cosine = np.minimum(along.min(axis=1), np.float32(1))
         sine = np.sqrt(1 - cosine * cosine)
+        cosine[~directions_in_runs.any(axis=(0, 2))] = np.inf  # no ray at all, which nothing needs to meet
         centre = origins_in_runs.mean(axis=2)
         slack = np.sqrt(((origins_in_runs - centre[..., None]) ** 2).sum(axis=0).max(axis=1))
         return cls(

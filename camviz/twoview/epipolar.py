@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.lenses import Perspective
+from camviz.distortion import bends
 from camviz.lenses.base import Array, as_points, unit
 
 
@@ -31,8 +31,8 @@ def cross_matrix(v: ArrayLike) -> Array:
 
 
 def projection_matrix(camera: Camera) -> Array:
-    """P = K [R | t] (3, 4) of a perspective camera (eq. 6.8). Raises ValueError for any other lens."""
-    if not isinstance(camera.lens, Perspective):
+    """P = K [R | t] (3, 4) of a perspective camera (eq. 6.8). Raises ValueError for a lens that bends."""
+    if bends(camera.lens):
         lens = type(camera.lens).__name__
         raise ValueError(f"only a Perspective lens keeps straight lines straight and has a matrix, got {lens}")
     return camera.intrinsics.K @ camera.cam_from_world.as_matrix()[:3]
@@ -57,7 +57,7 @@ def essential(right_from_left: RigidTransform) -> Array:
 def fundamental(left: Camera, right: Camera) -> Array:
     """F = K_right⁻ᵀ E K_left⁻¹ (3, 3): corresponding pixels satisfy x_rightᵀ F x_left = 0 (section 9.2).
 
-    Raises ValueError unless both lenses are Perspective (see `epipolar_curve` for the others), or without a baseline.
+    Raises ValueError for a lens that bends (see `epipolar_curve` for the others), or without a baseline.
     """
     for camera in (left, right):
         projection_matrix(camera)

@@ -169,8 +169,7 @@ class BoardPosesView(View):
 
     def _image(self) -> str:
         k = self.camera.intrinsics
-        width = min(360, 270 * k.width / k.height)
-        panel = image_panel("picture", 580, 34, width, k.width, k.height)
+        panel = image_panel("picture", 580, 34, 360, k.width, k.height, tallest=270)
         content = photograph(panel, "photograph", k.width, k.height) if self.photographs else self._drawn(panel)
         title = f"Picture {self.index + 1}, and the corners computed"
         return panel.show(content + svg.dots(panel.place(self.pixels()), "red", 5), title=title)

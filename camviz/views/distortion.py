@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cache, cached_property
-from math import atan, degrees, isfinite
+from math import atan, atan2, cos, degrees, hypot, inf, isfinite, pi, sin, tan
 from typing import Any, ClassVar
 
 import cv2
@@ -26,7 +26,7 @@ from camviz.views.base import View, choice, slider, switch
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
 _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
-_WIDTH = 380
+_WIDTH, _TALLEST = 380, 300
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,9 @@ class DistortionView(View):
             names = [name for name in cls.controls() if hasattr(lens, name)]
             coefficients = {name: getattr(lens, name) for name in names}
             return cls(intrinsics=camera.intrinsics, photograph=photograph, **coefficients)
-        return cls(intrinsics=camera.intrinsics, lens=lens, photograph=photograph)
+        aside = lens.unproject(camera.intrinsics.from_pixels(camera.intrinsics.border(4)))[:, 2]
+        eye = cls.eye if np.min(aside) > 0.25 else Eye(distance=3.7, yaw_deg=-35, pitch_deg=25)  # NaN stands back too
+        return cls(intrinsics=camera.intrinsics, lens=lens, photograph=photograph, eye=eye)
 
     @cached_property
     def camera(self) -> Camera:
@@ -80,16 +82,43 @@ class DistortionView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         corner = distortion.image_corner_radius(self.intrinsics)
-        fold = distortion.fold_radius(self.camera.lens)
         pole = distortion.pole_radius(self.camera.lens)
-        moved = self.moved(self.intrinsics.border(1))
         lost = "beyond the pole" if pole <= corner else "folded away"
+        moved, folds = self.moved(self.intrinsics.border(1)), isfinite(self._fold_angle)
         return {
-            "image corner": f"r = {_with_angle(corner)}",
+            "image corner": f"r = {_with_angle(corner)}" if not self.lens else f"r = {corner:.4g}, {self._widest()}",
             "corner moves": f"{np.max(moved):.1f} px" if np.isfinite(moved).all() else lost,
-            "fold": f"r = {_with_angle(fold)}" if isfinite(fold) else _none_but(pole),
-            "farthest a ray lands": f"r = {self._radial(np.array(fold)):.4f}" if isfinite(fold) else "no limit",
+            "fold": self._fold_in_words() if folds else _none_but(pole),
+            "farthest a ray lands": f"r = {np.hypot(*self._fold_rim(1)[0]):.4f}" if folds else "no limit",
         }
+
+    def _widest(self) -> str:
+        """The angle of the ray that arrives at the corner farthest from the axis."""
+        corners = self.intrinsics.from_pixels(self.intrinsics.border(1))
+        ray = self.camera.lens.unproject(corners[np.linalg.norm(corners, axis=-1).argmax()])
+        return f"{degrees(atan2(hypot(*ray[:2]), ray[2])):.1f}°" if np.isfinite(ray).all() else "no ray"
+
+    @cached_property
+    def _fold_angle(self) -> float:
+        return distortion.fold_angle(self.camera.lens)
+
+    @property
+    def _fold(self) -> float:
+        """The radius of the fold on the plane z = 1; infinity also where it lies beside the camera or behind it."""
+        return tan(self._fold_angle) if self._fold_angle < pi / 2 else inf
+
+    def _fold_in_words(self) -> str:
+        return (
+            f"r = {_with_angle(self._fold)}" if isfinite(self._fold) else f"{degrees(self._fold_angle):.1f}° off axis"
+        )
+
+    def _fold_rim(self, samples: int) -> np.ndarray:
+        """Where the lens puts the rays of its fold, all around: image points (samples, 2) in focal lengths."""
+        around = _circle(samples)
+        if isinstance(self.camera.lens, BrownConrady):
+            return self.camera.lens.distort(self._fold * around)
+        angle = self._fold_angle * (1 - 1e-9)  # of the last ray that has an image
+        return self.camera.lens.project(np.hstack([sin(angle) * around, np.full((samples, 1), cos(angle))]))
 
     def equation(self) -> str:
         """The radial polynomial with this state's coefficients filled in."""
@@ -126,15 +155,15 @@ class DistortionView(View):
         )
 
     def _coefficients(self) -> dict[str, float]:
+        if self.lens:
+            parameters = fields(self.lens)  # type: ignore[arg-type]
+            return {parameter.name: getattr(self.lens, parameter.name) for parameter in parameters}
         return {name: getattr(self, name) for name in type(self).controls() if hasattr(BrownConrady, name)}
 
     # The picture -----------------------------------------------------------------------------------------------------
 
     def image(self, *, draft: bool) -> np.ndarray:
-        width = 320 if draft else 480
-        small = Camera(
-            self.intrinsics.resized(width, width * self.intrinsics.height // self.intrinsics.width), self.camera.lens
-        )
+        small = Camera(self.intrinsics.within(256 if draft else 480), self.camera.lens)
         if self.photograph is None:
             picture = snapshot(_scene(), small)
         else:
@@ -157,7 +186,7 @@ class DistortionView(View):
 
     def _picture_panel(self) -> str:
         width, height = self.intrinsics.width, self.intrinsics.height
-        panel = image_panel("picture", 20, 34, _WIDTH, width, height)
+        panel = image_panel("picture", 20, 34, _WIDTH, width, height, tallest=_TALLEST)
         straight = _grid_lines(self.intrinsics)
         lines = self._bend(straight) if self.show == "distorted" else straight
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "yellow thin")
@@ -167,14 +196,10 @@ class DistortionView(View):
 
     def _fold_circle(self, panel: Panel, *, bent: bool) -> str:
         """Where the radial curve turns back, among ideal points or, `bent`, where the lens puts them."""
-        fold = distortion.fold_radius(self.camera.lens)
-        if not isfinite(fold):
+        if not isfinite(self._fold_angle if bent else self._fold):
             return ""
-        turn = np.linspace(0, 2 * np.pi, 90)
-        rim = fold * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-        if bent and isinstance(self.camera.lens, BrownConrady):
-            rim = self.camera.lens.distort(rim)
-        return svg.line(panel.place(self.intrinsics.to_pixels(rim)), "red dashed")
+        rim = self._fold_rim(90) if bent else self._fold * _circle(90)
+        return svg.line(panel.place(self.intrinsics.to_pixels(np.vstack([rim, rim[:1]]))), "red dashed")
 
     # The displacement ------------------------------------------------------------------------------------------------
 
@@ -186,7 +211,8 @@ class DistortionView(View):
         return self.intrinsics.to_pixels(self._bend(self.intrinsics.from_pixels(uv)))
 
     def _field_panel(self) -> str:
-        panel = image_panel("field", 420, 34, _WIDTH, self.intrinsics.width, self.intrinsics.height)
+        width, height = self.intrinsics.width, self.intrinsics.height
+        panel = image_panel("field", 420, 34, _WIDTH, width, height, tallest=_TALLEST)
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
@@ -214,11 +240,11 @@ class DistortionView(View):
     # The radial curve ------------------------------------------------------------------------------------------------
 
     def _curve_panel(self) -> str:
-        corner = distortion.image_corner_radius(self.intrinsics)
+        corner = distortion.image_corner_radius(self.intrinsics) or 1.0  # a single pixel on the axis has none
         top = 1.5 * corner
         panel = plot.plot_panel("curve", 70, 370, 420, 180, (0, top), (0, 1.2 * corner))
         r = np.linspace(0, top, 241)
-        fold = distortion.fold_radius(self.camera.lens)
+        fold = self._fold
         curve, beyond = self._radial(np.where(r <= fold, r, np.nan)), self._radial(np.where(r >= fold, r, np.nan))
         lines = (
             plot.band(panel, min(fold, top), top, "fill-red")
@@ -285,7 +311,7 @@ class DistortionView(View):
     def _numbers_column(self) -> str:
         x = 822
         rows = [svg.text((x, 26), "This lens", "title")]
-        for i, (name, value) in enumerate(self._coefficients().items()):
+        for i, (name, value) in enumerate(self._coefficients().items()):  # the lens's own, where one is given
             class_ = "number" if value else "number faint"
             rows.append(svg.text((x, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
         for i, (name, figure) in enumerate(self.numbers().items()):
@@ -309,6 +335,12 @@ def _polynomial(*coefficients: float) -> str:
     return "1" + "".join(f" {term[0]} {term[1:]}" for term in terms).replace("-", "−")
 
 
+def _circle(samples: int) -> np.ndarray:
+    """Points (samples, 2) around the unit circle."""
+    turn = 2 * pi * np.arange(samples) / samples
+    return np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+
+
 def _on_plane(xy: np.ndarray) -> np.ndarray:
     return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
 
@@ -318,12 +350,13 @@ def _none_but(pole: float) -> str:
 
 
 def _with_angle(r: float) -> str:
-    return f"{r:.4f} ({degrees(atan(r)):.1f}°)"
+    return f"{r:.4f} ({degrees(atan(r)):.1f}°)" if r < 100 else f"{r:.3g} ({degrees(atan(r)):.1f}°)"
 
 
-def _pixel_grid(intrinsics: Intrinsics, columns: int) -> np.ndarray:
-    """An even grid of pixels (rows, columns, 2) from edge to edge of the image."""
-    rows = round(columns * intrinsics.height / intrinsics.width)
+def _pixel_grid(intrinsics: Intrinsics, most: int) -> np.ndarray:
+    """An even grid of pixels (rows, columns, 2) from edge to edge of the image, `most` along its longer side."""
+    aspect = intrinsics.width / intrinsics.height
+    columns, rows = (max(2, round(most * min(1, side))) for side in (aspect, 1 / aspect))
     u = np.linspace(-0.5, intrinsics.width - 0.5, columns)
     v = np.linspace(-0.5, intrinsics.height - 0.5, rows)
     return np.stack(np.meshgrid(u, v), axis=-1)

@@ -10,11 +10,11 @@ import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera, transform
+from camviz.distortion import bends
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
-from camviz.lenses import Perspective
 from camviz.lenses.base import Array, unit
 from camviz.scenes import textured_scene
 from camviz.views import garden
@@ -25,7 +25,7 @@ _DISTANCES = np.concatenate([np.geomspace(0.02, 400, 120), [np.inf]])
 _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point
 _PATCH = 48  # pixels on a side of the details that are compared
 _PLANES = 40  # epipolar planes in a full turn around the baseline
-_WIDTH = 455
+_WIDTH, _TALLEST = 455, 342
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class EpipolarView(TwoCameras):
         """What the two cameras see, as pixels and as JPEG."""
         if self.photographs is None:
             cameras = {"left": self.left, "right": self.right}
-            taken = {name: garden.taken(camera, 320 if draft else 480) for name, camera in cameras.items()}
+            taken = {name: garden.taken(camera, 256 if draft else 480) for name, camera in cameras.items()}
         else:
             taken = {
                 name: (image, jpeg(image)) for name, image in zip(("left", "right"), self.photographs, strict=True)
@@ -137,11 +137,13 @@ class EpipolarView(TwoCameras):
 
     @property
     def _left_panel(self) -> Panel:
-        return image_panel("left", 20, 34, _WIDTH, self.left.intrinsics.width, self.left.intrinsics.height)
+        size = self.left.intrinsics
+        return image_panel("left", 20, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
     @property
     def _right_panel(self) -> Panel:
-        return image_panel("right", 485, 34, _WIDTH, self.right.intrinsics.width, self.right.intrinsics.height)
+        size = self.right.intrinsics
+        return image_panel("right", 485, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
     def _picture_panel(self, panel: Panel, camera: Camera, other: Camera, note: str, action: str) -> str:
         content = "".join(
@@ -319,7 +321,7 @@ def _far(uv: Array, camera: Camera) -> str:
     away = float(np.linalg.norm(uv - np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2))
     if away < 1e6:
         return f"{away:,.0f} px"
-    return "at infinity" if isinstance(camera.lens, Perspective) else "beyond the lens’s field"
+    return "beyond the lens’s field" if bends(camera.lens) else "at infinity"
 
 
 def _infinity(at: Array) -> str:

@@ -140,9 +140,9 @@ class FrustumView(View):
 
     def _image(self, draft: bool) -> np.ndarray:
         k, pose = self.camera.intrinsics, self.camera.world_from_cam
-        width = 320 if draft else 480
-        small = k.resized(width, max(1, round(width * k.height / k.width)))
-        return _taken(small, self.lens, tuple(pose.translation), tuple(pose.rotation.as_quat()))
+        return _taken(
+            k.within(256 if draft else 480), self.lens, tuple(pose.translation), tuple(pose.rotation.as_quat())
+        )
 
     def _world_panel(self, image: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("world", 20, 34, 540, 400)
@@ -168,8 +168,7 @@ class FrustumView(View):
 
     def _picture_panel(self) -> str:
         k = self.camera.intrinsics
-        width = min(360, 270 * k.width / k.height)
-        panel = image_panel("picture", 580, 34, width, k.width, k.height)
+        panel = image_panel("picture", 580, 34, 360, k.width, k.height, tallest=270)
         content = photograph(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
         label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
         return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)

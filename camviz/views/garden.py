@@ -16,10 +16,9 @@ from camviz.scenes import snapshot, textured_scene
 Pose = tuple[float, ...]
 
 
-def taken(camera: Camera, width: int) -> tuple[np.ndarray, bytes]:
-    """The picture that a camera takes of the garden at `width` pixels, uint8 RGB, and the same as JPEG."""
-    height = width * camera.intrinsics.height // camera.intrinsics.width
-    return _taken(camera.intrinsics.resized(width, height), camera.lens, _pose(camera))
+def taken(camera: Camera, side: int) -> tuple[np.ndarray, bytes]:
+    """The picture that a camera takes of the garden, `side` pixels on its longer side, uint8 RGB, and it as JPEG."""
+    return _taken(camera.intrinsics.within(side), camera.lens, _pose(camera))
 
 
 def landmarks(camera: Camera) -> Array:

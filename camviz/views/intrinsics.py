@@ -200,8 +200,7 @@ class IntrinsicsView(View):
     @cached_property
     def _picture(self) -> Panel:
         """In the pixels of the picture as taken."""
-        width = min(440.0, 330 * self.width / self.height)
-        return image_panel("picture", 20, 34, width, self.width, self.height)
+        return image_panel("picture", 20, 34, 440, self.width, self.height, tallest=330)
 
     def _picture_panel(self) -> str:
         panel, K = self._picture, self.intrinsics

@@ -14,13 +14,14 @@ from camviz.lenses.base import Array
 
 def border_arrow(panel: Panel, toward: Array, words: str) -> str:
     """An arrow at the panel's border that points out of it along `toward` (2,), and what lies there."""
-    half = np.array([panel.width, panel.height]) / 2 - 14
+    centre = np.array([panel.width, panel.height]) / 2
+    half = np.maximum(centre - 14, 1)
     with np.errstate(divide="ignore"):
-        tip = half + 14 + toward * np.min(half / np.abs(toward))
+        tip = centre + toward * np.min(half / np.abs(toward))
     across = np.array([-toward[1], toward[0]])
     arrow = svg.polygon([tip + 8 * toward, tip - 6 * toward + 7 * across, tip - 6 * toward - 7 * across], "fill-yellow")
     side = "end" if toward[0] > 0.5 else "" if toward[0] < -0.5 else "middle"
-    below = -12 if tip[1] > half[1] else 22
+    below = -12 if tip[1] > centre[1] - 14 else 22
     return arrow + svg.text(tip + (-14 * np.sign(toward[0]) * (side != "middle"), below), words, f"yellow halo {side}")
 
 

@@ -11,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
+from camviz.distortion import bends
 from camviz.lenses import BrownConrady, Equidistant, Perspective
 from camviz.lenses.base import Array, unit
 from camviz.scenes import textured_scene
@@ -106,8 +107,7 @@ class TwoCameras(View):
     @cached_property
     def F(self) -> Array | None:
         """The fundamental matrix (3, 3) of unit norm; None without a baseline or where a lens bends lines."""
-        straight = isinstance(self.left.lens, Perspective) and isinstance(self.right.lens, Perspective)
-        if not straight or not self.baseline:
+        if bends(self.left.lens) or bends(self.right.lens) or not self.baseline:
             return None
         F = twoview.fundamental(self.left, self.right)
         return F / np.linalg.norm(F)

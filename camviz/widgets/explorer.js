@@ -1,7 +1,7 @@
 // The pane of every visualizer: controls and a picture. It draws nothing itself and knows no mathematics:
 // it tells the kernel what the reader wants and shows the picture that comes back.
 
-const SETTLE_MS = 60;   // idle time after which a draft is replaced by the fine picture
+const SETTLE_MS = 40;   // idle time after which a draft is replaced by the fine picture
 const LATE_MS = 6000;   // silence of the kernel after which the reader is told
 const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
 
@@ -27,12 +27,21 @@ function render({ model, el }) {
     const values = model.get("values");
     inputs.forEach((input) => { if (!ask.pending(input.name)) input.show(values[input.name]); });
   };
-  const showFrame = async () => {
-    const frame = model.get("frame");
-    ask.answered(frame);
-    say(frame.error ? `This state could not be drawn. ${frame.error}` : "");
-    await swap(picture, frame);
-    root.dataset.rendered = String(Number(root.dataset.rendered) + 1);
+  let newest = null, showing = false;
+  const showFrame = async () => {      // one picture at a time, and always the newest: a slow browser skips, it never starves
+    newest = model.get("frame");
+    ask.answered(newest);
+    if (showing) return;
+    showing = true;
+    while (newest) {
+      const frame = newest;
+      newest = null;
+      say(frame.error ? `This state could not be drawn. ${frame.error}` : "");
+      await swap(picture, frame);
+      root.dataset.rendered = String(Number(root.dataset.rendered) + 1);
+    }
+    showing = false;
+    ask.shown();
   };
   const stopHands = hands(picture, ask);
   keepKeys(root);
@@ -60,6 +69,7 @@ function asker(model, root, late) {
   };
   const ask = (part, draft) => {
     clearTimeout(settle);
+    settle = null;
     if (part.reset) wish = null;
     wish ??= { values: {}, drags: [], keys: [], draft };
     wish.draft = draft;
@@ -78,16 +88,15 @@ function asker(model, root, late) {
     flying = null;
     clearTimeout(patience);
     if (wish) return send();
-    root.dataset.busy = String(frame.draft);
     if (frame.draft) settle = setTimeout(() => ask({}, false), SETTLE_MS);
   };
+  ask.shown = () => { root.dataset.busy = String(Boolean(flying || settle)); };
   ask.pending = (name) => Boolean(wish && name in wish.values);
   return ask;
 }
 
 // Photographs are decoded before the picture is replaced: no flash, no half-drawn state.
 async function swap(picture, frame) {
-  const turn = (picture.turn = (picture.turn ?? 0) + 1);
   let svg = frame.svg;
   const urls = [];
   await Promise.all(Object.entries(frame.photographs ?? {}).map(async ([name, data]) => {
@@ -98,7 +107,6 @@ async function swap(picture, frame) {
     image.src = url;
     await image.decode().catch(() => {});
   }));
-  if (turn !== picture.turn) return urls.forEach(URL.revokeObjectURL);
   const focused = picture.contains(document.activeElement) ? document.activeElement.dataset.drag : null;
   picture.innerHTML = svg;
   keepKeys(picture);

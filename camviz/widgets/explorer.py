@@ -56,7 +56,8 @@ class Explorer(StillWidget):
             self._show(self._wished(message), answers=message["id"], draft=message["draft"])
         # The widget's edge: whatever a view raises belongs in front of the reader, and nobody above would show it.
         except Exception as error:
-            self.frame = {**self.frame, "answers": message["id"], "error": f"{type(error).__name__}: {error}"}
+            told = {"answers": message["id"], "draft": False, "error": f"{type(error).__name__}: {error}"}
+            self.frame = {**self.frame, **told}
             self.log.warning("%s", "".join(traceback.format_exception(error)))
 
     def _wished(self, message: dict[str, Any]) -> View:

@@ -37,13 +37,14 @@ def lesson(request: pytest.FixtureRequest, browser: Browser, address: str) -> It
 
 
 @pytest.fixture
-def screenshot(request: pytest.FixtureRequest, tmp_path: Path):
-    """Takes a picture of an element, into the folder that CAMVIZ_SCREENSHOTS names if it names one."""
-    folder = Path(os.environ.get("CAMVIZ_SCREENSHOTS", tmp_path))
+def screenshot(request: pytest.FixtureRequest):
+    """Takes a picture of an element into the folder that CAMVIZ_SCREENSHOTS names; does nothing when it names none."""
+    folder = os.environ.get("CAMVIZ_SCREENSHOTS")
 
     def take(element, name: str) -> None:
-        stem = re.sub(r"[^\w.-]+", "-", f"{request.node.name}-{name}")
-        folder.mkdir(parents=True, exist_ok=True)
-        element.screenshot(path=folder / f"{stem}.png")
+        if folder:
+            stem = re.sub(r"[^\w.-]+", "-", f"{request.node.callspec.id}-{name}")
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            element.screenshot(path=Path(folder, f"{stem}.png"))
 
     return take

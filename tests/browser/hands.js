@@ -45,17 +45,22 @@ window.hands = {
 
   handles: (root) => [...new Set([...root.querySelectorAll(".camviz-picture [data-drag]")].map((one) => one.dataset.drag))],
 
-  // A point of the page where the pointer would take hold of a handle.
-  grip(root, name) {
-    for (const part of root.querySelectorAll(`[data-drag="${CSS.escape(name)}"]`)) {
-      part.scrollIntoView({ block: "center" });
-      const box = part.getBoundingClientRect();
-      for (const [s, t] of [[0.5, 0.5], [0.15, 0.5], [0.5, 0.15], [0.85, 0.5], [0.5, 0.85], [0.08, 0.08]]) {
-        const [x, y] = [box.left + s * box.width, box.top + t * box.height];
-        if (document.elementFromPoint(x, y)?.closest("[data-drag]")?.dataset.drag === name) return [x, y];
-      }
+  // The middle one of the points of the page where the pointer would take hold of a handle.
+  async grip(root, name) {
+    const svg = root.querySelector(".camviz-picture svg");
+    for (let i = 0; i < 5; i++) {      // cells that come into view take their true height only then, and push
+      svg.scrollIntoView({ block: "center" });
+      await hands.pause(40);
     }
-    throw new Error(`the pointer cannot reach the handle ${name}`);
+    const box = svg.getBoundingClientRect(), points = [];
+    for (let i = 0; i < 60 * 60; i++) {
+      const [s, t] = [((i % 60) + 0.5) / 60, (Math.floor(i / 60) + 0.5) / 60];
+      const [x, y] = [box.left + s * box.width, box.top + t * box.height];
+      if (document.elementFromPoint(x, y)?.closest("[data-drag]")?.dataset.drag === name) points.push([x, y]);
+    }
+    if (!points.length) throw new Error(`the pointer cannot reach the handle ${name}`);
+    const [u, v] = [0, 1].map((axis) => points.reduce((sum, point) => sum + point[axis], 0) / points.length);
+    return points.reduce((a, b) => (Math.hypot(b[0] - u, b[1] - v) < Math.hypot(a[0] - u, a[1] - v) ? b : a));
   },
 
   // Elements whose words have a contrast below 4.5 with the colour behind them, as "words: contrast".

@@ -1,0 +1,95 @@
+"""Basalt's calibration json: cameras around an IMU."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.cameras import Camera
+from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.models import Model, expressed, model_named
+from camviz.files.output import as_json, refuse_own_world
+from camviz.files.section import LARGEST_SIDE, Section
+from camviz.files.trees import shown
+from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
+
+GRID = "fx fy cx cy"
+MODELS = [
+    Model("pinhole", Perspective, GRID),
+    Model("pinhole-radtan8", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
+    Model("kb4", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
+    Model("fov", FieldOfView, f"{GRID} omega"),
+    Model("ds", DoubleSphere, f"{GRID} xi alpha"),
+    Model("ucm", ExtendedUnified, f"{GRID} alpha", {"beta": 1.0}),
+    Model("eucm", ExtendedUnified, f"{GRID} alpha beta"),
+]
+KEYS = {"omega": "w"}
+
+
+def read(section: Section, path: Path) -> Calibration:
+    """cam0, cam1 … by T_imu_cam, the camera's place in the IMU's frame; the world is cam0's frame."""
+    whole = section.section("value0")
+    lenses, places = (_list(whole, key) for key in ("intrinsics", "T_imu_cam"))
+    sizes = whole.matrix("resolution", len(lenses), 2) if lenses else np.empty((0, 2))
+    if not lenses or len(lenses) != len(places):
+        raise whole.error("intrinsics", "as many cameras as in T_imu_cam, at least one", f"{len(lenses)}")
+    imu_from_cam = [_pose(place) for place in places]
+    world_from_imu = imu_from_cam[0].inv()
+    cameras = {}
+    for index, (part, size, pose) in enumerate(zip(lenses, sizes, imu_from_cam, strict=True)):
+        sides = Section({"width": float(size[0]), "height": float(size[1])}, whole.where(f"resolution[{index}]"))
+        camera = _camera(part, sides.whole("width", LARGEST_SIDE), sides.whole("height", LARGEST_SIDE))
+        cameras[f"cam{index}"] = camera.at(world_from_imu * pose) if index else camera
+    return Calibration(cameras, path, "Basalt", world_from_imu=world_from_imu)
+
+
+def _list(section: Section, key: str) -> list[Section]:
+    held = section.get(key, "a list")
+    if not isinstance(held, list) or not all(isinstance(part, dict) for part in held):
+        raise section.error(key, "a list of mappings", shown(held))
+    return [Section(part, section.where(f"{key}[{index}]")) for index, part in enumerate(held)]
+
+
+def _pose(section: Section) -> RigidTransform:
+    quaternion = [section.number(key) for key in ("qx", "qy", "qz", "qw")]
+    length = float(np.linalg.norm(quaternion))
+    if not abs(length - 1) < 1e-3:
+        raise CalibrationError(f"{section.path}: expected a quaternion of length 1, got length {length:g}")
+    place = [section.number(key) for key in ("px", "py", "pz")]
+    return RigidTransform.from_components(place, Rotation.from_quat(quaternion))
+
+
+def _camera(section: Section, width: int, height: int) -> Camera:
+    name = section.choice("camera_type", [model.name for model in MODELS])
+    model, held = model_named(name, MODELS) or MODELS[0], section.section("intrinsics")
+    values = [held.number(KEYS.get(key, key)) for key in model.names]
+    return model.camera(values, width, height, 0.0, held.path)
+
+
+def write(calibration: Calibration) -> bytes:
+    """All cameras beside the IMU; CalibrationError where the calibration does not know of one."""
+    refuse_own_world(calibration, "Basalt")
+    if calibration.world_from_imu is None:
+        raise CalibrationError("Basalt places its cameras by the IMU, and this calibration holds none")
+    imu_from_world = calibration.world_from_imu.inv()
+    poses = [imu_from_world * camera.world_from_cam for camera in calibration.cameras.values()]
+    held = [expressed(name, camera, MODELS, "Basalt") for name, camera in calibration.cameras.items()]
+    tree: dict[str, Any] = {
+        "T_imu_cam": [_written_pose(pose) for pose in poses],
+        "intrinsics": [_written_camera(model, camera) for model, camera in held],
+        "resolution": [[camera.intrinsics.width, camera.intrinsics.height] for _, camera in held],
+    }
+    return as_json({"value0": tree})
+
+
+def _written_pose(pose: RigidTransform) -> dict[str, float]:
+    names = ("px", "py", "pz", "qx", "qy", "qz", "qw")
+    return dict(zip(names, map(float, (*pose.translation, *pose.rotation.as_quat())), strict=True))
+
+
+def _written_camera(model: Model, camera: Camera) -> dict[str, Any]:
+    values = zip(model.names, model.values(camera, 0.0), strict=True)
+    return {"camera_type": model.name, "intrinsics": {KEYS.get(name, name): value for name, value in values}}

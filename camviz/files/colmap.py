@@ -1,0 +1,239 @@
+"""COLMAP models: a folder with cameras and images, as text or binary; the file's own world and unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.cameras import Camera
+from camviz.files import colmap_binary
+from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.models import Model, expressed, model_named
+from camviz.files.section import LARGEST, LARGEST_SIDE, Section
+from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_text
+from camviz.files.trees import scalar, shown
+from camviz.lenses import BrownConrady, Equidistant, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
+
+FIRST_PIXEL = 0.5  # "the upper left corner is (0, 0), the centre of the first pixel (0.5, 0.5)"
+MAX_IMAGES = 100_000
+MOST_WORDS = 32  # more than any line of cameras.txt has
+MODELS = {  # by COLMAP's number for it, in COLMAP's order of parameters (colmap/sensor/models.h)
+    0: Model("SIMPLE_PINHOLE", Perspective, "f cx cy"),
+    1: Model("PINHOLE", Perspective, "fx fy cx cy"),
+    2: Model("SIMPLE_RADIAL", BrownConrady, "f cx cy k1"),
+    3: Model("RADIAL", BrownConrady, "f cx cy k1 k2"),
+    4: Model("OPENCV", BrownConrady, "fx fy cx cy k1 k2 p1 p2"),
+    5: Model("OPENCV_FISHEYE", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"),
+    6: Model("FULL_OPENCV", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6"),
+    7: Model("FOV", FieldOfView, "fx fy cx cy omega"),
+    8: Model("SIMPLE_RADIAL_FISHEYE", KannalaBrandt, "f cx cy k1"),
+    9: Model("RADIAL_FISHEYE", KannalaBrandt, "f cx cy k1 k2"),
+    14: Model("SIMPLE_FISHEYE", Equidistant, "f cx cy"),
+    15: Model("FISHEYE", Equidistant, "fx fy cx cy"),
+    16: Model("EUCM", ExtendedUnified, "fx fy cx cy alpha beta"),
+}
+# What every COLMAP reads; the last three, of its newest releases, are written only where nothing else will do.
+WRITTEN = [model for number, model in MODELS.items() if number < 14] + [MODELS[16]]
+UNNAMED = {10: "THIN_PRISM_FISHEYE", 11: "RAD_TAN_THIN_PRISM_FISHEYE", 12: "SIMPLE_DIVISION", 13: "DIVISION"}
+UNNAMED |= {17: "EQUIRECTANGULAR"}
+_CAMERA_LINE = re.compile(r"(?:[ \t]*(?:#[^\r\n]*)?\r?\n)*[ \t]*\d+[ \t]+[A-Z][A-Z0-9_]{2,40}[ \t]+\d+[ \t]+\d+[ \t]")
+_FILES = ("cameras.txt", "images.txt", "cameras.bin", "images.bin")
+
+Image = tuple[str, int, list[float]]  # name, number of its camera, quaternion w x y z and translation
+
+
+def model_of(path: Path) -> Path | None:
+    """The cameras file of the model that a path belongs to, be it the folder, that file, or the images beside it."""
+    if path.is_dir():
+        found = [path / name for name in ("cameras.bin", "cameras.txt") if (path / name).is_file()]
+        return found[0] if found else None
+    if path.name in _FILES or path.suffix == ".bin":
+        return path.with_name(path.name.replace("images", "cameras"))
+    return None
+
+
+def is_cameras(text: str) -> bool:
+    """True for the text of a cameras.txt: a number, a camera model, a width, a height."""
+    return bool(_CAMERA_LINE.match(text[:HEAD]))
+
+
+def read(cameras_path: Path, path: Path) -> Calibration:
+    """The images of a model as cameras in its world, by name; without an images file the cameras alone."""
+    binary = cameras_path.suffix == ".bin"
+    with _named(cameras_path):
+        cameras = colmap_binary.cameras(cameras_path, MODELS, _unknown) if binary else _cameras(read_text(cameras_path))
+        if not cameras:
+            raise CalibrationError("expected at least one camera, got none")
+    images_path = cameras_path.with_name("images" + cameras_path.suffix)
+    if cameras_path.stem != "cameras" or not images_path.exists():
+        note = "There is no images file beside the cameras: they stand at the origin."
+        return Calibration({f"camera{n}": camera for n, camera in cameras.items()}, path, "COLMAP", notes=(note,))
+    with _named(images_path):
+        placed = _placed(cameras, colmap_binary.images(images_path) if binary else _images(images_path))
+    notes = ["COLMAP's world has no unit of its own: lengths are in the file's."]
+    if idle := len(cameras) - len({id(camera.lens) for camera in placed.values()}):
+        notes.append(f"{idle} of the {len(cameras)} cameras took none of the images and are left out.")
+    return Calibration(placed, path, "COLMAP", notes=tuple(notes))
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except CalibrationError as error:
+        said = str(error)
+        raise CalibrationError(said if said.startswith(str(path)) else f"{path}: {said}") from error.__cause__
+
+
+def _unknown(name: str) -> CalibrationError:
+    known = ", ".join(model.name for model in MODELS.values())
+    return CalibrationError(f"there is no lens here for the camera model {name}; there is for {known}")
+
+
+def _cameras(text: str) -> dict[int, Camera]:
+    """Lines of CAMERA_ID MODEL WIDTH HEIGHT PARAMS…"""
+    cameras: dict[int, Camera] = {}
+    if text.count("\n") > MAX_IMAGES:
+        raise CalibrationError(f"expected at most {MAX_IMAGES:,} lines, got {text.count(chr(10)):,}")
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.split(maxsplit=MOST_WORDS)
+        if not words or words[0].startswith("#"):
+            continue
+        where = f"line {number}"
+        if len(words) < 4:
+            raise CalibrationError(f"{where}: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS…, got {shown(line)}")
+        model = model_named(words[1], MODELS.values())
+        if model is None:
+            raise _unknown(words[1][:40])
+        key = _whole(words[0], where)
+        if key in cameras:
+            raise CalibrationError(f"{where}: the camera {key} appears twice")
+        section = Section({"size": _numbers(words[2:4]), "params": _numbers(words[4:])}, where)
+        cameras[key] = camera_of(model, section)
+    return cameras
+
+
+def camera_of(model: Model, section: Section) -> Camera:
+    """A camera of `size` and `params`, at the origin."""
+    width, height = (side for side in section.vector("size", [2], "width height"))
+    sides = Section({"width": width, "height": height}, section.path)
+    values = section.vector("params", [len(model.names)], model.parameters)
+    width, height = sides.whole("width", LARGEST_SIDE), sides.whole("height", LARGEST_SIDE)
+    return model.camera(values, width, height, FIRST_PIXEL, section.path)
+
+
+def _images(path: Path) -> Iterator[Image]:
+    """Pairs of lines: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, and the points seen, which are passed over."""
+    with open_bounded(path, 64 * MAX_BYTES) as file:
+        number, skip = 0, False
+        while line := file.readline(MAX_BYTES):
+            number += 1
+            if skip or not line.strip() or line.lstrip().startswith(b"#"):
+                skip = skip and len(line) == MAX_BYTES and not line.endswith(b"\n")
+                continue
+            yield _image(line, f"line {number}")
+            skip = True
+
+
+def _image(line: bytes, where: str) -> Image:
+    try:
+        words = line.decode("utf-8").strip().split(maxsplit=9)
+    except UnicodeDecodeError:
+        raise CalibrationError(f"{where}: expected text in UTF-8") from None
+    if len(words) != 10:
+        expected = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
+        raise CalibrationError(f"{where}: expected {expected}, got {len(words)} words")
+    pose = Section({"pose": _numbers(words[1:8])}, where).vector("pose", [7], "QW QX QY QZ TX TY TZ")
+    return words[9], _whole(words[8], where), pose
+
+
+def _whole(word: str, where: str) -> int:
+    if not re.fullmatch(r"[0-9]{1,10}", word):
+        raise CalibrationError(f"{where}: expected a number that names a camera, got {shown(word)}")
+    return int(word)
+
+
+def _numbers(words: list[str]) -> list[object]:
+    return [scalar(word) for word in words]
+
+
+def _placed(cameras: dict[int, Camera], images: Iterable[Image]) -> dict[str, Camera]:
+    """cam_from_world = [R(q) | t] for every image."""
+    names, used, poses = [], [], []
+    for name, key, pose in images:
+        if key not in cameras:
+            raise CalibrationError(f"{shown(name)}: expected one of the cameras of the model, got camera {key}")
+        names.append(name)
+        used.append(cameras[key])
+        poses.append(pose)
+        if len(names) > MAX_IMAGES:
+            raise CalibrationError(f"holds more than {MAX_IMAGES:,} images")
+    if not names:
+        raise CalibrationError("expected at least one image, got none")
+    if len(set(names)) < len(names):
+        raise CalibrationError("expected images of different names, got one twice")
+    world_from_cam = _inverted(np.array(poses), names)
+    return {name: camera.at(pose) for name, camera, pose in zip(names, used, world_from_cam, strict=True)}
+
+
+def _inverted(poses: np.ndarray, names: list[str]) -> Iterable[RigidTransform]:
+    wild = np.flatnonzero(~(np.abs(poses) <= LARGEST).all(axis=1))
+    if len(wild):
+        raise CalibrationError(f"{shown(names[wild[0]])}: expected a pose of finite numbers below {LARGEST:g}")
+    lengths = np.linalg.norm(poses[:, :4], axis=1)
+    bad = np.flatnonzero(np.abs(lengths - 1) > 1e-3)
+    if len(bad):
+        name, length = shown(names[bad[0]]), lengths[bad[0]]
+        raise CalibrationError(f"{name}: expected a quaternion of length 1, got length {length:g}")
+    rotations = Rotation.from_quat(poses[:, :4], scalar_first=True)
+    return RigidTransform.from_components(poses[:, 4:], rotations).inv()
+
+
+# Writing.
+
+Row = tuple[int, int, Model, list[float], Camera]  # camera's number, model's number, model, parameters, camera
+
+
+def rows(calibration: Calibration) -> tuple[list[Row], list[Image]]:
+    """The distinct cameras of a calibration, and an image of one of them for each of its cameras."""
+    numbers: dict[object, int] = {}
+    cameras, images = [], []
+    for name, camera in calibration.cameras.items():
+        if not re.fullmatch(r"[^\s\x00-\x1f\x7f#][^\s\x00-\x1f\x7f]{0,999}", name):
+            raise CalibrationError(f"COLMAP takes image names without spaces, the camera is named {shown(name)}")
+        key = (camera.intrinsics, camera.lens)
+        if key not in numbers:
+            model, same = expressed(name, camera, WRITTEN, "COLMAP")
+            numbers[key] = len(numbers) + 1
+            number = next(n for n, known in MODELS.items() if known is model)
+            cameras.append((numbers[key], number, model, model.values(same, FIRST_PIXEL), camera))
+        pose = camera.cam_from_world
+        quaternion = pose.rotation.as_quat(scalar_first=True)
+        images.append((name, numbers[key], [float(x) for x in (*quaternion, *pose.translation)]))
+    return cameras, images
+
+
+def write_text(calibration: Calibration) -> dict[str, bytes]:
+    """cameras.txt, images.txt and an empty points3D.txt."""
+    cameras, images = rows(calibration)
+    lines = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
+    for key, _, model, values, camera in cameras:
+        size = f"{camera.intrinsics.width} {camera.intrinsics.height}"
+        lines.append(f"{key} {model.name} {size} {' '.join(map(repr, values))}")
+    image_lines = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)"]
+    for number, (name, key, pose) in enumerate(images, 1):
+        image_lines += [f"{number} {' '.join(map(repr, pose))} {key} {name}", ""]
+    points = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n"
+    texts = {"cameras.txt": "\n".join(lines) + "\n", "images.txt": "\n".join(image_lines) + "\n"}
+    return {name: text.encode() for name, text in (texts | {"points3D.txt": points}).items()}
+
+
+def write_binary(calibration: Calibration) -> dict[str, bytes]:
+    """The same in COLMAP's binary form."""
+    cameras, images = rows(calibration)
+    return colmap_binary.packed(cameras, images)

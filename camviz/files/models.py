@@ -1,0 +1,118 @@
+"""Camera models as formats list them: a name, a lens, and the parameters in the order in which the file has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.files.calibration import CalibrationError
+from camviz.files.section import explained
+from camviz.lenses import BrownConrady, Equidistant, ExtendedUnified, KannalaBrandt, Lens, Perspective, UnifiedSphere
+
+PLAIN = {BrownConrady: Perspective, KannalaBrandt: Equidistant}  # what is left where all coefficients are zero
+
+
+@dataclass(frozen=True)
+class Model:
+    """One camera model of a format; `parameters` has the names of Intrinsics and the lens, or f for fx = fy."""
+
+    name: str
+    lens: type[Any]
+    parameters: str
+    fixed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def names(self) -> list[str]:
+        return self.parameters.split()
+
+    def camera(self, values: Sequence[float], width: int, height: int, first_pixel: float, where: str) -> Camera:
+        """The camera of these values; `first_pixel` is the coordinate the format gives the first pixel's centre."""
+        held = dict(zip(self.names, map(float, values), strict=True)) | dict(self.fixed)
+        focal = held.pop("f", None)
+        fx, fy = (held.pop(name, focal) for name in ("fx", "fy"))
+        cx, cy = held.pop("cx") - first_pixel, held.pop("cy") - first_pixel
+        with explained(where):
+            grid = Intrinsics(width, height, fx, fy, cx, cy, held.pop("skew", 0.0))  # type: ignore[arg-type]
+            return Camera(grid, self.lens(**held))
+
+    def values(self, camera: Camera, first_pixel: float) -> list[float]:
+        """The inverse of `camera`, for a camera that the model can hold."""
+        grid = camera.intrinsics
+        held = asdict(grid) | _parameters(camera.lens) | {"f": grid.fx}
+        held |= {"cx": grid.cx + first_pixel, "cy": grid.cy + first_pixel}
+        return [float(held[name]) for name in self.names]
+
+    def lacks(self, camera: Camera) -> list[str]:
+        """The parameters of a camera with a lens of this model's kind that have no place in the model."""
+        grid = camera.intrinsics
+        needed = {name: value for name, value in _parameters(camera.lens).items() if value != self.fixed.get(name, 0.0)}
+        lacking = [name for name in needed if name not in self.names]
+        lacking += ["skew"] * (grid.skew != 0 and "skew" not in self.names)
+        return lacking + ["fy, which differs from fx,"] * (grid.fx != grid.fy and "f" in self.names)
+
+
+def expressed(name: str, camera: Camera, models: Iterable[Model], title: str) -> tuple[Model, Camera]:
+    """The first model that holds the camera, and the camera in its terms; CalibrationError saying why none does."""
+    models = list(models)
+    fitting = [(model, same) for same in equals(camera) for model in models if model.lens is type(same.lens)]
+    if not fitting:
+        known = ", ".join(dict.fromkeys(model.lens.__name__ for model in models))
+        lens = type(camera.lens).__name__
+        raise CalibrationError(f"{title} has no {lens} lens, which {name} has; it holds {known}")
+    for model, same in fitting:
+        if not model.lacks(same):
+            return model, same
+    model, same = min(fitting, key=lambda pair: len(pair[0].lacks(pair[1])))
+    lacking = ", ".join(model.lacks(same))
+    raise CalibrationError(f"{title} has no place for {lacking} of {name}: its {model.name} holds {model.parameters}")
+
+
+def model_named(name: str, models: Iterable[Model]) -> Model | None:
+    """The model of this name, if there is one."""
+    return next((model for model in models if model.name == name), None)
+
+
+def equals(camera: Camera) -> Iterator[Camera]:
+    """The camera, and then the same camera under the other names that its lens has."""
+    yield camera
+    lens, grid = camera.lens, camera.intrinsics
+    for rich, plain in PLAIN.items():
+        if lens == rich():
+            yield replace(camera, lens=plain())
+        elif isinstance(lens, plain):
+            yield replace(camera, lens=rich())
+    if isinstance(lens, UnifiedSphere) and not lens.distortion:  # α = ξ/(1 + ξ), f = γ/(1 + ξ)
+        scale = 1 + lens.xi
+        yield Camera(_scaled(grid, 1 / scale), ExtendedUnified(lens.xi / scale, 1.0), camera.world_from_cam)
+    if isinstance(lens, ExtendedUnified) and lens.beta == 1 and lens.alpha < 1:
+        scale = 1 / (1 - lens.alpha)
+        yield Camera(_scaled(grid, scale), UnifiedSphere.from_alpha(lens.alpha), camera.world_from_cam)
+
+
+def same_camera(a: Camera, b: Camera, tolerance: float = 1e-11) -> bool:
+    """True where both have the same pixels, the same lens under one name or another, and the same pose."""
+    return _same_pose(a, b, tolerance) and any(_same_values(form, b, tolerance) for form in equals(a))
+
+
+def _same_pose(a: Camera, b: Camera, tolerance: float) -> bool:
+    first, second = a.world_from_cam.as_matrix(), b.world_from_cam.as_matrix()
+    return bool(np.abs(first - second).max() <= tolerance * max(1.0, float(np.abs(first).max())))
+
+
+def _same_values(a: Camera, b: Camera, tolerance: float) -> bool:
+    if type(a.lens) is not type(b.lens):
+        return False
+    first, second = (np.array([*asdict(c.intrinsics).values(), *_parameters(c.lens).values()]) for c in (a, b))
+    return bool(np.all(np.abs(first - second) <= tolerance * np.maximum(1, np.abs(first))))
+
+
+def _scaled(grid: Intrinsics, scale: float) -> Intrinsics:
+    return replace(grid, fx=grid.fx * scale, fy=grid.fy * scale, skew=grid.skew * scale)
+
+
+def _parameters(lens: Lens) -> dict[str, float]:
+    return {each.name: getattr(lens, each.name) for each in fields(lens)}  # type: ignore[arg-type]

@@ -1,0 +1,74 @@
+"""mrcal's .cameramodel: a Python literal with one lens, one pose and what they were made from."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.files.calibration import Calibration
+from camviz.files.models import Model, expressed, model_named
+from camviz.files.output import only_camera
+from camviz.files.section import Section
+from camviz.files.sizes import pair_of_sides
+from camviz.files.text import HEAD
+from camviz.files.trees import shown
+from camviz.lenses import BrownConrady, Equirectangular, Perspective, Stereographic
+
+GRID = "fx fy cx cy"
+MODELS = [
+    Model("LENSMODEL_PINHOLE", Perspective, GRID),
+    Model("LENSMODEL_OPENCV4", BrownConrady, f"{GRID} k1 k2 p1 p2"),
+    Model("LENSMODEL_OPENCV5", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
+    Model("LENSMODEL_OPENCV8", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
+    Model("LENSMODEL_OPENCV12", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4"),
+    Model("LENSMODEL_STEREOGRAPHIC", Stereographic, GRID),
+    Model("LENSMODEL_LONLAT", Equirectangular, GRID),
+]
+POSES = ("rt_cam_ref", "extrinsics")  # the second until mrcal 2.4
+_KEY = re.compile(r"""(?:\s|#[^\n]*\n)*\{(?:\s|#[^\n]*\n)*['"](?:lensmodel|[a-z_]+)['"]\s*:""")
+
+
+def is_model(text: str, path: Path) -> bool:
+    """True for a .cameramodel, and for a literal that names a lens model."""
+    named = path.suffix == ".cameramodel" or re.search(r"""['"]lensmodel['"]\s*:""", text[:HEAD])
+    return bool(named and _KEY.match(text[:HEAD]))
+
+
+def read(section: Section, path: Path) -> Calibration:
+    """One camera in mrcal's reference frame: [r t] takes points from it to the camera."""
+    name = section.text("lensmodel")
+    model = model_named(name, MODELS)
+    if model is None:
+        known = ", ".join(each.name for each in MODELS)
+        raise section.error("lensmodel", f"one of {known}, the ones there is a lens for here", shown(name))
+    width, height = pair_of_sides(section, "imagersize")
+    values = section.vector("intrinsics", [len(model.names)], model.parameters)
+    camera = model.camera(values, width, height, 0.0, section.where("intrinsics"))
+    key = next((key for key in POSES if key in section), POSES[0])
+    rt = section.vector(key, [6], "rotation vector and translation") if key in section else [0.0] * 6
+    cam_from_world = RigidTransform.from_components(rt[3:], Rotation.from_rotvec(rt[:3]))
+    return Calibration({"camera": camera.at(cam_from_world.inv())}, path, "mrcal cameramodel", notes=_notes(section))
+
+
+def _notes(section: Section) -> tuple[str, ...]:
+    kept = [key for key in ("valid_intrinsics_region", "optimization_inputs") if key in section]
+    return (f"{' and '.join(kept)}: passed over, mrcal alone makes use of it.",) if kept else ()
+
+
+def write(calibration: Calibration) -> bytes:
+    """The literal, with `extrinsics`, which every mrcal reads."""
+    name, camera = only_camera(calibration, "mrcal's cameramodel")
+    model, same = expressed(name, camera, MODELS, "mrcal's cameramodel")
+    grid, pose = camera.intrinsics, camera.cam_from_world
+    rt = [float(x) for x in (*pose.rotation.as_rotvec(), *pose.translation)]
+    lines = [
+        f"'lensmodel':  '{model.name}',",
+        f"# {model.parameters}",
+        f"'intrinsics': {model.values(same, 0.0)},",
+        "# rt_cam_ref: from the reference frame to the camera",
+        f"'extrinsics': {rt},",
+        f"'imagersize': [{grid.width}, {grid.height}],",
+    ]
+    return ("{\n" + "".join(f"    {line}\n" for line in lines) + "}\n").encode()

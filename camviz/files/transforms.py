@@ -1,0 +1,121 @@
+"""transforms.json of nerfstudio and instant-ngp: images placed in the world, in OpenGL's axes."""
+
+from __future__ import annotations
+
+from math import tan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.models import Model, expressed
+from camviz.files.output import as_json, rows_of
+from camviz.files.section import Section, explained
+from camviz.files.sizes import agreed_size, two_sides
+from camviz.files.trees import shown
+from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
+
+FIRST_PIXEL = 0.5
+OPENGL = RigidTransform.from_rotation(Rotation.from_matrix(np.diag([1.0, -1, -1])))  # y up, z backward
+MODELS = [
+    Model("OPENCV", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3"),
+    Model("OPENCV_FISHEYE", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"),
+]
+STRAIGHT = ("PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")
+KEYS = {"fx": "fl_x", "fy": "fl_y"}
+GRID_KEYS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_angle_y")
+LENS_KEYS = ("camera_model", "is_fisheye", "k1", "k2", "k3", "k4", "p1", "p2")
+
+
+def is_transforms(section: Section) -> bool:
+    return any(key in section for key in ("fl_x", "camera_angle_x", "frames"))
+
+
+def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+    """Every frame as a camera in the file's world; without frames one camera at the origin."""
+    shared = None
+    cameras: dict[str, Camera] = {}
+    for name, frame in _frames(section):
+        if any(key in frame for key in GRID_KEYS + LENS_KEYS):
+            camera = _camera(Section({**section.values, **frame.values}, frame.path), size)
+        else:
+            camera = shared = shared or _camera(section, size)
+        if name in cameras:
+            raise frame.error("file_path", "images of different names", f"{shown(name)} twice")
+        cameras[name] = camera.at(frame.transform("transform_matrix") * OPENGL)
+    notes = ("The world has no unit of its own: lengths are in the file's.",) if cameras else ()
+    return Calibration(cameras or {"camera": _camera(section, size)}, path, "transforms.json", notes=notes)
+
+
+def _frames(section: Section) -> list[tuple[str, Section]]:
+    held = section.values.get("frames") or []
+    if not isinstance(held, list) or not all(isinstance(frame, dict) for frame in held):
+        raise section.error("frames", "a list of mappings", shown(held))
+    frames = [Section(frame, section.where(f"frames[{index}]")) for index, frame in enumerate(held)]
+    return [
+        (frame.text("file_path") if "file_path" in frame else f"frame{index}", frame)
+        for index, frame in enumerate(frames)
+    ]
+
+
+def _camera(section: Section, size: tuple[int, int] | None) -> Camera:
+    width, height = agreed_size(two_sides(section, "w", "h"), size, "w, h")
+    fx = _focal_length(section, "fl_x", "camera_angle_x", width)
+    fy = _focal_length(section, "fl_y", "camera_angle_y", height, fx)
+    cx, cy = (section.number(key) if key in section else side / 2 for key, side in (("cx", width), ("cy", height)))
+    with explained(section.path or "the intrinsics"):
+        return Camera(Intrinsics(width, height, fx, fy, cx - FIRST_PIXEL, cy - FIRST_PIXEL), _lens(section))
+
+
+def _focal_length(section: Section, key: str, angle: str, side: int, default: float | None = None) -> float:
+    """f, or f = side / (2 tan(angle / 2)) from the angle of view."""
+    if key in section or angle not in section:
+        return default if default is not None and key not in section else section.number(key)
+    view = section.number(angle)
+    if not 0 < view < np.pi:
+        raise section.error(angle, "an angle of view between 0 and π radians", f"{view:g}")
+    return side / (2 * tan(view / 2))
+
+
+def _lens(section: Section) -> Lens:
+    held = {key: section.number(key) for key in LENS_KEYS[2:] if section.values.get(key) is not None}
+    name = section.text("camera_model") if "camera_model" in section else STRAIGHT[-1]
+    if name == "OPENCV_FISHEYE" or section.values.get("is_fisheye") is True:
+        return KannalaBrandt(**_without(section, held, "p1", "p2"))
+    if name not in STRAIGHT:
+        raise section.error("camera_model", f"{' or '.join(STRAIGHT)} or OPENCV_FISHEYE", shown(name))
+    lens = BrownConrady(**_without(section, held, "k4"))
+    return lens if held else Perspective()
+
+
+def _without(section: Section, held: dict[str, float], *keys: str) -> dict[str, float]:
+    """The coefficients, but for those that must be zero: k4 is of the eighth power here, which is not OpenCV's k4."""
+    for key in keys:
+        if held.get(key):
+            raise section.error(key, "0, there is no lens here that has it beside the others", f"{held[key]:g}")
+    return {key: value for key, value in held.items() if key not in keys}
+
+
+def write(calibration: Calibration) -> bytes:
+    """One set of intrinsics for all frames where they share it, otherwise one in each frame."""
+    frames: list[dict[str, Any]] = []
+    intrinsics = [_intrinsics(name, camera) for name, camera in calibration.cameras.items()]
+    shared = intrinsics[0] if all(each == intrinsics[0] for each in intrinsics) else {}
+    models = {each["camera_model"] for each in intrinsics}
+    if len(models) > 1:
+        raise CalibrationError(f"transforms.json holds one camera model for all, these cameras need {sorted(models)}")
+    for (name, camera), own in zip(calibration.cameras.items(), intrinsics, strict=True):
+        pose = rows_of(camera.world_from_cam * OPENGL)
+        frames.append({"file_path": name, **({} if shared else own), "transform_matrix": pose})
+    return as_json({"camera_model": models.pop(), **shared, "frames": frames})
+
+
+def _intrinsics(name: str, camera: Camera) -> dict[str, Any]:
+    model, same = expressed(name, camera, MODELS, "transforms.json")
+    grid = camera.intrinsics
+    values = zip(model.names, model.values(same, FIRST_PIXEL), strict=True)
+    held = {KEYS.get(key, key): value for key, value in values}
+    return {"camera_model": model.name, "w": grid.width, "h": grid.height, **held}

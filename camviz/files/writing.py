@@ -1,0 +1,172 @@
+"""`write`: a calibration in another format, whole and unchanged, or a sentence that says why not."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from camviz.files import basalt, colmap, euroc, kalibr, kitti, matlab, metashape, mrcal, opencv_writing, ros, transforms
+from camviz.files.calibration import Calibration, CalibrationError
+from camviz.files.loading import load
+from camviz.files.models import same_camera
+
+Content = bytes | dict[str, bytes]  # of a file, or of the files of a folder by name
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format that can be written: for whom, under which name, and how."""
+
+    title: str
+    file: str  # such a file's usual name
+    content: Callable[[Calibration, Path], Content]
+
+
+def _format(title: str, file: str, write: Callable[[Calibration], Content]) -> Format:
+    return Format(title, file, lambda calibration, _: write(calibration))
+
+
+FORMATS: Mapping[str, Format] = MappingProxyType(
+    {
+        "opencv": Format("OpenCV FileStorage", "camera.yml, .xml or .json", opencv_writing.write),
+        "ros": _format("ROS CameraInfo", "camera.yaml", ros.write),
+        "kalibr": _format("Kalibr camchain", "camchain.yaml", kalibr.write),
+        "colmap": _format("COLMAP, as text", "a folder", colmap.write_text),
+        "colmap-bin": _format("COLMAP, binary", "a folder", colmap.write_binary),
+        "mrcal": _format("mrcal", "camera.cameramodel", mrcal.write),
+        "nerfstudio": _format("nerfstudio, instant-ngp", "transforms.json", transforms.write),
+        "euroc": _format("EuRoC", "sensor.yaml", euroc.write),
+        "basalt": _format("Basalt", "calibration.json", basalt.write),
+        "kitti": _format("KITTI, rectified", "calib.txt", kitti.write_rectified),
+        "kitti-raw": _format("KITTI, before rectification", "calib_cam_to_cam.txt", kitti.write_raw),
+        "matlab": _format("MATLAB cameraParameters", "camera.json", matlab.write),
+        "metashape": _format("Metashape", "camera.xml", metashape.write),
+    }
+)
+
+
+def write(calibration: Calibration, path: str | PathLike[str], format: str) -> tuple[str, ...]:
+    """Write a calibration in one of FORMATS and return in sentences what the format could not hold beside the cameras.
+
+    Pixels, lenses and poses are written so that they are read back the same, or not at all: CalibrationError says
+    what the format has no place for. The file appears under its name when it is complete; COLMAP's is a folder.
+    """
+    path = Path(path)
+    if format not in FORMATS:
+        raise CalibrationError(f"format: expected one of {', '.join(FORMATS)}, got {format!r}")
+    try:
+        content = FORMATS[format].content(calibration, path)
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from error.__cause__
+    if isinstance(content, dict):
+        return _folder(calibration, path, content)
+    return _file(calibration, path, content)
+
+
+def alone(calibration: Calibration, name: str) -> Calibration:
+    """One of the cameras and what was recorded of it, where it stands."""
+    if name not in calibration.cameras:
+        names = ", ".join(calibration.cameras)
+        raise CalibrationError(f"{calibration.source}: expected one of the cameras {names}, got {name!r}")
+    views: dict[str, Any] = {
+        field: {key: value for key, value in getattr(calibration, field).items() if key == name}
+        for field in ("detections", "cam_from_board", "per_view_errors")
+    }
+    return replace(calibration, cameras={name: calibration.cameras[name]}, **views)
+
+
+def from_first_camera(calibration: Calibration) -> Calibration:
+    """The same cameras with the first one's frame as the world."""
+    first_from_world = next(iter(calibration.cameras.values())).cam_from_world
+    names = list(calibration.cameras)
+    moved = {name: camera.at(first_from_world * camera.world_from_cam) for name, camera in calibration.cameras.items()}
+    moved[names[0]] = replace(moved[names[0]], world_from_cam=first_from_world.identity())
+    imu = calibration.world_from_imu
+    return replace(calibration, cameras=moved, world_from_imu=None if imu is None else first_from_world * imu)
+
+
+def _file(calibration: Calibration, path: Path, content: bytes) -> tuple[str, ...]:
+    """By way of a file beside it, of the same ending, that is read back before it takes the name."""
+    if path.is_dir():
+        raise CalibrationError(f"{path}: expected the name of a file to write, this is a directory")
+    _refuse_no_parent(path)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as room:
+        part = Path(room) / path.name
+        _put(part, content)
+        left_out = _left_out(calibration, part, path)
+        os.replace(part, path)
+    return left_out
+
+
+def _folder(calibration: Calibration, path: Path, content: dict[str, bytes]) -> tuple[str, ...]:
+    """A folder that was not there, or was empty."""
+    if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+        raise CalibrationError(f"{path}: expected the name of a new folder, or of an empty one")
+    _refuse_no_parent(path)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as room:
+        part = Path(room) / "model"
+        part.mkdir()
+        for name, held in content.items():
+            _put(part / name, held)
+        left_out = _left_out(calibration, part, path)
+        if path.exists():
+            path.rmdir()
+        os.replace(part, path)
+    return left_out
+
+
+def _refuse_no_parent(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise CalibrationError(f"{path}: there is no directory {path.parent} to write into")
+
+
+def _put(path: Path, content: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _left_out(calibration: Calibration, part: Path, path: Path) -> tuple[str, ...]:
+    """What is not read back, in sentences; CalibrationError should that be a camera."""
+    grid = next(iter(calibration.cameras.values())).intrinsics
+    sizes = {(camera.intrinsics.width, camera.intrinsics.height) for camera in calibration.cameras.values()}
+    try:
+        back = load(part, size=(grid.width, grid.height) if len(sizes) == 1 else None)
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {str(error).removeprefix(f'{part}: ')}") from error
+    pairs = zip(calibration.cameras.items(), back.cameras.values(), strict=False)
+    changed = [name for (name, camera), other in pairs if not same_camera(camera, other)]
+    if changed or len(back.cameras) != len(calibration.cameras):
+        raise CalibrationError(f"{path}: what would be written is not read back as the same cameras ({changed[:3]})")
+    return (*_renamed(calibration, back), *_missing(calibration, back))
+
+
+def _renamed(calibration: Calibration, back: Calibration) -> list[str]:
+    pairs = [(old, new) for old, new in zip(calibration.cameras, back.cameras, strict=True) if old != new]
+    more = f", and {len(pairs) - 4} more" * (len(pairs) > 4)
+    said = ", ".join(f"{old} is {new}" for old, new in pairs[:4])
+    return [f"The format does not keep these names: {said}{more}."] if pairs else []
+
+
+def _missing(calibration: Calibration, back: Calibration) -> list[str]:
+    kinds = {
+        "board": "the board",
+        "detections": "the detected corners",
+        "cam_from_board": "the poses of the board",
+        "per_view_errors": "the errors of the views",
+        "world_from_imu": "the place of the IMU",
+    }
+    lost = [said for field, said in kinds.items() if _held(calibration, field) and not _held(back, field)]
+    return [f"The format does not hold {', '.join(lost)}: left out."] if lost else []
+
+
+def _held(calibration: Calibration, field: str) -> bool:
+    value = getattr(calibration, field)
+    return value is not None and value != {}

@@ -1,0 +1,401 @@
+"""What is written says the same as what was read, in the other program's own terms; or it is not written, with why."""
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import RigidTransform, Rotation
+
+import camviz
+from camviz import command
+from camviz.cameras import Camera, Intrinsics, transform
+from camviz.files import FORMATS, Board, Calibration, CalibrationError, alone, from_first_camera, write, writing
+from camviz.files.models import same_camera
+from camviz.lenses import (
+    BrownConrady,
+    Cylindrical,
+    DoubleSphere,
+    Equidistant,
+    Equirectangular,
+    ExtendedUnified,
+    FieldOfView,
+    KannalaBrandt,
+    Orthographic,
+    Perspective,
+    Stereographic,
+    UnifiedSphere,
+)
+
+DATA = Path(__file__).parent / "data"
+POINTS = np.random.default_rng(7).uniform([-0.3, -0.25, 0.9], [0.3, 0.25, 3.0], size=(50, 3))
+GRID = Intrinsics(640, 480, 1000 / 3, 1000 / 7, 321.1, 239.9)
+SKEWED = replace(GRID, skew=1.3)
+BROWN = (-0.11, 0.023, 1.1e-3, -2.3e-3, 3.7e-3, 4.1e-3, 5.3e-3, 6.7e-3, 7.1e-4, 8.3e-4, 9.7e-4, 1.1e-4, 0.013, -0.017)
+LENSES = {
+    "perspective": Perspective(),
+    "brown4": BrownConrady(*BROWN[:4]),
+    "brown5": BrownConrady(*BROWN[:5]),
+    "brown8": BrownConrady(*BROWN[:8]),
+    "brown12": BrownConrady(*BROWN[:12]),
+    "brown14": BrownConrady(*BROWN),
+    "fisheye": KannalaBrandt(0.0069, -0.0014, -0.00027, -0.00045),
+    "equidistant": Equidistant(),
+    "fov": FieldOfView(0.92),
+    "mei": UnifiedSphere(1.7, -0.02, 0.004, 0.0003, -0.0001),
+    "ucm": UnifiedSphere(0.85),
+    "eucm": ExtendedUnified(0.6, 1.1),
+    "ds": DoubleSphere(-0.2, 0.55),
+    "stereographic": Stereographic(),
+    "orthographic": Orthographic(),
+    "lonlat": Equirectangular(),
+    "cylindrical": Cylindrical(),
+}
+BROWN5 = {"perspective", "brown4", "brown5"}
+HOLDS = {
+    "opencv": {*BROWN5, "brown8", "brown12", "brown14", "fisheye", "equidistant", "mei", "ucm"},
+    "ros": {*BROWN5, "brown8", "fisheye", "equidistant"},
+    "kalibr": {"perspective", "brown4", "fisheye", "equidistant", "fov", "mei", "ucm", "eucm", "ds"},
+    "colmap": {*BROWN5, "brown8", "fisheye", "equidistant", "fov", "ucm", "eucm"},
+    "mrcal": {*BROWN5, "brown8", "brown12", "stereographic", "lonlat"},
+    "nerfstudio": {*BROWN5, "fisheye", "equidistant"},
+    "euroc": {"perspective", "brown4", "fisheye", "equidistant"},
+    "basalt": {*BROWN5, "brown8", "fisheye", "equidistant", "fov", "ucm", "eucm", "ds"},
+    "kitti": {"perspective"},
+    "kitti-raw": BROWN5,
+    "matlab": BROWN5,
+    "metashape": {*BROWN5, "fisheye", "equidistant", "lonlat", "cylindrical"},
+}
+HOLDS["colmap-bin"] = HOLDS["colmap"]
+POSE = RigidTransform.from_components([0.3, -0.2, 0.1], Rotation.from_rotvec([0.3, -1.2, 0.4]))
+IMU = RigidTransform.from_components([0.05, 0.02, -0.01], Rotation.from_rotvec([-0.2, 0.1, 1.4]))
+WORLDS = ("colmap", "colmap-bin", "mrcal", "nerfstudio", "kitti-raw", "metashape")
+
+
+def calibration(*cameras, imu=None, **fields):
+    named = {f"cam{index}": camera for index, camera in enumerate(cameras)}
+    return Calibration(named, Path("made.yml"), "made", world_from_imu=imu, **fields)
+
+
+def pair(lens=LENSES["brown4"]):
+    return calibration(Camera(GRID, lens), Camera(replace(GRID, fx=350.1), lens, POSE))
+
+
+def assert_same(first, second):
+    assert len(first.cameras) == len(second.cameras)
+    for a, b in zip(first.cameras.values(), second.cameras.values(), strict=True):
+        assert same_camera(a, b, 1e-12)
+        seen, back = a.project(transform(a.world_from_cam, POINTS)), b.project(transform(a.world_from_cam, POINTS))
+        np.testing.assert_allclose(back, seen, rtol=0, atol=1e-8)
+        assert np.isfinite(seen).all()
+
+
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_lens_is_written_whole_or_refused(tmp_path, name, lens):
+    """One camera by its IMU: what the format has a model for is read back to 1e-12, the rest gets a sentence."""
+    made = calibration(Camera(GRID, LENSES[lens]), imu=IMU)
+    path = tmp_path / "out"
+    if lens in HOLDS[name]:
+        write(made, path, name)
+        assert_same(made, camviz.load(path, size=(640, 480)))
+    else:
+        with pytest.raises(CalibrationError, match=r"has no (place for|[A-Z][a-zA-Z]+ lens)") as caught:
+            write(made, path, name)
+        assert "\n" not in str(caught.value)
+        assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_skew_is_kept_or_refused(tmp_path, name):
+    """KITTI's and MATLAB's matrices and Metashape's b2 have a place for it; the others' models have none."""
+    made = calibration(Camera(SKEWED), imu=IMU)
+    if name in ("kitti", "matlab", "metashape"):
+        write(made, tmp_path / "out", name)
+        assert_same(made, camviz.load(tmp_path / "out", size=(640, 480)))
+    else:
+        with pytest.raises(CalibrationError, match="no place for skew of cam0"):
+            write(made, tmp_path / "out", name)
+
+
+@pytest.mark.parametrize("name", ["opencv", "kalibr", "basalt", *sorted({*WORLDS} - {"mrcal"})])
+def test_two_cameras_keep_their_places(tmp_path, name):
+    made = replace(pair(), world_from_imu=IMU)
+    write(made, tmp_path / "out", name)
+    assert_same(made, camviz.load(tmp_path / "out"))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_world_of_ones_own_is_kept_or_refused(tmp_path, name):
+    made = calibration(Camera(GRID, Perspective(), POSE), imu=IMU)
+    if name in WORLDS:
+        write(made, tmp_path / "out", name)
+        assert_same(made, camviz.load(tmp_path / "out"))
+    else:
+        with pytest.raises(CalibrationError, match=r"--first-as-world|all turned alike"):
+            write(made, tmp_path / "out", name)
+        write(from_first_camera(made), tmp_path / "out", name)
+
+
+@pytest.mark.parametrize("name", ["ros", "mrcal", "euroc", "matlab"])
+def test_a_format_of_one_camera_asks_which(tmp_path, name):
+    with pytest.raises(CalibrationError, match="choose one of cam0, cam1"):
+        write(pair(), tmp_path / "out", name)
+    assert write(alone(pair(), "cam0"), tmp_path / "out", name) is not None
+
+
+@pytest.mark.parametrize("name", ["kalibr", "basalt", "euroc"])
+def test_the_imu_stays_where_it_is(tmp_path, name):
+    write(calibration(Camera(GRID, LENSES["brown4"]), imu=IMU), tmp_path / "out", name)
+    back = camviz.load(tmp_path / "out").world_from_imu
+    np.testing.assert_allclose(back.as_matrix(), IMU.as_matrix(), rtol=0, atol=1e-12)
+
+
+def test_basalt_invents_no_imu(tmp_path):
+    with pytest.raises(CalibrationError, match="this calibration holds none"):
+        write(pair(), tmp_path / "out", "basalt")
+
+
+def test_moving_the_world_into_the_first_camera_keeps_what_they_see_of_each_other():
+    made = calibration(Camera(GRID, Perspective(), IMU), Camera(GRID, Perspective(), POSE), imu=POSE)
+    moved = from_first_camera(made)
+    before, after = made.rig.a_from_b("cam1", "cam0"), moved.rig.a_from_b("cam1", "cam0")
+    np.testing.assert_allclose(after.as_matrix(), before.as_matrix(), atol=1e-14)
+    imu_from_cam = [each.world_from_imu.inv() * each.cameras["cam1"].world_from_cam for each in (made, moved)]
+    np.testing.assert_allclose(imu_from_cam[1].as_matrix(), imu_from_cam[0].as_matrix(), atol=1e-14)
+
+
+@pytest.mark.parametrize("suffix", [".yml", ".xml", ".json"])
+def test_opencv_keeps_all_that_it_knows_of_the_views(tmp_path, suffix):
+    made = camviz.load(DATA / "opencv_mono.json")
+    assert write(made, tmp_path / f"out{suffix}", "opencv") == ()
+    back = camviz.load(tmp_path / f"out{suffix}")
+    assert back.board == made.board
+    for field in ("detections", "per_view_errors"):
+        np.testing.assert_array_equal(getattr(back, field)["camera"], getattr(made, field)["camera"])
+    poses = [each.cam_from_board["camera"].as_matrix() for each in (back, made)]
+    np.testing.assert_allclose(*poses, rtol=0, atol=1e-12)
+
+
+def test_what_a_format_does_not_hold_beside_the_cameras_is_said(tmp_path):
+    lens = LENSES["brown4"]
+    made = calibration(Camera(GRID, lens), board=Board(9, 6, 0.025), per_view_errors={"cam0": np.ones(3)}, imu=IMU)
+    renamed, left_out = write(made, tmp_path / "out", "mrcal")
+    assert renamed == "The format does not keep these names: cam0 is camera."
+    assert left_out == "The format does not hold the board, the errors of the views, the place of the IMU: left out."
+
+
+# Independent readers.
+
+
+def test_opencv_reads_what_is_written_and_projects_the_same(tmp_path):
+    made = pair(LENSES["brown14"])
+    write(made, tmp_path / "pair.yml", "opencv")
+    storage = cv2.FileStorage(str(tmp_path / "pair.yml"), cv2.FILE_STORAGE_READ)
+    K, D, R, T = (storage.getNode(key).mat() for key in ("M2", "D2", "R", "T"))
+    pixels = cv2.projectPoints(POINTS, cv2.Rodrigues(R)[0], T, K, D)[0].reshape(-1, 2)
+    mine = made.cameras["cam1"].project(POINTS)
+    seen = np.isfinite(mine).all(axis=1)
+    assert seen.sum() > 5
+    np.testing.assert_allclose(mine[seen], pixels[seen], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["colmap", "colmap-bin"])
+@pytest.mark.parametrize("lens", sorted(HOLDS["colmap"]))
+def test_colmap_reads_what_is_written_and_projects_the_same(tmp_path, name, lens):
+    pycolmap = pytest.importorskip("pycolmap")
+    made = calibration(Camera(GRID, LENSES[lens], IMU), Camera(GRID, LENSES[lens], POSE))
+    write(made, tmp_path / "model", name)
+    model = pycolmap.Reconstruction(tmp_path / "model")
+    assert len(model.cameras) == 1
+    for image in model.images.values():
+        camera = made.cameras[image.name]
+        world = transform(camera.world_from_cam, POINTS)
+        np.testing.assert_allclose(image.cam_from_world() * world, POINTS, rtol=0, atol=1e-12)
+        pixels = model.cameras[image.camera_id].img_from_cam(POINTS)
+        np.testing.assert_allclose(camera.project(world) + 0.5, pixels, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize(("name", "lens"), [("kalibr", "brown4"), ("ros", "brown5"), ("euroc", "brown4")])
+def test_yaml_is_read_with_all_digits_by_another_reader(tmp_path, name, lens):
+    """Numbers such as 1e-05 need a point to be numbers to PyYAML."""
+    small = replace(LENSES[lens], p1=1e-5, p2=1e-7)
+    write(calibration(Camera(GRID, small)), tmp_path / "out", name)
+    tree = yaml.safe_load((tmp_path / "out").read_text())
+    tree = tree.get("cam0", tree)
+    values = tree.get("distortion_coeffs") or tree["distortion_coefficients"]
+    values = values["data"] if isinstance(values, dict) else values
+    assert values[:4] == [small.k1, small.k2, 1e-5, 1e-7]
+    K = tree["camera_matrix"]["data"] if name == "ros" else tree["intrinsics"]
+    focal_lengths = [K[0], K[4]] if name == "ros" else K[:2]
+    assert focal_lengths == [GRID.fx, GRID.fy]
+
+
+def test_a_kalibr_chain_goes_from_each_camera_to_the_next(tmp_path):
+    """T_cn_cnm1 takes points of the camera before, T_cam_imu those of the IMU."""
+    made = replace(pair(), world_from_imu=IMU)
+    write(made, tmp_path / "chain.yaml", "kalibr")
+    cam1 = yaml.safe_load((tmp_path / "chain.yaml").read_text())["cam1"]
+    np.testing.assert_allclose(cam1["T_cn_cnm1"], POSE.inv().as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(cam1["T_cam_imu"], (POSE.inv() * IMU).as_matrix(), atol=1e-14)
+
+
+def test_nerfstudios_columns_are_right_up_and_backward(tmp_path):
+    write(calibration(Camera(GRID, Perspective(), POSE)), tmp_path / "out.json", "nerfstudio")
+    tree = json.loads((tmp_path / "out.json").read_text())
+    right, down, forward = POSE.rotation.as_matrix().T
+    columns = np.array(tree["frames"][0]["transform_matrix"])[:3].T
+    np.testing.assert_allclose(columns, [right, -down, -forward, POSE.translation], atol=1e-14)
+    assert (tree["cx"], tree["cy"]) == (GRID.cx + 0.5, GRID.cy + 0.5)
+
+
+def test_matlabs_matrix_is_transposed_and_counts_from_one(tmp_path):
+    write(calibration(Camera(SKEWED, LENSES["brown5"])), tmp_path / "out.json", "matlab")
+    tree = json.loads((tmp_path / "out.json").read_text())
+    K = np.transpose(tree["IntrinsicMatrix"])
+    np.testing.assert_allclose(K - SKEWED.K, [[0, 0, 1], [0, 0, 1], [0, 0, 0]], atol=1e-12)
+    assert (tree["RadialDistortion"], tree["TangentialDistortion"]) == ([-0.11, 0.023, 3.7e-3], [1.1e-3, -2.3e-3])
+    assert tree["ImageSize"] == [480, 640]
+
+
+def test_metashape_is_written_with_its_tangential_pair_swapped(tmp_path):
+    from xml.etree import ElementTree
+
+    write(calibration(Camera(SKEWED, LENSES["brown5"])), tmp_path / "out.xml", "metashape")
+    held = {each.tag: each.text for each in ElementTree.parse(tmp_path / "out.xml").getroot()}
+    assert (float(held["p1"]), float(held["p2"])) == (-2.3e-3, 1.1e-3)
+    expected = [GRID.fy, GRID.fx - GRID.fy, 1.3, GRID.cx + 0.5 - 320, GRID.cy + 0.5 - 240]
+    np.testing.assert_allclose([float(held[key]) for key in ("f", "b1", "b2", "cx", "cy")], expected, atol=1e-12)
+
+
+def test_mrcals_literal_is_one_to_python(tmp_path):
+    from ast import literal_eval
+
+    write(calibration(Camera(GRID, LENSES["brown12"], POSE)), tmp_path / "out.cameramodel", "mrcal")
+    held = literal_eval((tmp_path / "out.cameramodel").read_text())
+    inverse = POSE.inv()
+    np.testing.assert_allclose(held["extrinsics"], [*inverse.rotation.as_rotvec(), *inverse.translation], atol=1e-14)
+    assert held["intrinsics"] == [GRID.fx, GRID.fy, GRID.cx, GRID.cy, *BROWN[:12]]
+
+
+def test_kittis_first_row_holds_the_baseline(tmp_path):
+    right = Camera(GRID, Perspective(), RigidTransform.from_translation([0.54, 0, 0]))
+    write(calibration(Camera(GRID), right), tmp_path / "calib.txt", "kitti")
+    P1 = (tmp_path / "calib.txt").read_text().splitlines()[1].split()
+    assert P1[0] == "P1:"
+    assert -float(P1[4]) / float(P1[1]) == pytest.approx(0.54, abs=1e-15)
+
+
+def test_basalts_quaternions_end_with_their_real_part(tmp_path):
+    write(calibration(Camera(GRID, LENSES["ds"]), imu=IMU), tmp_path / "out.json", "basalt")
+    held = json.loads((tmp_path / "out.json").read_text())["value0"]["T_imu_cam"][0]
+    inverse = IMU.inv()
+    np.testing.assert_allclose([held[f"q{axis}"] for axis in "xyzw"], inverse.rotation.as_quat(), atol=1e-15)
+    np.testing.assert_allclose([held[f"p{axis}"] for axis in "xyz"], inverse.translation, atol=1e-15)
+
+
+# Whole or not at all.
+
+
+@pytest.mark.parametrize("name", ["kalibr", "colmap"])
+def test_a_write_that_is_interrupted_leaves_nothing(tmp_path, monkeypatch, name):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write(pair(), tmp_path / "out", name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_not_read_back_the_same_is_not_written(tmp_path, monkeypatch):
+    """Half a pixel would be noticed before the file has its name."""
+    (tmp_path / "out").write_text("as it was")
+    elsewhere = calibration(Camera(replace(GRID, cx=GRID.cx + 0.5)))
+    monkeypatch.setattr(writing, "load", lambda *_, **__: elsewhere)
+    with pytest.raises(CalibrationError, match="not read back as the same cameras"):
+        write(calibration(Camera(GRID)), tmp_path / "out", "mrcal")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["as it was"]
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path):
+    (tmp_path / "model").mkdir()
+    write(pair(), tmp_path / "model", "colmap")
+    with pytest.raises(CalibrationError, match="a new folder, or of an empty one"):
+        write(pair(), tmp_path / "model", "colmap")
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "what"),
+    [
+        ("nowhere/out", "kalibr", "no directory"),
+        ("", "kalibr", "this is a directory"),
+        ("out", "word", "expected one of"),
+    ],
+)
+def test_a_place_or_format_that_cannot_be_is_refused(tmp_path, path, name, what):
+    with pytest.raises(CalibrationError, match=what):
+        write(pair(), tmp_path / path, name)
+
+
+# The command.
+
+
+def test_convert_writes_what_load_reads(tmp_path, capsys):
+    out = tmp_path / "model"
+    assert command.main(["convert", str(DATA / "kalibr_chain.yaml"), str(out), "--to", "colmap"]) == 0
+    assert_same(camviz.load(DATA / "kalibr_chain.yaml"), camviz.load(out))
+    assert "the place of the IMU: left out" in capsys.readouterr().out
+
+
+def test_convert_takes_one_camera_and_makes_it_the_world(tmp_path):
+    words = ["convert", str(DATA / "kalibr_chain.yaml"), str(tmp_path / "o.yml"), "--to", "opencv", "--camera", "cam1"]
+    assert command.main(words) == 2
+    assert command.main([*words, "--first-as-world"]) == 0
+    assert camviz.load(tmp_path / "o.yml").cameras["cam1"].lens == KannalaBrandt(-0.0128, 0.0047, -0.0031, 0.0006)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["opencv_mono.json", "out", "--to", "kalibr"], "no place for k3, k4, k5, k6 of camera"),
+        (["opencv_mono.json", "out", "--to", "exif"], "expected one of opencv, ros"),
+        (["opencv_mono.json", "out"], "--to"),
+        (["kitti_calib.txt", "out", "--to", "colmap"], "--size 640x480"),
+        (
+            ["opencv_mono.json", "out", "--to", "ros", "--camera", "left"],
+            "expected one of the cameras camera, got 'left'",
+        ),
+        (["missing.yml", "out", "--to", "ros"], "no such file"),
+    ],
+)
+def test_convert_refuses_in_one_sentence_and_writes_nothing(tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    assert command.main(["convert", str(DATA / words[0]), *words[1:]]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_convert_does_not_overwrite_what_it_reads(tmp_path, capsys):
+    path = tmp_path / "camera.json"
+    path.write_bytes((DATA / "opencv_mono.json").read_bytes())
+    assert command.main(["convert", str(path), str(path), "--to", "colmap"]) == 2
+    assert "would overwrite" in capsys.readouterr().err
+    assert path.read_bytes() == (DATA / "opencv_mono.json").read_bytes()
+
+
+def test_the_documentation_lists_every_format():
+    page = (Path(__file__).parents[1] / "docs" / "formats.md").read_text()
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `") and "--to" not in line]
+    assert [word.strip(" `,") for row in rows for word in row.split()] == list(FORMATS)
+
+
+def test_the_help_lists_every_format():
+    listed = [line.split()[0] for line in command.FORMATS.split("examples:")[0].splitlines()[1:] if line.strip()]
+    assert listed == list(FORMATS)

@@ -1,0 +1,95 @@
+"""The page of a calibration: whole, offline, with the file's own numbers, whatever the shape of its images."""
+
+import re
+import time
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from scipy.spatial.transform import RigidTransform
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.files import Calibration
+from camviz.lenses import BrownConrady, DoubleSphere, KannalaBrandt, UnifiedSphere
+from camviz.page import page
+from camviz.views.distortion import DistortionView
+from camviz.views.epipolar import EpipolarView
+from camviz.views.frustum import FrustumView
+
+ASIDE = RigidTransform.from_translation([0.3, 0, 0])
+ODD = {
+    "one pixel": Intrinsics(1, 1, 1, 1, 0, 0),
+    "two rows": Intrinsics(4096, 2, 2000, 2000, 2047.5, 0.5),
+    "one column": Intrinsics(1, 4096, 2000, 2000, 0, 2047.5),
+    "portrait": Intrinsics(480, 1200, 600, 600, 239.5, 599.5),
+    "square": Intrinsics(500, 500, 400, 400, 249.5, 249.5),
+    "large": Intrinsics(20000, 10000, 15000, 15000, 9999.5, 4999.5),
+    "focal length of a thousandth": Intrinsics(640, 480, 1e-3, 1e-3, 319.5, 239.5),
+    "focal length of a million": Intrinsics(640, 480, 1e6, 1e6, 319.5, 239.5),
+    "axis far outside": Intrinsics(640, 480, 500, 500, 1e6, -1e6),
+}
+
+
+def calibration(*cameras, names=("left", "right", "third")):
+    return Calibration(dict(zip(names, cameras, strict=False)), Path("some camera.yml"), "a test")
+
+
+def panels(picture):
+    """(x, y, width, height) of every panel of a picture."""
+    sizes = r'<svg x="([^"]+)" y="([^"]+)" width="([^"]+)" height="([^"]+)"'
+    return [tuple(map(float, found)) for found in re.findall(sizes, picture.body)]
+
+
+@pytest.mark.parametrize("intrinsics", ODD.values(), ids=ODD)
+def test_an_odd_image_gets_its_page_in_time(intrinsics):
+    page(calibration(Camera(Intrinsics(640, 480, 500, 500, 320, 240))))  # what the first page of a process loads
+    start = time.perf_counter()
+    text = page(calibration(Camera(intrinsics, BrownConrady(-0.1))))
+    assert time.perf_counter() - start < 5
+    assert text.count("<svg xmlns") == 3
+    assert not re.search(r'[ "(,](nan|inf)\b', re.sub("base64,[^\"']*", "", text))
+
+
+@pytest.mark.parametrize("intrinsics", ODD.values(), ids=ODD)
+@pytest.mark.parametrize("view", [FrustumView, DistortionView, EpipolarView])
+def test_no_panel_lies_on_another(view, intrinsics):
+    camera = Camera(intrinsics)
+    picture = view.of(camera, camera.at(ASIDE)).figure() if view is EpipolarView else view.of(camera).figure()
+    found = panels(picture)
+    assert len(found) > 1
+    for (x0, y0, w0, h0), (x1, y1, w1, h1) in combinations(found, 2):
+        assert min(x0 + w0, x1 + w1) <= max(x0, x1) or min(y0 + h0, y1 + h1) <= max(y0, y1)
+    assert max(x + w for x, _, w, _ in found) <= picture.width
+    assert max(y + h for _, y, _, h in found) <= picture.height
+
+
+def test_the_page_needs_nothing_from_elsewhere():
+    text = page(calibration(Camera(ODD["square"]), Camera(ODD["square"], KannalaBrandt(), ASIDE)))
+    assert "attached:" not in text
+    assert not re.search(r'(?:src|href)="(?!data:|#)|url\((?!data:|#)|@import|<script', text)
+    assert re.sub(r"http://www\.w3\.org/\S+", "", text).count("http") == 0
+
+
+def test_a_cameras_name_is_words_and_not_html():
+    assert "<b>left" not in page(calibration(Camera(ODD["square"]), names=["<b>left & 'right'</b>"]))
+
+
+@pytest.mark.parametrize(
+    ("lens", "words"),
+    [
+        (BrownConrady(-0.3, 0.1), "BrownConrady: k1 = -0.3, k2 = 0.1"),
+        (KannalaBrandt(0.01, 0, 0, -0.002), "KannalaBrandt: k1 = 0.01, k4 = -0.002"),
+        (UnifiedSphere(1.8, -0.2), "UnifiedSphere: xi = 1.8, k1 = -0.2"),
+        (DoubleSphere(-0.2, 0.6), "DoubleSphere: xi = -0.2, alpha = 0.6"),
+    ],
+)
+def test_the_table_lists_what_is_not_at_rest(lens, words):
+    assert f"<td>{words}</td>" in page(calibration(Camera(ODD["square"], lens)))
+
+
+def test_every_pair_that_stands_apart_is_shown_once():
+    square = Camera(ODD["square"])
+    text = page(calibration(square, square.at(ASIDE), square))
+    assert re.findall(r"<figcaption>(\w+ and \w+)<", text) == ["left and right", "right and third"]
+    assert "its own copy" not in text
+    assert "its own copy 10 cm to its right" in page(calibration(square, square))
