@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from camviz.cameras import Camera, Intrinsics, rotate
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective, UnifiedSphere
-from camviz.lenses.base import Array, as_points
+from camviz.lenses.base import Array, as_points, on_plane
 
 WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more than stretch
 
@@ -103,7 +103,7 @@ def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
     if isinstance(lens, BrownConrady):
         return _determinant(lens.jacobian(xy))
     step = 6e-6 * (1 + np.linalg.norm(xy, axis=-1))[..., None, None] * np.eye(2)
-    ahead, behind = (lens.project(_on_plane(xy[..., None, :] + sign * step)) for sign in (1, -1))
+    ahead, behind = (lens.project(on_plane(xy[..., None, :] + sign * step)) for sign in (1, -1))
     return _determinant((ahead - behind) / (2 * step.max(axis=-1, keepdims=True)))
 
 
@@ -123,7 +123,7 @@ def displacement(camera: Camera, step_px: float) -> tuple[Array, Array]:
     intrinsics = camera.intrinsics
     u, v = (_centred(size, step_px) for size in (intrinsics.width, intrinsics.height))
     ideal = np.stack(np.meshgrid(u, v), axis=-1)
-    distorted = intrinsics.to_pixels(camera.lens.project(_on_plane(intrinsics.from_pixels(ideal))))
+    distorted = intrinsics.to_pixels(camera.lens.project(on_plane(intrinsics.from_pixels(ideal))))
     return ideal, distorted - ideal
 
 
@@ -220,10 +220,6 @@ def _ideal(camera: Camera, uv: Array) -> Array:
 def _determinant(J: Array) -> Array:
     with np.errstate(all="ignore"):
         return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
-
-
-def _on_plane(xy: Array) -> Array:
-    return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
 
 
 def _centred(size: int, step: float) -> Array:

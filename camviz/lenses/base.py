@@ -105,6 +105,11 @@ def as_points(values: ArrayLike, size: int, name: str) -> Array:
     return points
 
 
+def on_plane(xy: Array) -> Array:
+    """Directions (..., 3) through points (..., 2) of the plane z = 1."""
+    return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
+
+
 def unit(vectors: Array) -> Array:
     """Vectors (..., n) scaled to length 1; the zero vector has no direction and becomes NaN."""
     with np.errstate(invalid="ignore", divide="ignore"):

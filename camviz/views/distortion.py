@@ -19,7 +19,7 @@ from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
 from camviz.lenses import BrownConrady, Lens
-from camviz.lenses.base import unit
+from camviz.lenses.base import on_plane, unit
 from camviz.scenes import Scene, snapshot, textured_scene
 from camviz.views.base import View, choice, slider, switch
 
@@ -181,7 +181,7 @@ class DistortionView(View):
     def _bend(self, xy: np.ndarray) -> np.ndarray:
         """Distorted lens coordinates (..., 2) of ideal ones: the lens, or its bare polynomial where folds are shown."""
         if self.hide_fold or not isinstance(self.camera.lens, BrownConrady):
-            return self.camera.lens.project(_on_plane(xy))
+            return self.camera.lens.project(on_plane(xy))
         return self.camera.lens.distort(xy)
 
     def _picture_panel(self) -> str:
@@ -233,7 +233,7 @@ class DistortionView(View):
     def _folded_area(self, panel: Panel) -> str:
         uv = _pixel_grid(self.intrinsics, 97)
         xy = self.intrinsics.from_pixels(uv)
-        folded = ~np.isfinite(self.camera.lens.project(_on_plane(xy))[..., 0])
+        folded = ~np.isfinite(self.camera.lens.project(on_plane(xy))[..., 0])
         outlines = contour_generator(uv[..., 0], uv[..., 1], folded.astype(float)).filled(0.5, 1.5)
         return "".join(svg.polygon(panel.place(outline), "wash fill-red") for outline in outlines[0])
 
@@ -289,7 +289,7 @@ class DistortionView(View):
     def _bent_frustum(self) -> list[Item]:
         """The rays of a grid of pixels, a metre long, beside those of a pinhole with the same intrinsics."""
         pinhole = self.camera.intrinsics.from_pixels(self.intrinsics.border(8))
-        rim = unit(_on_plane(pinhole))
+        rim = unit(on_plane(pinhole))
         reach = self.camera.unproject(_pixel_grid(self.intrinsics, 25))
         mesh = [*reach[::3], *np.swapaxes(reach[:, ::4], 0, 1)]
         spokes = [np.stack([np.zeros(3), corner]) for corner in reach[[0, 0, -1, -1], [0, -1, -1, 0]]]
@@ -339,10 +339,6 @@ def _circle(samples: int) -> np.ndarray:
     """Points (samples, 2) around the unit circle."""
     turn = 2 * pi * np.arange(samples) / samples
     return np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-
-
-def _on_plane(xy: np.ndarray) -> np.ndarray:
-    return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
 
 
 def _none_but(pole: float) -> str:
