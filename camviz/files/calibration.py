@@ -5,15 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Rig
 from camviz.lenses.base import Array
 
+if TYPE_CHECKING:
+    from camviz.clinic import Inspection
+
 
 class CalibrationError(ValueError):
-    """A file that cannot be read as a calibration; the message is one sentence: where, what was expected, what came."""
+    """A file that cannot be read as a calibration; the message is one sentence: where, what was expected, what came.
+
+    `id` names the clinic's finding that this is, such as "bad-k"; it is empty where the file is simply unreadable.
+    """
+
+    def __init__(self, sentence: str, id: str = "") -> None:
+        super().__init__(sentence)
+        self.id = id
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,7 @@ class Calibration:
     per_view_errors: Mapping[str, Array] = field(default_factory=dict, repr=False)  # name → RMS (views,) in pixels
     world_from_imu: RigidTransform | None = None
     notes: tuple[str, ...] = ()
+    faults: tuple[CalibrationError, ...] = ()  # what was mended in reading, where `load` was asked to mend
 
     def __post_init__(self) -> None:
         if not self.cameras:
@@ -59,3 +71,9 @@ class Calibration:
     def rig(self) -> Rig:
         """The cameras as one rig."""
         return Rig(self.cameras)
+
+    def inspect(self, **options: Any) -> Inspection:
+        """What is wrong with it, and what to do: see `camviz.clinic.inspect`, which takes the same options."""
+        from camviz.clinic import inspect
+
+        return inspect(self, **options)
