@@ -10,6 +10,7 @@ from math import prod
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.files.calibration import CalibrationError
@@ -136,7 +137,7 @@ class Section:
             matrix = matrix.T if _is_bottom(matrix[:, 3]) else matrix
         return RigidTransform.from_components(matrix[:3, 3], self._rotation(matrix[:3, :3], key))
 
-    def quaternion(self, quaternion: Sequence[float], where: str, scalar_first: bool = False) -> Rotation:
+    def quaternion(self, quaternion: ArrayLike, where: str, scalar_first: bool = False) -> Rotation:
         """The rotation of four numbers, which must have length 1."""
         length = float(np.linalg.norm(quaternion))
         if not abs(length - 1) < ROTATION_TOLERANCE:
