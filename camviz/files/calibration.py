@@ -23,12 +23,13 @@ Mask = NDArray[np.bool_]
 class CalibrationError(ValueError):
     """A file that cannot be read as a calibration; the message is one sentence: where, what was expected, what came.
 
-    `id` names the clinic's finding that this is, such as "bad-k"; it is empty where the file is simply unreadable.
+    `id` names the clinic's finding that this is, such as "bad-k", and `value` is the number that shows it; the id is
+    empty where the file is simply unreadable.
     """
 
-    def __init__(self, sentence: str, id: str = "") -> None:
+    def __init__(self, sentence: str, id: str = "", value: float | None = None) -> None:
         super().__init__(sentence)
-        self.id = id
+        self.id, self.value = id, value
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,8 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except CalibrationError as error:
         said = str(error)
-        raise CalibrationError(said if said.startswith(str(path)) else f"{path}: {said}", error.id) from error.__cause__
+        said = said if said.startswith(str(path)) else f"{path}: {said}"
+        raise CalibrationError(said, error.id, error.value) from error.__cause__
 
 
 def _unknown(name: str) -> CalibrationError:

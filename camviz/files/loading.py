@@ -52,7 +52,7 @@ def _loaded(path: Path, size: tuple[int, int] | None, mended: list[CalibrationEr
     try:
         return _plausible(_read(text, path, size, mended))
     except CalibrationError as error:
-        raise CalibrationError(f"{path}: {error}", error.id) from error.__cause__
+        raise CalibrationError(f"{path}: {error}", error.id, error.value) from error.__cause__
 
 
 def _read(text: str, path: Path, size: tuple[int, int] | None, mended: list[CalibrationError] | None) -> Calibration:

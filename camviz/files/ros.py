@@ -48,7 +48,7 @@ def _lens(section: Section) -> Lens:
     if count != COUNTS[model]:
         fitting = [f"; {count} belong to {other}" for other in COUNTS if COUNTS[other] == count]
         expected = f"{COUNTS[model]} numbers ({MEANINGS[model]}) for {model}"
-        error = section.error(key, expected, f"{count}{''.join(fitting)}", COUNT)
+        error = section.error(key, expected, f"{count}{''.join(fitting)}", COUNT, count)
         if model == "equidistant" or count not in (4, 5, 8):
             raise error
         section.mend(error)

@@ -40,8 +40,8 @@ class Section:
     def where(self, key: str) -> str:
         return f"{self.path}.{key}" if self.path else key
 
-    def error(self, key: str, expected: str, got: Any, id: str = "") -> CalibrationError:
-        return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}", id)
+    def error(self, key: str, expected: str, got: Any, id: str = "", value: float | None = None) -> CalibrationError:
+        return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}", id, value)
 
     def mend(self, error: CalibrationError) -> None:
         """Notes the error where this file is to be read in spite of it; otherwise raises it."""
@@ -104,7 +104,7 @@ class Section:
         values = np.atleast_1d(self.array(key))
         if values.size not in lengths or max(values.shape, default=0) != values.size:
             takes = " or ".join(filter(None, [", ".join(map(str, lengths[:-1])), str(lengths[-1])]))
-            raise self.error(key, f"{takes} numbers ({meaning})", _shape(values), id)
+            raise self.error(key, f"{takes} numbers ({meaning})", _shape(values), id, values.size)
         return [float(value) for value in values.ravel()]
 
     def coefficients(self, key: str, lengths: Sequence[int], meaning: str, others: Sequence[int] = ()) -> list[float]:
@@ -133,7 +133,8 @@ class Section:
         matrix = self.matrix(key, 4, 4)
         if not _is_bottom(matrix[3]):
             row = " ".join(f"{x:g}" for x in matrix[3])
-            self.mend(self.error(key, "0 0 0 1 in the bottom row of a rigid transform", row, NOT_A_ROTATION))
+            off = float(np.abs(matrix[3] - [0, 0, 0, 1]).max())
+            self.mend(self.error(key, "0 0 0 1 in the bottom row of a rigid transform", row, NOT_A_ROTATION, off))
             matrix = matrix.T if _is_bottom(matrix[:, 3]) else matrix
         return RigidTransform.from_components(matrix[:3, 3], self._rotation(matrix[:3, :3], key))
 
@@ -141,9 +142,8 @@ class Section:
         """The rotation of four numbers, which must have length 1."""
         length = float(np.linalg.norm(quaternion))
         if not abs(length - 1) < ROTATION_TOLERANCE:
-            error = CalibrationError(
-                f"{where}: expected a quaternion of length 1, got length {length:g}", NOT_A_ROTATION
-            )
+            text = f"{where}: expected a quaternion of length 1, got length {length:g}"
+            error = CalibrationError(text, NOT_A_ROTATION, length)
             if not length > 0:
                 raise error
             self.mend(error)
@@ -154,7 +154,8 @@ class Section:
         if not _is_camera_matrix(K):
             turned = " (its transpose is)" if _is_camera_matrix(K.T) else ""
             text = f"{where}: K must be upper triangular with K[2, 2] = 1{turned}, got {K.tolist()}"
-            error = CalibrationError(text, BAD_K)
+            off = K[2, 2] if K[2, 2] != 1 else K[2, 0] or K[2, 1] or K[1, 0]
+            error = CalibrationError(text, BAD_K, float(off))
             with np.errstate(invalid="ignore", divide="ignore"):
                 good = next((form for form in (K.T, K / K[2, 2], K.T / K[2, 2]) if _is_camera_matrix(form)), None)
             if good is None:
@@ -190,10 +191,10 @@ def as_rotation(matrix: Array, where: str) -> Rotation:
     off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     if off > ROTATION_TOLERANCE:
         text = f"{where}: expected a rotation, but R Rᵀ differs from the identity by {off:.3g}"
-        raise CalibrationError(text, NOT_A_ROTATION)
+        raise CalibrationError(text, NOT_A_ROTATION, float(off))
     if np.linalg.det(matrix) < 0:
         text = f"{where}: expected a rotation, but this is a reflection (its determinant is -1)"
-        raise CalibrationError(text, NOT_A_ROTATION)
+        raise CalibrationError(text, NOT_A_ROTATION, -1.0)
     return Rotation.from_matrix(matrix)
 
 
