@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import astuple
-from math import degrees, isfinite, pi
+from math import cos, degrees, isfinite, pi, radians
 
 import cv2
 import numpy as np
@@ -26,6 +26,7 @@ from camviz.lenses.base import Array
 
 WEAKEST = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
+NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z = 1 worth the name
 
 
 def near_pole(evidence: Evidence) -> Outcome:
@@ -86,9 +87,10 @@ def _where(camera: Camera) -> str:
         image = float(bending.radial(turn))
     else:
         return "mirrors part of the image (the determinant of its Jacobian reaches 0)"
+    radius = "" if isinstance(lens, KannalaBrandt) else f"at r = {turn:.4g}, "
     return (
-        f"turns back at r = {turn:.4g} ({degrees(fold_angle(lens)):.1f}° from the axis), whose image is {image:.3g} focal "
-        f"lengths from the principal point, and the farthest corner is at {corner:.3g}"
+        f"turns back {radius}{degrees(fold_angle(lens)):.1f}° from the axis, whose image is {image:.3g} focal lengths "
+        f"from the principal point, and the farthest corner is at {corner:.3g}"
     )
 
 
@@ -110,9 +112,8 @@ def _corners_lost(evidence: Evidence, name: str, camera: Camera) -> bool:
 
 def inverse_not_converged(evidence: Evidence) -> Outcome:
     """Border pixels through OpenCV's inverse as it is called without criteria, and forward again."""
-    known = {
-        name: each for name, each in evidence.cameras.items() if isinstance(each.lens, (BrownConrady, KannalaBrandt))
-    }
+    lenses = (BrownConrady, KannalaBrandt)
+    known = {name: camera for name, camera in evidence.cameras.items() if isinstance(camera.lens, lenses)}
     if not known:
         return Lacking("OpenCV's undistortPoints is not for these lenses")
     findings = []
@@ -131,7 +132,8 @@ def default_round_trip(camera: Camera) -> float:
     """The largest distance in pixels between a border pixel and its return from OpenCV's inverse with its defaults."""
     grid, lens = camera.intrinsics, camera.lens
     pixels = border_pixels(camera)
-    pixels = pixels[_seen(camera, pixels)]
+    forward = lens.unproject(grid.from_pixels(pixels))[..., 2]  # NaN where the lens folds
+    pixels = pixels[forward > NEARLY_SIDEWAYS]
     if not len(pixels):
         return 0.0
     points = pixels.reshape(-1, 1, 2)

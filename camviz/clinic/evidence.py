@@ -1,4 +1,4 @@
-"""What there is to judge a calibration by: its numbers, the corners it was solved from, pictures, another calibration."""
+"""What there is to judge a calibration by: its numbers, the corners it was solved from, pictures, another one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Evidence:
         return {name: self.calibration.cameras[name] for name in distinct.values()}
 
     def counterparts(self) -> Iterator[tuple[str, Camera, Camera]]:
-        """Name, camera, and the same camera in the other calibration: by name, else by order where both have as many."""
+        """Name, camera, and the same camera in the other calibration: by name, else by order if both have as many."""
         if self.compare is None:
             return
         ours, others = self.calibration.cameras, self.compare.cameras
