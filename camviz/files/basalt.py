@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.files.calibration import Calibration, CalibrationError
@@ -50,16 +50,13 @@ def _list(section: Section, key: str) -> list[Section]:
     held = section.get(key, "a list")
     if not isinstance(held, list) or not all(isinstance(part, dict) for part in held):
         raise section.error(key, "a list of mappings", shown(held))
-    return [Section(part, section.where(f"{key}[{index}]")) for index, part in enumerate(held)]
+    return [section.part(part, section.where(f"{key}[{index}]")) for index, part in enumerate(held)]
 
 
 def _pose(section: Section) -> RigidTransform:
     quaternion = [section.number(key) for key in ("qx", "qy", "qz", "qw")]
-    length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1) < 1e-3:
-        raise CalibrationError(f"{section.path}: expected a quaternion of length 1, got length {length:g}")
     place = [section.number(key) for key in ("px", "py", "pz")]
-    return RigidTransform.from_components(place, Rotation.from_quat(quaternion))
+    return RigidTransform.from_components(place, section.quaternion(quaternion, section.path))
 
 
 def _camera(section: Section, width: int, height: int) -> Camera:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,11 +14,22 @@ from scipy.spatial.transform import RigidTransform
 from camviz.cameras import Camera, Rig
 from camviz.lenses.base import Array
 
+if TYPE_CHECKING:
+    from camviz.clinic import Inspection
+
 Mask = NDArray[np.bool_]
 
 
 class CalibrationError(ValueError):
-    """A file that cannot be read as a calibration; the message is one sentence: where, what was expected, what came."""
+    """A file that cannot be read as a calibration; the message is one sentence: where, what was expected, what came.
+
+    `id` names the clinic's finding that this is, such as "bad-k", and `value` is the number that shows it; the id is
+    empty where the file is simply unreadable.
+    """
+
+    def __init__(self, sentence: str, id: str = "", value: float | None = None) -> None:
+        super().__init__(sentence)
+        self.id, self.value = id, value
 
 
 @dataclass(frozen=True)
@@ -92,6 +104,7 @@ class Calibration:
     intrinsics_covariance: Mapping[str, Array] = field(default_factory=dict, repr=False)  # (n, n), as `estimated` has n
     board_warp: Array | None = None  # (2,) sagittas in metres, see Board.warped
     skipped: tuple[tuple[str, str], ...] = ()  # pictures that were not used, and why
+    faults: tuple[CalibrationError, ...] = ()  # what was mended in reading, where `load` was asked to mend
 
     def __post_init__(self) -> None:
         if not self.cameras:
@@ -101,3 +114,9 @@ class Calibration:
     def rig(self) -> Rig:
         """The cameras as one rig."""
         return Rig(self.cameras)
+
+    def inspect(self, **options: Any) -> Inspection:
+        """What is wrong with it, and what to do: see `camviz.clinic.inspect`, which takes the same options."""
+        from camviz.clinic import inspect
+
+        return inspect(self, **options)

@@ -14,7 +14,7 @@ from camviz.cameras import Camera
 from camviz.files import colmap_binary
 from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed, model_named
-from camviz.files.section import LARGEST, LARGEST_SIDE, Section
+from camviz.files.section import COUNT, LARGEST, LARGEST_SIDE, ROTATION_TOLERANCE, Section
 from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_text
 from camviz.files.trees import scalar, shown
 from camviz.lenses import BrownConrady, Equidistant, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
@@ -62,7 +62,7 @@ def is_cameras(text: str) -> bool:
     return bool(_CAMERA_LINE.match(text[:HEAD]))
 
 
-def read(cameras_path: Path, path: Path) -> Calibration:
+def read(cameras_path: Path, path: Path, mended: list[CalibrationError] | None = None) -> Calibration:
     """The images of a model as cameras in its world, by name; without an images file the cameras alone."""
     binary = cameras_path.suffix == ".bin"
     with _named(cameras_path):
@@ -74,7 +74,7 @@ def read(cameras_path: Path, path: Path) -> Calibration:
         note = "There is no images file beside the cameras: they stand at the origin."
         return Calibration({f"camera{n}": camera for n, camera in cameras.items()}, path, "COLMAP", notes=(note,))
     with _named(images_path):
-        placed = _placed(cameras, colmap_binary.images(images_path) if binary else _images(images_path))
+        placed = _placed(cameras, colmap_binary.images(images_path) if binary else _images(images_path), mended)
     notes = ["COLMAP's world has no unit of its own: lengths are in the file's."]
     if idle := len(cameras) - len({id(camera.lens) for camera in placed.values()}):
         notes.append(f"{idle} of the {len(cameras)} cameras took none of the images and are left out.")
@@ -87,7 +87,8 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except CalibrationError as error:
         said = str(error)
-        raise CalibrationError(said if said.startswith(str(path)) else f"{path}: {said}") from error.__cause__
+        said = said if said.startswith(str(path)) else f"{path}: {said}"
+        raise CalibrationError(said, error.id, error.value) from error.__cause__
 
 
 def _unknown(name: str) -> CalibrationError:
@@ -122,7 +123,7 @@ def camera_of(model: Model, section: Section) -> Camera:
     """A camera of `size` and `params`, at the origin."""
     width, height = (side for side in section.vector("size", [2], "width height"))
     sides = Section({"width": width, "height": height}, section.path)
-    values = section.vector("params", [len(model.names)], model.parameters)
+    values = section.vector("params", [len(model.names)], model.parameters, COUNT)
     width, height = sides.whole("width", LARGEST_SIDE), sides.whole("height", LARGEST_SIDE)
     return model.camera(values, width, height, FIRST_PIXEL, section.path)
 
@@ -162,7 +163,9 @@ def _numbers(words: list[str]) -> list[object]:
     return [scalar(word) for word in words]
 
 
-def _placed(cameras: dict[int, Camera], images: Iterable[Image]) -> dict[str, Camera]:
+def _placed(
+    cameras: dict[int, Camera], images: Iterable[Image], mended: list[CalibrationError] | None
+) -> dict[str, Camera]:
     """cam_from_world = [R(q) | t] for every image."""
     names, used, poses = [], [], []
     for name, key, pose in images:
@@ -177,19 +180,18 @@ def _placed(cameras: dict[int, Camera], images: Iterable[Image]) -> dict[str, Ca
         raise CalibrationError("expected at least one image, got none")
     if len(set(names)) < len(names):
         raise CalibrationError("expected images of different names, got one twice")
-    world_from_cam = _inverted(np.array(poses), names)
+    world_from_cam = _inverted(np.array(poses), names, mended)
     return {name: camera.at(pose) for name, camera, pose in zip(names, used, world_from_cam, strict=True)}
 
 
-def _inverted(poses: np.ndarray, names: list[str]) -> Iterable[RigidTransform]:
+def _inverted(poses: np.ndarray, names: list[str], mended: list[CalibrationError] | None) -> Iterable[RigidTransform]:
     wild = np.flatnonzero(~(np.abs(poses) <= LARGEST).all(axis=1))
     if len(wild):
         raise CalibrationError(f"{shown(names[wild[0]])}: expected a pose of finite numbers below {LARGEST:g}")
     lengths = np.linalg.norm(poses[:, :4], axis=1)
-    bad = np.flatnonzero(np.abs(lengths - 1) > 1e-3)
-    if len(bad):
-        name, length = shown(names[bad[0]]), lengths[bad[0]]
-        raise CalibrationError(f"{name}: expected a quaternion of length 1, got length {length:g}")
+    bad = np.flatnonzero(np.abs(lengths - 1) > ROTATION_TOLERANCE)
+    if len(bad):  # the first speaks for all
+        Section({}, mended=mended).quaternion(poses[bad[0], :4], shown(names[bad[0]]))
     rotations = Rotation.from_quat(poses[:, :4], scalar_first=True)
     return RigidTransform.from_components(poses[:, 4:], rotations).inv()
 

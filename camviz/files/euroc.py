@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,11 @@ from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt
 
+GRID = "fx fy cx cy"
+RADIAL_TANGENTIAL = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
 MODELS = [
-    Model("radial-tangential", BrownConrady, "fx fy cx cy k1 k2 p1 p2"),
-    Model("equidistant", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"),
+    Model("radial-tangential", BrownConrady, f"{GRID} k1 k2 p1 p2"),
+    Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
 ]
 
 
@@ -33,7 +36,11 @@ def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibrat
     held = pair_of_sides(section, "resolution") if "resolution" in section else None
     width, height = agreed_size(held, size, "resolution")
     values = section.vector("intrinsics", [4], "fu fv cu cv")
-    values += section.vector("distortion_coefficients", [4], " ".join(model.names[4:]))
+    others = (5, 8) if model.lens is BrownConrady else ()
+    coefficients = section.coefficients("distortion_coefficients", [4], " ".join(model.names[4:]), others)
+    if len(coefficients) != 4:  # mended
+        model = replace(model, parameters=" ".join([GRID, *RADIAL_TANGENTIAL[: len(coefficients)]]))
+    values += coefficients
     camera = model.camera(values, width, height, 0.0, section.where("intrinsics"))
     imu = section.transform("T_BS").inv() if "T_BS" in section else None
     return Calibration({"camera": camera}, path, "EuRoC sensor.yaml", world_from_imu=imu)

@@ -98,7 +98,8 @@ def _lens(part: Section, projection: str, shape: list[float]) -> Lens:
         raise part.error("distortion_model", f"{known} with {projection}", shown(distortion))
     names = DISTORTIONS[distortion].split()
     held = part.values.get("distortion_coeffs") or names
-    coefficients = part.vector("distortion_coeffs", [len(names)], " ".join(names)) if held else []
+    others = (5, 8) if lens is BrownConrady else ()
+    coefficients = part.coefficients("distortion_coeffs", [len(names)], " ".join(names), others) if held else []
     with explained(part.path):
         return lens(*shape, *coefficients)
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
-from camviz.files.section import LARGEST_SIDE, Section, explained
+from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
 from camviz.files.sizes import agreed_size
 from camviz.files.trees import scalar, shown
 from camviz.lenses import BrownConrady, Perspective
@@ -28,14 +28,16 @@ def is_calib(text: str) -> bool:
     return bool(_START.search(text))
 
 
-def read(text: str, path: Path, size: tuple[int, int] | None) -> Calibration:
+def read(
+    text: str, path: Path, size: tuple[int, int] | None, mended: list[CalibrationError] | None = None
+) -> Calibration:
     """The rectified cameras of calib.txt, or the raw ones of calib_cam_to_cam.txt."""
-    section = _section(text)
+    section = Section(_values(text), mended=mended)
     raw = sorted(key[2:] for key in section.values if re.fullmatch(r"K_[0-9]{2}", key))
     return _read_raw(section, raw, path, size) if raw else _read_rectified(section, path, size)
 
 
-def _section(text: str) -> Section:
+def _values(text: str) -> dict[str, list[object]]:
     """Lines of a name and its values."""
     values: dict[str, list[object]] = {}
     if text.count("\n") > MAX_LINES:
@@ -46,7 +48,7 @@ def _section(text: str) -> Section:
             raise CalibrationError(f"line {number}: {shown(name)} appears twice")
         if name:
             values[name.rstrip(":")] = [scalar(word) for word in words]
-    return Section(values)
+    return values
 
 
 def _read_rectified(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
@@ -55,8 +57,8 @@ def _read_rectified(section: Section, path: Path, size: tuple[int, int] | None) 
     cameras = {}
     for name in sorted(key for key in section.values if re.fullmatch(r"P[0-9]", key)):
         P = section.matrix(name, 3, 4)
-        with explained(name):
-            grid = Intrinsics.from_matrix(P[:, :3], width, height)
+        with explained(name, BAD_K):
+            grid = Intrinsics.from_matrix(section.camera_matrix(P[:, :3], name), width, height)
         pose = RigidTransform.from_translation(np.linalg.solve(grid.K, P[:, 3])).inv()
         cameras[name] = Camera(grid, Perspective(), pose)
     if not cameras:
@@ -69,10 +71,11 @@ def _read_raw(section: Section, tags: list[str], path: Path, size: tuple[int, in
     """x_i = R_i x_0 + T_i, K and D in OpenCV's order."""
     cameras = {}
     for tag in tags:
-        with explained(section.where(f"K_{tag}")):
-            grid = Intrinsics.from_matrix(section.matrix(f"K_{tag}", 3, 3), *_size(section, f"S_{tag}", size))
+        with explained(section.where(f"K_{tag}"), BAD_K):
+            K = section.camera_matrix(section.matrix(f"K_{tag}", 3, 3), section.where(f"K_{tag}"))
+            grid = Intrinsics.from_matrix(K, *_size(section, f"S_{tag}", size))
         with explained(section.where(f"D_{tag}")):
-            lens = BrownConrady(*section.vector(f"D_{tag}", [5], "k1 k2 p1 p2 k3"))
+            lens = BrownConrady(*section.coefficients(f"D_{tag}", [5], "k1 k2 p1 p2 k3", (4, 8)))
         t = section.vector(f"T_{tag}", [3], "x y z")
         pose = RigidTransform.from_components(t, section.rotation(f"R_{tag}"))
         cameras[tag] = Camera(grid, lens, pose.inv())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -26,33 +27,40 @@ LOOKED_FOR = (
 _KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}
 
 
-def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None) -> Calibration:
+def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None, mend: bool = False) -> Calibration:
     """Read a calibration: OpenCV, ROS, Kalibr, COLMAP, mrcal, nerfstudio, EuRoC, Basalt, KITTI, MATLAB or Metashape.
 
     The content tells which it is; COLMAP's may be named by its folder. `size` is (width, height) in pixels for files
-    that do not hold it. Raises CalibrationError, a ValueError whose message is one sentence, for everything that is
-    not such a calibration. The file is data: nothing in it is run.
+    that do not hold it. With `mend` a fault that has an obvious cure, such as a transposed K, is cured, and listed in
+    the calibration's `faults`. Raises CalibrationError, a ValueError whose message is one sentence, for everything
+    that is not such a calibration. The file is data: nothing in it is run.
     """
     path = Path(path)
     if size is not None:
         size = _checked_size(size)
+    mended: list[CalibrationError] | None = [] if mend else None
+    calibration = _loaded(path, size, mended)
+    return replace(calibration, faults=tuple(mended)) if mended else calibration
+
+
+def _loaded(path: Path, size: tuple[int, int] | None, mended: list[CalibrationError] | None) -> Calibration:
     if "\0" not in str(path) and (cameras := colmap.model_of(path)):
-        return colmap.read(cameras, path)
+        return colmap.read(cameras, path, mended)
     text = read_text(path)
     if colmap.is_cameras(text):
-        return colmap.read(path, path)
+        return colmap.read(path, path, mended)
     try:
-        return _plausible(_read(text, path, size))
+        return _plausible(_read(text, path, size, mended))
     except CalibrationError as error:
-        raise CalibrationError(f"{path}: {error}") from error.__cause__
+        raise CalibrationError(f"{path}: {error}", error.id, error.value) from error.__cause__
 
 
-def _read(text: str, path: Path, size: tuple[int, int] | None) -> Calibration:
+def _read(text: str, path: Path, size: tuple[int, int] | None, mended: list[CalibrationError] | None) -> Calibration:
     if mrcal.is_model(text, path):
-        return mrcal.read(_mapping(parse_literal(text)), path)
+        return mrcal.read(_mapping(parse_literal(text), mended), path)
     if kitti.is_calib(text):
-        return kitti.read(text, path, size)
-    section = _mapping(parse(text))
+        return kitti.read(text, path, size, mended)
+    section = _mapping(parse(text), mended)
     return _reader(section)(section, path, size)
 
 
@@ -74,11 +82,11 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
     return size
 
 
-def _mapping(tree: Any) -> Section:
+def _mapping(tree: Any, mended: list[CalibrationError] | None) -> Section:
     if not isinstance(tree, dict):
         what = _KINDS.get(type(tree)) or shown(tree)
         raise CalibrationError(f"expected a calibration, this is {what}; looked for {LOOKED_FOR}")
-    return Section(tree)
+    return Section(tree, mended=mended)
 
 
 def _reader(section: Section) -> Reader:

@@ -9,7 +9,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Calibration
 from camviz.files.models import Model, expressed
 from camviz.files.output import as_json, only_camera, refuse_own_world
-from camviz.files.section import Section, explained
+from camviz.files.section import BAD_K, Section, explained
 from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.lenses import BrownConrady
 
@@ -26,8 +26,8 @@ def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibrat
     """One camera at the origin. Pixels count from 1, and IntrinsicMatrix is the transpose of K."""
     held = pair_of_sides(section, "ImageSize", "height width") if section.values.get("ImageSize") else None
     grid = _intrinsics(section, *agreed_size(held, size, "ImageSize"))
-    radial = section.vector(RADIAL, [2, 3], "k1 k2 k3") if RADIAL in section else [0.0, 0.0]
-    p1, p2 = section.vector(TANGENTIAL, [2], "p1 p2") if TANGENTIAL in section else (0.0, 0.0)
+    radial = section.coefficients(RADIAL, [2, 3], "k1 k2 k3") if RADIAL in section else [0.0, 0.0]
+    p1, p2 = section.coefficients(TANGENTIAL, [2], "p1 p2") if TANGENTIAL in section else (0.0, 0.0)
     with explained(section.where(RADIAL)):
         lens = BrownConrady(radial[0], radial[1], p1, p2, *radial[2:])
     notes = []
@@ -44,8 +44,10 @@ def _intrinsics(section: Section, width: int, height: int) -> Intrinsics:
     else:
         key = "IntrinsicMatrix" if "IntrinsicMatrix" in section else "K"
         matrix = section.matrix(key, 3, 3)
-        with explained(section.where(key) + (" transposed" if key == "IntrinsicMatrix" else "")):
-            K = Intrinsics.from_matrix(matrix.T if key == "IntrinsicMatrix" else matrix, width, height)
+        where = section.where(key) + (" transposed" if key == "IntrinsicMatrix" else "")
+        with explained(where, BAD_K):
+            matrix = section.camera_matrix(matrix.T if key == "IntrinsicMatrix" else matrix, where)
+            K = Intrinsics.from_matrix(matrix, width, height)
         fx, fy, cx, cy, skew = K.fx, K.fy, K.cx, K.cy, K.skew
     with explained(section.path or "the intrinsics"):
         return Intrinsics(width, height, fx, fy, cx - FIRST_PIXEL, cy - FIRST_PIXEL, skew)

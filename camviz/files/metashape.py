@@ -63,19 +63,19 @@ def _each(section: Section, outer: str, inner: str) -> list[Section]:
     parts = held if isinstance(held, Repeated) else [] if held is None else [held]
     if not all(isinstance(value, dict) for value in parts):
         raise part.error(inner, "elements with attributes", shown(held))
-    return [Section(value, part.where(f"{inner}[{index}]")) for index, value in enumerate(parts)]
+    return [part.part(value, part.where(f"{inner}[{index}]")) for index, value in enumerate(parts)]
 
 
 def _cameras(section: Section) -> Iterator[Section]:
     """Those of a list, and those in its groups."""
-    holder = Section({"cameras": dict(section.values)}, section.path)
+    holder = section.part({"cameras": dict(section.values)}, section.path)
     yield from _each(holder, "cameras", "camera")
     for group in _each(holder, "cameras", "group"):
         yield from _cameras(group)
 
 
 def _sensor(sensor: Section, size: tuple[int, int] | None) -> Camera:
-    found = _each(Section({"sensor": dict(sensor.values)}, sensor.path), "sensor", "calibration")
+    found = _each(sensor.part({"sensor": dict(sensor.values)}, sensor.path), "sensor", "calibration")
     adjusted = [part for part in found if part.values.get("class") == "adjusted"] or found
     if not adjusted:
         raise sensor.error("calibration", "a calibration", "none")

@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz.files.calibration import Calibration
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.output import only_camera
-from camviz.files.section import Section
+from camviz.files.section import COUNT, Section
 from camviz.files.sizes import pair_of_sides
 from camviz.files.text import HEAD
 from camviz.files.trees import shown
@@ -44,7 +44,7 @@ def read(section: Section, path: Path) -> Calibration:
         known = ", ".join(each.name for each in MODELS)
         raise section.error("lensmodel", f"one of {known}, the ones there is a lens for here", shown(name))
     width, height = pair_of_sides(section, "imagersize")
-    values = section.vector("intrinsics", [len(model.names)], model.parameters)
+    values = section.vector("intrinsics", [len(model.names)], model.parameters, COUNT)
     camera = model.camera(values, width, height, 0.0, section.where("intrinsics"))
     key = next((key for key in POSES if key in section), POSES[0])
     rt = section.vector(key, [6], "rotation vector and translation") if key in section else [0.0] * 6

@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Board, Calibration, CalibrationError
-from camviz.files.section import LARGEST_SIDE, Section, explained
+from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
 from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
 
@@ -90,8 +90,9 @@ def _held_size(section: Section) -> tuple[int, int] | None:
 
 def intrinsics(section: Section, key: str, width: int, height: int) -> Intrinsics:
     """The camera matrix under `key`, 3×3."""
-    with explained(section.where(key)):
-        return Intrinsics.from_matrix(section.matrix(key, 3, 3), width, height)
+    with explained(section.where(key), BAD_K):
+        K = section.camera_matrix(section.matrix(key, 3, 3), section.where(key))
+        return Intrinsics.from_matrix(K, width, height)
 
 
 def _camera(section: Section, tag: str, width: int, height: int) -> Camera:
@@ -108,10 +109,10 @@ def _lens(section: Section, tag: str) -> Lens:
         )
     with explained(section.where(key)):
         if xi := _find(section, "xi", tag):
-            return UnifiedSphere(section.number(xi), *section.vector(key, [4], "k1 k2 p1 p2 of cv2.omnidir"))
+            return UnifiedSphere(section.number(xi), *section.coefficients(key, [4], "k1 k2 p1 p2 of cv2.omnidir"))
         if _is_fisheye(section):
-            return KannalaBrandt(*section.vector(key, [4], "k1 k2 k3 k4 of cv2.fisheye"))
-        return BrownConrady.from_coefficients(section.vector(key, [4, 5, 8, 12, 14], "k1 k2 p1 p2 k3 …"))
+            return KannalaBrandt(*section.coefficients(key, [4], "k1 k2 k3 k4 of cv2.fisheye"))
+        return BrownConrady.from_coefficients(section.coefficients(key, [4, 5, 8, 12, 14], "k1 k2 p1 p2 k3 …"))
 
 
 def _is_fisheye(section: Section) -> bool:

@@ -12,7 +12,7 @@ from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size, intrinsics
 from camviz.files.output import as_yaml, only_camera, refuse_own_world
-from camviz.files.section import Section, explained
+from camviz.files.section import COUNT, Section, explained
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens
 
@@ -44,12 +44,16 @@ def _lens(section: Section) -> Lens:
     model, key = section.text("distortion_model"), _key(section, DISTORTION)
     if model not in COUNTS:
         raise section.error("distortion_model", " or ".join(COUNTS), shown(model))
-    count = section.array(key).size
+    count, values = section.array(key).size, section.array(key).ravel()
     if count != COUNTS[model]:
         fitting = [f"; {count} belong to {other}" for other in COUNTS if COUNTS[other] == count]
         expected = f"{COUNTS[model]} numbers ({MEANINGS[model]}) for {model}"
-        raise section.error(key, expected, f"{count}{''.join(fitting)}")
-    values = section.vector(key, [COUNTS[model]], MEANINGS[model])
+        error = section.error(key, expected, f"{count}{''.join(fitting)}", COUNT, count)
+        if model == "equidistant" or count not in (4, 5, 8):
+            raise error
+        section.mend(error)
+    else:
+        values = np.array(section.vector(key, [COUNTS[model]], MEANINGS[model]))
     with explained(section.where(key)):
         return KannalaBrandt(*values) if model == "equidistant" else BrownConrady.from_coefficients(values)
 

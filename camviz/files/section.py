@@ -10,6 +10,7 @@ from math import prod
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.files.calibration import CalibrationError
@@ -19,14 +20,19 @@ from camviz.lenses.base import Array
 LARGEST = 1e9  # larger magnitudes are damage, not metres or pixels
 LARGEST_SIDE = 32768  # pixels
 ROTATION_TOLERANCE = 1e-3  # of R Rᵀ = 1, for files written with few digits
+NOT_A_ROTATION, BAD_K, COUNT = "not-a-rotation", "bad-k", "coefficient-count"  # findings of the clinic
 
 
 @dataclass(frozen=True)
 class Section:
-    """A mapping of the file and the path of keys that leads to it. All readers raise CalibrationError."""
+    """A mapping of the file and the path of keys that leads to it. All readers raise CalibrationError.
+
+    Where `mended` is a list, what can be read in spite of a fault is read, and the error goes into the list.
+    """
 
     values: Mapping[str, Any]
     path: str = ""
+    mended: list[CalibrationError] | None = None
 
     def __contains__(self, key: str) -> bool:
         return self.values.get(key) is not None
@@ -34,8 +40,18 @@ class Section:
     def where(self, key: str) -> str:
         return f"{self.path}.{key}" if self.path else key
 
-    def error(self, key: str, expected: str, got: Any) -> CalibrationError:
-        return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}")
+    def error(self, key: str, expected: str, got: Any, id: str = "", value: float | None = None) -> CalibrationError:
+        return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}", id, value)
+
+    def mend(self, error: CalibrationError) -> None:
+        """Notes the error where this file is to be read in spite of it; otherwise raises it."""
+        if self.mended is None:
+            raise error
+        self.mended.append(error)
+
+    def part(self, values: Mapping[str, Any], where: str) -> Section:
+        """Values of the same file, from another place in it."""
+        return Section(values, where, self.mended)
 
     def get(self, key: str, expected: str) -> Any:
         if key not in self:
@@ -46,7 +62,7 @@ class Section:
         value = self.get(key, "a mapping")
         if not isinstance(value, dict):
             raise self.error(key, "a mapping", shown(value))
-        return Section(value, self.where(key))
+        return self.part(value, self.where(key))
 
     def text(self, key: str) -> str:
         value = self.get(key, "a word")
@@ -83,13 +99,24 @@ class Section:
             _refuse_damage(array, where)
         return array
 
-    def vector(self, key: str, lengths: Sequence[int], meaning: str) -> list[float]:
-        """As many numbers as one of `lengths` says, as a row or a column."""
+    def vector(self, key: str, lengths: Sequence[int], meaning: str, id: str = "") -> list[float]:
+        """As many numbers as one of `lengths` says, as a row or a column; the error for another count has `id`."""
         values = np.atleast_1d(self.array(key))
         if values.size not in lengths or max(values.shape, default=0) != values.size:
             takes = " or ".join(filter(None, [", ".join(map(str, lengths[:-1])), str(lengths[-1])]))
-            raise self.error(key, f"{takes} numbers ({meaning})", _shape(values))
+            raise self.error(key, f"{takes} numbers ({meaning})", _shape(values), id, values.size)
         return [float(value) for value in values.ravel()]
+
+    def coefficients(self, key: str, lengths: Sequence[int], meaning: str, others: Sequence[int] = ()) -> list[float]:
+        """Distortion coefficients, whose number is one of `lengths`; one of `others` can be mended."""
+        try:
+            return self.vector(key, lengths, meaning, COUNT)
+        except CalibrationError as error:
+            values = self.array(key).ravel()
+            if error.id != COUNT or values.size not in others:
+                raise
+            self.mend(error)
+            return [float(value) for value in values]
 
     def matrix(self, key: str, rows: int, columns: int) -> Array:
         """Numbers as rows × columns, nested or in one row-major list."""
@@ -99,37 +126,84 @@ class Section:
         return values.reshape(rows, columns)
 
     def rotation(self, key: str) -> Rotation:
-        return as_rotation(self.matrix(key, 3, 3), self.where(key))
+        return self._rotation(self.matrix(key, 3, 3), key)
 
     def transform(self, key: str) -> RigidTransform:
         """A rigid transform [R t; 0 1], 4×4."""
         matrix = self.matrix(key, 4, 4)
-        if not np.allclose(matrix[3], [0, 0, 0, 1], rtol=0, atol=ROTATION_TOLERANCE):
-            raise self.error(
-                key, "0 0 0 1 in the bottom row of a rigid transform", " ".join(f"{x:g}" for x in matrix[3])
-            )
-        return RigidTransform.from_components(matrix[:3, 3], as_rotation(matrix[:3, :3], self.where(key)))
+        if not _is_bottom(matrix[3]):
+            row = " ".join(f"{x:g}" for x in matrix[3])
+            off = float(np.abs(matrix[3] - [0, 0, 0, 1]).max())
+            self.mend(self.error(key, "0 0 0 1 in the bottom row of a rigid transform", row, NOT_A_ROTATION, off))
+            matrix = matrix.T if _is_bottom(matrix[:, 3]) else matrix
+        return RigidTransform.from_components(matrix[:3, 3], self._rotation(matrix[:3, :3], key))
+
+    def quaternion(self, quaternion: ArrayLike, where: str, scalar_first: bool = False) -> Rotation:
+        """The rotation of four numbers, which must have length 1."""
+        length = float(np.linalg.norm(quaternion))
+        if not abs(length - 1) < ROTATION_TOLERANCE:
+            text = f"{where}: expected a quaternion of length 1, got length {length:g}"
+            error = CalibrationError(text, NOT_A_ROTATION, length)
+            if not length > 0:
+                raise error
+            self.mend(error)
+        return Rotation.from_quat(quaternion, scalar_first=scalar_first)
+
+    def camera_matrix(self, K: Array, where: str) -> Array:
+        """K (3, 3), which must be upper triangular with K[2, 2] = 1; mended by transposing and by dividing."""
+        if not _is_camera_matrix(K):
+            turned = " (its transpose is)" if _is_camera_matrix(K.T) else ""
+            text = f"{where}: K must be upper triangular with K[2, 2] = 1{turned}, got {K.tolist()}"
+            off = K[2, 2] if K[2, 2] != 1 else K[2, 0] or K[2, 1] or K[1, 0]
+            error = CalibrationError(text, BAD_K, float(off))
+            with np.errstate(invalid="ignore", divide="ignore"):
+                good = next((form for form in (K.T, K / K[2, 2], K.T / K[2, 2]) if _is_camera_matrix(form)), None)
+            if good is None:
+                raise error
+            self.mend(error)
+            K = good
+        return K
+
+    def _rotation(self, matrix: Array, key: str) -> Rotation:
+        try:
+            return as_rotation(matrix, self.where(key))
+        except CalibrationError as error:
+            U, singular, Vt = np.linalg.svd(matrix)
+            if not singular[1] > 0.1 * singular[0]:  # nothing like a rotation is left in it
+                raise
+            self.mend(error)
+            return Rotation.from_matrix(U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt)
 
 
 @contextmanager
-def explained(where: str) -> Iterator[None]:
+def explained(where: str, id: str = "") -> Iterator[None]:
     """What a constructor complains about, said with the place in the file."""
     try:
         yield
     except CalibrationError:
         raise
     except ValueError as error:
-        raise CalibrationError(f"{where}: {error}") from error
+        raise CalibrationError(f"{where}: {error}", id) from error
 
 
 def as_rotation(matrix: Array, where: str) -> Rotation:
     """The rotation a 3×3 matrix is; CalibrationError when it is none, with the number that shows it."""
     off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     if off > ROTATION_TOLERANCE:
-        raise CalibrationError(f"{where}: expected a rotation, but R Rᵀ differs from the identity by {off:.3g}")
+        text = f"{where}: expected a rotation, but R Rᵀ differs from the identity by {off:.3g}"
+        raise CalibrationError(text, NOT_A_ROTATION, float(off))
     if np.linalg.det(matrix) < 0:
-        raise CalibrationError(f"{where}: expected a rotation, but this is a reflection (its determinant is -1)")
+        text = f"{where}: expected a rotation, but this is a reflection (its determinant is -1)"
+        raise CalibrationError(text, NOT_A_ROTATION, -1.0)
     return Rotation.from_matrix(matrix)
+
+
+def _is_bottom(row: Array) -> bool:
+    return np.allclose(row, [0, 0, 0, 1], rtol=0, atol=ROTATION_TOLERANCE)
+
+
+def _is_camera_matrix(K: Array) -> bool:
+    return np.array_equal(K[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1])
 
 
 def _as_matrix(section: Section) -> Array:

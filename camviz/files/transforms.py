@@ -40,7 +40,7 @@ def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibrat
     cameras: dict[str, Camera] = {}
     for name, frame in _frames(section):
         if any(key in frame for key in GRID_KEYS + LENS_KEYS):
-            camera = _camera(Section({**section.values, **frame.values}, frame.path), size)
+            camera = _camera(section.part({**section.values, **frame.values}, frame.path), size)
         else:
             camera = shared = shared or _camera(section, size)
         if name in cameras:
@@ -54,7 +54,7 @@ def _frames(section: Section) -> list[tuple[str, Section]]:
     held = section.values.get("frames") or []
     if not isinstance(held, list) or not all(isinstance(frame, dict) for frame in held):
         raise section.error("frames", "a list of mappings", shown(held))
-    frames = [Section(frame, section.where(f"frames[{index}]")) for index, frame in enumerate(held)]
+    frames = [section.part(frame, section.where(f"frames[{index}]")) for index, frame in enumerate(held)]
     return [
         (frame.text("file_path") if "file_path" in frame else f"frame{index}", frame)
         for index, frame in enumerate(frames)
