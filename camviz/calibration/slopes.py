@@ -29,9 +29,9 @@ def parameter(camera: Camera, name: str) -> float:
 
 def with_parameters(camera: Camera, values: dict[str, float]) -> Camera:
     """The camera with other values of the named parameters. Raises ValueError where it cannot take them."""
-    pinhole = {name: value for name, value in values.items() if name in PINHOLE}
+    pinhole: dict[str, Any] = {name: float(value) for name, value in values.items() if name in PINHOLE}
+    bent: dict[str, Any] = {name: float(value) for name, value in values.items() if name not in PINHOLE}
     lens: Any = camera.lens
-    bent = {name: value for name, value in values.items() if name not in PINHOLE}
     return replace(
         camera,
         intrinsics=replace(camera.intrinsics, **pinhole),
