@@ -129,6 +129,8 @@ def _named(panel: Panel, lines: list[Array], words: str, turn: int) -> str:
     if not lines:
         return ""
     line = max(lines, key=len)
+    if np.ptp(line, axis=0).max() < 60:  # an island that its own label would cover
+        return ""
     inside = line[(line[:, 0] > 14) & (line[:, 0] < panel.width - 14) & (line[:, 1] > 16) & (line[:, 1] < panel.height - 8)]
     if not len(inside):
         return ""
