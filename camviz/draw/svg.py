@@ -71,7 +71,8 @@ def text(point: ArrayLike, words: str, class_: str = "label", **attributes: Any)
 def paragraph(point: ArrayLike, words: str, width: float, class_: str = "note", line: float = 17) -> str:
     """Words from a point (2,) on, broken into lines that fit `width` as nearly as letters of unknown width can tell."""
     x, y = np.asarray(point, dtype=float)
-    lines = [part for given in words.splitlines() for part in wrap(given, max(8, int(width / 6.3))) or [""]]
+    letters = max(8, int(width / (6.3 if "note" in class_ else 7.1)))
+    lines = [part for given in words.splitlines() for part in wrap(given, letters) or [""]]
     return "".join(text((x, y + line * i), part, class_) for i, part in enumerate(lines))
 
 

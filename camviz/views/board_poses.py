@@ -15,9 +15,9 @@ from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Label, Line, Sheet, axes_triad, camera_body, draw_space, space_panel
-from camviz.files.calibration import Board
+from camviz.files.calibration import Board, Calibration
 from camviz.lenses.base import Array
-from camviz.views.base import View, choice, slider
+from camviz.views.base import Control, View, choice, slider
 
 _NINE_BY_SIX = Board(9, 6, 0.025)
 _MOST_NUMBERED = 40  # boards that still leave room for each other's numbers
@@ -47,6 +47,22 @@ class BoardPosesView(View):
         if self.photographs and len(self.photographs) != len(self.cam_from_board):
             got = len(self.photographs)
             raise ValueError(f"photographs must be as many as the {len(self.cam_from_board)} poses, got {got}")
+
+    @classmethod
+    def of(cls, calibration: Calibration, camera: str = "") -> BoardPosesView:
+        """The boards of a calibration before a camera of it, the first unless named. Raises ValueError without poses."""
+        name = camera or next(iter(calibration.cameras))
+        if calibration.board is None or name not in calibration.cam_from_board:
+            raise ValueError(f"The file does not hold where the board was in the views of {name}.")
+        standing = calibration.cameras[name].at(RigidTransform.identity())
+        poses = calibration.cam_from_board[name]
+        view = cls(standing, poses, calibration.board, "camera")
+        away = float(np.median(np.linalg.norm(poses.translation, axis=-1)))
+        return view.but(eye=replace(view.eye, distance=2.2 * away))
+
+    def offered(self) -> dict[str, Control]:
+        controls = self.controls()
+        return {**controls, "picture": replace(controls["picture"], high=len(self.cam_from_board))}
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
