@@ -34,7 +34,7 @@ class Arrowhead:
     def of(cls, by_shared: Array, by_view: Array, residuals: Array) -> Arrowhead:
         """From J's columns (v, n, s) and (v, n, m) and the residuals (v, n) of every view's n measurements."""
         transposed = np.swapaxes(by_shared, 1, 2)
-        columns, rows = by_shared.shape[2], by_shared.reshape(-1, by_shared.shape[2])
+        columns, rows = by_shared.shape[2], by_shared.reshape(residuals.size, by_shared.shape[2])
         return cls(
             shared=rows.T @ rows,
             border=transposed @ by_view,
