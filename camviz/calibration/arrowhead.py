@@ -34,12 +34,12 @@ class Arrowhead:
     def of(cls, by_shared: Array, by_view: Array, residuals: Array) -> Arrowhead:
         """From J's columns (v, n, s) and (v, n, m) and the residuals (v, n) of every view's n measurements."""
         transposed = np.swapaxes(by_shared, 1, 2)
-        columns, rows = by_shared.shape[2], by_shared.reshape(residuals.size, by_shared.shape[2])
+        rows = by_shared.reshape(residuals.size, by_shared.shape[2])
         return cls(
             shared=rows.T @ rows,
             border=transposed @ by_view,
             blocks=np.swapaxes(by_view, 1, 2) @ by_view,
-            shared_gradient=rows.T @ residuals.ravel() if columns else np.zeros(0),
+            shared_gradient=rows.T @ residuals.ravel(),
             gradients=np.einsum("vnm,vn->vm", by_view, residuals),
         )
 
