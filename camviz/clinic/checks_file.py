@@ -11,12 +11,14 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import PANORAMAS, Evidence
+from camviz.clinic.observed import explained, parameter_columns
 from camviz.lenses import BrownConrady, KannalaBrandt, Perspective
 
 SQUARE = 0.02  # how far fx/fy may be from 1: sensors have square pixels to a few thousandths
 OFF_CENTRE = 0.1  # of the longer side: lenses sit within a few hundredths of the middle of the sensor
 WIDEST_DEG = 170.0  # no lens that keeps lines nearly straight sees more
 CLEAN = sorted({Fraction(p, q) for p in range(1, 5) for q in range(1, 5)} - {Fraction(1)})  # 1/4 … 4
+STANDARD_ERRORS = 5.0
 ALIKE = 0.06  # how well a clean factor must fit both axes
 
 
@@ -40,11 +42,20 @@ def zero_distortion(evidence: Evidence) -> Outcome:
     """A lens whose kind has coefficients, all of which are 0. A pinhole that says it is one has none."""
     if all(isinstance(camera.lens, Perspective) for camera in evidence.cameras.values()):
         return Lacking("the file describes pinholes, which have no distortion coefficients")
-    return [
-        found("zero-distortion", f"{name}: all distortion coefficients are 0.", 0, "", name)
-        for name, camera in evidence.cameras.items()
-        if camera.lens in (BrownConrady(), KannalaBrandt())
-    ]
+    bare = {name: each for name, each in evidence.cameras.items() if each.lens in (BrownConrady(), KannalaBrandt())}
+    return [finding for name, camera in bare.items() for finding in _zero(evidence, name)]
+
+
+def _zero(evidence: Evidence, name: str) -> Iterator[Finding]:
+    """Where there are corners, they say whether the lens is straight."""
+    sentence, observed = f"{name}: all distortion coefficients are 0", evidence.observed.get(name)
+    if observed is None:
+        yield found("zero-distortion", f"{sentence}.", 0, "", name)
+        return
+    k1 = explained(observed.best, name, parameter_columns(observed.best, name, ["k1"]))
+    if k1.count and abs(k1.values[0]) > STANDARD_ERRORS * k1.sigmas[0]:
+        sentence += f", and the corners ask for k1 = {k1.values[0]:.3g} ± {k1.sigmas[0]:.1g}."
+        yield found("zero-distortion", sentence, k1.values[0], "", name)
 
 
 def aspect(evidence: Evidence) -> Outcome:
@@ -52,13 +63,14 @@ def aspect(evidence: Evidence) -> Outcome:
     cameras = {name: each for name, each in evidence.cameras.items() if not isinstance(each.lens, PANORAMAS)}
     if not cameras:
         return Lacking("a panorama's pixels are angles")
-    return [finding for name, camera in cameras.items() for finding in _aspect(name, camera)]
+    return [finding for name, camera in cameras.items() for finding in _aspect(evidence, name, camera)]
 
 
-def _aspect(name: str, camera: Camera) -> Iterator[Finding]:
+def _aspect(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
     grid = camera.intrinsics
     ratio = grid.fx / grid.fy
-    if abs(np.log(ratio)) > SQUARE:
+    sigma = (evidence.sigma_of(name, "fx") or 0.0) / grid.fx
+    if abs(np.log(ratio)) > max(SQUARE, STANDARD_ERRORS * sigma):
         sentence = f"{name}: fx/fy = {ratio:.4g}, as if pixels were {_percent(1 / ratio)} than high."
         yield found("aspect", sentence, ratio, "", name)
 

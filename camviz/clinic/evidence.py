@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import cv2
 import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
 
+from camviz.calibration.adjustment import Adjustment
 from camviz.cameras import Camera
-from camviz.files.calibration import Calibration
+from camviz.clinic.catalogue import Lacking
+from camviz.clinic.observed import Observed
+from camviz.files.calibration import Board, Calibration
 from camviz.lenses import Cylindrical, Equirectangular
+from camviz.lenses.base import Array
 
 PANORAMAS = (Cylindrical, Equirectangular)
+FEWEST_CORNERS = 6  # of a view whose pose is to be found
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +51,78 @@ class Evidence:
             for (name, camera), other in zip(ours.items(), others.values(), strict=True):
                 yield name, camera, other
 
+    @cached_property
+    def cam_from_board(self) -> dict[str, RigidTransform]:
+        """The board's poses by camera: the file's, or found from its corners where it has none."""
+        calibration, poses = self.calibration, dict(self.calibration.cam_from_board)
+        if calibration.board is not None:
+            for name, pixels in calibration.detections.items():
+                if name not in poses and pixels.shape[1] == calibration.board.columns * calibration.board.rows:
+                    poses[name] = board_poses(calibration.cameras[name], calibration.board, pixels)
+        return poses
 
-def border_pixels(camera: Camera, samples: int = 16) -> np.ndarray:
+    @cached_property
+    def observed(self) -> dict[str, Observed]:
+        """The cameras whose corners, board and poses are known."""
+        calibration = replace(self.calibration, cam_from_board=self.cam_from_board)
+        found = {}
+        for name, pixels in calibration.detections.items():
+            board = calibration.board
+            if board is not None and name in self.cam_from_board and pixels.shape[1] == board.columns * board.rows:
+                observed = Observed(name, Adjustment.of(calibration, name))
+                if observed.adjustment.posed.any():
+                    found[name] = observed
+        return found
+
+    def picture(self, name: str, view: int) -> str:
+        """What to call a view: the name of its picture, or its number."""
+        pictures = self.calibration.pictures.get(name)
+        called = pictures[view] if pictures else f"view {view + 1}"
+        return called if len(self.calibration.cameras) == 1 else f"{name}, {called}"
+
+    def sigma_of(self, name: str, parameter: str) -> float | None:
+        """The standard deviation of an estimated intrinsic, from the file or from its corners; None where unknown."""
+        estimated, covariance = self.calibration.estimated.get(name, ()), self.calibration.intrinsics_covariance
+        if name in covariance and parameter in estimated:
+            place = estimated.index(parameter)
+            return float(np.sqrt(max(covariance[name][place, place], 0)))
+        if name not in self.observed:
+            return None
+        adjustment = self.observed[name].adjustment
+        names = adjustment.estimated[name]
+        if parameter not in names or not np.isfinite(adjustment.sigma):
+            return None
+        place = names.index(parameter)
+        return float(np.sqrt(max(adjustment.covariance[place, place], 0)))
+
+    def focal_uncertainty(self, name: str) -> float | None:
+        """σ of fx over fx; None where it cannot be told."""
+        sigma = self.sigma_of(name, "fx")
+        return None if sigma is None else sigma / self.calibration.cameras[name].intrinsics.fx
+
+
+def no_corners(evidence: Evidence, what: str = "detected corners of a known board") -> Lacking:
+    """That a check needs what only the solution's own views hold."""
+    return Lacking(f"the file holds no {what}")
+
+
+def board_poses(camera: Camera, board: Board, pixels: Array) -> RigidTransform:
+    """cam_from_board of views (v, n, 2) by the perspective-n-point method; without enough corners, a board ahead."""
+    rays = camera.lens.unproject(camera.intrinsics.from_pixels(pixels))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        plane = rays[..., :2] / np.where(rays[..., 2:] > 0.05, rays[..., 2:], np.nan)
+    vectors = np.zeros((len(pixels), 6))
+    vectors[:, 5] = 1
+    for view, points in enumerate(plane):
+        seen = np.isfinite(points).all(axis=-1)
+        if seen.sum() >= FEWEST_CORNERS:
+            solved, rotation, translation = cv2.solvePnP(board.corners[seen], points[seen], np.eye(3), None)
+            if solved:
+                vectors[view] = [*rotation.ravel(), *translation.ravel()]
+    return RigidTransform.from_components(vectors[:, 3:], Rotation.from_rotvec(vectors[:, :3]))
+
+
+def border_pixels(camera: Camera, samples: int = 16) -> Array:
     """The centres of pixels all along the border (n, 2)."""
     grid = camera.intrinsics
     return np.asarray(np.clip(grid.border(samples), [0, 0], [grid.width - 1, grid.height - 1]))

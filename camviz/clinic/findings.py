@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.clinic import checks_file, checks_lens
+from camviz.clinic import checks_file, checks_lens, checks_model, checks_views
 from camviz.clinic.catalogue import SEVERITIES, Check, Finding, Kind, Lacking, found, kinds
 from camviz.clinic.evidence import Evidence
 from camviz.files import CalibrationError, load
@@ -31,6 +31,15 @@ CHECKS: Mapping[str, Check] = {
     "fold": checks_lens.fold,
     "near-pole": checks_lens.near_pole,
     "inverse-not-converged": checks_lens.inverse_not_converged,
+    "outlier-view": checks_views.outlier_view,
+    "outlier-line": checks_views.outlier_line,
+    "low-coverage": checks_views.low_coverage,
+    "parallel-boards": checks_views.parallel_boards,
+    "pose-absorbs-error": checks_views.pose_absorbs_error,
+    "model-too-simple": checks_model.model_too_simple,
+    "board-warp": checks_model.board_warp,
+    "split-disagreement": checks_model.split_disagreement,
+    "half-pixel": checks_model.half_pixel,
 }
 JSON_KEYS = ("id", "severity", "sentence", "value", "unit", "camera", "view", "causes", "remedy")
 

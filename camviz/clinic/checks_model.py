@@ -1,0 +1,190 @@
+"""What is left over: residuals that a richer lens, a bent board, another half of the views would explain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy import stats
+
+from camviz.calibration.adjustment import Adjustment, sagittas
+from camviz.calibration.slopes import pixel_slopes
+from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
+from camviz.clinic.evidence import Evidence, no_corners
+from camviz.clinic.observed import BY_CHANCE, Observed, explained
+from camviz.lenses.base import Array
+
+DEGREE = 5  # of the smooth field over the image, in u and in v
+FARTHER = (7, 9, 11)  # powers of the radius beyond it
+SYSTEMATIC = 1 / 3  # of the noise: a model's error that one can see among it
+BENT = 0.005  # of the board's longer side
+FEWEST_VIEWS = 6  # to be parted in two
+APART_PX = 1.0  # the RMS difference of the halves in the image
+SHIFTS = (0.5, 1.0)  # what conventions for the first pixel's centre differ by
+CLOSE_TO_SHIFT = 0.1
+STANDARD_ERRORS = 5.0
+
+
+def model_too_simple(evidence: Evidence) -> Outcome:
+    """A smooth field over the image on top of the solution, with the bend of the board given its share."""
+    if not evidence.observed:
+        return no_corners(evidence)
+    findings = []
+    for name, observed in evidence.observed.items():
+        field = explained(observed.best, name, smooth_field(observed.best, name), warp_columns(observed.best, name))
+        if field.chance < BY_CHANCE and field.part > SYSTEMATIC:
+            sentence = (
+                f"{name}: {field.part * observed.best.sigma:.2g} px of the residuals ({field.part:.0%} of the noise) "
+                f"follow a smooth pattern over the image that the lens model cannot take up."
+            )
+            findings.append(found("model-too-simple", sentence, field.part * observed.best.sigma, "px", name))
+    return findings
+
+
+def smooth_field(adjustment: Adjustment, name: str) -> Array:
+    """Vector fields (views, corners, 2, f): polynomials of u and v up to a degree, and higher powers of the radius."""
+    grid = adjustment.cameras[name].intrinsics
+    centred = adjustment.projected(name) - [grid.cx, grid.cy]  # the detections' noise must not explain itself
+    x, y = np.moveaxis(centred / np.hypot(grid.width, grid.height) * 2, -1, 0)
+    terms = [x**i * y**j for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
+    zero = np.zeros_like(x)
+    columns = [np.stack(pair, axis=-1) for term in terms for pair in ((term, zero), (zero, term))]
+    columns += [np.stack([x, y], axis=-1) * np.hypot(x, y)[..., None] ** (power - 1) for power in FARTHER]
+    return np.nan_to_num(np.stack(columns, axis=-1))
+
+
+def warp_columns(adjustment: Adjustment, name: str) -> Array:
+    """∂pixel/∂(the board's two sagittas), (views, corners, 2, 2)."""
+    camera = adjustment.cameras[name]
+    points = np.stack([pose.apply(adjustment.corners) for pose in adjustment.first_from_board])
+    _, by_point, _ = pixel_slopes(camera, points, ())
+    normals = adjustment.first_from_board.rotation.as_matrix()[:, None, :, 2:]
+    return np.nan_to_num((by_point @ normals) * sagittas(adjustment.board)[:, None, :])
+
+
+def board_warp(evidence: Evidence) -> Outcome:
+    """The two sagittas of the board on top of the solution, with a smooth field over the image given its share."""
+    if not evidence.observed:
+        return no_corners(evidence)
+    findings = []
+    for name, observed in evidence.observed.items():
+        board = observed.adjustment.board
+        bend = explained(observed.best, name, warp_columns(observed.best, name), smooth_field(observed.best, name))
+        side = (max(board.columns, board.rows) - 1) * board.square_size
+        worst = bend.values[np.abs(bend.values).argmax()]
+        if bend.chance < BY_CHANCE and abs(worst) > BENT * side:
+            along, across = bend.values * 1000
+            sentence = (
+                f"{name}: the corners fit a board that is bent by {along:.2g} mm along its rows and {across:.2g} mm "
+                f"along its columns, {abs(worst) / side:.1%} of its length."
+            )
+            findings.append(found("board-warp", sentence, abs(worst) * 1000, "mm", name))
+    return findings
+
+
+def split_disagreement(evidence: Evidence) -> Outcome:
+    """The cameras of two halves of the views, parted in time and by turns, against their own uncertainties."""
+    if not evidence.observed:
+        return no_corners(evidence)
+    enough = {name: each for name, each in evidence.observed.items() if each.best.posed.sum() >= FEWEST_VIEWS}
+    if not enough:
+        return Lacking(f"it needs at least {FEWEST_VIEWS} views")
+    return [finding for observed in enough.values() for finding in _disagreement(observed)]
+
+
+def _disagreement(observed: Observed) -> Iterator[Finding]:
+    views = np.flatnonzero(observed.best.posed)
+    splits = {
+        "the first and the second half": (views[: len(views) // 2], views[len(views) // 2 :]),
+        "every other view": (views[::2], views[1::2]),
+    }
+    results = {said: halves_apart(observed, *halves) for said, halves in splits.items()}
+    said = max(results, key=lambda key: results[key][1] * (results[key][0] < BY_CHANCE))
+    chance, apart = results[said]
+    if chance < BY_CHANCE and apart > APART_PX:
+        sentence = (
+            f"{observed.name}: solved from {said} of the views, the camera differs by {apart:.2g} px over the image, "
+            f"far more than the uncertainty of either."
+        )
+        yield found("split-disagreement", sentence, apart, "px", observed.name)
+
+
+def halves_apart(observed: Observed, first: Array, second: Array) -> tuple[float, float]:
+    """How likely noise makes two sets of views disagree so much, and by how many pixels (RMS) they do.
+
+    Each set's camera is one Gauss-Newton step from that of all views; with Cᵢ its covariance, dᵀ(C₁ + C₂)⁻¹d is χ².
+    The pixels are taken where the corners are, with the rotation between the two cameras left out.
+    """
+    best = observed.best
+    halves = [observed.views(best, part) for part in (first, second)]
+    steps, covariances = [], []
+    for half in halves:
+        equations = half.normal_equations
+        steps.append(equations.solution()[0])
+        covariances.append(equations.covariance)
+    difference = steps[0] - steps[1]
+    spread = best.sigma**2 * (covariances[0] + covariances[1])
+    scale = np.sqrt(np.diag(spread))
+    values, vectors = np.linalg.eigh(spread / np.outer(scale, scale))
+    kept = values > 1e-9 * values[-1]
+    whitened = (vectors[:, kept].T @ (difference / scale)) / np.sqrt(values[kept])
+    chance = float(stats.chi2.sf(whitened @ whitened, kept.sum()))
+    return chance, _shift(observed, difference)
+
+
+def _shift(observed: Observed, difference: Array) -> float:
+    """The RMS in pixels of a change of the intrinsics at the corners, but for what a turn of the camera does."""
+    best, camera = observed.best, observed.best.cameras[observed.name]
+    pixels = observed.detections[best.used[observed.name]]
+    pixels = pixels[:: max(1, len(pixels) // 2000)]
+    rays = camera.lens.unproject(camera.intrinsics.from_pixels(pixels))
+    _, by_point, by_parameter = pixel_slopes(camera, rays, best.estimated[observed.name])
+    shift = (by_parameter @ difference[: by_parameter.shape[-1]]).ravel()
+    turn = np.cross(np.eye(3)[:, None, :], rays[None]).transpose(1, 2, 0)  # ∂(ω × ray)/∂ω
+    turns = (by_point @ turn).reshape(-1, 3)
+    finite = np.isfinite(shift) & np.isfinite(turns).all(axis=1)
+    left = shift[finite] - turns[finite] @ np.linalg.lstsq(turns[finite], shift[finite], rcond=None)[0]
+    return float(np.sqrt(2 * np.mean(left**2))) if len(left) else 0.0
+
+
+def half_pixel(evidence: Evidence) -> Outcome:
+    """A constant shift of all residuals, or between two calibrations of one camera."""
+    others = list(evidence.counterparts())
+    if not evidence.observed and not others:
+        return Lacking("it needs detected corners with the poses of the board, or another calibration (--compare)")
+    findings = [finding for observed in evidence.observed.values() for finding in _shifted_corners(observed)]
+    known = {finding.camera for finding in findings}
+    for name, camera, other in others:
+        if name not in known and (camera.intrinsics.width, camera.intrinsics.height) == (
+            other.intrinsics.width,
+            other.intrinsics.height,
+        ):
+            pixels = camera.intrinsics.from_pixels(_grid(camera.intrinsics.width, camera.intrinsics.height))
+            rays = camera.lens.unproject(pixels)
+            shift = other.intrinsics.to_pixels(other.lens.project(rays)) - camera.intrinsics.to_pixels(pixels)
+            shift = shift[np.isfinite(shift).all(axis=-1)]
+            if len(shift) and _is_shift(np.median(shift, axis=0)) and shift.std(axis=0).max() < CLOSE_TO_SHIFT:
+                findings.append(_shift_found(name, np.median(shift, axis=0), "against the other calibration"))
+    return findings
+
+
+def _shifted_corners(observed: Observed) -> Iterator[Finding]:
+    residuals = observed.residuals[observed.adjustment.used[observed.name]]
+    mean = residuals.mean(axis=0)
+    error = residuals.std(axis=0) / np.sqrt(len(residuals))
+    if _is_shift(mean) and (np.abs(mean) > STANDARD_ERRORS * error).all():
+        yield _shift_found(observed.name, mean, "on average over all corners")
+
+
+def _is_shift(shift: Array) -> bool:
+    return any((np.abs(np.abs(shift) - size) < CLOSE_TO_SHIFT).all() for size in SHIFTS)
+
+
+def _shift_found(name: str, shift: Array, where: str) -> Finding:
+    sentence = f"{name}: pixels are shifted by ({shift[0]:+.2f}, {shift[1]:+.2f}) {where}."
+    return found("half-pixel", sentence, float(np.abs(shift).mean()), "px", name)
+
+
+def _grid(width: int, height: int) -> Array:
+    u, v = np.meshgrid(np.linspace(0, width - 1, 24), np.linspace(0, height - 1, 18))
+    return np.stack([u, v], axis=-1)
