@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log10
@@ -108,16 +109,19 @@ class ResidualsView(View):
         k = self.observations.camera.intrinsics
         return image_panel("picture", 20, 236, 450, k.width, k.height, tallest=338)
 
-    def bars_panel(self, panel: Panel, *, handle: bool = False) -> str:
-        """A bar per view, the chosen one orange."""
+    def bars_panel(self, panel: Panel, *, handle: bool = False, links: Mapping[int, str] | None = None) -> str:
+        """A bar per view, the chosen one orange; with `handle` for the pointer, or with `links` from views (from 0)."""
         seen, n = self.observations, len(self.observations)
         x, gap = np.arange(1, n + 1), 0.12 if n <= 60 else 0.0
         chosen = x == self.index + 1
         rms, all_seen = seen.rms, np.where(seen.rms_seen > seen.rms * 1.001, seen.rms_seen, np.nan)
         content = plot.grid(panel, xticks=[])
         content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, all_seen, "wash fill-red")
-        for mask, class_ in ((~chosen, "fill-blue"), (chosen, "fill-orange")):
-            content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, np.where(mask, rms, np.nan), class_)
+        if links is None:
+            for mask, class_ in ((~chosen, "fill-blue"), (chosen, "fill-orange")):
+                content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, np.where(mask, rms, np.nan), class_)
+        else:
+            content += "".join(self._linked_bar(panel, i, gap, links.get(i)) for i in range(n))
         content += svg.line(panel.place([(panel.left, seen.total_rms), (panel.right, seen.total_rms)]), "ink dashed")
         if n <= _NAMED:
             content += "".join(
@@ -132,6 +136,18 @@ class ResidualsView(View):
         words = f"dashed: all views, {_pixels(seen.total_rms)}{aside}"
         place = (panel.x + panel.width - (90 if handle else 0), panel.y - 8)
         return shown + svg.text(place, words, "note end") + plot.axes(panel, "", "RMS [px]", xticks=self._view_names())
+
+    def _linked_bar(self, panel: Panel, i: int, gap: float, link: str | None) -> str:
+        """One bar, and all above it, as a link to its view; a bar whose view is not shown is none."""
+        seen = self.observations
+        left, right = np.array([i + 0.5 + gap]), np.array([i + 1.5 - gap])
+        drawn = plot.bars(panel, left, right, seen.rms[i : i + 1], "fill-blue" if link else "fill-muted")
+        if link is None:
+            return drawn
+        (x0, _), (x1, _) = panel.place([(i + 0.5, 0), (i + 1.5, 0)])
+        target = svg.rectangle(x0, 0, x1 - x0, panel.height, "target")
+        words = f"{seen.picture(i)}, {_pixels(seen.rms_seen[i])}"
+        return svg.element("a", target + drawn, href=link, data_choose=i + 1, aria_label=words)
 
     def _view_names(self) -> list[tuple[float, str]]:
         seen, n = self.observations, len(self.observations)
