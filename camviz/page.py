@@ -118,4 +118,5 @@ def _stepped_aside(camera: Camera) -> RigidTransform:
 
 def figure(name: str, picture: Picture) -> str:
     """A picture under its caption."""
-    return f"<figure><figcaption>{escape(name)}</figcaption>{picture.embedded()}</figure>"
+    caption = f"<figcaption>{escape(name)}</figcaption>" if name else ""
+    return f"<figure>{caption}{picture.embedded()}</figure>"

@@ -92,9 +92,11 @@ class Case:
         return photograph if full else lru_cache(maxsize=32)(photograph)
 
     def _path(self, picture: str) -> Path | None:
-        """Where a picture lies: in the named folder, where the file says, or beside the file."""
-        folders = [self.images, Path(), self.calibration.source.parent] if self.images else [Path(), self.calibration.source.parent]
-        tried = [folder / picture for folder in folders if folder] + [folder / Path(picture).name for folder in folders if folder]
+        """Where a picture lies: in the named folder or beside the file, never where a stranger's file points outside."""
+        named = Path(picture)
+        inside = named if not named.is_absolute() and ".." not in named.parts else Path(named.name)
+        folders = [folder for folder in (self.images, self.calibration.source.parent) if folder]
+        tried = (folder / part for folder in folders for part in (inside, Path(named.name)))
         return next((path for path in tried if path.is_file()), None)
 
 
