@@ -70,7 +70,9 @@ def difference(
     weights = _weights(first.intrinsics, uv, within, uncertainties)
     compared = np.isfinite(points).all(-1) & np.isfinite(rays_second).all(-1) & (weights > 0)
     if compared.sum() < 3:
-        raise ValueError(f"at least three rays must be known to both cameras where they are compared, got {compared.sum()}")
+        raise ValueError(
+            f"at least three rays must be known to both cameras where they are compared, got {compared.sum()}"
+        )
     second_from_first = aligned(points[compared], rays_second[compared], weights[compared], turn_only=isinf(distance))
     seen = second.intrinsics.to_pixels(second.lens.project(transform(second_from_first, points)))
     return Difference(uv, seen - uv, second_from_first, distance)

@@ -49,9 +49,7 @@ def worst_deviation(covariance: Array) -> Array:
     return np.sqrt(mean + np.hypot(half, covariance[..., 0, 1]))
 
 
-def projection_slopes(
-    adjustment: Adjustment, uv: ArrayLike, distance: float = inf, camera: str | None = None
-) -> Array:
+def projection_slopes(adjustment: Adjustment, uv: ArrayLike, distance: float = inf, camera: str | None = None) -> Array:
     """∂q⁺/∂(shared parameters, mean twist of the boards), (..., 2, s + 6), at pixels uv (..., 2).
 
     A board's twist (ω, τ) takes the point p it holds, in the first camera's frame, to p + ω × p + τ, whichever board
