@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from scipy import stats
 
+from camviz.calibration.cross_validation import held_out
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import Evidence, no_corners
 from camviz.clinic.observed import Observed
@@ -23,7 +24,8 @@ COVERED = 0.4  # of the image: the outermost corners are a square inside the boa
 CELLS = 64  # along the longer side of the image, to measure areas
 SAME_WAY_DEG = 20.0  # between the normals of two boards
 UNCERTAIN = 0.01  # of the focal length
-HELD_OUT = 1.5  # times what noise leads to
+HELD_OUT = 2.0  # times what noise leads to
+FEWEST_VIEWS = 3
 
 
 def outlier_view(evidence: Evidence) -> Outcome:
@@ -201,41 +203,21 @@ def pose_absorbs_error(evidence: Evidence) -> Outcome:
         if ratio > HELD_OUT:
             sentence = (
                 f"{name}: with each pose fitted to one half of the board, the other half is {ratio:.1f} times as far "
-                f"off as noise leads to, while the error of the fit is {observed.adjustment.rms:.3g} px."
+                f"off as the noise of the corners leads to; the error of the fit is {observed.adjustment.rms:.3g} px."
             )
             findings.append(found("pose-absorbs-error", sentence, ratio, "times", name))
     return findings
 
 
 def held_out_ratio(observed: Observed) -> float:
-    """The RMS of held-out corners over what noise leads to, in the view where half of all views are worse.
+    """How many times larger the errors of held-out corners are than noise makes them, in the median of the views.
 
-    With the pose fitted to corners A of slopes P_A, the residuals of the others have the covariance
-    σ² (1 + P_B (P_AᵀP_A)⁻¹ P_Bᵀ). Halves are left and right, upper and lower; the worst of the four counts.
+    Each corner's squared error is taken over its variance, of which `camviz.calibration.cross_validation` tells.
     """
-    rows, columns = observed.shape
-    row, column = np.divmod(np.arange(rows * columns), columns)
-    halves = [column < columns / 2, row < rows / 2]
-    return max(_held_out(observed, half) for side in halves for half in (side, ~side))
-
-
-def _held_out(observed: Observed, half: Array) -> float:
-    name, adjustment = observed.name, observed.adjustment
-    fixed = replace(adjustment, estimated={name: ()}, set_aside={})
-    seen = np.isfinite(observed.residuals).all(axis=-1)
-    fitted = replace(fixed, set_aside={name: seen & ~half}).refined()
-    _, by_pose = replace(fitted, set_aside={}).slopes(name)
-    residuals = fitted.residuals[name]
-    inside, outside = [], []
-    for row, view in enumerate(np.flatnonzero(replace(fitted, set_aside={}).posed)):
-        a, b = seen[view] & half, seen[view] & ~half
-        if not fitted.used[name][view].any() or a.sum() < 6 or b.sum() < 4:
-            continue
-        P_a, P_b = by_pose[row, a].reshape(-1, 6), by_pose[row, b].reshape(-1, 6)
-        x_a, x_b = residuals[view, a].ravel(), residuals[view, b].ravel()
-        spread = np.eye(len(x_b)) + P_b @ np.linalg.solve(P_a.T @ P_a, P_b.T)
-        inside.append(x_a @ x_a / (len(x_a) - 6))
-        outside.append(x_b @ np.linalg.solve(spread, x_b) / len(x_b))
-    if len(inside) < 3:
+    aside = replace(observed.adjustment, set_aside=observed.best.set_aside)
+    result = held_out(aside, camera=observed.name)
+    squares = np.moveaxis(result.residuals**2 / result.variances, 1, 0).reshape(observed.adjustment.views, -1)
+    known = np.isfinite(squares).any(axis=1)
+    if known.sum() < FEWEST_VIEWS:
         return 0.0
-    return float(np.sqrt(np.median(outside) / np.median(inside)))
+    return float(np.sqrt(np.median(np.nanmean(squares[known], axis=1))))

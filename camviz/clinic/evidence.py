@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.models import poses_from_rays
 from camviz.cameras import Camera
 from camviz.clinic.catalogue import Lacking
 from camviz.clinic.observed import Observed
@@ -19,7 +19,6 @@ from camviz.lenses import Cylindrical, Equirectangular
 from camviz.lenses.base import Array
 
 PANORAMAS = (Cylindrical, Equirectangular)
-FEWEST_CORNERS = 6  # of a view whose pose is to be found
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +38,16 @@ class Evidence:
         return {name: self.calibration.cameras[name] for name in distinct.values()}
 
     def counterparts(self) -> Iterator[tuple[str, Camera, Camera]]:
+        """As `matched`, without cameras that share their pixels and lens with one before."""
+        return (each for each in self.matched() if each[0] in self.cameras)
+
+    def matched(self) -> Iterator[tuple[str, Camera, Camera]]:
         """Name, camera, and the same camera in the other calibration: by name, else by order if both have as many."""
         if self.compare is None:
             return
         ours, others = self.calibration.cameras, self.compare.cameras
         if set(ours) & set(others):
-            for name in self.cameras:
+            for name in ours:
                 if name in others:
                     yield name, ours[name], others[name]
         elif len(ours) == len(others):
@@ -107,19 +110,16 @@ def no_corners(evidence: Evidence, what: str = "detected corners of a known boar
 
 
 def board_poses(camera: Camera, board: Board, pixels: Array) -> RigidTransform:
-    """cam_from_board of views (v, n, 2) by the perspective-n-point method; without enough corners, a board ahead."""
-    rays = camera.lens.unproject(camera.intrinsics.from_pixels(pixels))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        plane = rays[..., :2] / np.where(rays[..., 2:] > 0.05, rays[..., 2:], np.nan)
-    vectors = np.zeros((len(pixels), 6))
-    vectors[:, 5] = 1
-    for view, points in enumerate(plane):
-        seen = np.isfinite(points).all(axis=-1)
-        if seen.sum() >= FEWEST_CORNERS:
-            solved, rotation, translation = cv2.solvePnP(board.corners[seen], points[seen], np.eye(3), None)
-            if solved:
-                vectors[view] = [*rotation.ravel(), *translation.ravel()]
-    return RigidTransform.from_components(vectors[:, 3:], Rotation.from_rotvec(vectors[:, :3]))
+    """cam_from_board of views (v, n, 2) from their rays; a view without enough corners has the board ahead."""
+    ahead = RigidTransform.from_translation([0, 0, 10 * board.columns * board.square_size])
+    poses = []
+    for view in pixels:
+        seen = np.isfinite(view).all(axis=-1)
+        try:
+            poses.append(poses_from_rays(camera, [board.corners[seen]], [view[seen]])[0])
+        except (ValueError, np.linalg.LinAlgError):  # too few corners, on one line, or without rays
+            poses.append(ahead)
+    return RigidTransform.concatenate(poses)
 
 
 def border_pixels(camera: Camera, samples: int = 16) -> Array:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.clinic import checks_file, checks_lens, checks_model, checks_views
+from camviz.clinic import checks_file, checks_lens, checks_model, checks_rig, checks_views
 from camviz.clinic.catalogue import SEVERITIES, Check, Finding, Kind, Lacking, found, kinds
 from camviz.clinic.evidence import Evidence
 from camviz.files import CalibrationError, load
@@ -40,6 +40,12 @@ CHECKS: Mapping[str, Check] = {
     "board-warp": checks_model.board_warp,
     "split-disagreement": checks_model.split_disagreement,
     "half-pixel": checks_model.half_pixel,
+    "baseline-sign": checks_rig.baseline_sign,
+    "baseline-scale": checks_rig.baseline_scale,
+    "rectified-black": checks_rig.rectified_black,
+    "inverted-transform": checks_rig.inverted_transform,
+    "mirrored-frame": checks_rig.mirrored_frame,
+    "corner-order": checks_rig.corner_order,
 }
 JSON_KEYS = ("id", "severity", "sentence", "value", "unit", "camera", "view", "causes", "remedy")
 

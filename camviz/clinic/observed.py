@@ -71,18 +71,8 @@ class Observed:
             aside = best.set_aside.get(self.name, np.zeros_like(far))
             if not (far & ~aside).any():
                 break
-            best = replace(best, set_aside={self.name: far}).refined()
+            best = replace(best, set_aside={self.name: far | aside}).refined()
         return best
-
-    def views(self, adjustment: Adjustment, chosen: Mask | Sequence[int]) -> Adjustment:
-        """The same problem with only some of its views."""
-        rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen)
-        return replace(
-            adjustment,
-            detections={self.name: self.detections[rows]},
-            first_from_board=adjustment.first_from_board[rows],
-            set_aside={name: mask[rows] for name, mask in adjustment.set_aside.items()},
-        )
 
 
 @dataclass(frozen=True)
