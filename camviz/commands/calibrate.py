@@ -42,26 +42,7 @@ examples:
 """
 MODELS = ("standard", "rational", "thin-prism", "fisheye", "omni")
 FINDERS = ("auto", "sectors", "classic")
-PICTURES = frozenset(
-    [
-        ".bmp",
-        ".dib",
-        ".exr",
-        ".hdr",
-        ".jp2",
-        ".jpe",
-        ".jpeg",
-        ".jpg",
-        ".pbm",
-        ".pgm",
-        ".png",
-        ".pnm",
-        ".ppm",
-        ".tif",
-        ".tiff",
-        ".webp",
-    ]
-)
+PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
 
 
 def add(commands: Any) -> None:
@@ -113,7 +94,7 @@ def pictures(words: Sequence[str]) -> list[Path]:
             raise Refusal(f"{word!r} is not a file name.")
         path = Path(word)
         if path.is_dir():
-            paths = sorted((each for each in path.iterdir() if each.suffix.lower() in PICTURES), key=_natural)
+            paths = sorted((each for each in path.iterdir() if PICTURES.fullmatch(each.suffix)), key=_natural)
             if not paths:
                 raise Refusal(f"{path}: there are no pictures in this folder.")
         elif path.exists():

@@ -131,12 +131,13 @@ def board_of(options: argparse.Namespace) -> Board:
 
     if options.marker_mm is not None and options.charuco is None:
         raise Refusal("--marker-mm is for a ChArUco board: name its dictionary with --charuco.")
+    columns, rows = options.board
     try:
         if options.charuco is None:
-            return Board(*options.board, options.square_mm / 1000)
+            return Board(columns, rows, options.square_mm / 1000)
         marker = options.marker_mm or 0.75 * options.square_mm
         name = "DICT_" + options.charuco.removeprefix("DICT_")
-        board = Board(*options.board, options.square_mm / 1000, marker / 1000, name)
+        board = Board(columns, rows, options.square_mm / 1000, marker / 1000, name)
         charuco_dictionary(board)
     except ValueError as error:
         raise Refusal(f"{error}.") from error
