@@ -2,16 +2,14 @@
 
 from pathlib import Path
 
-import cv2
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import Board, Calibration, CalibrationError, load, write
+from camviz.files import Board, Calibration, load, write
 from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
 
 GRID = Intrinsics(640, 480, 533.25, 534.125, 342.5, 233.0)
@@ -25,7 +23,22 @@ LENSES = {
 NAMES = ("fx", "fy", "cx", "cy", "k1", "s1", "tau_x")
 
 words = st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=20) | st.sampled_from(
-    ["left01.jpg", "001", "true", "null", "~", "it's", 'a"b\\c', "a: b #c", "- x", "x\ny", "<a>&b", "50 %", "100%25", ""]
+    [
+        "left01.jpg",
+        "001",
+        "true",
+        "null",
+        "~",
+        "it's",
+        'a"b\\c',
+        "a: b #c",
+        "- x",
+        "x\ny",
+        "<a>&b",
+        "50 %",
+        "100%25",
+        "",
+    ]
 )
 numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
 
@@ -87,9 +100,7 @@ def test_nothing_of_a_calibration_is_lost_in_its_file(tmp_path_factory, calibrat
             assert second[name].dtype == values.dtype
             np.testing.assert_array_equal(second[name], values)
     for name, poses in calibration.cam_from_board.items():
-        np.testing.assert_allclose(
-            back.cam_from_board[name].as_matrix(), poses.as_matrix(), rtol=1e-14, atol=1e-14
-        )
+        np.testing.assert_allclose(back.cam_from_board[name].as_matrix(), poses.as_matrix(), rtol=1e-14, atol=1e-14)
         assert back.cameras[name].lens == calibration.cameras[name].lens
         assert back.cameras[name].intrinsics == calibration.cameras[name].intrinsics
     np.testing.assert_array_equal(back.board_warp, calibration.board_warp)

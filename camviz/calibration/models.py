@@ -156,7 +156,7 @@ def _equidistant(views: Views) -> Camera:
 
 
 def _misfit(camera: Camera, views: Views) -> float:
-    """The median over the views of the RMS in pixels that is left by the pose from rays; infinite where there is none."""
+    """The median over the views of the RMS in pixels that the pose from rays leaves; infinite where there is none."""
     errors = []
     for points, pixels in zip(views.points, views.pixels, strict=True):
         try:

@@ -60,9 +60,7 @@ def _pair(calibration: Calibration) -> dict[str, Any]:
         )
     pose = right.cam_from_world
     values = _size(left) | first | second | {"R": pose.rotation.as_matrix(), "T": np.reshape(pose.translation, (3, 1))}
-    return (
-        values | _recorded(calibration) | _views(calibration, left_name, "1") | _views(calibration, right_name, "2")
-    )
+    return values | _recorded(calibration) | _views(calibration, left_name, "1") | _views(calibration, right_name, "2")
 
 
 def _size(camera: Camera) -> dict[str, Any]:

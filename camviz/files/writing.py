@@ -86,8 +86,7 @@ def alone(calibration: Calibration, name: str) -> Calibration:
         names = ", ".join(calibration.cameras)
         raise CalibrationError(f"{calibration.source}: expected one of the cameras {names}, got {name!r}")
     views: dict[str, Any] = {
-        field: {key: value for key, value in getattr(calibration, field).items() if key == name}
-        for field in BY_CAMERA
+        field: {key: value for key, value in getattr(calibration, field).items() if key == name} for field in BY_CAMERA
     }
     return replace(calibration, cameras={name: calibration.cameras[name]}, **views)
 
