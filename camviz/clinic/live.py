@@ -8,8 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ipywidgets import Dropdown, HBox, Layout, VBox
 from IPython.display import display
+from ipywidgets import Dropdown, HBox, Layout, VBox
 
 from camviz.clinic.views import ALIASES, VIEWS, Case
 from camviz.views.base import View
@@ -37,7 +37,9 @@ class LiveInspection:
         if inspection.calibration is None:
             return
         self.case = Case(inspection.calibration, inspection.compare, None if images is None else Path(images), _LARGEST)
-        self._view = Dropdown(options=self._options(), value=self._first(), description="view", layout=Layout(width="28em"))
+        self._view = Dropdown(
+            options=self._options(), value=self._first(), description="view", layout=Layout(width="28em")
+        )
         self._camera = Dropdown(options=self.case.names, value=self._camera_of(self._view.value), description="camera")
         several = len(self.case.names) > 1
         self._above = HBox([self._view, self._camera] if several else [self._view])

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import transform
@@ -37,16 +36,20 @@ MOST_BOARDS = 60
 _MARKS = {"fault": "✗ fault", "warning": "! warning", "note": "· note"}
 
 
-def write_report(inspection: Inspection, path: str | PathLike[str], *, images: str | PathLike[str] | None = None) -> None:
+def write_report(
+    inspection: Inspection, path: str | PathLike[str], *, images: str | PathLike[str] | None = None
+) -> None:
     """Write the report of an inspection to `path`; `images` is the folder of the calibration's pictures."""
     Path(path).write_text(report(inspection, images=images), encoding="utf-8")
 
 
 def report(inspection: Inspection, *, images: str | PathLike[str] | None = None) -> str:
     """The report as HTML text, readable without a network and without JavaScript."""
-    layout, script = ((files("camviz.clinic") / name).read_text(encoding="utf-8") for name in ("report.css", "report.js"))
+    layout, script = (
+        (files("camviz.clinic") / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
+    )
     if inspection.calibration is None:
-        body = _findings(inspection, ()) + _missing({name: _UNREAD for name in _wanted(inspection)})
+        body = _findings(inspection, ()) + _missing(dict.fromkeys(_wanted(inspection), _UNREAD))
         return document("A calibration that could not be read", body, layout=layout, script=script)
     case = Case(inspection.calibration, inspection.compare, None if images is None else Path(images), LARGEST)
     sections, missing = [], {}
@@ -86,7 +89,11 @@ def _findings(inspection: Inspection, names: tuple[str, ...]) -> str:
 
 
 def _finding(inspection: Inspection, finding: Finding) -> str:
-    number = "" if finding.value is None else f" <data value=\"{finding.value!r}\">{finding.value:.4g} {escape(finding.unit)}</data>"
+    number = (
+        ""
+        if finding.value is None
+        else f' <data value="{finding.value!r}">{finding.value:.4g} {escape(finding.unit)}</data>'
+    )
     where = f" <span class=camera>{escape(finding.camera)}</span>" if finding.camera else ""
     causes = f"<dt>likely</dt><dd>{escape('; '.join(finding.causes))}</dd>" if finding.causes else ""
     remedy = f"<dt>remedy</dt><dd>{escape(finding.remedy)}</dd>" if finding.remedy else ""
@@ -143,9 +150,16 @@ def _section(case: Case, entry: Entry) -> tuple[str, str]:
     if not shown:
         return "", why
     left_out = case.names[MOST_CAMERAS:]
-    more = f'<p class="note">Shown for {MOST_CAMERAS} of {len(case.names)} cameras.</p>' if left_out and not entry.of_all else ""
+    more = (
+        f'<p class="note">Shown for {MOST_CAMERAS} of {len(case.names)} cameras.</p>'
+        if left_out and not entry.of_all
+        else ""
+    )
     anchors = "".join(f'<span id="view-{alias}"></span>' for alias, name in ALIASES.items() if name == entry.name)
-    return f'<section id="view-{entry.name}">{anchors}<h2>{escape(entry.title)}</h2><p>{escape(entry.purpose)}</p>{shown}{more}</section>', ""
+    return (
+        f'<section id="view-{entry.name}">{anchors}<h2>{escape(entry.title)}</h2><p>{escape(entry.purpose)}</p>{shown}{more}</section>',
+        "",
+    )
 
 
 def _missing(missing: Mapping[str, str]) -> str:
@@ -155,8 +169,12 @@ def _missing(missing: Mapping[str, str]) -> str:
     items = []
     for name, why in missing.items():
         entry = VIEWS.get(ALIASES.get(name, name))
-        anchors = "".join(f'<span id="view-{alias}"></span>' for alias, of in ALIASES.items() if of == name and alias not in missing)
-        items.append(f'<li id="view-{name}">{anchors}<strong>{escape(entry.title if entry else name)}</strong>: {escape(why)}</li>')
+        anchors = "".join(
+            f'<span id="view-{alias}"></span>' for alias, of in ALIASES.items() if of == name and alias not in missing
+        )
+        items.append(
+            f'<li id="view-{name}">{anchors}<strong>{escape(entry.title if entry else name)}</strong>: {escape(why)}</li>'
+        )
     return f'<section id="missing"><h2>What could not be shown</h2><ul>{"".join(items)}</ul></section>'
 
 
@@ -175,7 +193,11 @@ def _linked(case: Case, name: str, headed: bool) -> str:
         f"Error of every view of {name}", view.description().split(" Shown:")[0],
     )  # fmt: skip
     few = f" Of the {len(seen)} views the {len(shown)} worst are shown." if len(shown) < len(seen) else ""
-    words = f'<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.{few}</p>' if few or shown else ""
+    words = (
+        f'<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.{few}</p>'
+        if few or shown
+        else ""
+    )
     words = words if not few else f"<p>{few.strip()}</p>{words}"
     figures = "".join(_view_figure(view.but(view=i + 1), name, i) for i in shown)
     heading = f"<h3>{escape(name)}</h3>" if headed else ""
@@ -204,7 +226,14 @@ def _view_figure(view: ResidualsView, name: str, i: int) -> str:
     )
     height = below + 196 + 20 * len(view.numbers())
     described = view.description().split("Shown: ")[1]
-    picture = Picture(svg.rectangle(0, 0, 470, height, "paper") + image + board + rows, 470, height, view.observations.picture(i), described, attached)
+    picture = Picture(
+        svg.rectangle(0, 0, 470, height, "paper") + image + board + rows,
+        470,
+        height,
+        view.observations.picture(i),
+        described,
+        attached,
+    )
     return f'<figure id="{_id(name)}-{i + 1}" data-view="{i + 1}" tabindex="-1">{picture.embedded()}</figure>'
 
 
@@ -222,9 +251,21 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
     content, _ = draw_space(panel, items, eye, renderer="wire")
     for i, link in links.items():
         outline = transform(seen.cam_from_board[i], drawn.outline())
-        group: list[Item] = [Face(outline, "orange", 0.35), Line(np.vstack([outline, outline[:1]]), "muted", 1.1), Label(outline[0], str(i + 1), "note")]
+        group: list[Item] = [
+            Face(outline, "orange", 0.35),
+            Line(np.vstack([outline, outline[:1]]), "muted", 1.1),
+            Label(outline[0], str(i + 1), "note"),
+        ]
         lines, _ = draw_space(panel, group, eye, renderer="wire")
-        content += svg.element("a", lines, href=link, data_choose=i + 1, class_="board", tabindex=-1, aria_label=f"the board of {seen.picture(i)}")
+        content += svg.element(
+            "a",
+            lines,
+            href=link,
+            data_choose=i + 1,
+            class_="board",
+            tabindex=-1,
+            aria_label=f"the board of {seen.picture(i)}",
+        )
     body = svg.rectangle(0, 0, 490, 514, "paper") + panel.show(content, title="Where the boards were held")
     told = f"The boards of {len(seen)} views of {name}, {seen.distances.min():.2g} m to {seen.distances.max():.2g} m before the camera."
     return Picture(body, 490, 514, "Boards in space", told)

@@ -69,7 +69,9 @@ class Case:
 
     def observations(self, name: str) -> Observations:
         """What a camera saw. Raises Missing."""
-        return self._once(("observations", name), lambda: Observations.of(self.calibration, name, self.photographs(name)))
+        return self._once(
+            ("observations", name), lambda: Observations.of(self.calibration, name, self.photographs(name))
+        )
 
     def _once(self, key: tuple[str, ...], make: Callable[[], Any]) -> Any:
         if key not in self._made:

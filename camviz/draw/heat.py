@@ -6,7 +6,6 @@ Smith 2015) for amounts, blue through grey to orange for what has a sign.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from math import ceil, floor, log10
@@ -81,7 +80,9 @@ def heat(panel: Panel, name: str, values: Array, shades: Shades) -> tuple[str, d
     Between the values the colours follow straight lines; a NaN leaves the place around it bare.
     """
     rows, columns = values.shape
-    u, v = np.meshgrid(np.linspace(0, columns - 1, 192, dtype=np.float32), np.linspace(0, rows - 1, 144, dtype=np.float32))
+    u, v = np.meshgrid(
+        np.linspace(0, columns - 1, 192, dtype=np.float32), np.linspace(0, rows - 1, 144, dtype=np.float32)
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         level = np.log(values) if shades.logarithmic else values
     fine = cv2.remap(level.astype(np.float32), u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -89,17 +90,21 @@ def heat(panel: Panel, name: str, values: Array, shades: Shades) -> tuple[str, d
     return svg.image(name, 0, 0, panel.width, panel.height), {name: png(colours)}
 
 
-def contours(panel: Panel, values: Array, levels: Iterable[float], unit: str = "", strong: float | None = None) -> str:
-    """Lines at `levels` through values (rows, columns) that span the panel's data rectangle, each with its number.
+def contours(panel: Panel, values: Array, shades: Shades, unit: str = "", strong: float | None = None) -> str:
+    """Lines at the bar's numbers through values (rows, columns) that span the panel's data rectangle, each with its own.
 
     The level `strong` has a thicker line.
     """
     rows, columns = values.shape
     u, v = np.linspace(panel.left, panel.right, columns), np.linspace(panel.top, panel.bottom, rows)
-    generator = contour_generator(u, v, np.ma.masked_invalid(values))
+    levels = shades.levels()
+    levels = levels[levels != 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        heights, cuts = (np.log(values), np.log(levels)) if shades.logarithmic else (values, levels)
+    generator = contour_generator(u, v, np.ma.masked_invalid(heights))
     drawn, names = "", ""
-    for i, level in enumerate(levels):
-        lines = [panel.place(line) for line in generator.lines(level)]
+    for i, (level, cut) in enumerate(zip(levels, cuts, strict=True)):
+        lines = [panel.place(line) for line in generator.lines(cut)]
         thick = strong is not None and np.isclose(level, strong)
         drawn += svg.path(lines, "paper-line") + svg.path(lines, "ink thick" if thick else "ink thin")
         names += _named(panel, lines, f"{level:g}{unit}", i)
@@ -119,7 +124,9 @@ def bar(x: float, y: float, height: float, name: str, shades: Shades, title: str
         svg.text((x + 20, place + 4), f"{level:g}".replace("-", "−"), "tick")
         for place, level in zip(at, np.round(levels, 9) + 0.0, strict=True)
     )
-    marks = svg.segments(np.stack([np.full_like(at, x + 14), at], -1), np.stack([np.full_like(at, x + 17), at], -1), "muted")
+    marks = svg.segments(
+        np.stack([np.full_like(at, x + 14), at], -1), np.stack([np.full_like(at, x + 17), at], -1), "muted"
+    )
     picture = svg.image(name, x, y, 14, height) + svg.rectangle(x, y, 14, height, "frame")
     return picture + marks + ticks + svg.text((x - 2, y - 8), title, "note"), {name: png(shades.rgba(values[:, None]))}
 
@@ -131,7 +138,9 @@ def _named(panel: Panel, lines: list[Array], words: str, turn: int) -> str:
     line = max(lines, key=len)
     if np.ptp(line, axis=0).max() < 60:  # an island that its own label would cover
         return ""
-    inside = line[(line[:, 0] > 14) & (line[:, 0] < panel.width - 14) & (line[:, 1] > 16) & (line[:, 1] < panel.height - 8)]
+    inside = line[
+        (line[:, 0] > 14) & (line[:, 0] < panel.width - 14) & (line[:, 1] > 16) & (line[:, 1] < panel.height - 8)
+    ]
     if not len(inside):
         return ""
     at = inside[int((0.15 + 0.19 * turn) % 1 * len(inside))]
@@ -141,7 +150,9 @@ def _named(panel: Panel, lines: list[Array], words: str, turn: int) -> str:
 def _rounded(value: float, *, down: bool) -> float:
     power = 10.0 ** floor(log10(value))
     steps = [factor * power for factor in (1, 2, 5, 10)]
-    return max(s for s in steps if s <= value * (1 + 1e-9)) if down else min(s for s in steps if s >= value * (1 - 1e-9))
+    return (
+        max(s for s in steps if s <= value * (1 + 1e-9)) if down else min(s for s in steps if s >= value * (1 - 1e-9))
+    )
 
 
 @cache

@@ -33,7 +33,9 @@ class BoardResidualsView(View):
 
     observations: Observations = field(compare=False, repr=False)
     exaggeration: float = slider(20.0, 1, 200, 1, label="bend", unit="×", help="how much the bend is exaggerated")
-    scale: float = slider(100.0, 1, 1000, 1, label="arrows", unit="×", help="how much longer the arrows are than the mean")
+    scale: float = slider(
+        100.0, 1, 1000, 1, label="arrows", unit="×", help="how much longer the arrows are than the mean"
+    )
     eye: Eye = Eye(yaw_deg=-35, pitch_deg=35)
 
     @classmethod
@@ -71,7 +73,9 @@ class BoardResidualsView(View):
         centres = -np.einsum("vij,vi->vj", R, t)[:, None]
         rays = seen.corners_board - centres
         slope = -rays[..., :2] / rays[..., 2:]
-        weight = np.where(seen.used[..., None], 1 / np.maximum(np.linalg.norm(rays, axis=-1, keepdims=True), 1e-12) ** 2, 0)
+        weight = np.where(
+            seen.used[..., None], 1 / np.maximum(np.linalg.norm(rays, axis=-1, keepdims=True), 1e-12) ** 2, 0
+        )
         off = np.where(seen.used[..., None], seen.on_board - seen.corners_board[:, :2], 0)
         with np.errstate(invalid="ignore", divide="ignore"):
             lift = np.sum(weight * slope * off, axis=(0, 2)) / np.sum(weight * slope**2, axis=(0, 2))
@@ -95,7 +99,11 @@ class BoardResidualsView(View):
         return {
             "longest_mm": 1000 * float(np.nanmax(np.linalg.norm(self.means, axis=-1), initial=0)),
             "depth_mm": 1000 * float(np.nanmax(self.heights) - np.nanmin(self.heights)) if known else np.nan,
-            **({} if warp is None else {"along_rows_mm": 1000 * float(warp[0]), "along_columns_mm": 1000 * float(warp[1])}),
+            **(
+                {}
+                if warp is None
+                else {"along_rows_mm": 1000 * float(warp[0]), "along_columns_mm": 1000 * float(warp[1])}
+            ),
         }
 
     def _solved(self) -> str:
@@ -130,7 +138,11 @@ class BoardResidualsView(View):
         grid = starts.reshape(board.rows, board.columns, 2)
         content = svg.path([*grid, *grid.swapaxes(0, 1)], "grid")
         content += arrows(starts, ends, "orange") + svg.dots(starts, "green", 4)
-        return panel.show(content, title=f"Mean residual on the board, × {self.scale:g}", note=f"longest {self.numbers()['longest_mm']:.2g} mm"), {}
+        return panel.show(
+            content,
+            title=f"Mean residual on the board, × {self.scale:g}",
+            note=f"longest {self.numbers()['longest_mm']:.2g} mm",
+        ), {}
 
     def _bent(self, draft: bool) -> tuple[str, dict[str, bytes]]:
         board, heights = self.observations.board, self.heights
@@ -152,11 +164,15 @@ class BoardResidualsView(View):
             items.append(Sheet.over(grid, np.repeat(np.repeat(colours, 8, 0), 8, 1), 0.9))
         middle = board.corners.mean(axis=0)
         size = float(np.linalg.norm(board.corners[-1]))
-        eye = replace(self.eye, target=tuple(middle.tolist()), distance=1.75 * size * self.eye.distance / Eye().distance)
+        eye = replace(
+            self.eye, target=tuple(middle.tolist()), distance=1.75 * size * self.eye.distance / Eye().distance
+        )
         content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
         legend, bar_picture = bar(872, 64, 270, "bend-bar", shades, "mm")
         label = "The bent board in space; drag or press the arrow keys to walk around it"
-        shown = panel.show(content, title=f"The board’s bend, × {self.exaggeration:g}", hint="drag to turn", drag="eye", label=label)
+        shown = panel.show(
+            content, title=f"The board’s bend, × {self.exaggeration:g}", hint="drag to turn", drag="eye", label=label
+        )
         return shown + legend, attached | bar_picture
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:

@@ -76,8 +76,12 @@ class CorrelationView(View):
     def description(self) -> str:
         """The state in words and numbers."""
         told = "; ".join(f"{a} with {b} {_signed(r)}" for a, b, r in self.strongest()[:6])
-        deviations = "; ".join(f"{name} ±{d:.3g}" for name, d in zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True))
-        return f"Correlations of {len(self.names)} parameters. The strongest: {told}. Standard deviations: {deviations}."
+        deviations = "; ".join(
+            f"{name} ±{d:.3g}" for name, d in zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True)
+        )
+        return (
+            f"Correlations of {len(self.names)} parameters. The strongest: {told}. Standard deviations: {deviations}."
+        )
 
     def figure(self, *, draft: bool = False) -> Picture:
         n = len(self.names)
@@ -91,13 +95,30 @@ class CorrelationView(View):
             places = panel.place(np.stack(np.meshgrid(np.arange(n) + 0.5, np.arange(n) + 0.5), -1)).reshape(-1, 2)
             size = min(12.0, 0.36 * cell)
             content += "".join(
-                svg.text(place + (0, 0.35 * size), f"{r:.2f}" if self.show == "size only" else _signed(r), "label halo middle", style=f"font-size:{size:.1f}px")
+                svg.text(
+                    place + (0, 0.35 * size),
+                    f"{r:.2f}" if self.show == "size only" else _signed(r),
+                    "label halo middle",
+                    style=f"font-size:{size:.1f}px",
+                )
                 for place, r in zip(places, shown.ravel(), strict=True)
                 if np.isfinite(r)
             )
         legend, bar_picture = bar(panel.x + side + 14, 64, side - 60, "matrix-bar", shades, "r")
-        body = svg.rectangle(0, 0, 960, 590, "paper") + panel.show(content, title="Correlations") + legend + self._names(panel, cell)
-        return Picture(body + self._words(680), 960, 590, self.title, self.description(), {"matrix": png(shades.rgba(shown)), **bar_picture})
+        body = (
+            svg.rectangle(0, 0, 960, 590, "paper")
+            + panel.show(content, title="Correlations")
+            + legend
+            + self._names(panel, cell)
+        )
+        return Picture(
+            body + self._words(680),
+            960,
+            590,
+            self.title,
+            self.description(),
+            {"matrix": png(shades.rgba(shown)), **bar_picture},
+        )
 
     def _names(self, panel: Panel, cell: float) -> str:
         size = f"font-size:{min(12.0, max(5.0, 0.8 * cell)):.1f}px"
@@ -116,7 +137,9 @@ class CorrelationView(View):
         words += svg.text((x, 280), "One standard deviation", "title")
         rows = list(zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True))
         for i, (name, deviation) in enumerate(rows[:12]):
-            words += svg.text((x, 302 + 17 * i), name, "note") + svg.text((x + 140, 302 + 17 * i), f"±{deviation:.3g}", "number")
+            words += svg.text((x, 302 + 17 * i), name, "note") + svg.text(
+                (x + 140, 302 + 17 * i), f"±{deviation:.3g}", "number"
+            )
         if len(rows) > 12:
             words += svg.text((x, 302 + 17 * 12), f"and {len(rows) - 12} more", "note")
         advice = "Close to ±1: the boards cannot tell the two apart. Neighbouring terms of a polynomial (k1, k2, k3) and fx with fy always hang together."

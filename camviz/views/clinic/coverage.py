@@ -101,15 +101,25 @@ class CoverageView(View):
         content += svg.dots(panel.place(corners[:: max(1, len(corners) // _MOST_DOTS)]), "paper-dot", 2.5)
         content += self._figures(panel)
         legend, bar_picture = bar(panel.x + panel.width + 10, 60, panel.height - 40, "counts-bar", shades, self.count)
-        return panel.show(content, title=f"{self.count.capitalize()} in every cell", note="bare: none") + legend, {"counts": png(rgba), **bar_picture}
+        return panel.show(content, title=f"{self.count.capitalize()} in every cell", note="bare: none") + legend, {
+            "counts": png(rgba),
+            **bar_picture,
+        }
 
     def _figures(self, panel: Panel) -> str:
         """The counts as numbers, where the cells are large enough for them."""
         rows, columns = self.counts.shape
         if columns > 8:
             return ""
-        places = [(x, y) for y in (np.arange(rows) + 0.5) * panel.height / rows for x in (np.arange(columns) + 0.5) * panel.width / columns]
-        return "".join(svg.text((x, y + 4), f"{n}", "label halo middle") for (x, y), n in zip(places, self.counts.ravel(), strict=True))
+        places = [
+            (x, y)
+            for y in (np.arange(rows) + 0.5) * panel.height / rows
+            for x in (np.arange(columns) + 0.5) * panel.width / columns
+        ]
+        return "".join(
+            svg.text((x, y + 4), f"{n}", "label halo middle")
+            for (x, y), n in zip(places, self.counts.ravel(), strict=True)
+        )
 
     def _radius(self) -> str:
         edges, picture, corners = self.rings
@@ -119,15 +129,23 @@ class CoverageView(View):
         steps = np.stack([np.repeat(100 * edges, 2)[1:-1], np.repeat(100 * picture, 2)], -1)
         content += svg.line(panel.place(steps), "orange thick")
         content += plot.legend(panel, [("blue thick", "corners"), ("orange thick", "the picture’s area")], "top right")
-        return panel.show(content, title="How far out") + plot.axes(panel, "from the middle to the corner [%]", "share [%]")
+        return panel.show(content, title="How far out") + plot.axes(
+            panel, "from the middle to the corner [%]", "share [%]"
+        )
 
     def _tilt(self) -> str:
         seen = self.observations
         distance = seen.distances
         high = 1.12 * float(np.nanmax(distance))
-        panel = plot.plot_panel("tilt", 585, 226, 355, 130, (0, max(60.0, 1.1 * float(np.nanmax(seen.tilts_deg)))), (0, high))
+        panel = plot.plot_panel(
+            "tilt", 585, 226, 355, 130, (0, max(60.0, 1.1 * float(np.nanmax(seen.tilts_deg)))), (0, high)
+        )
         points = np.stack([seen.tilts_deg, distance], axis=-1)
         content = plot.grid(panel) + svg.dots(panel.place(points), "blue", 9)
         if len(seen) <= 40:
-            content += "".join(svg.text(panel.place(p) + (6, -5), f"{i + 1}", "tick halo") for i, p in enumerate(points))
-        return panel.show(content, title="How the board was held", note="one dot per view") + plot.axes(panel, "tilt against the line of sight [°]", "distance [m]")
+            content += "".join(
+                svg.text(panel.place(p) + (6, -5), f"{i + 1}", "tick halo") for i, p in enumerate(points)
+            )
+        return panel.show(content, title="How the board was held", note="one dot per view") + plot.axes(
+            panel, "tilt against the line of sight [°]", "distance [m]"
+        )

@@ -110,9 +110,14 @@ class CrossValidationView(View):
             low = float(np.quantile(both, 0.05)) if both.size else 0.1
             shades, unit = Shades.around(np.maximum(both, low)), " px"
         colours, attached = heat(panel, "colours", values, shades)
-        content = colours + contours(panel, values, shades.levels(), unit, strong=1.0)
-        legend, bar_picture = bar(panel.x + panel.width + 12, 62, panel.height - 40, "bar", shades, unit.strip() or "times")
-        title = {"difference": "Two halves of the views: difference", "ratio": "Difference over what noise lets expect"}.get(self.show, "What noise lets expect")
+        content = colours + contours(panel, values, shades, unit, strong=1.0)
+        legend, bar_picture = bar(
+            panel.x + panel.width + 12, 62, panel.height - 40, "bar", shades, unit.strip() or "times"
+        )
+        title = {
+            "difference": "Two halves of the views: difference",
+            "ratio": "Difference over what noise lets expect",
+        }.get(self.show, "What noise lets expect")
         return panel.show(content, title=title) + legend, attached | bar_picture
 
     def _views(self) -> str:
@@ -125,7 +130,10 @@ class CrossValidationView(View):
         content += plot.bars(panel, x + 0.0, x + 0.5 - gap, held, "fill-orange")
         level = [(panel.left, self.held.expected_rms), (panel.right, self.held.expected_rms)]
         content += svg.line(panel.place(level), "ink dashed")
-        content += plot.legend(panel, [("blue thick", "fitted"), ("orange thick", "held out"), ("ink dashed", "held out, expected from noise")])
+        content += plot.legend(
+            panel,
+            [("blue thick", "fitted"), ("orange thick", "held out"), ("ink dashed", "held out, expected from noise")],
+        )
         ticks = [(t, f"{t:g}") for t in (x.tolist() if n <= 20 else plot.ticks(1, n, 10).tolist())]
         return panel.show(content, title="Corners of every view") + plot.axes(panel, "view", "RMS [px]", xticks=ticks)
 

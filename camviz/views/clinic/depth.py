@@ -96,7 +96,11 @@ class DepthErrorView(View):
             "Calibration: what the noise of the corners leaves open in both cameras and in how they stand. It is the same "
             "for all points of a picture, so averaging does not lessen it. Model error is left out."
         )
-        body = svg.rectangle(0, 0, 960, 376, "paper") + panel.show(content, title=f"{' and '.join(self.names)}, middle of the picture") + axes
+        body = (
+            svg.rectangle(0, 0, 960, 376, "paper")
+            + panel.show(content, title=f"{' and '.join(self.names)}, middle of the picture")
+            + axes
+        )
         return Picture(body + svg.paragraph((690, 50), words, 255), 960, 376, self.title, self.description())
 
 

@@ -37,7 +37,9 @@ class DifferenceView(View):
     second: Camera = field(repr=False)
     names: tuple[str, str] = ("the first", "the second")
     distance: str = choice(*DISTANCES, help="how far away the points are that are compared")
-    scale: float = slider(10.0, 1, 500, 1, label="arrows", unit="×", help="how much longer the arrows are than the difference")
+    scale: float = slider(
+        10.0, 1, 500, 1, label="arrows", unit="×", help="how much longer the arrows are than the difference"
+    )
 
     @classmethod
     def of(cls, calibration: Any, other: Any, camera: str = "") -> DifferenceView:
@@ -52,7 +54,9 @@ class DifferenceView(View):
         return cls.about(calibration.cameras[name], second, (calibration.source.name, other.source.name))
 
     @classmethod
-    def about(cls, first: Camera, second: Camera, names: tuple[str, str] = ("the first", "the second")) -> DifferenceView:
+    def about(
+        cls, first: Camera, second: Camera, names: tuple[str, str] = ("the first", "the second")
+    ) -> DifferenceView:
         """The view with arrows that can be seen. Raises Missing where the two cannot be compared."""
         try:
             shift = np.linalg.norm(_difference(first, second, "infinity", 15, 10).shift, axis=-1)
@@ -60,7 +64,12 @@ class DifferenceView(View):
             raise Missing(f"The two calibrations cannot be compared: {error}.") from error
         typical = float(np.nanquantile(shift, 0.8)) if np.isfinite(shift).any() else 0.0
         per_pixel = 500 / first.intrinsics.width
-        return cls(first, second, names, scale=float(np.clip(nice(26 / (typical * per_pixel)), 1, 500)) if typical > 1e-9 else 1.0)
+        return cls(
+            first,
+            second,
+            names,
+            scale=float(np.clip(nice(26 / (typical * per_pixel)), 1, 500)) if typical > 1e-9 else 1.0,
+        )
 
     def compared(self, columns: int = 45, rows: int = 30) -> Difference:
         """The difference on a grid of pixels."""
@@ -89,7 +98,9 @@ class DifferenceView(View):
         n, d = self.numbers(), DISTANCES[self.distance]
         if n["turn_deg"] < LARGE_TURN_DEG and (np.isinf(d) or n["shift_m"] < LARGE_SHIFT * d):
             return ""
-        return "That motion is large: with one of the two, poses and intrinsics make up for each other. Do not mix them."
+        return (
+            "That motion is large: with one of the two, poses and intrinsics make up for each other. Do not mix them."
+        )
 
     def description(self) -> str:
         """The state in words and numbers."""
@@ -109,10 +120,12 @@ class DifferenceView(View):
         floor = float(np.nanquantile(length, 0.03)) if np.isfinite(length).any() else 1e-6
         shades = Shades.around(np.maximum(length, floor))
         colours, attached = heat(panel, "colours", length, shades)
-        content = colours + self._arrows(panel) + contours(panel, length, shades.levels(), " px", strong=1.0)
+        content = colours + self._arrows(panel) + contours(panel, length, shades, " px", strong=1.0)
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
-        body = svg.rectangle(0, 0, 960, 470, "paper") + panel.show(content, title=f"Points {where}", note=f"arrows × {self.scale:g}")
+        body = svg.rectangle(0, 0, 960, 470, "paper") + panel.show(
+            content, title=f"Points {where}", note=f"arrows × {self.scale:g}"
+        )
         body += legend + self._words(panel.x + panel.width + 100)
         return Picture(body, 960, 470, self.title, self.description(), attached | bar_picture)
 
@@ -124,12 +137,21 @@ class DifferenceView(View):
 
     def _words(self, x: float) -> str:
         n = self.numbers()
-        rows = [("typically apart", f"{n['median']:.3g} px"), ("at most", f"{n['worst']:.3g} px"), ("the second is turned by", f"{n['turn_deg']:.3g}°")]
+        rows = [
+            ("typically apart", f"{n['median']:.3g} px"),
+            ("at most", f"{n['worst']:.3g} px"),
+            ("the second is turned by", f"{n['turn_deg']:.3g}°"),
+        ]
         if self.distance != "infinity":
             rows.append(("and moved by", f"{1000 * n['shift_m']:.3g} mm"))
-        words = "".join(svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label") for i, (a, b) in enumerate(rows))
+        words = "".join(
+            svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label")
+            for i, (a, b) in enumerate(rows)
+        )
         told = "Turn and move are what the two sets of intrinsics imply; they are taken out, for a pose takes them up."
-        words += svg.paragraph((x, 236), f"{self.names[0]} against {self.names[1]}.", 950 - x) + svg.paragraph((x, 290), told, 950 - x)
+        words += svg.paragraph((x, 236), f"{self.names[0]} against {self.names[1]}.", 950 - x) + svg.paragraph(
+            (x, 290), told, 950 - x
+        )
         return words + svg.paragraph((x, 380), self.warning, 950 - x, "label red")
 
 

@@ -35,7 +35,9 @@ class FoldView(View):
 
     camera: Camera = field(repr=False)
     name: str = "camera"
-    margin: float = slider(0.0, 0, 40, 1, label="look beyond the border", unit="%", help="of the picture's width, on every side")
+    margin: float = slider(
+        0.0, 0, 40, 1, label="look beyond the border", unit="%", help="of the picture's width, on every side"
+    )
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "") -> FoldView:
@@ -80,7 +82,9 @@ class FoldView(View):
         if isfinite(n["fold_deg"]):
             told.append(f"It folds {n['fold_deg']:.1f}° off the axis (r = {n['fold_radius']:.3f}).")
         if isfinite(n["pole_radius"]):
-            told.append(f"It has a pole at r = {n['pole_radius']:.3f}, {degrees(atan(n['pole_radius'])):.1f}° off the axis.")
+            told.append(
+                f"It has a pole at r = {n['pole_radius']:.3f}, {degrees(atan(n['pole_radius'])):.1f}° off the axis."
+            )
         if self._rational:
             near = " That is a near-pole: small errors are thrown far." if n["weakest"] < _WEAK else ""
             told.append(f"The denominator is least at r = {n['weakest_at']:.3f}: D = {n['weakest']:.3g}.{near}")
@@ -107,7 +111,10 @@ class FoldView(View):
         """
         k = self.camera.intrinsics
         beyond = self.margin / 100 * k.width
-        u, v = np.linspace(-0.5 - beyond, k.width - 0.5 + beyond, columns), np.linspace(-0.5 - beyond, k.height - 0.5 + beyond, rows)
+        u, v = (
+            np.linspace(-0.5 - beyond, k.width - 0.5 + beyond, columns),
+            np.linspace(-0.5 - beyond, k.height - 0.5 + beyond, rows),
+        )
         uv = np.stack(np.meshgrid(u, v), axis=-1)
         rays = self.camera.unproject(uv)
         down, right = np.gradient(rays, v, u, axis=(0, 1))
@@ -122,13 +129,15 @@ class FoldView(View):
         top = float(np.quantile(known, 0.99)) if known.size else 1.0
         shades = Shades(0.0, 1.02 * top)
         colours, attached = heat(panel, "resolution", np.minimum(values, top), shades)
-        content = colours + contours(panel, values, shades.levels()[1:]) + self._without_ray(panel, uv, values)
+        content = colours + contours(panel, values, shades) + self._without_ray(panel, uv, values)
         if self.margin:
             rim = panel.place(k.border(2))
             content += svg.path([np.vstack([rim, rim[:1]])], "ink thick")
         legend, bar_picture = bar(panel.x + panel.width + 12, 62, panel.height - 50, "resolution-bar", shades, "px/°")
         words = "red: no ray arrives" if not np.isfinite(values).all() else "a ray arrives everywhere"
-        return panel.show(content, title=f"{self.name}: pixels for a degree", note=words) + legend, attached | bar_picture
+        return panel.show(
+            content, title=f"{self.name}: pixels for a degree", note=words
+        ) + legend, attached | bar_picture
 
     def _without_ray(self, panel: Panel, uv: Array, values: Array) -> str:
         none = ~np.isfinite(values)
@@ -144,13 +153,27 @@ class FoldView(View):
         bending = distortion.polynomial(self.camera.lens)
         if bending is None or not self._rational:
             words = "The model has no denominator, so it can have no pole: only the numerator of g(r), above, can turn back."
-            return svg.rectangle(570, 282, 370, 120, "card") + svg.rectangle(570, 282, 370, 120, "frame") + svg.paragraph((586, 312), words, 340)
+            return (
+                svg.rectangle(570, 282, 370, 120, "card")
+                + svg.rectangle(570, 282, 370, 120, "frame")
+                + svg.paragraph((586, 312), words, 340)
+            )
         n = self.numbers()
         r = np.linspace(0, 1.5 * n["ideal_radius"], 241)
         D = bending.denominator(r**2)
         inside = D[r <= n["ideal_radius"]]
-        panel = plot.plot_panel("denominator", 570, 282, 370, 100, (0, float(r[-1])), (min(-0.1, 1.1 * float(inside.min())), min(1.5, 1.15 * float(inside.max()))))
-        content = plot.grid(panel) + svg.rectangle(0, panel.place((0, _WEAK))[1], panel.width, panel.height, "wash fill-red")
+        panel = plot.plot_panel(
+            "denominator",
+            570,
+            282,
+            370,
+            100,
+            (0, float(r[-1])),
+            (min(-0.1, 1.1 * float(inside.min())), min(1.5, 1.15 * float(inside.max()))),
+        )
+        content = plot.grid(panel) + svg.rectangle(
+            0, panel.place((0, _WEAK))[1], panel.width, panel.height, "wash fill-red"
+        )
         content += plot.curve(panel, r, D, "blue thick") + plot.upright(panel, n["ideal_radius"], "green dashed")
         at = panel.place((n["weakest_at"], n["weakest"]))
         content += svg.dots([at], "red", 9) + svg.text(at + (8, -8), f"D = {n['weakest']:.3g}", "red halo")

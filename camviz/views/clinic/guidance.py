@@ -106,20 +106,30 @@ class GuidanceView(View):
         a, standing = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
         boards = BoardPosesView(standing, self._cam_from_board, a.board, "camera")
         size = a.board.square_size
-        items: list[Item] = [*camera_body(standing, 2 * size, colour="blue"), *axes_triad(RigidTransform.identity(), 2 * size)]
+        items: list[Item] = [
+            *camera_body(standing, 2 * size, colour="blue"),
+            *axes_triad(RigidTransform.identity(), 2 * size),
+        ]
         for pose in self._cam_from_board[: 60 if len(self._cam_from_board) > 60 else None]:
             items += boards.board_items(pose, False)
         ghost = transform(self.chosen.cam_from_board, boards.outline())
         items += [Face(ghost, "orange", 0.25), Line(np.vstack([ghost, ghost[:1]]), "orange dashed", 2.2)]
-        items += [Line(transform(self.chosen.cam_from_board, line), "orange", 1.0) for line in _squares(a.board.columns, a.board.rows, size)]
+        items += [
+            Line(transform(self.chosen.cam_from_board, line), "orange", 1.0)
+            for line in _squares(a.board.columns, a.board.rows, size)
+        ]
         middle = ghost.mean(axis=0)
         target = tuple((middle / 2).tolist())
-        farthest = max(float(np.linalg.norm(middle)), float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1))))
+        farthest = max(
+            float(np.linalg.norm(middle)), float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
+        )
         eye = replace(self.eye, target=target, distance=1.6 * farthest * self.eye.distance / Eye().distance)
         panel = space_panel("guidance", 20, 34, 450, 340)
         content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
         label = "The boards in space; drag or press the arrow keys to walk around them"
-        return panel.show(content, title="Imitate the orange board", hint="drag to turn", drag="eye", label=label), attached
+        return panel.show(
+            content, title="Imitate the orange board", hint="drag to turn", drag="eye", label=label
+        ), attached
 
     def _imitate(self) -> tuple[str, dict[str, bytes]]:
         """The picture that the ghost would give, its squares bent as the lens bends them."""
@@ -128,7 +138,10 @@ class GuidanceView(View):
         panel = image_panel("imitate", 490, 34, 450, k.width, k.height, tallest=340)
         content, attached = "", {}
         if self.backdrop is not None:
-            content, attached = photograph(panel, "backdrop", k.width, k.height, class_="faint"), {"backdrop": jpeg(self.backdrop)}
+            content, attached = (
+                photograph(panel, "backdrop", k.width, k.height, class_="faint"),
+                {"backdrop": jpeg(self.backdrop)},
+            )
         along = np.linspace(0, 1, _SIDE, endpoint=False)[:, None]
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
         ring = np.concatenate([p + along * (q - p) for p, q in zip(corners, np.roll(corners, -1, 0), strict=True)])
@@ -139,7 +152,12 @@ class GuidanceView(View):
 
         whole = projected(ring * (board.columns + 1, board.rows + 1) - 1)
         content += svg.polygon(whole, "fill-orange", style="fill-opacity:.18;stroke:none")
-        dark = [projected(ring + (i - 1, j - 1)) for i in range(board.columns + 1) for j in range(board.rows + 1) if (i + j) % 2 == 0]
+        dark = [
+            projected(ring + (i - 1, j - 1))
+            for i in range(board.columns + 1)
+            for j in range(board.rows + 1)
+            if (i + j) % 2 == 0
+        ]
         content += svg.path([d for d in dark if np.isfinite(d).all()], "fill-orange", closed=True)
         content += svg.line(np.vstack([whole, whole[:1]]), "orange thick")
         return panel.show(content, title="The picture it would give"), attached

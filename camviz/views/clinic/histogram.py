@@ -79,7 +79,9 @@ class HistogramView(View):
         x = self.values
         if not len(x):
             return 1.0
-        return float(min(max(4 * np.nan_to_num(self.sigma), 1.05 * np.quantile(np.abs(x), 0.995)), 1.05 * np.abs(x).max() + 1e-9))
+        return float(
+            min(max(4 * np.nan_to_num(self.sigma), 1.05 * np.quantile(np.abs(x), 0.995)), 1.05 * np.abs(x).max() + 1e-9)
+        )
 
     def _histogram(self) -> str:
         reach, x = self._reach, self.values
@@ -88,7 +90,12 @@ class HistogramView(View):
         width = edges[1] - edges[0]
         bell = np.zeros(_BINS)
         if self.sigma > 0:
-            bell = len(x) * width * np.exp(-0.5 * ((middle - np.median(x)) / self.sigma) ** 2) / (self.sigma * np.sqrt(2 * np.pi))
+            bell = (
+                len(x)
+                * width
+                * np.exp(-0.5 * ((middle - np.median(x)) / self.sigma) ** 2)
+                / (self.sigma * np.sqrt(2 * np.pi))
+            )
         panel = plot.plot_panel("histogram", 70, 34, 400, 240, (-reach, reach), (0, 1.15 * max(1.0, *count, *bell)))
         content = plot.grid(panel) + plot.bars(panel, edges[:-1], edges[1:], count.astype(float), "fill-blue half")
         content += plot.curve(panel, middle, bell, "orange thick") if self.sigma > 0 else ""
@@ -101,12 +108,24 @@ class HistogramView(View):
         reach = max(self._reach, 1e-9)
         sigma = self.sigma if self.sigma > 0 else 1.0
         panel = plot.plot_panel("quantiles", 545, 34, 190, 240, (-3.6, 3.6), (-reach, reach))
-        content = plot.grid(panel) + plot.curve(panel, np.array([-3.6, 3.6]), 3.6 * np.array([-sigma, sigma]), "orange thick")
+        content = plot.grid(panel) + plot.curve(
+            panel, np.array([-3.6, 3.6]), 3.6 * np.array([-sigma, sigma]), "orange thick"
+        )
         if len(x):
             normal = ndtri((np.arange(len(x)) + 0.5) / len(x))
-            shown = np.unique(np.concatenate([np.arange(min(40, len(x))), np.linspace(0, len(x) - 1, 160).astype(int), np.arange(max(0, len(x) - 40), len(x))]))
+            shown = np.unique(
+                np.concatenate(
+                    [
+                        np.arange(min(40, len(x))),
+                        np.linspace(0, len(x) - 1, 160).astype(int),
+                        np.arange(max(0, len(x) - 40), len(x)),
+                    ]
+                )
+            )
             content += svg.dots(panel.place(np.stack([normal[shown], x[shown]], -1)), "blue", 4)
-        return panel.show(content, title="Quantile by quantile") + plot.axes(panel, "of a Gaussian [σ]", "residual [px]")
+        return panel.show(content, title="Quantile by quantile") + plot.axes(
+            panel, "of a Gaussian [σ]", "residual [px]"
+        )
 
     def _words(self) -> str:
         rows = []

@@ -43,12 +43,17 @@ class NumbersView(View):
             ("focal lengths fx, fy", f"{k.fx:.6g}, {k.fy:.6g} px"),
             ("fx / fy", f"{k.fx / k.fy:.5f}"),
             ("principal point cx, cy", f"{k.cx:.6g}, {k.cy:.6g} px"),
-            ("from the middle", f"{away[0]:+.1f}, {away[1]:+.1f} px ({100 * np.linalg.norm(away) / np.hypot(k.width, k.height):.1f} % of the diagonal)"),
+            (
+                "from the middle",
+                f"{away[0]:+.1f}, {away[1]:+.1f} px ({100 * np.linalg.norm(away) / np.hypot(k.width, k.height):.1f} % of the diagonal)",
+            ),
             ("field of view across, down", self._fields_of_view()),
         ]
         rows += [("skew", f"{k.skew:.6g}")] if k.skew else []
         rows += [] if self.rms is None else [("RMS of the fit", f"{self.rms:.4g} px")]
-        coefficients = [f"{f.name} {getattr(lens, f.name):.6g}" for f in fields(lens) if getattr(lens, f.name) != f.default]  # type: ignore[arg-type]
+        coefficients = [
+            f"{f.name} {getattr(lens, f.name):.6g}" for f in fields(lens) if getattr(lens, f.name) != f.default
+        ]  # type: ignore[arg-type]
         return [*rows, ("lens", f"{type(lens).__name__}: {', '.join(coefficients) or 'nothing but zeros'}")]
 
     def _fields_of_view(self) -> str:
@@ -58,7 +63,9 @@ class NumbersView(View):
         told = []
         for pair in ends:
             a, b = self.camera.lens.unproject(k.from_pixels(pair))
-            told.append(f"{degrees(atan2(np.linalg.norm(np.cross(a, b)), a @ b)):.1f}°" if np.isfinite(a @ b) else "no ray")
+            told.append(
+                f"{degrees(atan2(np.linalg.norm(np.cross(a, b)), a @ b)):.1f}°" if np.isfinite(a @ b) else "no ray"
+            )
         return ", ".join(told)
 
     def description(self) -> str:
@@ -68,7 +75,9 @@ class NumbersView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         k = self.camera.intrinsics
         beyond = float(max(0.0, -k.cx, -k.cy, k.cx - k.width, k.cy - k.height))
-        panel = image_panel("picture", 20, 34, 330, k.width, k.height, margin=min(beyond * 1.2, 3 * k.width), tallest=240)
+        panel = image_panel(
+            "picture", 20, 34, 330, k.width, k.height, margin=min(beyond * 1.2, 3 * k.width), tallest=240
+        )
         rim = panel.place(k.border(1))
         middle, axis = panel.place([((k.width - 1) / 2, (k.height - 1) / 2), (k.cx, k.cy)])
         content = svg.polygon(rim, "wash fill-blue") + svg.path([np.vstack([rim, rim[:1]])], "muted")

@@ -69,14 +69,20 @@ class OutliersView(View):
         seen = self.observations
         middle = np.round(seen.detections[view, corner])
         half = self.patch / 2
-        panel = Panel(f"corner {i + 1}", x, y, 138, 138, middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half)
+        panel = Panel(
+            f"corner {i + 1}", x, y, 138, 138, middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half
+        )
         content, crops = "", {}
         if image is not None:
             crops = {f"corner{i}": jpeg(crop(image, seen.camera.intrinsics, middle, self.patch))}
             content = svg.image(f"corner{i}", 0, 0, 138, 138)
         start, end = panel.place(seen.detections[view, corner]), panel.place(seen.projected[view, corner])
         content += arrows([start], [end], "orange thick", 8)
-        content += cross([start], "red") if seen.aside[view, corner] else svg.dots([start], "paper-dot", 7) + svg.dots([start], "green", 5)
+        content += (
+            cross([start], "red")
+            if seen.aside[view, corner]
+            else svg.dots([start], "paper-dot", 7) + svg.dots([start], "green", 5)
+        )
         row, column = divmod(corner, seen.board.columns)
         below = svg.text((x, y + 154), f"{seen.lengths[view, corner]:.2f} px, row {row + 1}, col. {column + 1}", "note")
         return panel.show(content, title=seen.picture(view)[-18:]) + below, crops

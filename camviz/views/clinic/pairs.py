@@ -39,7 +39,9 @@ class SharedViews:
     photographs: tuple[Photographs, Photographs] = (no_photographs, no_photographs)
 
     @classmethod
-    def of(cls, calibration: Calibration, photographs: tuple[Photographs, Photographs] = (no_photographs, no_photographs)) -> SharedViews:
+    def of(
+        cls, calibration: Calibration, photographs: tuple[Photographs, Photographs] = (no_photographs, no_photographs)
+    ) -> SharedViews:
         """The first two cameras of a calibration. Raises Missing where it has no pair, or no views that both saw."""
         names = tuple(calibration.cameras)[:2]
         if len(names) < 2:
@@ -54,8 +56,18 @@ class SharedViews:
             if name in calibration.set_aside:
                 seen[i][calibration.set_aside[name]] = np.nan
         if len(seen[0]) != len(seen[1]):
-            raise Missing(f"The two cameras have {len(seen[0])} and {len(seen[1])} views: which belong together is not known.")
-        found = cls(left, right, (seen[0], seen[1]), calibration.board.columns, names, calibration.pictures.get(names[0], ()), photographs)
+            raise Missing(
+                f"The two cameras have {len(seen[0])} and {len(seen[1])} views: which belong together is not known."
+            )
+        found = cls(
+            left,
+            right,
+            (seen[0], seen[1]),
+            calibration.board.columns,
+            names,
+            calibration.pictures.get(names[0], ()),
+            photographs,
+        )
         if not np.isfinite(found.distances[0]).any():
             raise Missing(f"No corner was seen by {names[0]} and {names[1]} in one view.")
         return found
@@ -118,7 +130,9 @@ class EpipolarPairsView(View):
 
     shared: SharedViews = field(compare=False, repr=False)
     view: int = slider(1, 1, 13, 1, help="which pair is shown; a click on its bar chooses it as well")
-    scale: float = slider(50.0, 1, 300, 1, label="arrows", unit="×", help="how much longer the arrows are than the distance")
+    scale: float = slider(
+        50.0, 1, 300, 1, label="arrows", unit="×", help="how much longer the arrows are than the distance"
+    )
 
     @classmethod
     def of(cls, calibration: Any, **options: Any) -> EpipolarPairsView:
@@ -131,7 +145,9 @@ class EpipolarPairsView(View):
         worst = int(np.nanargmax(shared.rms))
         typical = float(np.nanquantile(shared.distances[1], 0.9))
         per_pixel = 455 / shared.right.intrinsics.width
-        return cls(shared, worst + 1, float(np.clip(nice(26 / (typical * per_pixel)), 1, 300)) if typical > 1e-9 else 1.0)
+        return cls(
+            shared, worst + 1, float(np.clip(nice(26 / (typical * per_pixel)), 1, 300)) if typical > 1e-9 else 1.0
+        )
 
     def offered(self) -> dict[str, Control]:
         controls = self.controls()
@@ -171,12 +187,19 @@ class EpipolarPairsView(View):
         content = plot.grid(panel, xticks=[])
         for mask, class_ in ((~chosen, "fill-blue"), (chosen, "fill-orange")):
             content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, np.where(mask, shared.rms, np.nan), class_)
-        content += svg.line(panel.place([(panel.left, shared.total_rms), (panel.right, shared.total_rms)]), "ink dashed")
+        content += svg.line(
+            panel.place([(panel.left, shared.total_rms), (panel.right, shared.total_rms)]), "ink dashed"
+        )
         if n <= 16:
-            content += "".join(svg.text(panel.place((i, r)) + (0, -4), f"{r:.2f}", "tick middle halo") for i, r in zip(x, shared.rms, strict=True))
+            content += "".join(
+                svg.text(panel.place((i, r)) + (0, -4), f"{r:.2f}", "tick middle halo")
+                for i, r in zip(x, shared.rms, strict=True)
+            )
         ticks = [(t, f"{t:g}") for t in (x.tolist() if n <= 16 else plot.ticks(1, n, 16).tolist())]
         label = "One bar per shared view; click, drag or press the arrow keys to choose a view"
-        shown = panel.show(content, title="Distance from the epipolar lines", drag="bars", hint="click a bar", label=label)
+        shown = panel.show(
+            content, title="Distance from the epipolar lines", drag="bars", hint="click a bar", label=label
+        )
         return shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
 
     def _side(self, side: int, camera: Camera) -> tuple[str, dict[str, bytes]]:
@@ -194,7 +217,9 @@ class EpipolarPairsView(View):
         content += svg.dots(starts, "paper-dot", 6) + svg.dots(starts, "red", 4)
         row = starts[: shared.columns][np.isfinite(starts[: shared.columns, 0])]
         if len(row) > 1:
-            content += arrows(row[:1], row[-1:], "blue thick", 12) + svg.text(row[0] + (-4, -10), "1", "blue halo middle")
+            content += arrows(row[:1], row[-1:], "blue thick", 12) + svg.text(
+                row[0] + (-4, -10), "1", "blue halo middle"
+            )
         note = "" if image is not None else "the picture is not at hand"
         return panel.show(content, title=f"{shared.names[side]}: arrows × {self.scale:g}", note=note), attached
 

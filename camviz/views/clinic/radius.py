@@ -18,6 +18,7 @@ from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows
 
 _RINGS, _CELLS = 12, (10, 8)
+_FEW = 8  # corners of a ring below which its standard error says little
 _MOST_DOTS = 1500
 
 
@@ -32,7 +33,9 @@ class RadiusView(View):
     title: ClassVar[str] = "Residuals against radius and direction"
 
     observations: Observations = field(compare=False, repr=False)
-    scale: float = slider(100.0, 1, 1000, 1, label="arrows", unit="×", help="how much longer the arrows are than the mean")
+    scale: float = slider(
+        100.0, 1, 1000, 1, label="arrows", unit="×", help="how much longer the arrows are than the mean"
+    )
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "", **options: Any) -> RadiusView:
@@ -66,8 +69,12 @@ class RadiusView(View):
         rows = []
         for i in range(_RINGS):
             chosen = [part[ring == i] for part in parts]
-            few = len(chosen[0]) < 3
-            figures = [np.nan] * 4 if few else [f(p) for p in chosen for f in (np.mean, _standard_error)]
+            few = len(chosen[0]) < _FEW
+            figures = [np.nan] * 4
+            if not few:
+                figures = [
+                    f for p, whole in zip(chosen, parts, strict=True) for f in (p.mean(), _standard_error(p, whole))
+                ]
             rows.append([(edges[i] + edges[i + 1]) / 2, *figures])
         return np.array(rows, dtype=float)
 
@@ -111,17 +118,27 @@ class RadiusView(View):
     def _plot(self, name: str, title: str, part: int, y: float, height: float) -> str:
         radius, values = self.polar[0], self.polar[part]
         middle, mean, error = self.rings[:, 0], self.rings[:, 2 * part - 1], self.rings[:, 2 * part]
-        reach = max(float(np.quantile(np.abs(values), 0.98)) if len(values) else 0, float(np.nanmax(np.abs(mean) + 2 * error, initial=0)), 1e-6)
-        panel = plot.plot_panel(name, 530, y, 410, height, (0, max(1.0, 1.03 * radius.max(initial=0))), (-1.1 * reach, 1.1 * reach))
+        reach = max(
+            float(np.quantile(np.abs(values), 0.98)) if len(values) else 0,
+            float(np.nanmax(np.abs(mean) + 2 * error, initial=0)),
+            1e-6,
+        )
+        panel = plot.plot_panel(
+            name, 530, y, 410, height, (0, max(1.0, 1.03 * radius.max(initial=0))), (-1.1 * reach, 1.1 * reach)
+        )
         dots = np.stack([radius, np.where(np.abs(values) <= 1.1 * reach, values, np.nan)], axis=-1)
         dots = dots[:: max(1, len(dots) // _MOST_DOTS)]
         content = plot.grid(panel) + svg.dots(panel.place(dots), "muted faint", 3)
         bars = [panel.place(np.stack([middle, mean + sign * 2 * error], -1)) for sign in (-1, 1)]
         content += svg.segments(*bars, "orange half", style="stroke-width:7px;stroke-linecap:butt")
         known = np.isfinite(mean)
-        content += plot.curve(panel, middle[known], mean[known], "orange thick") + svg.dots(panel.place(np.stack([middle, mean], -1)), "orange", 7)
+        content += plot.curve(panel, middle[known], mean[known], "orange thick") + svg.dots(
+            panel.place(np.stack([middle, mean], -1)), "orange", 7
+        )
         label = "from the principal point [px]" if part == 2 else ""
-        return panel.show(content, title=title, note="mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive") + plot.axes(panel, label, "[px]")
+        return panel.show(
+            content, title=title, note="mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive"
+        ) + plot.axes(panel, label, "[px]")
 
     def _picture(self) -> str:
         k = self.observations.camera.intrinsics
@@ -132,10 +149,16 @@ class RadiusView(View):
         lines += [panel.place([(-0.5, y), (k.width - 0.5, y)]) for y in np.linspace(0, k.height, _CELLS[1] + 1) - 0.5]
         known = np.isfinite(means[:, 0])
         centre = panel.place([(k.cx, k.cy)])
-        content = svg.path(lines, "grid") + svg.dots(centre, "ink", 8) + svg.text(centre[0] + (8, -6), "principal point", "note halo")
+        content = (
+            svg.path(lines, "grid")
+            + svg.dots(centre, "ink", 8)
+            + svg.text(centre[0] + (8, -6), "principal point", "note halo")
+        )
         content += svg.dots(starts[known], "green", 4) + arrows(starts[known], ends[known], "orange", 8)
         return panel.show(content, title=f"Mean residual of every cell, × {self.scale:g}")
 
 
-def _standard_error(values: Array) -> float:
-    return float(np.std(values, ddof=1) / np.sqrt(len(values)))
+def _standard_error(values: Array, whole: Array) -> float:
+    """Of the mean of a ring's values; where few of them happen to lie together, as those of the whole picture scatter."""
+    low, high = np.quantile(whole, [0.16, 0.84])
+    return float(max(np.std(values, ddof=1), (high - low) / 2) / np.sqrt(len(values)))

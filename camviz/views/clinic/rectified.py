@@ -83,7 +83,9 @@ class RectifiedView(View):
         pair = self.pair
         left, right = (
             turned.project(turned.centre + camera.unproject(uv))
-            for turned, camera, uv in zip((pair.left, pair.right), (self.left, self.right), self.shared.detections, strict=True)
+            for turned, camera, uv in zip(
+                (pair.left, pair.right), (self.left, self.right), self.shared.detections, strict=True
+            )
         )
         return left[..., 1] - right[..., 1]
 
@@ -94,12 +96,16 @@ class RectifiedView(View):
         told = [f"f = {self.pair.focal_length:.1f} px, baseline {self.pair.baseline:.4g} m."]
         if self.row_differences is not None:
             d = self.row_differences
-            told.append(f"Corners of one view are {np.sqrt(np.nanmean(d**2)):.3g} px RMS apart in their rows over all views; here {_rms(d[self.index])}.")
+            told.append(
+                f"Corners of one view are {np.sqrt(np.nanmean(d**2)):.3g} px RMS apart in their rows over all views; here {_rms(d[self.index])}."
+            )
         else:
             told.append("The file holds no corners of shared views, so only the picture can be judged.")
         empty = self._empty
         if empty > 0.4:
-            told.append(f"{100 * empty:.0f} % of the two pictures is black: the cameras may be swapped, or a lens folds.")
+            told.append(
+                f"{100 * empty:.0f} % of the two pictures is black: the cameras may be swapped, or a lens folds."
+            )
         return told
 
     @cached_property
@@ -124,7 +130,10 @@ class RectifiedView(View):
             turned = camera if isinstance(self.pair, str) else (self.pair.left, self.pair.right)[side]
             k = turned.intrinsics
             panel = image_panel(f"rectified {side}", 20 + 470 * side, 34, 450, k.width, k.height, tallest=380)
-            name, title = f"rectified{side}", f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}"
+            name, title = (
+                f"rectified{side}",
+                f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}",
+            )
             content = photograph(panel, name, k.width, k.height) + self._marks(panel, side, turned, camera)
             body += panel.show(content, title=title)
             attached[name] = jpeg(self._rectified(side, turned, camera, 240 if draft else _SIDE))
@@ -132,7 +141,9 @@ class RectifiedView(View):
         height = bottom + 24 + 20 * len(self.sentences())
         for i, sentence in enumerate(self.sentences()):
             body += svg.paragraph((20, bottom + 24 + 20 * i), sentence, 920, "label")
-        return Picture(svg.rectangle(0, 0, 960, height, "paper") + body, 960, height, self.title, self.description(), attached)
+        return Picture(
+            svg.rectangle(0, 0, 960, height, "paper") + body, 960, height, self.title, self.description(), attached
+        )
 
     def _rectified(self, side: int, turned: Camera, camera: Camera, size: int) -> NDArray[np.uint8]:
         source = replace(camera, intrinsics=camera.intrinsics.within(size))

@@ -37,7 +37,9 @@ class ResidualsView(View):
 
     observations: Observations = field(compare=False, repr=False)
     view: int = slider(1, 1, 13, 1, help="which picture is shown; a click on its bar chooses it as well")
-    scale: float = slider(50.0, 1, 300, 1, label="arrows", unit="×", help="how much longer the arrows are than the error")
+    scale: float = slider(
+        50.0, 1, 300, 1, label="arrows", unit="×", help="how much longer the arrows are than the error"
+    )
     eye: Eye = Eye(yaw_deg=-50, pitch_deg=20)
 
     @classmethod
@@ -161,11 +163,17 @@ class ResidualsView(View):
         image = seen.photographs(i)
         content, attached, note = self._grid(panel), {}, "the picture is not at hand"
         if image is not None:
-            content, attached, note = photograph(panel, "photograph", k.width, k.height), {"photograph": jpeg(image)}, ""
+            content, attached, note = (
+                photograph(panel, "photograph", k.width, k.height),
+                {"photograph": jpeg(image)},
+                "",
+            )
         starts, ends = panel.place(seen.detections[i]), panel.place(self.arrow_tips())
         content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange")
         content += svg.dots(starts[seen.used[i]], "paper-dot", 6) + svg.dots(starts[seen.used[i]], "green", 4)
-        content += arrows(starts[seen.aside[i]], ends[seen.aside[i]], "red dotted") + cross(starts[seen.aside[i]], "red")
+        content += arrows(starts[seen.aside[i]], ends[seen.aside[i]], "red dotted") + cross(
+            starts[seen.aside[i]], "red"
+        )
         title = f"{seen.picture(i)}: residuals × {self.scale:g}"
         return panel.show(content, title=title, note=note or "from detected to projected"), attached
 
@@ -185,15 +193,22 @@ class ResidualsView(View):
         seen, i, board = self.observations, self.index, self.observations.board
         wide, high = (board.columns + 1) * board.square_size, (board.rows + 1) * board.square_size
         scale = min(place.width / wide, place.height / high)
-        left, top = -board.square_size - (place.width / scale - wide) / 2, -board.square_size - (place.height / scale - high) / 2
+        left, top = (
+            -board.square_size - (place.width / scale - wide) / 2,
+            -board.square_size - (place.height / scale - high) / 2,
+        )
         panel = replace(place, left=left, top=top, right=left + place.width / scale, bottom=top + place.height / scale)
         corners = seen.corners_board[:, :2]
         grid = panel.place(corners).reshape(board.rows, board.columns, 2)
         tips = corners + self.board_scale * (corners - seen.on_board[i])
         content = svg.path([*grid, *grid.swapaxes(0, 1)], "grid")
         starts, ends = panel.place(corners), panel.place(tips)
-        content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange") + svg.dots(starts[seen.used[i]], "green", 4)
-        content += arrows(starts[seen.aside[i]], ends[seen.aside[i]], "red dotted") + cross(starts[seen.aside[i]], "red", 4)
+        content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange") + svg.dots(
+            starts[seen.used[i]], "green", 4
+        )
+        content += arrows(starts[seen.aside[i]], ends[seen.aside[i]], "red dotted") + cross(
+            starts[seen.aside[i]], "red", 4
+        )
         off = np.linalg.norm(seen.on_board[i] - corners, axis=-1)[seen.used[i]]
         note = f"typically {1000 * np.median(off):.2g} mm on the board" if off.size else ""
         return panel.show(content, title=f"The same on the board, × {self.board_scale:.3g}", note=note)
@@ -209,7 +224,9 @@ class ResidualsView(View):
     @cached_property
     def _poses(self) -> BoardPosesView:
         seen = self.observations
-        eye = replace(self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / Eye().distance)
+        eye = replace(
+            self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / Eye().distance
+        )
         return BoardPosesView(seen.camera, seen.cam_from_board, seen.board, "camera", self.index + 1, eye=eye)
 
     def _numbers_block(self) -> str:
@@ -223,7 +240,9 @@ class ResidualsView(View):
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         if handle == "bars":
-            return self.but(view=int(np.clip(round(self._bars.data((x - self._bars.x, 0))[0]), 1, len(self.observations))))
+            return self.but(
+                view=int(np.clip(round(self._bars.data((x - self._bars.x, 0))[0]), 1, len(self.observations)))
+            )
         return self.but(eye=self.eye.orbited(dx, dy))
 
     def pressed(self, handle: str, key: str) -> Self:

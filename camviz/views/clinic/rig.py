@@ -38,7 +38,9 @@ class RigView(View):
     cameras: Mapping[str, Camera] = field(compare=False, repr=False)
     board: Board | None = None
     world_from_board: RigidTransform | None = field(default=None, compare=False, repr=False)
-    reading: str = choice("as written", "inverted", "both", help="the transforms as the file has them, or each inverted")
+    reading: str = choice(
+        "as written", "inverted", "both", help="the transforms as the file has them, or each inverted"
+    )
     eye: Eye = Eye(yaw_deg=-40, pitch_deg=25)
 
     @classmethod
@@ -58,7 +60,9 @@ class RigView(View):
         """The cameras by what they are called, for every reading that is shown; the first camera stays where it is."""
         first = next(iter(self.cameras.values())).world_from_cam
         written = dict(self.cameras)
-        inverted = {name: camera.at(first * (first.inv() * camera.world_from_cam).inv()) for name, camera in written.items()}
+        inverted = {
+            name: camera.at(first * (first.inv() * camera.world_from_cam).inv()) for name, camera in written.items()
+        }
         return {"as written": {"as written": written}, "inverted": {"inverted": inverted}}.get(
             self.reading, {"as written": written, "inverted": inverted}
         )
@@ -72,7 +76,9 @@ class RigView(View):
             x, y, z = first.world_from_cam.inv().apply(self.cameras[name].centre)
             turn = np.degrees((first.world_from_cam.inv() * self.cameras[name].world_from_cam).rotation.magnitude())
             sides = (_side(x, "to its right", "to its left"), _side(y, "below", "above"), _side(z, "before", "behind"))
-            told.append(f"{name} stands {np.linalg.norm((x, y, z)):.4g} m from {names[0]}, {', '.join(sides)}, turned by {turn:.1f}°.")
+            told.append(
+                f"{name} stands {np.linalg.norm((x, y, z)):.4g} m from {names[0]}, {', '.join(sides)}, turned by {turn:.1f}°."
+            )
         if self._boards is not None:
             told.append(f"{len(self._boards)} boards.")
         return " ".join(told)
@@ -87,8 +93,12 @@ class RigView(View):
         content, attached = draw_space(panel, self._items(), self._onlooker, draft=draft, renderer="wire")
         label = "The cameras in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
         note = {"both": "blue: as written; orange: inverted"}.get(self.reading, self.reading)
-        body = svg.rectangle(0, 0, 960, 512, "paper") + panel.show(content, title="The cameras in space", note=note, drag="eye", label=label)
-        return Picture(body + svg.paragraph((20, 486), self.description(), 920), 960, 512, self.title, self.description(), attached)
+        body = svg.rectangle(0, 0, 960, 512, "paper") + panel.show(
+            content, title="The cameras in space", note=note, drag="eye", label=label
+        )
+        return Picture(
+            body + svg.paragraph((20, 486), self.description(), 920), 960, 512, self.title, self.description(), attached
+        )
 
     @cached_property
     def _places(self) -> Array:
@@ -111,7 +121,11 @@ class RigView(View):
         places = self._places
         middle = (places.min(axis=0) + places.max(axis=0)) / 2
         reach = max(float(np.linalg.norm(np.ptp(places, axis=0))), 1e-6)
-        return replace(self.eye, target=tuple(middle.tolist()), distance=1.25 * (reach + self._size) * self.eye.distance / Eye().distance)
+        return replace(
+            self.eye,
+            target=tuple(middle.tolist()),
+            distance=1.25 * (reach + self._size) * self.eye.distance / Eye().distance,
+        )
 
     def _items(self) -> list[Item]:
         items: list[Item] = []

@@ -71,7 +71,9 @@ class UncertaintyView(View):
     def _centre(self) -> float:
         k = self.seen_by.intrinsics
         middle = [(k.width - 1) / 2, (k.height - 1) / 2]
-        return float(worst_deviation(projection_covariance(self.adjustment, middle, DISTANCES[self.distance], self.name)))
+        return float(
+            worst_deviation(projection_covariance(self.adjustment, middle, DISTANCES[self.distance], self.name))
+        )
 
     def numbers(self) -> dict[str, float]:
         """The uncertainty in pixels in the middle of the picture and at its worst, and the share of it below 1 px."""
@@ -99,7 +101,7 @@ class UncertaintyView(View):
         panel = image_panel("uncertainty", 20, 34, 560, k.width, k.height, tallest=420)
         shades = Shades.around(values)
         colours, attached = heat(panel, "colours", values, shades)
-        content = colours + self._ellipses(panel) + contours(panel, values, shades.levels(), " px", strong=1.0)
+        content = colours + self._ellipses(panel) + contours(panel, values, shades, " px", strong=1.0)
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         shown = panel.show(content, title=f"{self.name}: one standard deviation, points {where}")
@@ -127,7 +129,10 @@ class UncertaintyView(View):
         n = self.numbers()
         rows = [("in the middle", f"±{n['middle']:.3g} px"), ("at worst", f"±{n['worst']:.3g} px"),
                 ("below 1 px over", f"{100 * n['below_1']:.0f} % of the picture"), ("noise of a corner", f"{n['sigma']:.3g} px")]  # fmt: skip
-        words = "".join(svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label") for i, (a, b) in enumerate(rows))
+        words = "".join(
+            svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label")
+            for i, (a, b) in enumerate(rows)
+        )
         words += svg.paragraph((x, 236), "Ellipses: in which direction (not to scale).", 960 - x - 10)
         return words + svg.paragraph((x, 280), LEFT_OUT, 960 - x - 10)
 
@@ -179,7 +184,9 @@ class UncertaintyRangeView(View):
         near, far = float(np.min(self.boards)) / 8, float(np.max(self.boards)) * 200
         distances = np.geomspace(near, far, 49)
         uv = np.stack(list(self.pixels.values()))
-        return distances, np.stack([worst_deviation(projection_covariance(self.adjustment, uv, d, self.name)) for d in distances], -1)
+        return distances, np.stack(
+            [worst_deviation(projection_covariance(self.adjustment, uv, d, self.name)) for d in distances], -1
+        )
 
     def description(self) -> str:
         """The state in words and numbers."""
@@ -201,7 +208,11 @@ class UncertaintyRangeView(View):
         finite = values[np.isfinite(values) & (values > 0)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.1, 1.0)
         x = np.log10(distances)
-        ylim = (float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.3 * float(np.log10(high / low)) + 0.1) if log else (0.0, 1.25 * high)
+        ylim = (
+            (float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.3 * float(np.log10(high / low)) + 0.1)
+            if log
+            else (0.0, 1.25 * high)
+        )
         panel = plot.plot_panel("range", 70, 34, 610, 290, (float(x[0]), float(x[-1])), ylim)
         xticks = plot.logarithmic(panel.left, panel.right)
         yticks = plot.logarithmic(*ylim) if log else None
@@ -215,7 +226,9 @@ class UncertaintyRangeView(View):
         content += plot.legend(panel, list(zip(classes, self.pixels, strict=True)), "top right")
         axes = plot.axes(panel, "distance of the point [m]", "standard deviation [px]", xticks, yticks)
         words = f"The solution knows the camera best where the boards were held. Nearer than that, the place of the camera’s centre is what is uncertain.\n \n{LEFT_OUT}"
-        body = svg.rectangle(0, 0, 960, 380, "paper") + panel.show(content, title=f"{self.name}: at three pixels") + axes
+        body = (
+            svg.rectangle(0, 0, 960, 380, "paper") + panel.show(content, title=f"{self.name}: at three pixels") + axes
+        )
         return Picture(body + svg.paragraph((705, 50), words, 240), 960, 380, self.title, self.description())
 
 
@@ -239,11 +252,15 @@ def determined(adjustment: Adjustment) -> Adjustment:
     """The adjustment, if its corners determine its parameters and their noise. Raises Missing if not."""
     if not np.isfinite(adjustment.sigma):
         n, k = adjustment.measurements, adjustment.unknowns
-        raise Missing(f"The calibration has {n} measurements for {k} unknowns: too few to tell the noise of the corners.")
+        raise Missing(
+            f"The calibration has {n} measurements for {k} unknowns: too few to tell the noise of the corners."
+        )
     try:
         known = np.isfinite(adjustment.mean_twist_covariance).all()
     except np.linalg.LinAlgError:
         known = False
     if not known:
-        raise Missing("The corners do not determine the parameters of this solution, so their uncertainty has no bounds.")
+        raise Missing(
+            "The corners do not determine the parameters of this solution, so their uncertainty has no bounds."
+        )
     return adjustment

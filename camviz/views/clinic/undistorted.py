@@ -69,18 +69,29 @@ class UndistortedView(View):
         small = Camera(k.within(256 if draft else _SIDE), self.camera.lens)
         taken = self._taken(small)
         found, attached = self.target(), {"before": jpeg(taken)}
-        body = before.show(photograph(before, "before", k.width, k.height) + self._bent(before, found), title=f"{self.name}: as taken")
+        body = before.show(
+            photograph(before, "before", k.width, k.height) + self._bent(before, found), title=f"{self.name}: as taken"
+        )
         if isinstance(found, str):
             body += after.show(svg.paragraph((16, 34), found, after.width - 30, "label"), title="Undistorted")
         else:
             target, roi = found
-            straight = distortion.remap(taken, distortion.undistort_maps(small, target.resized(small.intrinsics.width, small.intrinsics.height)))
+            straight = distortion.remap(
+                taken, distortion.undistort_maps(small, target.resized(small.intrinsics.width, small.intrinsics.height))
+            )
             attached["after"] = jpeg(straight)
             content = photograph(after, "after", k.width, k.height) + self._straight(after) + _rectangle(after, roi)
             body += after.show(content, title=f"Undistorted, alpha = {self.alpha:g}", note="yellow: without black")
         height = max(before.height, after.height) + 82
         words = svg.paragraph((20, height - 24), self.description(), 920, "note")
-        return Picture(svg.rectangle(0, 0, 960, height, "paper") + body + words, 960, height, self.title, self.description(), attached)
+        return Picture(
+            svg.rectangle(0, 0, 960, height, "paper") + body + words,
+            960,
+            height,
+            self.title,
+            self.description(),
+            attached,
+        )
 
     def _taken(self, small: Camera) -> NDArray[np.uint8]:
         if self.image is None:
@@ -88,7 +99,11 @@ class UndistortedView(View):
         return cv2.resize(self.image, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA)
 
     def _straight(self, panel: Panel) -> str:
-        return on_photograph([panel.place(line) for line in _grid(self.camera.intrinsics)], "sky thin") if self.lines else ""
+        return (
+            on_photograph([panel.place(line) for line in _grid(self.camera.intrinsics)], "sky thin")
+            if self.lines
+            else ""
+        )
 
     def _bent(self, panel: Panel, found: tuple[Intrinsics, tuple[int, int, int, int]] | str) -> str:
         """The grid of the undistorted picture where it lies in the photograph."""
@@ -96,7 +111,9 @@ class UndistortedView(View):
             return ""
         rays = on_plane(found[0].from_pixels(_grid(self.camera.intrinsics)))
         bent = self.camera.intrinsics.to_pixels(self.camera.lens.project(rays))
-        return svg.path([panel.place(line) for line in bent], "paper-line") + svg.path([panel.place(line) for line in bent], "sky thin")
+        return svg.path([panel.place(line) for line in bent], "paper-line") + svg.path(
+            [panel.place(line) for line in bent], "sky thin"
+        )
 
 
 def _grid(k: Intrinsics) -> NDArray[np.float64]:
