@@ -274,7 +274,7 @@ def test_pictures_of_two_sizes_cannot_be_compared_and_the_words_say_so():
 
 
 def test_the_correlations_are_those_of_many_solutions():
-    """Against the spread of 40 solutions by OpenCV of the same boards with fresh noise: the signs and sizes of pairs."""
+    """Against the spread of 40 solutions by OpenCV, of the same boards with fresh noise."""
     view = CorrelationView.of(single())
     held = poses(10)
     solutions = []
@@ -296,7 +296,7 @@ def test_two_halves_of_a_healthy_set_agree_and_a_changed_focus_does_not():
     drifted = replace(TRUE, intrinsics=replace(TRUE.intrinsics, fx=540, fy=542))
     uv = seen(TRUE, held, BOARD.corners, 0.1)
     uv[::2] = seen(drifted, held, BOARD.corners, 0.1)[::2]
-    camera, found, errors = solved(uv)
+    camera, found, _ = solved(uv)
     calibration = replace(
         single(views=16), cameras={"camera": camera}, detections={"camera": uv}, cam_from_board={"camera": found}
     )

@@ -123,8 +123,10 @@ def test_of_many_views_the_worst_are_shown_and_the_page_says_so():
 
 def test_a_file_that_cannot_be_read_gets_its_finding_and_no_views(tmp_path):
     path = tmp_path / "bad.yml"
-    path.write_text("%YAML:1.0\nimage_width: 640\nimage_height: 480\ncamera_matrix: [[500, 0, 320], [0, 500, 240], [0, 0, 0]]\n"
-                    "distortion_coefficients: [0.1, 0, 0, 0, 0]\n")  # fmt: skip
+    path.write_text(
+        "%YAML:1.0\nimage_width: 640\nimage_height: 480\n"
+        "camera_matrix: [[500, 0, 320], [0, 500, 240], [0, 0, 0]]\ndistortion_coefficients: [0.1, 0, 0, 0, 0]\n"
+    )
     inspection = inspect_file(path)
     text = report(replace(inspection, calibration=None))
     assert parsed(text).ids.count("findings") == 1

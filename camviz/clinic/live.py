@@ -118,10 +118,14 @@ def findings_html(inspection: Inspection) -> str:
         entry = VIEWS.get(ALIASES.get(finding.view, finding.view))
         seen = f" (view: {escape(entry.title)})" if entry else ""
         items.append(
-            f'<li style="border-left:4px solid {_COLOURS[finding.severity]};padding-left:.7em;margin:.4em 0;list-style:none">'
+            f'<li style="border-left:4px solid {_COLOURS[finding.severity]};padding-left:.7em;margin:.4em '
+            '0;list-style:none">'
             f"<b>{finding.severity}</b> <code>{escape(finding.id)}</code>: {escape(finding.sentence)}{seen}{causes}"
             f"<br>remedy: {escape(finding.remedy)}</li>"
         )
     found = f'<ul style="padding:0;margin:0">{"".join(items)}</ul>' if items else "<p><b>Nothing found.</b></p>"
     checked = escape(", ".join(inspection.checked)) or "nothing"
-    return f"{found}<p style='opacity:.75'>Checked: {checked}. Not checked: {len(inspection.skipped)} for want of evidence.</p>"
+    return (
+        f"{found}<p style='opacity:.75'>Checked: {checked}. Not checked: {len(inspection.skipped)} for want of "
+        "evidence.</p>"
+    )

@@ -1,4 +1,4 @@
-"""An inspection as one HTML file: the findings in words, then the views, linked with each other, and nothing outside."""
+"""An inspection as one HTML file: the findings in words, then the views, linked with each other."""
 
 from __future__ import annotations
 
@@ -49,24 +49,25 @@ def report(inspection: Inspection, *, images: str | PathLike[str] | None = None)
         (files("camviz.clinic") / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
     )
     if inspection.calibration is None:
-        body = _findings(inspection, ()) + _missing(dict.fromkeys(_wanted(inspection), _UNREAD))
+        body = _findings(inspection) + _missing(dict.fromkeys(_wanted(inspection), _UNREAD))
         return document("A calibration that could not be read", body, layout=layout, script=script)
     case = Case(inspection.calibration, inspection.compare, None if images is None else Path(images), LARGEST)
-    sections, missing = [], {}
+    sections: list[tuple[Entry, str]] = []
+    missing: dict[str, str] = {}
     for entry in VIEWS.values():
         shown, why = _section(case, entry)
         sections += [(entry, shown)] if shown else []
         missing |= {entry.name: why} if why else {}
     contents = "".join(f'<a href="#view-{entry.name}">{escape(entry.title)}</a> ' for entry, _ in sections)
-    body = [
+    parts = [
         f"<p>{escape(inspection.calibration.format)}</p>",
-        _findings(inspection, case.names),
+        _findings(inspection),
         f'<nav aria-label="Views">{contents}</nav>',
         numbers_table(inspection.calibration),
         *(shown for _, shown in sections),
         _missing(missing),
     ]
-    return document(inspection.calibration.source.name, "".join(body), layout=layout, script=script)
+    return document(inspection.calibration.source.name, "".join(parts), layout=layout, script=script)
 
 
 _STILL = RigidTransform.identity()
@@ -80,7 +81,7 @@ def _wanted(inspection: Inspection) -> tuple[str, ...]:
 # The findings --------------------------------------------------------------------------------------------------------
 
 
-def _findings(inspection: Inspection, names: tuple[str, ...]) -> str:
+def _findings(inspection: Inspection) -> str:
     counts = {severity: sum(f.severity == severity for f in inspection.findings) for severity in _MARKS}
     told = ", ".join(f"{count} {severity}{'s' * (count != 1)}" for severity, count in counts.items() if count)
     items = "".join(_finding(inspection, finding) for finding in inspection.findings)
@@ -98,7 +99,8 @@ def _finding(inspection: Inspection, finding: Finding) -> str:
     causes = f"<dt>likely</dt><dd>{escape('; '.join(finding.causes))}</dd>" if finding.causes else ""
     remedy = f"<dt>remedy</dt><dd>{escape(finding.remedy)}</dd>" if finding.remedy else ""
     return (
-        f'<li class="{finding.severity}"><p><strong>{_MARKS[finding.severity]}</strong> <code>{escape(finding.id)}</code>{where}: '
+        f'<li class="{finding.severity}"><p><strong>{_MARKS[finding.severity]}</strong> '
+        f"<code>{escape(finding.id)}</code>{where}: "
         f"{escape(finding.sentence)}{number} {_see(inspection, finding)}</p><dl>{causes}{remedy}</dl></li>"
     )
 
@@ -157,7 +159,8 @@ def _section(case: Case, entry: Entry) -> tuple[str, str]:
     )
     anchors = "".join(f'<span id="view-{alias}"></span>' for alias, name in ALIASES.items() if name == entry.name)
     return (
-        f'<section id="view-{entry.name}">{anchors}<h2>{escape(entry.title)}</h2><p>{escape(entry.purpose)}</p>{shown}{more}</section>',
+        "<section "
+        f'id="view-{entry.name}">{anchors}<h2>{escape(entry.title)}</h2><p>{escape(entry.purpose)}</p>{shown}{more}</section>',
         "",
     )
 
@@ -173,7 +176,8 @@ def _missing(missing: Mapping[str, str]) -> str:
             f'<span id="view-{alias}"></span>' for alias, of in ALIASES.items() if of == name and alias not in missing
         )
         items.append(
-            f'<li id="view-{name}">{anchors}<strong>{escape(entry.title if entry else name)}</strong>: {escape(why)}</li>'
+            f'<li id="view-{name}">{anchors}<strong>{escape(entry.title if entry else name)}</strong>: '
+            f"{escape(why)}</li>"
         )
     return f'<section id="missing"><h2>What could not be shown</h2><ul>{"".join(items)}</ul></section>'
 
@@ -203,7 +207,8 @@ def _linked(case: Case, name: str, headed: bool) -> str:
     heading = f"<h3>{escape(name)}</h3>" if headed else ""
     return (
         f'<div class="linked" data-worst="{seen.worst + 1}">{heading}{words}{_picture(bars)}'
-        f'<div class="side-by-side"><div class="pictures">{figures}</div>{_picture(_boards(seen, name, links))}</div></div>'
+        '<div class="side-by-side"><div '
+        f'class="pictures">{figures}</div>{_picture(_boards(seen, name, links))}</div></div>'
     )
 
 
@@ -267,7 +272,10 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
             aria_label=f"the board of {seen.picture(i)}",
         )
     body = svg.rectangle(0, 0, 490, 514, "paper") + panel.show(content, title="Where the boards were held")
-    told = f"The boards of {len(seen)} views of {name}, {seen.distances.min():.2g} m to {seen.distances.max():.2g} m before the camera."
+    told = (
+        f"The boards of {len(seen)} views of {name}, {seen.distances.min():.2g} m to {seen.distances.max():.2g} m "
+        "before the camera."
+    )
     return Picture(body, 490, 514, "Boards in space", told)
 
 

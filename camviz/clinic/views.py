@@ -79,7 +79,7 @@ class Case:
         return self._made[key]
 
     def photographs(self, name: str, *, full: bool = False) -> Photographs:
-        """The pictures of a camera's views as they are shown, or in `full` size; None for those that are not at hand."""
+        """The pictures of a camera's views as they are shown, or in `full` size; None for one that is not at hand."""
         pictures, k = self.calibration.pictures.get(name, ()), self.calibration.cameras[name].intrinsics
 
         def photograph(view: int) -> NDArray[np.uint8] | None:
@@ -94,7 +94,7 @@ class Case:
         return photograph if full else lru_cache(maxsize=32)(photograph)
 
     def _path(self, picture: str) -> Path | None:
-        """Where a picture lies: in the named folder or beside the file, never where a stranger's file points outside."""
+        """Where a picture lies: in the named folder or beside the file, never outside, wherever the file points."""
         named = Path(picture)
         inside = named if not named.is_absolute() and ".." not in named.parts else Path(named.name)
         folders = [folder for folder in (self.images, self.calibration.source.parent) if folder]
@@ -104,7 +104,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Entry:
-    """One view of the clinic: its stable name, its title, what it is for, and whether it is of each camera or of all."""
+    """One view of the clinic: its stable name, its title, what it is for, and whether it is of all cameras at once."""
 
     name: str
     title: str
@@ -170,41 +170,125 @@ def _cross_validation(case: Case, name: str) -> View:
 
 
 _ENTRIES = (
-    Entry("numbers", "The numbers", "What the file says of the camera, and where its axis meets the picture.",
-          lambda case, name: NumbersView.of(case.calibration, name)),
-    Entry("residual-vectors", "Residuals, view by view", "Where each picture disagrees with the calibration: choose a bar, see its picture and its board.",
-          lambda case, name: ResidualsView.about(case.observations(name))),
-    Entry("outliers", "The worst corners", "The corners that fit worst, enlarged: was the corner found where it is?", _outliers),
-    Entry("boards", "Cameras and boards in space", "Where the cameras and boards were: are they where you held them?", _boards, True),
-    Entry("residual-histogram", "Are the residuals noise?", "Noise follows the bell curve; outliers and wrong models do not.",
-          lambda case, name: HistogramView(case.observations(name))),
-    Entry("residual-radius", "Residuals against radius and direction", "Residuals that point outward or around somewhere: the model is too simple there.",
-          lambda case, name: RadiusView.about(case.observations(name))),
-    Entry("board-residuals", "Is the board flat?", "What all views agree on is the board’s fault, and may be its bend.",
-          lambda case, name: BoardResidualsView.about(case.observations(name))),
-    Entry("coverage", "Coverage", "Where the corners were: outside of that the calibration is a guess.",
-          lambda case, name: CoverageView(case.observations(name))),
-    Entry("uncertainty", "Uncertainty of projection", "How far off a projected pixel may be, over the picture.",
-          lambda case, name: UncertaintyView(case.adjustment(name), name)),
-    Entry("uncertainty-range", "Uncertainty against range", "At which distances the calibration is good.",
-          lambda case, name: UncertaintyRangeView(case.adjustment(name), name)),
-    Entry("correlation", "What the solution cannot tell apart", "Parameters that can be traded for one another.", _correlation),
-    Entry("cross-validation", "Cross-validation", "What the calibration says of views and corners that it has not seen.", _cross_validation),
-    Entry("guidance", "Where to hold the board next", "The pose that would take most off the uncertainty.",
-          lambda case, name: GuidanceView.about(case.adjustment(name), name)),
-    Entry("difference", "The difference of two calibrations", "How far apart two calibrations put the same points.",
-          lambda case, name: DifferenceView.of(case.calibration, case.compare, name)),
-    Entry("distortion", "Lens distortion", "What the lens does to straight lines, and where each pixel goes.",
-          lambda case, name: DistortionView.of(case.calibration.cameras[name], _some_photograph(case, name))),
-    Entry("fold-map", "Folds and poles", "Where a ray arrives at all, and how near the polynomial is to folding or to a pole.",
-          lambda case, name: FoldView.of(case.calibration, name)),
-    Entry("undistorted", "Undistorted", "What is left of a picture when it is straightened.",
-          lambda case, name: UndistortedView.of(case.calibration, name, _some_photograph(case, name))),
-    Entry("epipolar-pairs", "Epipolar lines, pair by pair", "How far the corners of shared views are off their epipolar lines.", _pairs, True),
+    Entry(
+        "numbers",
+        "The numbers",
+        "What the file says of the camera, and where its axis meets the picture.",
+        lambda case, name: NumbersView.of(case.calibration, name),
+    ),
+    Entry(
+        "residual-vectors",
+        "Residuals, view by view",
+        "Where each picture disagrees with the calibration: choose a bar, see its picture and its board.",
+        lambda case, name: ResidualsView.about(case.observations(name)),
+    ),
+    Entry(
+        "outliers",
+        "The worst corners",
+        "The corners that fit worst, enlarged: was the corner found where it is?",
+        _outliers,
+    ),
+    Entry(
+        "boards",
+        "Cameras and boards in space",
+        "Where the cameras and boards were: are they where you held them?",
+        _boards,
+        True,
+    ),
+    Entry(
+        "residual-histogram",
+        "Are the residuals noise?",
+        "Noise follows the bell curve; outliers and wrong models do not.",
+        lambda case, name: HistogramView(case.observations(name)),
+    ),
+    Entry(
+        "residual-radius",
+        "Residuals against radius and direction",
+        "Residuals that point outward or around somewhere: the model is too simple there.",
+        lambda case, name: RadiusView.about(case.observations(name)),
+    ),
+    Entry(
+        "board-residuals",
+        "Is the board flat?",
+        "What all views agree on is the board’s fault, and may be its bend.",
+        lambda case, name: BoardResidualsView.about(case.observations(name)),
+    ),
+    Entry(
+        "coverage",
+        "Coverage",
+        "Where the corners were: outside of that the calibration is a guess.",
+        lambda case, name: CoverageView(case.observations(name)),
+    ),
+    Entry(
+        "uncertainty",
+        "Uncertainty of projection",
+        "How far off a projected pixel may be, over the picture.",
+        lambda case, name: UncertaintyView(case.adjustment(name), name),
+    ),
+    Entry(
+        "uncertainty-range",
+        "Uncertainty against range",
+        "At which distances the calibration is good.",
+        lambda case, name: UncertaintyRangeView(case.adjustment(name), name),
+    ),
+    Entry(
+        "correlation",
+        "What the solution cannot tell apart",
+        "Parameters that can be traded for one another.",
+        _correlation,
+    ),
+    Entry(
+        "cross-validation",
+        "Cross-validation",
+        "What the calibration says of views and corners that it has not seen.",
+        _cross_validation,
+    ),
+    Entry(
+        "guidance",
+        "Where to hold the board next",
+        "The pose that would take most off the uncertainty.",
+        lambda case, name: GuidanceView.about(case.adjustment(name), name),
+    ),
+    Entry(
+        "difference",
+        "The difference of two calibrations",
+        "How far apart two calibrations put the same points.",
+        lambda case, name: DifferenceView.of(case.calibration, case.compare, name),
+    ),
+    Entry(
+        "distortion",
+        "Lens distortion",
+        "What the lens does to straight lines, and where each pixel goes.",
+        lambda case, name: DistortionView.of(case.calibration.cameras[name], _some_photograph(case, name)),
+    ),
+    Entry(
+        "fold-map",
+        "Folds and poles",
+        "Where a ray arrives at all, and how near the polynomial is to folding or to a pole.",
+        lambda case, name: FoldView.of(case.calibration, name),
+    ),
+    Entry(
+        "undistorted",
+        "Undistorted",
+        "What is left of a picture when it is straightened.",
+        lambda case, name: UndistortedView.of(case.calibration, name, _some_photograph(case, name)),
+    ),
+    Entry(
+        "epipolar-pairs",
+        "Epipolar lines, pair by pair",
+        "How far the corners of shared views are off their epipolar lines.",
+        _pairs,
+        True,
+    ),
     Entry("rectified", "Rectified", "What belongs together must lie in one row of both pictures.", _rectified, True),
-    Entry("depth-error", "Depth error against range", "How well the pair knows how far away things are.",
-          lambda case, _: DepthErrorView.of(case.calibration), True),
-)  # fmt: skip
+    Entry(
+        "depth-error",
+        "Depth error against range",
+        "How well the pair knows how far away things are.",
+        lambda case, _: DepthErrorView.of(case.calibration),
+        True,
+    ),
+)
 
 VIEWS: Mapping[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 ALIASES: Mapping[str, str] = {"per-view-errors": "residual-vectors"}  # the bars are part of that view

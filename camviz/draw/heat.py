@@ -39,19 +39,19 @@ class Shades:
     @classmethod
     def around(cls, values: ArrayLike, least: float = 1e-12) -> Shades:
         """By logarithm, over the round numbers (1, 2 or 5 times a power of ten) that hold the finite `values`."""
-        values = np.asarray(values, dtype=float)
-        values = values[np.isfinite(values) & (values > least)]
-        low, high = (float(values.min()), float(values.max())) if values.size else (0.1, 1.0)
+        given = np.asarray(values, dtype=float)
+        given = given[np.isfinite(given) & (given > least)]
+        low, high = (float(given.min()), float(given.max())) if given.size else (0.1, 1.0)
         low, high = _rounded(low, down=True), _rounded(high, down=False)
         return cls(low, high if high > low else 2 * low, logarithmic=True)
 
     def fraction(self, values: ArrayLike) -> Array:
         """Where (...) the values stand on the bar, 0 … 1; NaN stays NaN."""
-        values, low, high = np.asarray(values, dtype=float), self.low, self.high
-        if self.logarithmic:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                values, low, high = np.log(values), np.log(low), np.log(high)
-        return np.clip((values - low) / (high - low), 0, 1)
+        given = np.asarray(values, dtype=float)
+        if not self.logarithmic:
+            return np.clip((given - self.low) / (self.high - self.low), 0, 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.clip(np.log(given / self.low) / np.log(self.high / self.low), 0, 1)
 
     def rgba(self, values: ArrayLike) -> NDArray[np.uint8]:
         """The colours (..., 4) of values (...); NaN is transparent."""
@@ -91,7 +91,7 @@ def heat(panel: Panel, name: str, values: Array, shades: Shades) -> tuple[str, d
 
 
 def contours(panel: Panel, values: Array, shades: Shades, unit: str = "", strong: float | None = None) -> str:
-    """Lines at the bar's numbers through values (rows, columns) that span the panel's data rectangle, each with its own.
+    """Lines at the bar's numbers, each with its own, through values (rows, columns) that span the panel's rectangle.
 
     The level `strong` has a thicker line.
     """

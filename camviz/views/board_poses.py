@@ -50,7 +50,7 @@ class BoardPosesView(View):
 
     @classmethod
     def of(cls, calibration: Calibration, camera: str = "") -> BoardPosesView:
-        """The boards of a calibration before a camera of it, the first unless named. Raises ValueError without poses."""
+        """The boards of a calibration before its camera, the first unless named. Raises ValueError without poses."""
         name = camera or next(iter(calibration.cameras))
         if calibration.board is None or name not in calibration.cam_from_board:
             raise ValueError(f"The file does not hold where the board was in the views of {name}.")

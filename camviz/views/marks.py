@@ -53,7 +53,7 @@ def on_photograph(lines: ArrayLike, class_: str) -> str:
 
 
 def arrows(starts: ArrayLike, ends: ArrayLike, class_: str, head: float = 6) -> str:
-    """Arrows between places (n, 2) in the panel, with an edge in the colour of the paper; short ones have short heads."""
+    """Arrows between places (n, 2) in the panel, with an edge in the colour of the paper and a head of their size."""
     starts, ends = (np.asarray(places, dtype=float).reshape(-1, 2) for places in (starts, ends))
     along = ends - starts
     length = np.linalg.norm(along, axis=-1, keepdims=True)

@@ -71,7 +71,8 @@ def test_a_bar_brings_its_picture_and_its_board(browser, written, scheme):
 def test_a_board_in_space_brings_its_bar(browser, written):
     page, complaints, _ = opened(browser, written / "one.html")
     page.evaluate(
-        "document.querySelector(\"a.board[data-choose='2']\").dispatchEvent(new MouseEvent('click', {bubbles: true, cancelable: true}))"
+        "document.querySelector(\"a.board[data-choose='2']\").dispatchEvent(new MouseEvent('click', "
+        "{bubbles: true, cancelable: true}))"
     )
     assert chosen(page) == (["2"], ["2"], ["2"])
     assert complaints == []

@@ -109,16 +109,24 @@ class BoardResidualsView(View):
     def _solved(self) -> str:
         n = self.numbers()
         if "along_rows_mm" in n:
-            return f"The solution bends the board by {n['along_rows_mm']:+.2f} mm along its rows and {n['along_columns_mm']:+.2f} mm along its columns."
+            return (
+                f"The solution bends the board by {n['along_rows_mm']:+.2f} mm along its rows and "
+                f"{n['along_columns_mm']:+.2f} mm along its columns."
+            )
         if not np.isfinite(n["depth_mm"]):
             return "Too few views show each corner to tell a bend."
-        return f"The solution takes the board to be flat; the residuals ask for {n['depth_mm']:.2f} mm between its lowest and highest corner."
+        return (
+            f"The solution takes the board to be flat; the residuals ask for {n['depth_mm']:.2f} mm between its "
+            "lowest and highest corner."
+        )
 
     def description(self) -> str:
         """The state in words and numbers."""
         return (
-            f"{len(self.observations)} views: the mean residual of the worst corner is {self.numbers()['longest_mm']:.3f} mm on the "
-            f"board. {self._solved()} Arrows {self.scale:g} times, bend {self.exaggeration:g} times as large as they are."
+            f"{len(self.observations)} views: the mean residual of the worst corner is "
+            f"{self.numbers()['longest_mm']:.3f} mm on the "
+            f"board. {self._solved()} Arrows {self.scale:g} times, bend {self.exaggeration:g} times as large as "
+            "they are."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:

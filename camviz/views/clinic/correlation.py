@@ -142,7 +142,10 @@ class CorrelationView(View):
             )
         if len(rows) > 12:
             words += svg.text((x, 302 + 17 * 12), f"and {len(rows) - 12} more", "note")
-        advice = "Close to ±1: the boards cannot tell the two apart. Neighbouring terms of a polynomial (k1, k2, k3) and fx with fy always hang together."
+        advice = (
+            "Close to ±1: the boards cannot tell the two apart. Neighbouring terms of a polynomial (k1, k2, k3) "
+            "and fx with fy always hang together."
+        )
         return words + svg.paragraph((x, 520), advice, 270)
 
 

@@ -79,16 +79,21 @@ class CoverageView(View):
         """The state in words and numbers."""
         n, seen = self.numbers(), self.observations
         return (
-            f"{seen.used.sum()} corners in {len(seen)} views of {seen.name} touch {100 * n['share']:.0f} % of the picture's "
+            f"{seen.used.sum()} corners in {len(seen)} views of {seen.name} touch {100 * n['share']:.0f} % of the "
+            "picture's "
             f"{self.cells} cells and reach {100 * n['reach']:.0f} % of the way to the corner. The board was tilted by "
-            f"{n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {seen.distances.min():.2g} m to {seen.distances.max():.2g} m away."
+            f"{n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {seen.distances.min():.2g} m to "
+            f"{seen.distances.max():.2g} m away."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
         heat, attached = self._map()
         body = svg.rectangle(0, 0, 960, 412, "paper") + heat + self._radius() + self._tilt()
         n = self.numbers()
-        words = f"{100 * n['share']:.0f} % of the cells have a corner; the farthest corner lies {100 * n['reach']:.0f} % of the way out."
+        words = (
+            f"{100 * n['share']:.0f} % of the cells have a corner; the farthest corner lies "
+            f"{100 * n['reach']:.0f} % of the way out."
+        )
         return Picture(body + svg.text((20, 398), words, "label"), 960, 412, self.title, self.description(), attached)
 
     def _map(self) -> tuple[str, dict[str, bytes]]:

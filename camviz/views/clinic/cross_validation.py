@@ -24,7 +24,7 @@ _GRID = (30, 20)
 
 @dataclass(frozen=True)
 class CrossValidationView(View):
-    """The difference of two solutions from halves of the views, beside what noise lets expect; corners held out, by view.
+    """The difference of solutions from halves of the views, beside what noise lets expect; held-out corners, by view.
 
     A view's corners are held out by halves of the board: its pose is fitted to one half and tried on the other.
     """
@@ -76,15 +76,19 @@ class CrossValidationView(View):
         n = self.numbers()
         agree = n["ratio"] < 2 or n["probability"] > 1e-3
         return [
-            f"The difference of the two halves is {n['ratio']:.1f} times what noise lets expect (probability {n['probability']:.2g}): "
-            + ("they agree." if agree else "something besides noise is at work."),
-            f"Corners held out of their view's pose are off by {n['held_out']:.3g} px RMS, {n['held_out_ratio']:.1f} times what noise alone would give.",
+            f"The difference of the two halves is {n['ratio']:.1f} times what noise lets expect (probability "
+            f"{n['probability']:.2g}): " + ("they agree." if agree else "something besides noise is at work."),
+            f"Corners held out of their view's pose are off by {n['held_out']:.3g} px RMS, "
+            f"{n['held_out_ratio']:.1f} times what noise alone would give.",
         ]
 
     def description(self) -> str:
         """The state in words and numbers."""
         worst = int(np.nanargmax(self.held.per_view)) if np.isfinite(self.held.per_view).any() else 0
-        return f"{self.camera}: {' '.join(self.sentences())} Worst view held out: {self._name(worst)}, {self.held.per_view[worst]:.3g} px."
+        return (
+            f"{self.camera}: {' '.join(self.sentences())} Worst view held out: {self._name(worst)}, "
+            f"{self.held.per_view[worst]:.3g} px."
+        )
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map()

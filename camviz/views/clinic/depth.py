@@ -90,10 +90,12 @@ class DepthErrorView(View):
         content += plot.legend(panel, [(classes[name], name) for name in curves])
         axes = plot.axes(panel, "depth [m]", f"standard deviation [{unit}]")
         words = (
-            "Both parts grow with the square of the depth: an error of the disparity or of the angle between the cameras "
+            "Both parts grow with the square of the depth: an error of the disparity or of the angle between the "
+            "cameras "
             "moves a point the farther, the farther it is.\n \n"
             f"Matching: Z² σ / (f B), with the baseline B = {self.baseline:.4g} m.\n \n"
-            "Calibration: what the noise of the corners leaves open in both cameras and in how they stand. It is the same "
+            "Calibration: what the noise of the corners leaves open in both cameras and in how they stand. It is "
+            "the same "
             "for all points of a picture, so averaging does not lessen it. Model error is left out."
         )
         body = (

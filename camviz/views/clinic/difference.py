@@ -43,7 +43,7 @@ class DifferenceView(View):
 
     @classmethod
     def of(cls, calibration: Any, other: Any, camera: str = "") -> DifferenceView:
-        """The view of the camera of one calibration against that of another. Raises Missing where they have none alike."""
+        """The camera of one calibration against that of another. Raises Missing where they have none alike."""
         name = camera or next(iter(calibration.cameras))
         if other is None:
             raise Missing("There is no second calibration to compare this one with: name one with --compare.")
@@ -108,7 +108,8 @@ class DifferenceView(View):
         moved = f" and moved by {1000 * n['shift_m']:.2g} mm" if self.distance != "infinity" else ""
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         return (
-            f"{self.names[0]} against {self.names[1]}, points {where}: typically {n['median']:.3g} px apart, at most {n['worst']:.3g} px, "
+            f"{self.names[0]} against {self.names[1]}, points {where}: typically {n['median']:.3g} px apart, at "
+            f"most {n['worst']:.3g} px, "
             f"after the second camera was turned by {n['turn_deg']:.3g}°{moved} to agree best. {self.warning}"
         ).strip()
 

@@ -47,12 +47,12 @@ class FoldView(View):
 
     @cached_property
     def _ideal_radius(self) -> float:
-        """How far out on the plane z = 1 the picture looks; the distorted radius where no pixel of the border has a ray."""
+        """How far out on the plane z = 1 the picture looks; the distorted radius where its border has no ray."""
         radius = distortion.ideal_image_radius(self.camera)
         return min(radius, 10.0) if isfinite(radius) else distortion.image_corner_radius(self.camera.intrinsics)
 
     def numbers(self) -> dict[str, float]:
-        """Share of pixels without a ray, the fold's angle in °, the pole's radius, the least D(r²) in view and where."""
+        """Share of pixels without a ray, the fold's angle in °, the pole's radius, the least D(r²) and where."""
         lens, k = self.camera.lens, self.camera.intrinsics
         weakest_at, weakest = distortion.weakest_denominator(lens, self._ideal_radius)
         step = max(1, max(k.width, k.height) // 240)
@@ -75,7 +75,8 @@ class FoldView(View):
         """What the numbers mean, in words."""
         n = self.numbers()
         told = [
-            f"{100 * n['without_ray']:.2g} % of the picture's pixels have no ray: the polynomial folds before it reaches them."
+            f"{100 * n['without_ray']:.2g} % of the picture's pixels have no ray: the polynomial folds before it "
+            "reaches them."
             if n["without_ray"] > 0
             else "Every pixel of the picture has a ray: nothing folds inside it."
         ]
@@ -152,7 +153,10 @@ class FoldView(View):
         """D(r²) out to beyond the picture, where the model has one."""
         bending = distortion.polynomial(self.camera.lens)
         if bending is None or not self._rational:
-            words = "The model has no denominator, so it can have no pole: only the numerator of g(r), above, can turn back."
+            words = (
+                "The model has no denominator, so it can have no pole: only the numerator of g(r), above, can "
+                "turn back."
+            )
             return (
                 svg.rectangle(570, 282, 370, 120, "card")
                 + svg.rectangle(570, 282, 370, 120, "frame")

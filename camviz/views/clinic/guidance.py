@@ -76,8 +76,10 @@ class GuidanceView(View):
         away = float(np.linalg.norm(points.mean(axis=0)))
         gain = 100 * (1 - c.after / c.before)
         return [
-            f"Hold the board {across}, {down}, {away:.2g} m away, tilted by {c.tilt_deg:.0f}°, as in the picture on the right.",
-            f"One such view would lessen the mean uncertainty from {c.before:.3g} px to {c.after:.3g} px, by {gain:.0f} %.",
+            f"Hold the board {across}, {down}, {away:.2g} m away, tilted by {c.tilt_deg:.0f}°, as in the picture "
+            "on the right.",
+            f"One such view would lessen the mean uncertainty from {c.before:.3g} px to {c.after:.3g} px, by "
+            f"{gain:.0f} %.",
         ]
 
     def description(self) -> str:

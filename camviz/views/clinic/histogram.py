@@ -131,5 +131,8 @@ class HistogramView(View):
         rows = []
         for i, (name, value) in enumerate(self.numbers().items()):
             rows.append(svg.text((765, 48 + 38 * i), name, "note") + svg.text((765, 65 + 38 * i), value, "label"))
-        advice = "Pure noise follows the orange curve. Tails that stand off it are outliers; a flat or two-peaked shape is a model that does not fit."
+        advice = (
+            "Pure noise follows the orange curve. Tails that stand off it are outliers; a flat or two-peaked "
+            "shape is a model that does not fit."
+        )
         return "".join(rows) + svg.paragraph((765, 248), advice, 190)

@@ -36,7 +36,8 @@ class NumbersView(View):
 
     def rows(self) -> list[tuple[str, str]]:
         """What is said and its value, in words."""
-        k, lens = self.camera.intrinsics, self.camera.lens
+        k = self.camera.intrinsics
+        lens: Any = self.camera.lens
         away = np.array([k.cx - (k.width - 1) / 2, k.cy - (k.height - 1) / 2])
         rows = [
             ("picture", f"{k.width} × {k.height} pixels"),
@@ -45,15 +46,15 @@ class NumbersView(View):
             ("principal point cx, cy", f"{k.cx:.6g}, {k.cy:.6g} px"),
             (
                 "from the middle",
-                f"{away[0]:+.1f}, {away[1]:+.1f} px ({100 * np.linalg.norm(away) / np.hypot(k.width, k.height):.1f} % of the diagonal)",
+                f"{away[0]:+.1f}, {away[1]:+.1f} px "
+                f"({100 * np.linalg.norm(away) / np.hypot(k.width, k.height):.1f} % of the diagonal)",
             ),
             ("field of view across, down", self._fields_of_view()),
         ]
         rows += [("skew", f"{k.skew:.6g}")] if k.skew else []
         rows += [] if self.rms is None else [("RMS of the fit", f"{self.rms:.4g} px")]
-        coefficients = [
-            f"{f.name} {getattr(lens, f.name):.6g}" for f in fields(lens) if getattr(lens, f.name) != f.default
-        ]  # type: ignore[arg-type]
+        moved = (f.name for f in fields(lens) if getattr(lens, f.name) != f.default)
+        coefficients = [f"{name} {getattr(lens, name):.6g}" for name in moved]
         return [*rows, ("lens", f"{type(lens).__name__}: {', '.join(coefficients) or 'nothing but zeros'}")]
 
     def _fields_of_view(self) -> str:

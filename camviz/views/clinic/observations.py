@@ -117,7 +117,7 @@ class Observations:
     def used(self) -> NDArray[np.bool_]:
         """Which corners (views, corners) were seen, have an image, and were not set aside."""
         known = np.isfinite(self.residuals).all(axis=-1)
-        return known if self.set_aside is None else known & ~self.set_aside
+        return np.asarray(known if self.set_aside is None else known & ~self.set_aside)
 
     @cached_property
     def aside(self) -> NDArray[np.bool_]:

@@ -48,10 +48,13 @@ class OutliersView(View):
             for view, corner in self.worst
         ]
         typical = float(np.median(seen.lengths[seen.used])) if seen.used.any() else np.nan
-        return f"{seen.aside.sum()} corners are set aside. A typical residual is {typical:.2g} px. The largest: {'; '.join(told)}."
+        return (
+            f"{seen.aside.sum()} corners are set aside. A typical residual is {typical:.2g} px. The largest: "
+            f"{'; '.join(told)}."
+        )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = svg.rectangle(0, 0, 960, 440, "paper"), {}
+        body, attached = svg.rectangle(0, 0, 960, 440, "paper"), dict[str, bytes]()
         images: dict[int, Any] = {}
         for i, (view, corner) in enumerate(self.worst):
             if view not in images:
@@ -60,7 +63,10 @@ class OutliersView(View):
             drawn, crops = self._detail(i, view, corner, images[view], 20 + 155 * column, 34 + 190 * row)
             body, attached = body + drawn, attached | crops
         seen = self.observations
-        words = f"Green: detected; orange arrow: to the projection; red cross: set aside ({seen.aside.sum()} of {(seen.used | seen.aside).sum()} corners)."
+        words = (
+            f"Green: detected; orange arrow: to the projection; red cross: set aside ({seen.aside.sum()} of "
+            f"{(seen.used | seen.aside).sum()} corners)."
+        )
         if not attached:
             words += " The pictures are not at hand, so the places are bare."
         return Picture(body + svg.text((20, 424), words, "note"), 960, 440, self.title, self.description(), attached)

@@ -64,7 +64,7 @@ class SharedViews:
             right,
             (seen[0], seen[1]),
             calibration.board.columns,
-            names,
+            (names[0], names[1]),
             calibration.pictures.get(names[0], ()),
             photographs,
         )
@@ -90,7 +90,7 @@ class SharedViews:
 
     @cached_property
     def offsets(self) -> tuple[Array, Array]:
-        """From each corner straight to its epipolar line, (views, corners, 2) ideal pixels, in the left and right picture."""
+        """From each corner straight to its epipolar line, (views, corners, 2) ideal pixels, in either picture."""
         F = twoview.fundamental(*self.ideal)
         left, right = self.straightened
         return _to_line(twoview.epipolar_lines(F.T, right), left), _to_line(twoview.epipolar_lines(F, left), right)
@@ -163,16 +163,20 @@ class EpipolarPairsView(View):
         shared, i = self.shared, self.index
         told = f"{shared.rms[i]:.3g} px" if np.isfinite(shared.rms[i]) else "not seen by both"
         return (
-            f"{np.isfinite(shared.rms).sum()} views that {' and '.join(shared.names)} share, {shared.total_rms:.3g} px RMS off their "
+            f"{np.isfinite(shared.rms).sum()} views that {' and '.join(shared.names)} share, "
+            f"{shared.total_rms:.3g} px RMS off their "
             f"epipolar lines. Shown: {shared.picture(i)}: {told}. Arrows {self.scale:g} times as long as the distance."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = svg.rectangle(0, 0, 960, 600, "paper") + self._bars_panel(), {}
+        body, attached = svg.rectangle(0, 0, 960, 600, "paper") + self._bars_panel(), dict[str, bytes]()
         for side, camera in enumerate((self.shared.left, self.shared.right)):
             shown, pictures = self._side(side, camera)
             body, attached = body + shown, attached | pictures
-        words = "Green: the line on which the other picture puts a corner. Blue arrow: the first row, from the first corner on."
+        words = (
+            "Green: the line on which the other picture puts a corner. Blue arrow: the first row, from the first "
+            "corner on."
+        )
         return Picture(body + svg.text((20, 588), words, "note"), 960, 600, self.title, self.description(), attached)
 
     @property

@@ -103,16 +103,22 @@ class RadiusView(View):
         """The state in words and numbers."""
         n = self.numbers()
         return (
-            f"{self.observations.used.sum()} corners of {self.observations.name}. The ring that stands out most is off by "
-            f"{n['outward_px']:+.3f} px outward ({n['outward_errors']:.1f} standard errors) and by {n['around_px']:+.3f} px "
-            f"around ({n['around_errors']:.1f}). Arrows {self.scale:g} times as long as the mean residual of their cell."
+            f"{self.observations.used.sum()} corners of {self.observations.name}. The ring that stands out most "
+            "is off by "
+            f"{n['outward_px']:+.3f} px outward ({n['outward_errors']:.1f} standard errors) and by "
+            f"{n['around_px']:+.3f} px "
+            f"around ({n['around_errors']:.1f}). Arrows {self.scale:g} times as long as the mean residual of "
+            "their cell."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
         body = svg.rectangle(0, 0, 960, 400, "paper") + self._picture()
         for i, (name, title) in enumerate((("outward", "Outward"), ("around", "Around the principal point"))):
             body += self._plot(name, title, 1 + i, 34 + 172 * i, 128)
-        advice = "Noise scatters around zero. A ring's mean off zero by more than its pale bars says that the model is too simple there, or the board not flat."
+        advice = (
+            "Noise scatters around zero. A ring's mean off zero by more than its pale bars says that the model "
+            "is too simple there, or the board not flat."
+        )
         return Picture(body + svg.paragraph((20, 356), advice, 440), 960, 400, self.title, self.description())
 
     def _plot(self, name: str, title: str, part: int, y: float, height: float) -> str:
@@ -129,8 +135,8 @@ class RadiusView(View):
         dots = np.stack([radius, np.where(np.abs(values) <= 1.1 * reach, values, np.nan)], axis=-1)
         dots = dots[:: max(1, len(dots) // _MOST_DOTS)]
         content = plot.grid(panel) + svg.dots(panel.place(dots), "muted faint", 3)
-        bars = [panel.place(np.stack([middle, mean + sign * 2 * error], -1)) for sign in (-1, 1)]
-        content += svg.segments(*bars, "orange half", style="stroke-width:7px;stroke-linecap:butt")
+        low, high = (panel.place(np.stack([middle, mean + sign * 2 * error], -1)) for sign in (-1, 1))
+        content += svg.segments(low, high, "orange half", style="stroke-width:7px;stroke-linecap:butt")
         known = np.isfinite(mean)
         content += plot.curve(panel, middle[known], mean[known], "orange thick") + svg.dots(
             panel.place(np.stack([middle, mean], -1)), "orange", 7
@@ -159,6 +165,6 @@ class RadiusView(View):
 
 
 def _standard_error(values: Array, whole: Array) -> float:
-    """Of the mean of a ring's values; where few of them happen to lie together, as those of the whole picture scatter."""
+    """Of the mean of a ring's values; not below what the scatter over the whole picture would give it."""
     low, high = np.quantile(whole, [0.16, 0.84])
     return float(max(np.std(values, ddof=1), (high - low) / 2) / np.sqrt(len(values)))

@@ -97,7 +97,8 @@ class RectifiedView(View):
         if self.row_differences is not None:
             d = self.row_differences
             told.append(
-                f"Corners of one view are {np.sqrt(np.nanmean(d**2)):.3g} px RMS apart in their rows over all views; here {_rms(d[self.index])}."
+                f"Corners of one view are {np.sqrt(np.nanmean(d**2)):.3g} px RMS apart in their rows over all "
+                f"views; here {_rms(d[self.index])}."
             )
         else:
             told.append("The file holds no corners of shared views, so only the picture can be judged.")

@@ -1,4 +1,4 @@
-"""The residuals of every view: a bar for each, and of the chosen one its photograph, its board in space and on paper."""
+"""The residuals of every view: a bar for each, and of the chosen one its photograph and its board."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _TOLD = 4  # cameras up to which each one's place is told
 class RigView(View):
     """The cameras as the file places them, with frusta that bend with the lens, axes x right, y down, z forward.
 
-    Read the other way round (`reading`), each transform is taken for its inverse: the picture that makes sense is right.
+    Read the other way round (`reading`), each transform is taken for its inverse: the one that makes sense is right.
     """
 
     title: ClassVar[str] = "The cameras in space"
@@ -77,7 +77,8 @@ class RigView(View):
             turn = np.degrees((first.world_from_cam.inv() * self.cameras[name].world_from_cam).rotation.magnitude())
             sides = (_side(x, "to its right", "to its left"), _side(y, "below", "above"), _side(z, "before", "behind"))
             told.append(
-                f"{name} stands {np.linalg.norm((x, y, z)):.4g} m from {names[0]}, {', '.join(sides)}, turned by {turn:.1f}°."
+                f"{name} stands {np.linalg.norm((x, y, z)):.4g} m from {names[0]}, {', '.join(sides)}, turned by "
+                f"{turn:.1f}°."
             )
         if self._boards is not None:
             told.append(f"{len(self._boards)} boards.")

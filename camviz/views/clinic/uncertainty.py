@@ -91,7 +91,8 @@ class UncertaintyView(View):
         n = self.numbers()
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         return (
-            f"{self.name}, points {where}: ±{n['middle']:.3g} px in the middle of the picture, ±{n['worst']:.3g} px at worst; "
+            f"{self.name}, points {where}: ±{n['middle']:.3g} px in the middle of the picture, ±{n['worst']:.3g} "
+            "px at worst; "
             f"below 1 px over {100 * n['below_1']:.0f} % of it. The corners' noise is {n['sigma']:.3g} px. {LEFT_OUT}"
         )
 
@@ -128,7 +129,8 @@ class UncertaintyView(View):
     def _words(self, x: float) -> str:
         n = self.numbers()
         rows = [("in the middle", f"±{n['middle']:.3g} px"), ("at worst", f"±{n['worst']:.3g} px"),
-                ("below 1 px over", f"{100 * n['below_1']:.0f} % of the picture"), ("noise of a corner", f"{n['sigma']:.3g} px")]  # fmt: skip
+                ("below 1 px over", f"{100 * n['below_1']:.0f} % of the picture"),
+                ("noise of a corner", f"{n['sigma']:.3g} px")]  # fmt: skip
         words = "".join(
             svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label")
             for i, (a, b) in enumerate(rows)
@@ -139,7 +141,7 @@ class UncertaintyView(View):
 
 @dataclass(frozen=True)
 class UncertaintyRangeView(View):
-    """The uncertainty of projection against the distance of the points, at the middle of the picture and towards a corner.
+    """The uncertainty of projection against the distance of the points, at three pixels from the middle outwards.
 
     It is least where the boards were held.
     """
@@ -225,7 +227,10 @@ class UncertaintyRangeView(View):
             content += plot.curve(panel, x, np.log10(curve) if log else curve, class_)
         content += plot.legend(panel, list(zip(classes, self.pixels, strict=True)), "top right")
         axes = plot.axes(panel, "distance of the point [m]", "standard deviation [px]", xticks, yticks)
-        words = f"The solution knows the camera best where the boards were held. Nearer than that, the place of the camera’s centre is what is uncertain.\n \n{LEFT_OUT}"
+        words = (
+            "The solution knows the camera best where the boards were held. Nearer than that, the place of the "
+            f"camera’s centre is what is uncertain.\n \n{LEFT_OUT}"
+        )
         body = (
             svg.rectangle(0, 0, 960, 380, "paper") + panel.show(content, title=f"{self.name}: at three pixels") + axes
         )
@@ -256,7 +261,7 @@ def determined(adjustment: Adjustment) -> Adjustment:
             f"The calibration has {n} measurements for {k} unknowns: too few to tell the noise of the corners."
         )
     try:
-        known = np.isfinite(adjustment.mean_twist_covariance).all()
+        known = bool(np.isfinite(adjustment.mean_twist_covariance).all())
     except np.linalg.LinAlgError:
         known = False
     if not known:

@@ -58,8 +58,10 @@ class UndistortedView(View):
         k, (x0, y0, width, height) = found
         share = 100 * width * height / (k.width * k.height)
         return (
-            f"{self.name} at alpha = {self.alpha:g}: new fx = {k.fx:.1f}, fy = {k.fy:.1f}, cx = {k.cx:.1f}, cy = {k.cy:.1f}; the "
-            f"rectangle without black starts at ({x0}, {y0}) and is {width} × {height} pixels, {share:.0f} % of the picture."
+            f"{self.name} at alpha = {self.alpha:g}: new fx = {k.fx:.1f}, fy = {k.fy:.1f}, cx = {k.cx:.1f}, cy = "
+            f"{k.cy:.1f}; the "
+            f"rectangle without black starts at ({x0}, {y0}) and is {width} × {height} pixels, {share:.0f} % of "
+            "the picture."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
