@@ -145,10 +145,9 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):
     shots(room / "shots")
     stop = "import os, signal; os.killpg(0, signal.SIGINT)"
     code = {
-        "detection": f"import camviz.commands.calibrate as c\nclass B(c.Bar):\n    def __call__(self, *_): {stop}\nc.Bar = B",
-        "solving": f"import camviz.calibration.solving as s\nold = s._settled\ndef new(a):\n    {stop}\n    return old(a)\n"
-        "s._settled = new",
-    }[stage]
+        "detection": "import camviz.commands.calibrate as c\nclass B(c.Bar):\n    def __call__(self, *_): STOP\nc.Bar = B",
+        "solving": "import camviz.calibration.solving as s\ndef new(a):\n    STOP\ns._settled = new",
+    }[stage].replace("STOP", stop)
     words = ["calibrate", "shots", *WORDS, "--workers", "2"]
     process = subprocess.run(
         [sys.executable, "-c", f"{code}\nimport sys\nfrom camviz.command import main\nsys.exit(main({words!r}))"],
