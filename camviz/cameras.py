@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import isfinite, radians, tan
 
 import numpy as np
@@ -146,13 +147,20 @@ class Camera:
 
     def project(self, points_world: ArrayLike) -> Array:
         """Pixels (..., 2) of world points (..., 3) in metres, K ∘ lens ∘ cam_from_world; NaN where there is none."""
-        points_cam = transform(self.cam_from_world, points_world)
+        R, t = self._extrinsics
+        points_cam = as_points(points_world, 3, "points_world") @ R.T + t
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
     def unproject(self, uv: ArrayLike) -> Array:
         """Unit rays (..., 3) in the world, from the centre through pixels (..., 2); NaN where there is no ray."""
-        rays_cam = self.lens.unproject(self.intrinsics.from_pixels(uv))
-        return rotate(self.world_from_cam.rotation, rays_cam)
+        R, _ = self._extrinsics
+        return self.lens.unproject(self.intrinsics.from_pixels(uv)) @ R
+
+    @cached_property
+    def _extrinsics(self) -> tuple[Array, Array]:
+        """R (3, 3) and t (3,) of cam_from_world; asking scipy for them costs more than projecting a few points."""
+        cam_from_world = self.cam_from_world
+        return cam_from_world.rotation.as_matrix(), np.asarray(cam_from_world.translation)
 
     def rays(self) -> Array:
         """The unit ray (height, width, 3) in the world of every pixel."""

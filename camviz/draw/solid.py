@@ -45,7 +45,7 @@ def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> t
     """
     shot = _stage().submit(_shoot, sight, items, 1.0 if draft else FINE).result()
     fragment, photographs = _cut_out(shot, sight, name)
-    fragment += "".join(draw_lines(sight, items, hidden=shot.hides).values()) + draw_marks(sight, items, shot.hides)
+    fragment += draw_lines(sight, items, shot.hides) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
 
 

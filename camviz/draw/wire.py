@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -30,7 +30,7 @@ def nothing_hides(px: Array, depth: Array) -> np.ndarray:
     return np.zeros(len(px), dtype=bool)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sight:
     """The onlooker's camera and how far it looks: what is `distance` metres deep is drawn at ordinary strength."""
 
@@ -67,11 +67,22 @@ class Pieces:
     hidden: np.ndarray
 
 
-def draw_wire(sight: Sight, items: Sequence[Item], name: str, scale: float = 1) -> tuple[str, dict[str, bytes]]:
-    """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …"""
-    fills = sorted(_fills(sight, items, name, scale), key=lambda fill: -fill[0])
+Fill = tuple[float, str, dict[str, bytes]]  # depth, fragment, attached pictures
+
+
+def draw_wire(
+    sight: Sight, items: Sequence[Item], name: str, scale: float = 1, scenery: tuple[Item, ...] = ()
+) -> tuple[str, dict[str, bytes]]:
+    """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …
+
+    What is seen of the `scenery`, lines and faces that do not change, is kept while the onlooker stands still.
+    """
+    stage, kept = _scenery(sight, scenery)
+    fills = sorted([*kept, *_fills(sight, items, name, scale)], key=lambda fill: -fill[0])
     depths = np.array([depth for depth, _, _ in fills])
-    strokes = draw_lines(sight, items, depths)
+    behind, lines = _lines(scenery), _lines(items)
+    pieces = _joined(stage, len(behind), cut(sight, lines, nothing_hides, fine=False))
+    strokes = _strokes(sight, [*behind, *lines], pieces, depths)
     layers = [strokes.get(0, "")]
     for i, (_, fragment, _) in enumerate(fills):
         layers += [fragment, strokes.get(i + 1, "")]
@@ -79,16 +90,25 @@ def draw_wire(sight: Sight, items: Sequence[Item], name: str, scale: float = 1) 
     return "".join(layers) + draw_marks(sight, items), photographs
 
 
-def draw_lines(
-    sight: Sight, items: Sequence[Item], fills: Array | None = None, hidden: Hidden = nothing_hides
-) -> dict[int, str]:
-    """The lines, keyed by how many of the filled things at depths `fills` (descending) they come after."""
-    lines = [item for item in items if isinstance(item, Line)]
+def draw_lines(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
+    """The lines alone, faint where something solid hides them."""
+    lines = _lines(items)
     pieces = cut(sight, lines, hidden, fine=hidden is not nothing_hides)
-    depths = np.empty(0) if fills is None else fills
-    slot = (
-        np.searchsorted(-depths, -0.98 * pieces.depth, side="left") if len(depths) else np.zeros(len(pieces.depth), int)
-    )
+    return "".join(_strokes(sight, lines, pieces, np.empty(0)).values())
+
+
+@lru_cache(maxsize=4)
+def _scenery(sight: Sight, items: tuple[Item, ...]) -> tuple[Pieces, list[Fill]]:
+    return cut(sight, _lines(items), nothing_hides, fine=False), list(_fills(sight, items, "scenery", 1))
+
+
+def _lines(items: Sequence[Item]) -> list[Line]:
+    return [item for item in items if isinstance(item, Line)]
+
+
+def _strokes(sight: Sight, lines: Sequence[Line], pieces: Pieces, depths: Array) -> dict[int, str]:
+    """The lines, keyed by how many of the filled things at `depths` (descending) they come after."""
+    slot = np.searchsorted(-depths, -0.98 * pieces.depth, side="left")
     level = np.where(pieces.hidden, -1, sight.strength(pieces.depth))
     pens = {pen: i for i, pen in enumerate(dict.fromkeys((line.class_, line.width) for line in lines))}
     pen = np.array([pens[line.class_, line.width] for line in lines], dtype=int)[pieces.line]
@@ -134,6 +154,15 @@ def cut(sight: Sight, lines: Sequence[Line], hidden: Hidden, fine: bool) -> Piec
     depth = 1 / ((1 - t) / z0[whole, None] + t / z1[whole, None])
     px = px0[whole, None] + t[..., None] * (px1 - px0)[whole, None]
     return Pieces(px[:, [0, 2]], depth[:, 1], line[whole], segment[whole], hidden(px[:, 1], depth[:, 1]))
+
+
+def _joined(first: Pieces, lines: int, then: Pieces) -> Pieces:
+    """The pieces of `lines` lines, then those of others."""
+    both = {name: np.concatenate([getattr(first, name), getattr(then, name)]) for name in vars(first)}
+    count = len(first.line)
+    both["line"][count:] += lines
+    both["segment"][count:] += 1 + first.segment.max(initial=0)
+    return Pieces(**both)
 
 
 def _segments(sight: Sight, lines: Sequence[Line]) -> tuple[Array, Array, np.ndarray]:
@@ -210,10 +239,8 @@ def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
                 )
 
 
-def _fills(
-    sight: Sight, items: Sequence[Item], name: str, scale: float
-) -> Iterator[tuple[float, str, dict[str, bytes]]]:
-    """Depth, fragment and attached pictures of every face and sheet in view."""
+def _fills(sight: Sight, items: Sequence[Item], name: str, scale: float) -> Iterator[Fill]:
+    """Every face and sheet in view."""
     for i, item in enumerate(items):
         if isinstance(item, Face):
             vertices = _cut_near(sight.points_cam(item.vertices))

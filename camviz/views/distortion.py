@@ -21,6 +21,7 @@ from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_pan
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import on_plane, unit
 from camviz.scenes import Scene, snapshot, textured_scene
+from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
@@ -163,7 +164,7 @@ class DistortionView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def image(self, *, draft: bool) -> np.ndarray:
-        small = Camera(self.intrinsics.within(256 if draft else 480), self.camera.lens)
+        small = Camera(self.intrinsics.within(garden.DRAFT if draft else garden.FINE), self.camera.lens)
         if self.photograph is None:
             picture = snapshot(_scene(), small)
         else:

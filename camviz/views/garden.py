@@ -13,6 +13,8 @@ from camviz.lenses import Lens
 from camviz.lenses.base import Array
 from camviz.scenes import snapshot, textured_scene
 
+DRAFT, FINE = 208, 480  # pixels on the longer side; at 4:3 the tracer takes the rays of a draft as one block
+
 Pose = tuple[float, ...]
 
 
