@@ -112,11 +112,13 @@ def _strokes(sight: Sight, lines: Sequence[Line], pieces: Pieces, depths: Array)
     level = np.where(pieces.hidden, -1, sight.strength(pieces.depth))
     pens = {pen: i for i, pen in enumerate(dict.fromkeys((line.class_, line.width) for line in lines))}
     pen = np.array([pens[line.class_, line.width] for line in lines], dtype=int)[pieces.line]
+    key = (slot * (LEVELS + 1) + level + 1) * len(pens) + pen
     layers: dict[int, str] = {}
     names = list(pens)
-    for key, chosen in _groups(np.stack([slot, level, pen], axis=-1)):
-        class_, width = names[key[2]]
-        layers[key[0]] = layers.get(key[0], "") + _stroke(pieces, chosen, class_, width, key[1])
+    for group, data in _path_data(pieces, key):
+        rest, which = divmod(group, len(pens))
+        slot_, strength = divmod(rest, LEVELS + 1)
+        layers[slot_] = layers.get(slot_, "") + _stroke(data, *names[which], strength - 1)
     last = max(layers, default=0)
     layers[last] = layers.get(last, "") + "".join(_heads(sight, lines))
     return layers
@@ -194,33 +196,34 @@ def _pyramid(sight: Sight) -> Array:
     return np.array([(0, 0, 1, NEAR), (1, 0, x, 0), (-1, 0, x, 0), (0, 1, y, 0), (0, -1, y, 0)])
 
 
-def _groups(keys: np.ndarray) -> Iterator[tuple[list[int], np.ndarray]]:
-    """Equal rows of keys (n, k) in ascending order: the row, and where it occurs."""
-    order = np.lexsort(keys.T[::-1])
-    ordered = keys[order]
-    borders = np.flatnonzero((ordered[1:] != ordered[:-1]).any(axis=-1)) + 1
-    for chosen in np.split(order, borders) if len(order) else []:
-        yield keys[chosen[0]].tolist(), np.sort(chosen)
-
-
-def _stroke(pieces: Pieces, chosen: np.ndarray, class_: str, width: float, level: int) -> str:
+def _stroke(data: str, class_: str, width: float, level: int) -> str:
     nearness = max(level, 0) / (LEVELS - 1)
     opacity = 0.16 if level < 0 else 0.55 + 0.45 * nearness
     style = f"stroke-width:{width * (0.75 + 0.5 * nearness):.2f};stroke-opacity:{opacity:.2f}"
-    return svg.element("path", d=_data(pieces, chosen), class_=class_, style=style)
+    return svg.element("path", d=data, class_=class_, style=style)
 
 
-def _data(pieces: Pieces, chosen: np.ndarray) -> str:
-    """Path data: consecutive pieces of one segment become one stroke, strokes that touch become one line."""
-    segment = pieces.segment[chosen]
-    broken = (chosen[1:] != chosen[:-1] + 1) | (segment[1:] != segment[:-1])
-    firsts, lasts = chosen[np.concatenate([_YES, broken])], chosen[np.concatenate([broken, _YES])]
-    strokes = np.concatenate([pieces.ends[firsts, 0], pieces.ends[lasts, 1]], axis=-1).round(1)
-    touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1)])
-    return "".join(
+def _path_data(pieces: Pieces, key: np.ndarray) -> Iterator[tuple[int, str]]:
+    """Of all pieces with one key, in ascending order of keys: the key, and their path data.
+
+    Consecutive pieces of one segment become one stroke, strokes that touch become one line.
+    """
+    order = np.argsort(key, kind="stable")
+    if not len(order):
+        return
+    key, segment = key[order], pieces.segment[order]
+    broken = (key[1:] != key[:-1]) | (order[1:] != order[:-1] + 1) | (segment[1:] != segment[:-1])
+    firsts, lasts = np.concatenate([_YES, broken]), np.concatenate([broken, _YES])
+    strokes = np.concatenate([pieces.ends[order[firsts], 0], pieces.ends[order[lasts], 1]], axis=-1).round(1)
+    key = key[firsts]
+    touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1) & (key[1:] == key[:-1])])
+    words = [
         f"L{c:g},{d:g}" if touch else f"M{a:g},{b:g}L{c:g},{d:g}"
         for (a, b, c, d), touch in zip(strokes.tolist(), touches.tolist(), strict=True)
-    )
+    ]
+    starts = np.flatnonzero(np.concatenate([_YES, key[1:] != key[:-1]])).tolist()
+    for start, end in zip(starts, [*starts[1:], len(words)], strict=True):
+        yield int(key[start]), "".join(words[start:end])
 
 
 def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
