@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -37,13 +37,8 @@ class Sight:
     camera: Camera
     distance: float
 
-    @cached_property
-    def _extrinsics(self) -> tuple[Array, Array]:
-        cam_from_world = self.camera.cam_from_world
-        return cam_from_world.rotation.as_matrix(), cam_from_world.translation
-
     def points_cam(self, points_world: Array) -> Array:
-        R, t = self._extrinsics
+        R, t = self.camera.extrinsics
         return points_world @ R.T + t
 
     def place(self, points_cam: Array) -> Array:

@@ -126,7 +126,9 @@ class EpipolarView(TwoCameras):
         """What the two cameras see, as pixels and as JPEG."""
         if self.photographs is None:
             cameras = {"left": self.left, "right": self.right}
-            taken = {name: garden.taken(camera, garden.DRAFT if draft else garden.FINE) for name, camera in cameras.items()}
+            taken = {
+                name: garden.taken(camera, garden.DRAFT if draft else garden.FINE) for name, camera in cameras.items()
+            }
         else:
             taken = {
                 name: (image, jpeg(image)) for name, image in zip(("left", "right"), self.photographs, strict=True)
@@ -166,8 +168,8 @@ class EpipolarView(TwoCameras):
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
         if not self.baseline:
             return ""
-        forward = self.left.world_from_cam.rotation.as_matrix()
-        along, first = self._plane_axes(forward[:, 2] if abs(self._along @ forward[:, 2]) < 0.9 else forward[:, 0])
+        axes = self.left.extrinsics[0]
+        along, first = self._plane_axes(axes[2] if abs(self._along @ axes[2]) < 0.9 else axes[0])
         turn = np.arange(_PLANES) * (2 * np.pi / _PLANES)
         across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(along, first)
         lines = clipped(panel, panel.place(camera.project(camera.centre + _half_planes(along, across, 40))))

@@ -113,10 +113,10 @@ class FrustumView(View):
 
     def numbers(self) -> dict[str, Array]:
         """R (3, 3) and t (3,) of the extrinsics, the centre C (3,), and K (3, 3)."""
-        extrinsics = self.camera.cam_from_world
+        R, t = self.camera.extrinsics
         return {
-            "R": extrinsics.rotation.as_matrix(),
-            "t": np.asarray(extrinsics.translation),
+            "R": R,
+            "t": t,
             "C": self.camera.centre,
             "K": self.camera.intrinsics.K,
         }
@@ -227,7 +227,7 @@ class FrustumView(View):
 
 
 def _up(camera: Camera) -> Array:
-    return -camera.world_from_cam.rotation.as_matrix()[:, 1]
+    return -camera.extrinsics[0][1]
 
 
 def _hfov_deg(intrinsics: Intrinsics) -> float:

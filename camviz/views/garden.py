@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
@@ -15,7 +15,10 @@ from camviz.lenses.base import Array
 from camviz.scenes import snapshot, textured_scene, to_display
 from camviz.scenes.scene import NEUTRAL
 
-DRAFT, FINE = 208, 416  # pixels on the longer side; at 4:3 the tracer takes a draft as one block of rays and a fine picture as four
+DRAFT, FINE = (
+    208,
+    416,
+)  # pixels on the longer side; at 4:3 the tracer takes a draft as one block of rays and a fine picture as four
 
 Pose = tuple[float, ...]
 
@@ -65,8 +68,8 @@ def _landmarks(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> Array:
 
 
 def _pose(camera: Camera) -> Pose:
-    return (*camera.world_from_cam.translation.tolist(), *camera.world_from_cam.rotation.as_quat().tolist())
+    return tuple(camera.world_from_cam.as_matrix().ravel().tolist())
 
 
 def _placed(pose: Pose) -> RigidTransform:
-    return RigidTransform.from_components(pose[:3], Rotation.from_quat(pose[3:]))
+    return RigidTransform.from_matrix(np.reshape(pose, (4, 4)))
