@@ -151,7 +151,7 @@ def test_difference_is_mrcals(mrcals, distance, weighted) -> None:
     """Within 2 %, or 0.005 px where there is next to none, at 99 of 100 pixels."""
     models = [(values[:4], values[4:]) for values in mrcals["intrinsics"]]
     first, second = (Camera(Intrinsics(640, 480, *p), BrownConrady.from_coefficients(d)) for p, d in models)
-    theirs, Rt, uncertainties = mrcals["difference"][f"{'0' if distance == inf else distance} {weighted}"]
+    theirs, _, uncertainties = mrcals["difference"][f"{'0' if distance == inf else distance} {weighted}"]
     given = (np.array(uncertainties[0]), np.array(uncertainties[1])) if weighted else None
     ours = difference(first, second, distance, (60, 45), uncertainties=given)
     length = np.linalg.norm(theirs, axis=-1)
