@@ -75,6 +75,13 @@ def test_corners_held_out_of_a_healthy_set_are_off_as_foretold(folds) -> None:
     assert np.mean([one.rms / one.expected_rms for one in found]) == pytest.approx(1, abs=0.07)
 
 
+def test_what_a_camera_of_few_views_foretells_is_as_uncertain_as_was_said() -> None:
+    """Cameras of four views asked of the fifth, 16 sets: most of the error is the camera's, and it is as foretold."""
+    rng = np.random.default_rng(15)
+    problems = [noisy(truth(board_poses(rng, 5)), rng, SIGMA).refined() for _ in range(16)]
+    assert np.mean([held_out(problem, folds=5).ratio for problem in problems]) == pytest.approx(1, abs=0.08)
+
+
 def test_corners_held_out_show_what_poses_have_made_up_for() -> None:
     """cx wrong by 50 px: fitted again, the poses hide most of it; corners that they were not fitted to do not."""
     rng = np.random.default_rng(4)
