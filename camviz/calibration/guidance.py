@@ -108,7 +108,7 @@ def _poses(camera: Camera, board: Board) -> Iterator[RigidTransform]:
 def shows_whole(camera: Camera, board: Board, cam_from_board: RigidTransform) -> np.ndarray:
     """True (n,) for poses in which the board, with the squares around its outer corners, lies within the picture."""
     uv = camera.intrinsics.to_pixels(camera.lens.project(moved(cam_from_board, outline(board))))
-    return camera.intrinsics.contains(uv).all(axis=1)
+    return np.all(camera.intrinsics.contains(uv), axis=1)
 
 
 def outline(board: Board) -> Array:
