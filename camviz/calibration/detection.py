@@ -21,10 +21,10 @@ import cv2
 import numpy as np
 
 from camviz.calibration.finding import charuco_detector, find_corners, look
-from camviz.files.calibration import Board
+from camviz.files.calibration import Board, Mask
 from camviz.lenses.base import Array
 
-__all__ = ["CannotCalibrate", "Detections", "detect", "find_corners"]
+__all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corners", "seen"]
 
 Progress = Callable[[int, int], object]
 Look = tuple[tuple[int, int] | None, Array | None, str]
@@ -77,16 +77,46 @@ def detect(
     called with the numbers of pictures done and in all. `finder` is that of `find_corners`. Raises CannotCalibrate
     where the board is in none of the pictures, or a process is lost.
     """
+    return _gathered(_names(paths), _looked(paths, board, finder, workers, progress), board)
+
+
+def detect_pair(
+    left: Sequence[str | PathLike[str]],
+    right: Sequence[str | PathLike[str]],
+    board: Board,
+    *,
+    finder: str = "auto",
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[Detections, Detections]:
+    """`detect` in the pictures of two cameras at once; those with the same index are of one moment."""
+    if len(left) != len(right):
+        raise ValueError(f"right must have as many pictures as left, {len(left)}, got {len(right)}")
+    looks = _looked([*left, *right], board, finder, workers, progress)
+    return (
+        _gathered(_names(left), looks[: len(left)], board),
+        _gathered(_names(right), looks[len(left) :], board),
+    )
+
+
+def seen(corners: Array) -> Mask:
+    """Which corners (..., 2) were seen, (...)."""
+    return np.asarray(np.isfinite(corners).all(axis=-1))
+
+
+def _looked(
+    paths: Sequence[str | PathLike[str]], board: Board, finder: str, workers: int | None, progress: Progress | None
+) -> list[Look]:
     if not paths:
         raise CannotCalibrate("there are no pictures to look for a board in")
     if board.dictionary is not None:
         charuco_detector(board)  # complains about a board that cannot be
     looks: dict[int, Look] = {}
-    for place, seen in _looks([str(path) for path in paths], board, finder, workers):
-        looks[place] = seen
+    for place, found in _looks([str(path) for path in paths], board, finder, workers):
+        looks[place] = found
         if progress:
             progress(len(looks), len(paths))
-    return _gathered(_names(paths), [looks[place] for place in range(len(paths))], board)
+    return [looks[place] for place in range(len(paths))]
 
 
 def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Detections:
@@ -167,10 +197,10 @@ def _in_processes(paths: list[str], board: Board, finder: str, workers: int) -> 
 
 @contextmanager
 def _starting_processes() -> Iterator[None]:
-    """Processes started here do not run the caller's script again, of which they need nothing, and leave Ctrl-C to us."""
+    """Processes started here do not run the caller's script again, of which they need nothing; Ctrl-C is not theirs."""
     main = sys.modules["__main__"]
     held = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
-    block = getattr(signal, "pthread_sigmask", lambda *_: set())  # inherited; not on Windows
+    block: Any = getattr(signal, "pthread_sigmask", lambda *_: set())  # inherited; not on Windows
     mask = block(getattr(signal, "SIG_BLOCK", None), {signal.SIGINT})
     try:
         main.__spec__ = None

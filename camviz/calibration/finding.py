@@ -112,16 +112,22 @@ def _charuco(gray: NDArray[Any], board: Board) -> Array | None:
 
 
 def charuco_detector(board: Board) -> Any:
-    """OpenCV's detector of a ChArUco board; ValueError for a dictionary that it does not have or that is too small."""
+    """OpenCV's detector of a ChArUco board; ValueError for a board that cannot be."""
+    squares = (board.columns + 1, board.rows + 1)
+    dictionary = charuco_dictionary(board)
+    return cv2.aruco.CharucoDetector(cv2.aruco.CharucoBoard(squares, board.square_size, board.marker_size, dictionary))  # type: ignore[arg-type]
+
+
+def charuco_dictionary(board: Board) -> Any:
+    """OpenCV's dictionary of a board's markers; ValueError for one that it does not have or that is too small."""
     names = sorted(name for name in dir(cv2.aruco) if name.startswith("DICT_"))
     if board.dictionary not in names or board.marker_size is None:
         raise ValueError(f"dictionary must be one of {', '.join(names)}, got {board.dictionary!r}")
-    squares = (board.columns + 1, board.rows + 1)
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
-    held, needed = len(dictionary.bytesList), squares[0] * squares[1] // 2
+    held, needed = len(dictionary.bytesList), (board.columns + 1) * (board.rows + 1) // 2
     if held < needed:
         raise ValueError(f"dictionary must have the {needed} markers of this board, {board.dictionary} has {held}")
-    return cv2.aruco.CharucoDetector(cv2.aruco.CharucoBoard(squares, board.square_size, board.marker_size, dictionary))
+    return dictionary
 
 
 def look(path: str, board: Board, finder: str) -> tuple[tuple[int, int] | None, Array | None, str]:

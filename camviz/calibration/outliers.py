@@ -4,9 +4,10 @@ A corner is an outlier when it lies further from where the solution puts it than
 corners that were seen: of N corners with nothing but Gaussian noise of σ in each coordinate, one set in ten loses a
 single corner (4.2 σ for 700 corners, 5 σ for 27,000; mrcal's rule is 4 σ for any number). σ is at first the median
 distance of all corners, divided by √(2 ln 2), which outliers hardly move; then that of the corners in use,
-√(Σ r²/(measurements - unknowns)), and never below 0.01 px, better than which no corner is found. A view that keeps fewer
-than half of its corners, or fewer than six, is set aside as a whole. Every corner is judged anew after every solution,
-until nothing changes; one that agrees again is taken back.
+√(Σ r²/(measurements - unknowns)); and never below 0.01 px, better than which no corner is found. A view that keeps
+fewer than half of its corners, or fewer than six, is set aside as a whole, with the pose that suits the better half of
+its corners. Every corner is judged anew after every solution, until nothing changes; one that agrees again is taken
+back.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.detection import seen
 from camviz.calibration.finding import FEWEST
 from camviz.files.calibration import Mask
 
@@ -27,35 +29,35 @@ FINEST = 0.01  # pixels
 
 def limit(adjustment: Adjustment, at_first: bool = False) -> float:
     """The distance in pixels from which a corner is an outlier."""
-    seen = sum(int(mask.sum()) for mask in _seen(adjustment).values())
-    return max(_sigma(adjustment, at_first), FINEST) * float(np.sqrt(2 * np.log(seen / FALSE_ALARMS)))
+    count = sum(int(mask.sum()) for mask in _seen(adjustment).values())
+    return max(_sigma(adjustment, at_first), FINEST) * float(np.sqrt(2 * np.log(count / FALSE_ALARMS)))
 
 
 def outliers(adjustment: Adjustment, at_first: bool = False) -> Masks:
     """Which corners (views, corners) are to be set aside, by camera; `at_first` before any have been."""
     most, found = limit(adjustment, at_first), {}
-    for name, seen in _seen(adjustment).items():
+    for name, there in _seen(adjustment).items():
         distance = np.linalg.norm(adjustment.residuals[name], axis=-1)
-        out = seen & ~(distance <= most)
-        kept = (seen & ~out).sum(axis=1)
-        whole = (kept < FEWEST) | (kept < seen.sum(axis=1) / 2)
-        found[name] = out | (seen & whole[:, None])
+        out = there & ~(distance <= most)
+        kept = (there & ~out).sum(axis=1)
+        whole = (kept < FEWEST) | (kept < there.sum(axis=1) / 2)
+        found[name] = out | (there & whole[:, None])
     return found
 
 
 def sentences(adjustment: Adjustment, pictures: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
     """What was set aside, in words."""
     said, parts, corners = [], [], 0
-    for name, seen in _seen(adjustment).items():
+    for name, there in _seen(adjustment).items():
         aside = adjustment.set_aside[name]
-        for picture, count, all_of_it in zip(pictures[name], aside.sum(axis=1), seen.sum(axis=1), strict=True):
+        for picture, count, all_of_it in zip(pictures[name], aside.sum(axis=1), there.sum(axis=1), strict=True):
             if count == all_of_it and count:
                 said.append(f"{picture} was set aside: too few of its corners agree with the other views.")
             elif count:
                 parts.append((-int(count), picture))
                 corners += int(count)
     if parts:
-        total = sum(int(seen.sum()) for seen in _seen(adjustment).values())
+        total = sum(int(there.sum()) for there in _seen(adjustment).values())
         most = ", ".join(f"{-count} in {picture}" for count, picture in sorted(parts)[:6])
         more = f" and {len(parts) - 6} more pictures" * (len(parts) > 6)
         said.append(
@@ -66,7 +68,7 @@ def sentences(adjustment: Adjustment, pictures: Mapping[str, tuple[str, ...]]) -
 
 
 def _seen(adjustment: Adjustment) -> Masks:
-    return {name: np.isfinite(corners).all(axis=-1) for name, corners in adjustment.detections.items()}
+    return {name: seen(corners) for name, corners in adjustment.detections.items()}
 
 
 def _sigma(adjustment: Adjustment, at_first: bool) -> float:

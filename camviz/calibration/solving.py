@@ -1,4 +1,4 @@
-"""From the corners of boards to cameras: OpenCV solves, outliers are set aside, all that is left is adjusted together."""
+"""From the corners of boards to cameras: OpenCV solves, outliers are set aside, what is left is adjusted together."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.detection import CannotCalibrate, Detections
+from camviz.calibration.detection import CannotCalibrate, Detections, seen
 from camviz.calibration.models import MODELS, Model, Views, poses_from_rays
 from camviz.calibration.outliers import Masks, outliers, sentences
 from camviz.calibration.slopes import with_parameters
@@ -124,24 +124,24 @@ def _solved(
     detections: Detections, board: Board, kind: Model, fixed: tuple[str, ...], aside: Mask
 ) -> tuple[Camera, RigidTransform]:
     """OpenCV's solution from the corners that are not set aside; a view that is has the pose of all its corners."""
-    seen = np.isfinite(detections.corners).all(axis=-1)
-    use = (seen & ~aside).any(axis=1)
+    there = seen(detections.corners)
+    use = np.asarray((there & ~aside).any(axis=1))
     size = detections.width, detections.height
     try:
-        camera, poses = kind.solve(Views.of(board, detections.corners[use], (seen & ~aside)[use], *size), fixed)
+        camera, poses = kind.solve(Views.of(board, detections.corners[use], (there & ~aside)[use], *size), fixed)
         middle = {"cx": (size[0] - 1) / 2, "cy": (size[1] - 1) / 2}
         camera = with_parameters(camera, {parameter: middle.get(parameter, 0.0) for parameter in fixed})
         if use.all():
             return camera, poses
-        others = Views.of(board, detections.corners[~use], seen[~use], *size)
-        every = np.empty(len(use), dtype=object)
-        every[use], every[~use] = list(poses), list(poses_from_rays(camera, others.points, others.pixels))
+        others = Views.of(board, detections.corners[~use], there[~use], *size)
+        silent = poses_from_rays(camera, others.points, others.pixels)
+        order = np.argsort(np.concatenate([np.flatnonzero(use), np.flatnonzero(~use)]))
     except (cv2.error, ValueError) as error:
         raise CannotCalibrate(
             f"the views of the board do not give a camera of this model ({_first_line(error)}): take views that are "
             "tilted against each other and reach into the corners of the image, or a simpler model"
         ) from error
-    return camera, RigidTransform.concatenate(list(every))
+    return camera, RigidTransform.concatenate([poses, silent])[order]
 
 
 def _paired(alone: Mapping[str, Adjustment], board: Board, estimated: tuple[str, ...]) -> Adjustment:
@@ -170,9 +170,9 @@ def _robust(adjustment: Adjustment, begin_anew: Callable[[Masks], Adjustment] | 
         found = outliers(adjustment, at_first=at_first and turn == 0)
         if turn > MOST_ROUNDS / 2:  # should some go to and fro, they go
             found = {name: mask | adjustment.set_aside[name] for name, mask in found.items()}
-        if all(np.array_equal(mask, adjustment.set_aside[name]) for name, mask in found.items()):
-            if not at_first or turn > 0:
-                return adjustment
+        same = all(np.array_equal(mask, adjustment.set_aside[name]) for name, mask in found.items())
+        if same and not (at_first and turn == 0):
+            return adjustment
         _refuse_too_few(adjustment, found)
         adjustment = begin_anew(found) if begin_anew and turn == 0 else replace(adjustment, set_aside=found)
     return _settled(adjustment)
@@ -188,16 +188,13 @@ def _settled(adjustment: Adjustment) -> Adjustment:
         raise CannotCalibrate(FOLDED)
     poses = list(adjustment.first_from_board)
     for view in np.flatnonzero(~adjustment.posed):
-        poses[view] = _trimmed(adjustment, view).first_from_board[0]
+        poses[view] = _trimmed(adjustment, int(view)).first_from_board[0]
     return replace(adjustment, first_from_board=RigidTransform.concatenate(poses))
 
 
 def _wanted(adjustment: Adjustment) -> list[Mask]:
     """By camera, which corners (views, corners) are seen and not set aside."""
-    return [
-        np.isfinite(corners).all(axis=-1) & ~adjustment.set_aside[name]
-        for name, corners in adjustment.detections.items()
-    ]
+    return [seen(corners) & ~adjustment.set_aside[name] for name, corners in adjustment.detections.items()]
 
 
 def _trimmed(adjustment: Adjustment, view: int) -> Adjustment:
@@ -220,7 +217,7 @@ def _trimmed(adjustment: Adjustment, view: int) -> Adjustment:
 
 def _refuse_too_few(adjustment: Adjustment, aside: Masks) -> None:
     for name, mask in aside.items():
-        left = int((np.isfinite(adjustment.detections[name]).all(axis=-1) & ~mask).any(axis=1).sum())
+        left = int((seen(adjustment.detections[name]) & ~mask).any(axis=1).sum())
         if left < FEWEST_VIEWS:
             raise CannotCalibrate(
                 f"the views contradict each other: only {left} of {len(mask)} of the camera {name} would agree on one "
@@ -261,7 +258,7 @@ def _per_view_errors(adjustment: Adjustment, name: str) -> Array:
     """RMS (views,) in pixels over the corners in use, and over all of a view that was set aside."""
     squared = np.sum(adjustment.residuals[name] ** 2, axis=-1)
     used = adjustment.used[name]
-    counted = np.where(used.any(axis=1)[:, None], used, np.isfinite(squared))
+    counted = np.where(used.any(axis=1, keepdims=True), used, np.isfinite(squared))
     return np.sqrt(np.sum(squared, axis=1, where=counted) / counted.sum(axis=1))
 
 
