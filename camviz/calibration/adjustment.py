@@ -252,14 +252,18 @@ class Adjustment:
 
     @cached_property
     def mean_twist_covariance(self) -> Array:
-        """Of the shared parameters and the mean of all views' twists together, (s + 6, s + 6).
+        """Of the shared parameters and the mean of all views' twists together, (s + 6, s + 6)."""
+        return self.joined_with_mean_twist(self.normal_equations.covariance)
+
+    def joined_with_mean_twist(self, shared: Array) -> Array:
+        """`mean_twist_covariance` if the shared parameters had the covariance `shared` (s, s) for σ = 1.
 
         With Wᵢ and Cᵢ of `Arrowhead`, a twist is -Wᵢ δ and noise of covariance Cᵢ⁻¹ that is its own. The mean of n:
         -W̄ δ, and noise of covariance Σ Cᵢ⁻¹/n².
         """
         normal = self.normal_equations
         follow = np.concatenate([np.eye(len(self.parameters)), -normal.levers.mean(axis=0)])
-        covariance = follow @ normal.covariance @ follow.T
+        covariance = follow @ shared @ follow.T
         covariance[-len(POSE) :, -len(POSE) :] += normal.block_inverses.mean(axis=0) / len(normal.block_inverses)
         return self.sigma**2 * covariance
 

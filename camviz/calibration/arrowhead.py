@@ -81,7 +81,7 @@ class Arrowhead:
         return inverse(self.information)
 
     def solution(self, *, only_views: bool = False) -> tuple[Array, Array]:
-        """The shared parameters (s,) and the views' (v, m) with JᵀJ δ = Jᵀr; or the views' with the shared ones kept."""
+        """The δ with JᵀJ δ = Jᵀr: shared (s,) and of the views (v, m); or of the views, with the shared ones kept."""
         views = np.einsum("vmn,vn->vm", self.block_inverses, self.gradients)
         if only_views:
             return np.zeros_like(self.shared_gradient), views

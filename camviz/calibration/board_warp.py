@@ -35,7 +35,7 @@ class WarpTest:
 
     @property
     def bend_mm(self) -> float:
-        """How far the corners stand off the plane that fits them best, in millimetres, from the lowest to the highest."""
+        """From the lowest to the highest corner above the plane that fits them best, in millimetres."""
         corners = self.bent.corners
         plane = np.column_stack([corners[:, :2], np.ones(len(corners))])
         off = corners[:, 2] - plane @ np.linalg.lstsq(plane, corners[:, 2], rcond=None)[0]

@@ -44,8 +44,8 @@ def halves(
 ) -> Halves:
     """The views of the mask `first` (views,) against the others; by default the earlier against the later ones.
 
-    The two sets of intrinsics differ by δ, of covariance Σ = Σ₁ + Σ₂ when nothing but noise is at work; `probability` is
-    that of a δᵀ Σ⁻¹ δ as large as this or larger, which is χ² in as many degrees of freedom as there are intrinsics.
+    The two sets of intrinsics differ by δ, of covariance Σ = Σ₁ + Σ₂ when nothing but noise is at work; `probability`
+    is that of a δᵀ Σ⁻¹ δ as large as this or larger, which is χ² in as many degrees of freedom as there are intrinsics.
     Raises ValueError where a half has fewer than three views with a say.
     """
     views = np.arange(adjustment.views)
@@ -98,7 +98,7 @@ class HeldOut:
 
     @property
     def ratio(self) -> float:
-        """How many times larger the errors are than expected, each against its own deviation; about 1 if all is well."""
+        """How many times larger the errors are than their own expected deviations; about 1 if all is well."""
         return float(np.sqrt(np.nanmean(self.residuals**2 / self.variances)))
 
     @property
@@ -112,10 +112,10 @@ class HeldOut:
 def held_out(adjustment: Adjustment, *, folds: int | None = None, camera: str | None = None) -> HeldOut:
     """Every view's pose from one half of its corners, scored on the other half: left, right, top and bottom in turn.
 
-    The pose of a view makes up for much of what is wrong with a camera; it does so for the corners it is fitted to, and
-    not for those beyond them. With `folds` the cameras are those of a solution without the view: the views are dealt
-    into as many parts, and each part is asked of the solution of the others. Otherwise they are the adjustment's own, right
-    or wrong; what noise alone would do is then reckoned from the corners with the cameras free.
+    The pose of a view makes up for much of what is wrong with a camera; it does so for the corners it is fitted to,
+    and not for those beyond them. With `folds` the cameras are those of a solution without the view: the views are
+    dealt into as many parts, and each part is asked of the solution of the others. Otherwise they are the adjustment's
+    own, right or wrong; what noise alone would do is then reckoned from the corners with the cameras free.
     """
     name = next(iter(adjustment.cameras)) if camera is None else camera
     shape = (4, adjustment.views, len(adjustment.corners), 2)
@@ -132,7 +132,7 @@ def held_out(adjustment: Adjustment, *, folds: int | None = None, camera: str | 
     return HeldOut(residuals, variances)
 
 
-def _folds(adjustment: Adjustment, folds: int | None) -> list[tuple[Array, Adjustment]]:
+def _folds(adjustment: Adjustment, folds: int | None) -> list[tuple[np.ndarray, Adjustment]]:
     """Views, and the solution they are asked of."""
     views = np.arange(adjustment.views)
     if folds is None:
@@ -153,8 +153,8 @@ def board_halves(board: Board) -> list[Mask]:
 def _foretold_variances(there: Adjustment, solution: Adjustment, name: str) -> Array:
     """The variance (views, corners, 2) of a corner's residual where neither pose nor camera have seen it.
 
-    Its own noise σ²; the noise of the pose, whose Cᵢ⁻¹ comes from the other half; and an error of the cameras, which the
-    pose follows by -Wᵢ (`Arrowhead`).
+    Its own noise σ²; the noise of the pose, whose Cᵢ⁻¹ comes from the other half; and an error of the cameras, which
+    the pose follows by -Wᵢ (`Arrowhead`).
     """
     normal = there.normal_equations
     by_shared, by_pose = there.slopes(name)

@@ -23,8 +23,8 @@ def projection_covariance(
 
     The point is `distance` metres along the pixel's ray. It keeps its place relative to the boards, which is all that
     two solutions have in common, and every board has an opinion of where that is: the camera sees the mean of them
-    (mrcal's recipe, mrcal.secretsauce.net/uncertainty.html). With the cameras' own frames held fixed instead, the freedom
-    to turn the camera and shift its principal point at once would count as an error of projection.
+    (mrcal's recipe, mrcal.secretsauce.net/uncertainty.html). With the camera's own frame held fixed instead, a shift of
+    its principal point would count as an error, though the camera need only be turned to make up for it.
     """
     slopes = projection_slopes(adjustment, uv, distance, camera)
     return slopes @ adjustment.mean_twist_covariance @ np.swapaxes(slopes, -1, -2)
