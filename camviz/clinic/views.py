@@ -16,7 +16,7 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.files.calibration import Calibration
 from camviz.views.base import View
 from camviz.views.board_poses import BoardPosesView
-from camviz.views.clinic.board_residuals import BoardResidualsView
+from camviz.views.clinic.board_residuals import BoardResidualsView, tested
 from camviz.views.clinic.correlation import CorrelationView
 from camviz.views.clinic.coverage import CoverageView
 from camviz.views.clinic.cross_validation import CrossValidationView
@@ -211,7 +211,7 @@ _ENTRIES = (
         "board-residuals",
         "Is the board flat?",
         "What all views agree on is the board’s fault, and may be its bend.",
-        lambda case, name: BoardResidualsView.about(case.observations(name)),
+        lambda case, name: BoardResidualsView.about(case.observations(name), tested(case.adjustment(name))),
     ),
     Entry(
         "coverage",

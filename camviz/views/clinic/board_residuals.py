@@ -8,6 +8,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.board_warp import WarpTest, warp_test
 from camviz.draw import svg
 from camviz.draw.heat import Shades, bar
 from camviz.draw.items import Item, Label, Line, Sheet
@@ -18,6 +20,7 @@ from camviz.lenses.base import Array
 from camviz.views.base import View, slider
 from camviz.views.clinic.observations import Observations
 from camviz.views.clinic.residuals import nice
+from camviz.views.clinic.uncertainty import adjusted
 from camviz.views.marks import arrows
 
 
@@ -25,13 +28,14 @@ from camviz.views.marks import arrows
 class BoardResidualsView(View):
     """The mean over all views of every corner's residual, in the board's own frame, and how far the board is bent.
 
-    The bend is the solution's where it has one; else what the residuals ask for, corner by corner: a corner that lies
-    `lift` above the plane is seen beside its place by all views that look at it aslant.
+    The bend is the solution's where it has one; else what the residuals ask for, corner by corner: a corner off the
+    plane is seen beside its place by all views that look at it aslant. `test` says whether that is more than noise.
     """
 
     title: ClassVar[str] = "Is the board flat?"
 
     observations: Observations = field(compare=False, repr=False)
+    test: WarpTest | None = field(default=None, compare=False, repr=False)
     exaggeration: float = slider(20.0, 1, 200, 1, label="bend", unit="×", help="how much the bend is exaggerated")
     scale: float = slider(
         100.0, 1, 1000, 1, label="arrows", unit="×", help="how much longer the arrows are than the mean"
@@ -41,16 +45,17 @@ class BoardResidualsView(View):
     @classmethod
     def of(cls, calibration: Any, camera: str = "", **options: Any) -> BoardResidualsView:
         """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls.about(Observations.of(calibration, camera, **options))
+        return cls.about(Observations.of(calibration, camera, **options), tested(adjusted(calibration, camera)))
 
     @classmethod
-    def about(cls, observations: Observations) -> BoardResidualsView:
+    def about(cls, observations: Observations, test: WarpTest | None = None) -> BoardResidualsView:
         """The view with a bend and arrows that can be seen."""
         view, square = cls(observations), observations.board.square_size
         longest = float(np.nanmax(np.linalg.norm(view.means, axis=-1), initial=0))
         deepest = float(np.nanmax(np.abs(view.heights), initial=0))
         scale = float(np.clip(nice(0.5 * square / longest), 1, 1000)) if longest > 0 else 1.0
-        return cls(observations, float(np.clip(nice(0.9 * square / deepest), 1, 200)) if deepest > 0 else 1.0, scale)
+        bend = float(np.clip(nice(0.9 * square / deepest), 1, 200)) if deepest > 0 else 1.0
+        return cls(observations, test, bend, scale)
 
     @cached_property
     def means(self) -> Array:
@@ -115,9 +120,18 @@ class BoardResidualsView(View):
             )
         if not np.isfinite(n["depth_mm"]):
             return "Too few views show each corner to tell a bend."
+        told = (
+            f"The solution takes the board to be flat; the residuals ask for {n['depth_mm']:.2f} mm from its "
+            "lowest to its highest corner."
+        )
+        if self.test is None:
+            return told
+        along_rows, along_columns = self.test.warp_mm
+        chance = "more than noise" if self.test.bowed() else "no more than noise may do"
         return (
-            f"The solution takes the board to be flat; the residuals ask for {n['depth_mm']:.2f} mm between its "
-            "lowest and highest corner."
+            f"{told}\nSolved with a bend it would be {along_rows:+.2f} mm along its rows and {along_columns:+.2f} "
+            "mm along its "
+            f"columns: {chance} (probability {self.test.probability:.2g} for a flat board)."
         )
 
     def description(self) -> str:
@@ -132,8 +146,13 @@ class BoardResidualsView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         panel, attached = self._means_panel()
         space, sheets = self._bent(draft)
-        body = svg.rectangle(0, 0, 960, 400, "paper") + panel + space + svg.text((20, 386), self._solved(), "label")
-        return Picture(body, 960, 400, self.title, self.description(), attached | sheets)
+        body = (
+            svg.rectangle(0, 0, 960, 420, "paper")
+            + panel
+            + space
+            + svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
+        )
+        return Picture(body, 960, 420, self.title, self.description(), attached | sheets)
 
     def _means_panel(self) -> tuple[str, dict[str, bytes]]:
         seen, board = self.observations, self.observations.board
@@ -188,3 +207,11 @@ class BoardResidualsView(View):
 
     def pressed(self, handle: str, key: str) -> Self:
         return self.but(eye=self.eye.key(key))
+
+
+def tested(adjustment: Adjustment) -> WarpTest | None:
+    """The test of a flat board, or None where the corners do not determine its solution."""
+    try:
+        return warp_test(adjustment)
+    except (ValueError, np.linalg.LinAlgError):
+        return None

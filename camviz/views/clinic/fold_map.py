@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import lru_cache
 from math import atan, degrees, isfinite
 from typing import Any, ClassVar
 
@@ -45,26 +45,9 @@ class FoldView(View):
         name = camera or next(iter(calibration.cameras))
         return cls(calibration.cameras[name], name)
 
-    @cached_property
-    def _ideal_radius(self) -> float:
-        """How far out on the plane z = 1 the picture looks; the distorted radius where its border has no ray."""
-        radius = distortion.ideal_image_radius(self.camera)
-        return min(radius, 10.0) if isfinite(radius) else distortion.image_corner_radius(self.camera.intrinsics)
-
     def numbers(self) -> dict[str, float]:
         """Share of pixels without a ray, the fold's angle in °, the pole's radius, the least D(r²) and where."""
-        lens, k = self.camera.lens, self.camera.intrinsics
-        weakest_at, weakest = distortion.weakest_denominator(lens, self._ideal_radius)
-        step = max(1, max(k.width, k.height) // 240)
-        return {
-            "without_ray": float(1 - distortion.valid_region(self.camera, step).mean()),
-            "fold_deg": degrees(distortion.fold_angle(lens)),
-            "fold_radius": distortion.fold_radius(lens),
-            "pole_radius": distortion.pole_radius(lens),
-            "weakest": weakest,
-            "weakest_at": weakest_at,
-            "ideal_radius": self._ideal_radius,
-        }
+        return dict(_numbers(self.camera))
 
     @property
     def _rational(self) -> bool:
@@ -183,3 +166,23 @@ class FoldView(View):
         content += svg.dots([at], "red", 9) + svg.text(at + (8, -8), f"D = {n['weakest']:.3g}", "red halo")
         note = "red: too weak"
         return panel.show(content, title="The denominator D(r²)", note=note) + plot.axes(panel, "r, ideal", "D")
+
+
+@lru_cache(maxsize=8)
+def _numbers(camera: Camera) -> dict[str, float]:
+    """What `FoldView.numbers` says, kept while its controls move."""
+    lens, k = camera.lens, camera.intrinsics
+    # How far out on the plane z = 1 the picture looks; the distorted radius where its border has no ray.
+    radius = distortion.ideal_image_radius(camera)
+    radius = min(radius, 10.0) if isfinite(radius) else distortion.image_corner_radius(k)
+    weakest_at, weakest = distortion.weakest_denominator(lens, radius)
+    step = max(1, max(k.width, k.height) // 240)
+    return {
+        "without_ray": float(1 - distortion.valid_region(camera, step).mean()),
+        "fold_deg": degrees(distortion.fold_angle(lens)),
+        "fold_radius": distortion.fold_radius(lens),
+        "pole_radius": distortion.pole_radius(lens),
+        "weakest": weakest,
+        "weakest_at": weakest_at,
+        "ideal_radius": radius,
+    }

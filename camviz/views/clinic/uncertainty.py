@@ -184,15 +184,12 @@ class UncertaintyRangeView(View):
     def curves(self) -> tuple[Array, Array]:
         """Distances (n,) in metres, and the standard deviations (pixels, n) at each of `pixels`."""
         near, far = float(np.min(self.boards)) / 8, float(np.max(self.boards)) * 200
-        distances = np.geomspace(near, far, 49)
-        uv = np.stack(list(self.pixels.values()))
-        return distances, np.stack(
-            [worst_deviation(projection_covariance(self.adjustment, uv, d, self.name)) for d in distances], -1
-        )
+        distances = tuple(np.geomspace(near, far, 49).tolist())
+        return _along(self.adjustment, self.name, distances, tuple(tuple(uv.tolist()) for uv in self.pixels.values()))
 
     def description(self) -> str:
         """The state in words and numbers."""
-        distances, values = self._curves
+        distances, values = self.curves()
         found = np.nan_to_num(values, nan=np.inf)
         best = "; ".join(
             f"{words}: least ±{v.min():.3g} px at {distances[v.argmin()]:.2g} m, ±{v[-1]:.3g} px far away"
@@ -200,12 +197,8 @@ class UncertaintyRangeView(View):
         )  # fmt: skip
         return f"{self.name}. {best}. The boards were {self.boards.min():.2g} m to {self.boards.max():.2g} m away."
 
-    @cached_property
-    def _curves(self) -> tuple[Array, Array]:
-        return self.curves()
-
     def figure(self, *, draft: bool = False) -> Picture:
-        distances, values = self._curves
+        distances, values = self.curves()
         log = self.scale == "logarithmic"
         finite = values[np.isfinite(values) & (values > 0)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.1, 1.0)
@@ -243,6 +236,15 @@ def _covariances(adjustment: Adjustment, name: str, distance: float, columns: in
     u, v = np.linspace(-0.5, k.width - 0.5, columns), np.linspace(-0.5, k.height - 0.5, rows)
     uv = np.stack(np.meshgrid(u, v), axis=-1)
     return uv, projection_covariance(adjustment, uv, distance, name)
+
+
+@lru_cache(maxsize=8)
+def _along(
+    adjustment: Adjustment, name: str, distances: tuple[float, ...], pixels: tuple[tuple[float, ...], ...]
+) -> tuple[Array, Array]:
+    """The distances (n,), and the standard deviations (pixels, n) there."""
+    deviations = [worst_deviation(projection_covariance(adjustment, pixels, d, name)) for d in distances]
+    return np.array(distances), np.stack(deviations, axis=-1)
 
 
 def adjusted(calibration: Any, *names: str) -> Adjustment:
