@@ -147,12 +147,12 @@ class BoardResidualsView(View):
         panel, attached = self._means_panel()
         space, sheets = self._bent(draft)
         body = (
-            svg.rectangle(0, 0, 960, 420, "paper")
+            svg.rectangle(0, 0, 960, 440, "paper")
             + panel
             + space
             + svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
         )
-        return Picture(body, 960, 420, self.title, self.description(), attached | sheets)
+        return Picture(body, 960, 440, self.title, self.description(), attached | sheets)
 
     def _means_panel(self) -> tuple[str, dict[str, bytes]]:
         seen, board = self.observations, self.observations.board
