@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -17,6 +18,9 @@ from camviz.clinic.observed import Observed
 from camviz.files.calibration import Board, Calibration
 from camviz.lenses import Cylindrical, Equirectangular
 from camviz.lenses.base import Array
+
+if TYPE_CHECKING:
+    from camviz.clinic.rig import Pair
 
 PANORAMAS = (Cylindrical, Equirectangular)
 
@@ -63,6 +67,13 @@ class Evidence:
                 if name not in poses and pixels.shape[1] == calibration.board.columns * calibration.board.rows:
                     poses[name] = board_poses(calibration.cameras[name], calibration.board, pixels)
         return poses
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """The stereo pairs."""
+        from camviz.clinic.rig import pairs
+
+        return pairs(self)
 
     @cached_property
     def observed(self) -> dict[str, Observed]:

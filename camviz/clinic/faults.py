@@ -458,7 +458,7 @@ FAULTS: Mapping[str, Fault] = {
         "near-pole", "the denominator at the farthest corner's ray", "", (0.5, 0.15, 0.05), 0.15, near_pole
     ),
     "folding polynomial": Fault(
-        "fold", "the polynomial turns back at", "of the corner's radius", (1.1, 0.95, 0.8), 0.95, fold
+        "fold", "the polynomial turns back at", "of the corner's radius", (1.6, 0.95, 0.8), 0.95, fold
     ),
     "strong lens": Fault(
         "inverse-not-converged", "a barrel lens, 80° wide", "-k1", (0.1, 0.25, 0.35), 0.35, strong_lens
