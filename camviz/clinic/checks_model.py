@@ -10,12 +10,13 @@ from camviz.calibration.cross_validation import halves
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import Evidence, no_corners
 from camviz.clinic.fields import smooth_field, warp_columns
-from camviz.clinic.observed import BY_CHANCE, Observed, explained
+from camviz.clinic.observed import BY_CHANCE, Observed, explained, parameter_columns
 from camviz.lenses.base import Array
 
 SYSTEMATIC = 0.5  # of the noise: what remains of a real lens under the standard model is a third of it
 BENT = 0.005  # of the board's longer side
 FEWEST_VIEWS = 6  # to be parted in two
+DRIFTING = 0.003  # of the focal length
 APART_PX = 1.0  # the median difference of the halves over the image
 COARSE = (16, 12)  # points of the image at which they are compared
 SHIFTS = (0.5, 1.0)  # what conventions for the first pixel's centre differ by
@@ -66,7 +67,24 @@ def split_disagreement(evidence: Evidence) -> Outcome:
     enough = {name: each for name, each in evidence.observed.items() if each.best.posed.sum() >= FEWEST_VIEWS}
     if not enough:
         return Lacking(f"it needs at least {FEWEST_VIEWS} views")
-    return [finding for observed in enough.values() for finding in _disagreement(observed)]
+    return [
+        finding for observed in enough.values() for finding in (list(_drift(observed)) or list(_disagreement(observed)))
+    ]
+
+
+def _drift(observed: Observed) -> Iterator[Finding]:
+    """A focal length that changes evenly from the first view to the last, as one more parameter."""
+    best, name = observed.best, observed.name
+    grid = best.cameras[name].intrinsics
+    time = np.linspace(-0.5, 0.5, best.views)[:, None, None, None]
+    stretch = parameter_columns(best, name, ["fx", "fy"]) @ [[grid.fx], [grid.fy]]
+    drift = explained(best, name, np.nan_to_num(time * stretch))
+    if drift.chance < BY_CHANCE and abs(drift.values[0]) > DRIFTING:
+        sentence = (
+            f"{name}: the focal length {'grows' if drift.values[0] > 0 else 'falls'} by {abs(drift.values[0]):.2%} "
+            f"(± {drift.sigmas[0]:.2%}) from the first view to the last."
+        )
+        yield found("split-disagreement", sentence, drift.values[0] * 100, "%", name)
 
 
 def _disagreement(observed: Observed) -> Iterator[Finding]:
