@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -68,7 +69,7 @@ def alone(calibration: Calibration, camera: Camera) -> Calibration:
     return Calibration({"camera": camera}, Path("virtual"), calibration.format)
 
 
-def changed(calibration: Calibration, **values: float) -> Calibration:
+def changed(calibration: Calibration, **values: Any) -> Calibration:
     """A calibration with other numbers in the camera matrix of its first camera."""
     name, camera = next(iter(calibration.cameras.items()))
     other = replace(camera, intrinsics=replace(camera.intrinsics, **values))
@@ -83,6 +84,11 @@ def healthy(rng: Rng) -> tuple[SetUp, Calibration]:
 def healthy_pair(rng: Rng) -> tuple[SetUp, Calibration]:
     set_up = pair(rng)
     return set_up, set_up.solved(set_up.observed(rng))
+
+
+def _polynomial(camera: Camera) -> BrownConrady:
+    assert isinstance(camera.lens, BrownConrady)
+    return camera.lens
 
 
 # The corners ---------------------------------------------------------------------------------------------------------
@@ -195,7 +201,7 @@ def near_pole(rng: Rng, strength: float) -> Case:
     """
     _, solved = healthy(rng)
     camera = solved.cameras["camera"]
-    lens, k4 = camera.lens, -(1 - strength) / ideal_image_radius(camera) ** 2
+    lens, k4 = _polynomial(camera), -(1 - strength) / ideal_image_radius(camera) ** 2
     k1, k2, k3 = lens.k1 + k4, lens.k2 + lens.k1 * k4, lens.k3 + lens.k2 * k4
     start = replace(camera, lens=replace(lens, k1=k1, k2=k2, k3=k3, k4=k4))
     best = replace(Adjustment.of(solved), cameras={"camera": start}).refined()
@@ -302,7 +308,9 @@ def mislabelled(rng: Rng, strength: float) -> Case:
 def edited_rotation(rng: Rng, strength: float) -> Case:
     """An element of the rotation of a pair changed by so much."""
     _, solved = healthy_pair(rng)
-    cameras = {name: replace(camera, lens=replace(camera.lens, k3=0.0)) for name, camera in solved.cameras.items()}
+    cameras = {
+        name: replace(camera, lens=replace(_polynomial(camera), k3=0.0)) for name, camera in solved.cameras.items()
+    }
     tree = yaml.safe_load(kalibr.write(replace(solved, cameras=cameras)))
     tree["cam1"]["T_cn_cnm1"][0][1] += strength
     return Case(text=yaml.safe_dump(tree))
@@ -420,8 +428,8 @@ FAULTS: Mapping[str, Fault] = {
         "low-coverage",
         "the boards stay inside this part of the sides",
         "of a side",
-        (0.25, 0.4, 0.5),
-        0.4,
+        (0.15, 0.25, 0.4),
+        0.25,
         boards_in_the_middle,
     ),
     "warped board": Fault(
@@ -436,7 +444,7 @@ FAULTS: Mapping[str, Fault] = {
         autofocus_drift,
     ),
     "rolling shutter": Fault(
-        "pose-absorbs-error", "the board moves while the image is read out", "px", (1, 3, 10, 30), 10, rolling_shutter
+        "pose-absorbs-error", "the board moves while the image is read out", "px", (1, 3, 10, 30), 30, rolling_shutter
     ),
     "absurd centre": Fault(
         "pose-absorbs-error",
@@ -472,7 +480,7 @@ FAULTS: Mapping[str, Fault] = {
     ),
     "crop": Fault("principal-point", "pictures were cropped at the left", "% of the width", (5, 30, 40), 30, uncropped),
     "zeroed distortion": Fault(
-        "zero-distortion", "the coefficients were not kept", "of k1 = -0.2", (0.01, 0.3, 1), 0.3, zeroed
+        "zero-distortion", "the coefficients were not kept", "of k1 = -0.2", (0.002, 0.3, 1), 0.3, zeroed
     ),
     "half pixel": Fault("half-pixel", "cx and cy are counted from elsewhere", "px", (0.5, 1), 0.5, half_pixel),
     "half pixel between two": Fault(
