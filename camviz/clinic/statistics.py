@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from camviz.clinic.catalogue import Finding, Kind, kinds
-from camviz.clinic.faults import FAULTS, Case, Fault, healthy, healthy_pair
+from camviz.clinic.faults import FAULTS, Case, Fault
+from camviz.clinic.injections import healthy, healthy_pair
 
 PAGE = Path(__file__).parents[2] / "docs" / "clinic.md"
 TABLES = "<!-- The tables below are counted by: python -m camviz.clinic.statistics -->"
@@ -98,7 +99,7 @@ def _faults_table(rows: list[str]) -> Iterator[str]:
     yield "### Faults"
     yield ""
     yield (
-        f"{REPEATS} set-ups for each fault (`camviz.clinic.faults`) and strength. **Bold**: the strength from which on the "
+        f"{REPEATS} set-ups for each fault (`camviz.clinic.faults`) and strength. **Bold**: the strength at which the "
         "tests hold that it is named. *Also found* counts, at that strength, what else an inspection names."
     )
     yield ""
@@ -140,18 +141,19 @@ HEAD = """\
 
 <!-- Made from camviz/clinic/findings.toml by: python -m camviz.clinic.statistics --page -->
 
-`camviz inspect FILE` and `camviz.load(path).inspect()` say what is wrong with a calibration. Every finding has a stable
-id, one sentence, the number that shows it, the view that shows it, its likely causes and a remedy. Nothing is guessed: a
-check whose evidence the file does not hold is listed as not made, with the reason. `camviz calibrate` writes files that
-hold all of it: corners, poses of the board, what was estimated and how well. With `--images` and `--board` the corners
-are looked for in pictures, and `--compare` holds a second calibration of the same cameras beside the first.
+`camviz inspect FILE` and `camviz.load(path).inspect()` say what is wrong with a calibration. Every finding has a
+stable id, one sentence, the number that shows it, the view that shows it, its likely causes and a remedy. Nothing is
+guessed: a check whose evidence the file does not hold is listed as not made, with the reason. `camviz calibrate` writes
+files that hold all of it: corners, poses of the board, what was estimated and how well. With `--images` and `--board`
+the corners are looked for in pictures, and `--compare` holds a second calibration of the same cameras beside the first.
 
-A *fault* makes the calibration wrong, a *warning* makes it doubtful, a *note* is something to know when it is used. The
-exit status of `camviz inspect` is 0 when nothing is worse than a note, 1 when something is, 2 when a file cannot be read.
+A *fault* makes the calibration wrong, a *warning* makes it doubtful, a *note* is something to know when it is used.
+The exit status of `camviz inspect` is 0 when nothing is worse than a note, 1 when something is, and 2 when a file
+cannot be read.
 
 As JSON (`--json`): `{"cameras": [{name, model, width, height, fx, fy, cx, cy, distortion, rms}], "findings": [{id,
-severity, sentence, value, unit, camera, view, causes, remedy}], "checked": [id, …], "skipped": [{id, why}]}`. Of several
-files it is a list of these, each with its `file`.
+severity, sentence, value, unit, camera, view, causes, remedy}], "checked": [id, …], "skipped": [{id, why}]}`. Of
+several files it is a list of these, each with its `file`.
 
 ## Findings
 """
@@ -161,9 +163,9 @@ MIDDLE = """\
 Where the theory of least squares gives the chance of a false alarm, the threshold is that chance: one in a million for
 every F- and χ²-test (`model-too-simple`, `board-warp`, `split-disagreement`, the rolling shutter of
 `pose-absorbs-error`), one in ten thousand for a whole set of views with few corners (`outlier-view`). It holds for
-independent Gaussian noise. Because real corners are neither, and because in a large set every small error of a real lens is
-beyond chance, there is a least effect beside each: it decides in practice. Rules about the numbers of a file have no
-chance in them.
+independent Gaussian noise. Because real corners are neither, and because in a large set every small error of a real
+lens is beyond chance, there is a least effect beside each: it decides in practice. Rules about the numbers of a file
+have no chance in them.
 """
 
 
