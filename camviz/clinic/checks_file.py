@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from math import atan, degrees
 
@@ -52,7 +53,8 @@ def _zero(evidence: Evidence, name: str) -> Iterator[Finding]:
     if observed is None:
         yield found("zero-distortion", f"{sentence}.", 0, "", name)
         return
-    k1 = explained(observed.best, name, parameter_columns(observed.best, name, ["k1"]))
+    bare = replace(observed.adjustment, estimated={name: ("fx", "fy", "cx", "cy")}).refined()
+    k1 = explained(bare, name, parameter_columns(bare, name, ["k1"]))
     if k1.count and abs(k1.values[0]) > STANDARD_ERRORS * k1.sigmas[0]:
         sentence += f", and the corners ask for k1 = {k1.values[0]:.3g} ± {k1.sigmas[0]:.1g}."
         yield found("zero-distortion", sentence, k1.values[0], "", name)

@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.calibration.adjustment import Adjustment, sagittas
 from camviz.calibration.cross_validation import halves
-from camviz.calibration.slopes import pixel_slopes
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import Evidence, no_corners
-from camviz.clinic.observed import BY_CHANCE, Observed, explained
+from camviz.clinic.fields import smooth_field, warp_columns
+from camviz.clinic.observed import BY_CHANCE, Observed, explained, parameter_columns
 from camviz.lenses.base import Array
 
-DEGREE = 5  # of the smooth field over the image, in u and in v
-FARTHER = (7, 9, 11)  # powers of the radius beyond it
 SYSTEMATIC = 0.5  # of the noise: what remains of a real lens under the standard model is a third of it
 BENT = 0.005  # of the board's longer side
 FEWEST_VIEWS = 6  # to be parted in two
+DRIFTING = 0.003  # of the focal length
 APART_PX = 1.0  # the median difference of the halves over the image
 COARSE = (16, 12)  # points of the image at which they are compared
 SHIFTS = (0.5, 1.0)  # what conventions for the first pixel's centre differ by
@@ -40,27 +38,6 @@ def model_too_simple(evidence: Evidence) -> Outcome:
             )
             findings.append(found("model-too-simple", sentence, field.part * observed.best.sigma, "px", name))
     return findings
-
-
-def smooth_field(adjustment: Adjustment, name: str) -> Array:
-    """Vector fields (views, corners, 2, f): polynomials of u and v up to a degree, and higher powers of the radius."""
-    grid = adjustment.cameras[name].intrinsics
-    centred = adjustment.projected(name) - [grid.cx, grid.cy]  # the detections' noise must not explain itself
-    x, y = np.moveaxis(centred / np.hypot(grid.width, grid.height) * 2, -1, 0)
-    terms = [x**i * y**j for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
-    zero = np.zeros_like(x)
-    columns = [np.stack(pair, axis=-1) for term in terms for pair in ((term, zero), (zero, term))]
-    columns += [np.stack([x, y], axis=-1) * np.hypot(x, y)[..., None] ** (power - 1) for power in FARTHER]
-    return np.nan_to_num(np.stack(columns, axis=-1))
-
-
-def warp_columns(adjustment: Adjustment, name: str) -> Array:
-    """∂pixel/∂(the board's two sagittas), (views, corners, 2, 2)."""
-    camera = adjustment.cameras[name]
-    points = np.stack([pose.apply(adjustment.corners) for pose in adjustment.first_from_board])
-    _, by_point, _ = pixel_slopes(camera, points, ())
-    normals = adjustment.first_from_board.rotation.as_matrix()[:, None, :, 2:]
-    return np.nan_to_num((by_point @ normals) * sagittas(adjustment.board)[:, None, :])
 
 
 def board_warp(evidence: Evidence) -> Outcome:
@@ -90,7 +67,24 @@ def split_disagreement(evidence: Evidence) -> Outcome:
     enough = {name: each for name, each in evidence.observed.items() if each.best.posed.sum() >= FEWEST_VIEWS}
     if not enough:
         return Lacking(f"it needs at least {FEWEST_VIEWS} views")
-    return [finding for observed in enough.values() for finding in _disagreement(observed)]
+    return [
+        finding for observed in enough.values() for finding in (list(_drift(observed)) or list(_disagreement(observed)))
+    ]
+
+
+def _drift(observed: Observed) -> Iterator[Finding]:
+    """A focal length that changes evenly from the first view to the last, as one more parameter."""
+    best, name = observed.best, observed.name
+    grid = best.cameras[name].intrinsics
+    time = np.linspace(-0.5, 0.5, best.views)[:, None, None, None]
+    stretch = parameter_columns(best, name, ["fx", "fy"]) @ [[grid.fx], [grid.fy]]
+    drift = explained(best, name, np.nan_to_num(time * stretch))
+    if drift.chance < BY_CHANCE and abs(drift.values[0]) > DRIFTING:
+        sentence = (
+            f"{name}: the focal length {'grows' if drift.values[0] > 0 else 'falls'} by {abs(drift.values[0]):.2%} "
+            f"(± {drift.sigmas[0]:.2%}) from the first view to the last."
+        )
+        yield found("split-disagreement", sentence, drift.values[0] * 100, "%", name)
 
 
 def _disagreement(observed: Observed) -> Iterator[Finding]:

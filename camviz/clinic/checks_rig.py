@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
@@ -17,11 +18,9 @@ from camviz.clinic.rig import (
     distances,
     fits_better,
     lone_poses,
-    pairs,
     references,
 )
 from camviz.files.calibration import Board
-from camviz.lenses.base import Array
 from camviz.twoview import RectifiedPair, rectify
 
 MUCH_BETTER = 5.0  # how many times closer a changed transform must be to what is known
@@ -38,9 +37,9 @@ NO_PAIR = Lacking("the file holds no stereo pair")
 def baseline_sign(evidence: Evidence) -> Outcome:
     """t.x of right_from_left, where the file says which camera is the left one."""
     of_file = [fault for fault in evidence.calibration.faults if fault.id == "baseline-sign"]
-    declared = [pair for pair in pairs(evidence) if pair.declared]
+    declared = [pair for pair in evidence.pairs if pair.declared and _length(pair) > 0]
     if not declared and not of_file:
-        return Lacking("the file does not say which of two cameras is the left one")
+        return Lacking("the file does not say where a left and a right camera stand")
     findings = [found("baseline-sign", f"{fault}.", fault.value, "m") for fault in of_file]
     for pair in declared:
         t = pair.right_from_left.translation
@@ -70,10 +69,10 @@ def _flipped_camera(pose: RigidTransform) -> RigidTransform:
 def baseline_scale(evidence: Evidence) -> Outcome:
     """Baselines against the boards that both cameras saw, another calibration, and the size of things."""
     board, own_unit = evidence.calibration.board, evidence.calibration.format in OWN_UNIT
-    stereo = [] if own_unit else [pair for pair in pairs(evidence) if _length(pair) > 0]
+    stereo = [] if own_unit else [pair for pair in evidence.pairs if _length(pair) > 0]
     if board is None and not stereo:
         return Lacking("the file holds neither a board nor a stereo pair in metres")
-    findings = [*_square(board)] if board is not None else []
+    findings = [*_square(board, evidence.board)] if board is not None else []
     for pair in stereo:
         finding = _baseline(evidence, pair)
         findings += [finding] if finding else []
@@ -84,7 +83,15 @@ def _length(pair: Pair) -> float:
     return float(np.linalg.norm(pair.right_from_left.translation))
 
 
-def _square(board: Board) -> Iterator[Finding]:
+def _square(board: Board, known: Board | None) -> Iterator[Finding]:
+    if known is not None and abs(np.log(board.square_size / known.square_size)) > SAME_LENGTH:
+        ratio = board.square_size / known.square_size
+        sentence = (
+            f"The file takes the side of a square for {board.square_size:.4g} m, it is {known.square_size:.4g} m: all "
+            f"lengths are {ratio:.4g} times what they should be."
+        )
+        yield found("baseline-scale", sentence, ratio, "times")
+        return
     if not SQUARES[0] <= board.square_size <= SQUARES[1]:
         likely = board.square_size / 1000 if board.square_size > 1 else board.square_size * 1000
         sentence = (
@@ -125,7 +132,7 @@ def _known_lengths(evidence: Evidence, pair: Pair) -> Iterator[tuple[float, str]
 
 def rectified_black(evidence: Evidence) -> Outcome:
     """Where the pixels of the rectified pictures come from, and how far rectification turns the cameras."""
-    stereo = [pair for pair in pairs(evidence) if _length(pair) > 0]
+    stereo = [pair for pair in evidence.pairs if _length(pair) > 0]
     if not stereo:
         return NO_PAIR
     return [finding for pair in stereo for finding in _rectified(pair)]
@@ -225,7 +232,7 @@ def _outwards(evidence: Evidence) -> Iterator[Finding]:
 
 def corner_order(evidence: Evidence) -> Outcome:
     """Views from which the pair would stand quite otherwise, unless one camera's corners are counted another way."""
-    stereo = [pair for pair in pairs(evidence) if pair.by_view is not None and len(pair.views) > 2]
+    stereo = [pair for pair in evidence.pairs if pair.by_view is not None and len(pair.views) > 2]
     if not stereo:
         return Lacking("it needs corners of at least three views that both cameras of a pair saw")
     return [finding for pair in stereo for finding in _other_order(evidence, pair)]
@@ -233,7 +240,10 @@ def corner_order(evidence: Evidence) -> Outcome:
 
 def _other_order(evidence: Evidence, pair: Pair) -> Iterator[Finding]:
     board, seen, by_view, agreed = evidence.calibration.board, pair.seen_from_both, pair.by_view, pair.agreed
-    assert board is not None and seen is not None and by_view is not None and agreed is not None
+    assert board is not None
+    assert seen is not None
+    assert by_view is not None
+    assert agreed is not None
     angles = np.degrees((by_view.rotation * agreed.rotation.inv()).magnitude())
     for row in np.flatnonzero(angles > ANOTHER_WAY_DEG):
         left, right = (seen[name][row : row + 1] for name in (pair.left, pair.right))
@@ -241,7 +251,7 @@ def _other_order(evidence: Evidence, pair: Pair) -> Iterator[Finding]:
         for order in orders(board):
             turned = lone_poses(pair.cameras[1], board, right[:, order]) * left_pose.inv()
             if np.degrees((turned.rotation * agreed.rotation.inv()).magnitude())[0] < AGAIN_DEG:
-                view = int(pair.views[row])
+                view = pair.views[row]
                 sentence = (
                     f"{evidence.picture(pair.right, view)}: the corners of the two cameras run in different orders; by "
                     f"this view the pair would be turned by {angles[row]:.0f}°."
@@ -250,7 +260,7 @@ def _other_order(evidence: Evidence, pair: Pair) -> Iterator[Finding]:
                 break
 
 
-def orders(board: Board) -> list[Array]:
+def orders(board: Board) -> list[NDArray[np.intp]]:
     """The other ways to count a board's corners: backwards, and by quarter turns where it is square."""
     index = np.arange(board.columns * board.rows).reshape(board.rows, board.columns)
     turns = (1, 2, 3) if board.columns == board.rows else (2,)

@@ -12,7 +12,8 @@ from scipy import stats
 from camviz.calibration.cross_validation import held_out
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import Evidence, no_corners
-from camviz.clinic.observed import Observed
+from camviz.clinic.fields import smooth_field, warp_columns
+from camviz.clinic.observed import APART, BY_CHANCE, Observed, unexplained
 from camviz.lenses.base import Array
 
 MANY_TIMES = 3.0  # the median error: twice happens between sharp and less sharp pictures
@@ -26,11 +27,13 @@ SAME_WAY_DEG = 20.0  # between the normals of two boards
 UNCERTAIN = 0.01  # of the focal length
 HELD_OUT = 2.0  # times what noise leads to
 FEWEST_VIEWS = 3
+MOVING = 0.7  # of the noise: what a rolling shutter must explain to be named
 
 
 def outlier_view(evidence: Evidence) -> Outcome:
     """The RMS of each view against the median of all, and each corner against the typical one."""
-    findings, looked = [], False
+    findings: list[Finding] = []
+    looked = False
     for name in evidence.calibration.cameras:
         observed, errors = evidence.observed.get(name), evidence.calibration.per_view_errors.get(name)
         if observed is not None:
@@ -56,20 +59,20 @@ def _bad_views(evidence: Evidence, name: str, errors: Array, counts: Array) -> I
         limit = np.maximum(MANY_TIMES, np.sqrt(stats.chi2.isf(ONCE_IN / len(errors), freedom)) / typical)
         median = float(np.nanmedian(errors))
         bad = np.flatnonzero(errors > limit * median)
-    for view in bad:
+    for view in map(int, bad):
         sentence = (
             f"{evidence.picture(name, view)}: its error is {errors[view]:.3g} px, {errors[view] / median:.1f} times "
             f"the median of all {len(errors)} views ({median:.3g} px)."
         )
-        yield found("outlier-view", sentence, errors[view], "px", name, pictures=(int(view),))
+        yield found("outlier-view", sentence, errors[view], "px", name, pictures=(view,))
 
 
 def _bad_corners(evidence: Evidence, observed: Observed, named: set[int]) -> Iterator[Finding]:
     """Views that are not bad as a whole, but for a corner or two."""
     lengths = np.linalg.norm(observed.residuals, axis=-1)
     far = lengths > max(FAR_CORNER * observed.scatter, VISIBLE_PX)
-    for view in np.flatnonzero(far.any(axis=1)):
-        if int(view) in named:
+    for view in map(int, np.flatnonzero(far.any(axis=1))):
+        if view in named:
             continue
         worst = int(np.nanargmax(lengths[view]))
         count = int(far[view].sum())
@@ -78,7 +81,7 @@ def _bad_corners(evidence: Evidence, observed: Observed, named: set[int]) -> Ite
             f"{'is' if count == 1 else 'are'} far off, the worst ({_corner(observed, worst)}) by "
             f"{lengths[view, worst]:.3g} px, {lengths[view, worst] / observed.scatter:.0f} times the typical error."
         )
-        yield found("outlier-view", sentence, lengths[view, worst], "px", observed.name, pictures=(int(view),))
+        yield found("outlier-view", sentence, lengths[view, worst], "px", observed.name, pictures=(view,))
 
 
 def _corner(observed: Observed, index: int) -> str:
@@ -118,20 +121,27 @@ def _lines(observed: Observed) -> list[tuple[str, Array]]:
 
 
 def _lengths_left_out(observed: Observed, lines: Sequence[Array]) -> list[list[Array]]:
-    """By view and line: the lengths of the line's residuals after a step of the pose towards all other corners."""
+    """By view and line: how far off its corners are, from a pose that follows the other corners.
+
+    One step of the pose, without corners that are far off by themselves. A length is divided by √(1 + lever), with
+    which the noise of the others comes through to a corner beyond them.
+    """
     adjustment = observed.adjustment
     _, by_pose = adjustment.slopes(observed.name)
     lengths: list[list[Array]] = [[np.empty(0) for _ in lines] for _ in range(adjustment.views)]
     for row, view in enumerate(np.flatnonzero(adjustment.posed)):
         seen = np.isfinite(observed.residuals[view]).all(axis=-1)
-        slopes = np.where(seen[:, None, None], by_pose[row], 0)
         residuals = np.where(seen[:, None], observed.residuals[view], 0)
-        normal = np.einsum("cik,cil->ckl", slopes, slopes)
-        gradient = np.einsum("cik,ci->ck", slopes, residuals)
+        sizes = np.linalg.norm(residuals, axis=-1)
+        good = seen & (sizes <= max(3 * np.median(sizes[seen]), FAR_LINE * observed.scatter))
+        slopes = np.where(seen[:, None, None], by_pose[row], 0)
+        normal = np.einsum("cik,cil->ckl", slopes, slopes) * good[:, None, None]
+        gradient = np.einsum("cik,ci->ck", slopes, residuals) * good[:, None]
         for number, line in enumerate(lines):
-            rest = normal.sum(axis=0) - normal[line].sum(axis=0)
-            step = np.linalg.lstsq(rest, gradient.sum(axis=0) - gradient[line].sum(axis=0), rcond=1e-12)[0]
-            left = np.linalg.norm(residuals[line] - slopes[line] @ step, axis=-1)
+            inverse = np.linalg.pinv(normal.sum(axis=0) - normal[line].sum(axis=0), rcond=1e-12, hermitian=True)
+            step = inverse @ (gradient.sum(axis=0) - gradient[line].sum(axis=0))
+            lever = np.einsum("cik,kl,cil->c", slopes[line], inverse, slopes[line]) / 2
+            left = np.linalg.norm(residuals[line] - slopes[line] @ step, axis=-1) / np.sqrt(1 + lever)
             lengths[view][number] = left[seen[line]]
     return lengths
 
@@ -194,10 +204,13 @@ def parallel_boards(evidence: Evidence) -> Outcome:
 
 
 def pose_absorbs_error(evidence: Evidence) -> Outcome:
-    """Each pose fitted to half of the board and tried on the other half, with the camera as it is in the file."""
+    """Each pose fitted to half of the board and tried on the other half, with the camera as it is in the file.
+
+    And: whether boards that move while the rows of the image are read out one after another explain the residuals.
+    """
     if not evidence.observed:
         return no_corners(evidence)
-    findings = []
+    findings: list[Finding] = []
     for name, observed in evidence.observed.items():
         ratio = held_out_ratio(observed)
         if ratio > HELD_OUT:
@@ -206,7 +219,42 @@ def pose_absorbs_error(evidence: Evidence) -> Outcome:
                 f"off as the noise of the corners leads to; the error of the fit is {observed.adjustment.rms:.3g} px."
             )
             findings.append(found("pose-absorbs-error", sentence, ratio, "times", name))
+            continue
+        chance, part = moving_boards(observed)
+        if chance < BY_CHANCE and part > MOVING:
+            sentence = (
+                f"{name}: boards that move while the rows are read out one after another explain "
+                f"{part * observed.best.sigma:.2g} px of the residuals ({part:.1f} times the noise): a rolling shutter."
+            )
+            findings.append(found("pose-absorbs-error", sentence, part, "times", name))
     return findings
+
+
+def moving_boards(observed: Observed) -> tuple[float, float]:
+    """The chance of an F-test of six velocities for every view, and what they explain over the noise (RMS).
+
+    A pixel in row v of a rolling shutter is late by v: it moves by (v/height - ½) times ∂pixel/∂pose and the velocity.
+    A bend of the board and a smooth field over the image are given their share before.
+    """
+    best, name = observed.best, observed.name
+    left, by_pose, used = unexplained(best, name, smooth_field(best, name), warp_columns(best, name))
+    late = best.projected(name)[best.posed][..., 1] / best.cameras[name].intrinsics.height - 0.5
+    moving = np.nan_to_num(late[..., None, None] * by_pose)
+    fallen, count = 0.0, 0
+    for residuals, slopes, motion, seen in zip(left, by_pose, moving, used, strict=True):
+        columns = np.concatenate([slopes[seen], motion[seen]], axis=-1).reshape(-1, 12)
+        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        columns[:, 6:] -= columns[:, :6] @ np.linalg.lstsq(columns[:, :6], columns[:, 6:], rcond=None)[0]
+        U, singular, _ = np.linalg.svd(columns[:, 6:], full_matrices=False)
+        kept = U[:, singular > APART]
+        fallen += float(np.sum(np.square(kept.T @ residuals[seen].ravel())))
+        count += kept.shape[1]
+    freedom = best.measurements - best.unknowns - count
+    if freedom < 1 or count == 0:
+        return 1.0, 0.0
+    variance = max(float(np.sum(left[used] ** 2)) - fallen, np.finfo(float).tiny) / freedom
+    part = np.sqrt(max(fallen - count * variance, 0) / best.measurements / variance)
+    return float(stats.f.sf(fallen / count / variance, count, freedom)), float(part)
 
 
 def held_out_ratio(observed: Observed) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -18,16 +19,20 @@ from camviz.files.calibration import Board, Calibration
 from camviz.lenses import Cylindrical, Equirectangular
 from camviz.lenses.base import Array
 
+if TYPE_CHECKING:
+    from camviz.clinic.rig import Pair
+
 PANORAMAS = (Cylindrical, Equirectangular)
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A calibration and what goes with it. `sizes` are (width, height) of pictures by their names."""
+    """A calibration, another one, (width, height) of pictures by their names, and the board as it was measured."""
 
     calibration: Calibration
     compare: Calibration | None = None
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    board: Board | None = None
 
     @cached_property
     def cameras(self) -> dict[str, Camera]:
@@ -63,6 +68,13 @@ class Evidence:
                 if name not in poses and pixels.shape[1] == calibration.board.columns * calibration.board.rows:
                     poses[name] = board_poses(calibration.cameras[name], calibration.board, pixels)
         return poses
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """The stereo pairs."""
+        from camviz.clinic.rig import pairs
+
+        return pairs(self)
 
     @cached_property
     def observed(self) -> dict[str, Observed]:

@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 FAR_OUT = 6.0  # standard deviations: beyond, a corner says more about its detection than about the camera
 BY_CHANCE = 1e-6  # how often a test may cry wolf
 APART = 1e-3  # the part of a column's length that must be left when others have taken theirs
-SAME = 1e-9  # the same for the parameters of the solution itself, some of which are all but one
+SAME = 1e-5  # the same for the parameters of the solution itself, some of which are all but one
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,22 +94,11 @@ def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> 
     sum of squares S in the direction of e columns that are left, makes F = (E/e) / ((S - E)/(N - k - e)) (Seber & Lee
     2003, theorem 4.1). Columns that cannot be told apart from the rest are not counted.
     """
-    by_shared, by_pose = adjustment.slopes(name)
-    views, used = adjustment.posed, adjustment.used[name][adjustment.posed]
-    groups = [by_shared, *(columns[views] for columns in also), extra[views]]
-    left = _without_poses([*groups, adjustment.residuals[name][views][..., None]], by_pose, used)
-    lengths = [np.sqrt(np.sum(np.where(used[..., None, None], group, 0) ** 2, axis=(0, 1, 2))) for group in groups]
-    residuals, known = left.pop()[:, 0], 0
-    for index, group in enumerate(left[:-1]):
-        axes = _axes(group / np.where(lengths[index] > 0, lengths[index], 1), APART if index else SAME)[0]
-        known += axes.shape[1] if index else len(adjustment.estimated[name])
-        residuals = residuals - axes @ (axes.T @ residuals)
-        left = [each - axes @ (axes.T @ each) for each in left]
-    scale = np.where(lengths[-1] > 0, lengths[-1], 1)
-    axes, into = _axes(left[-1] / scale, APART)
+    residuals, left, scale, known = _projected(adjustment, name, extra, also)
+    axes, into = _axes(left / scale, APART)
     along = axes.T @ residuals
     count, fallen = axes.shape[1], float(along @ along)
-    freedom = adjustment.measurements - (adjustment.unknowns - len(adjustment.estimated[name])) - known - count
+    freedom = adjustment.measurements - adjustment.unknowns - known - count
     if count == 0 or freedom < 1:
         return Explained(0, 0.0, 1.0, np.zeros(len(scale)), np.full(len(scale), np.inf), 0.0)
     variance = max(float(residuals @ residuals) - fallen, np.finfo(float).tiny) / freedom
@@ -117,6 +106,33 @@ def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> 
     part = float(np.sqrt(max(fallen - count * variance, 0) / adjustment.measurements / variance))
     sigmas = np.sqrt(variance) * np.linalg.norm(into, axis=1) / scale
     return Explained(count, F, float(stats.f.sf(F, count, freedom)), into @ along / scale, sigmas, part)
+
+
+def unexplained(adjustment: Adjustment, name: str, *also: Array) -> tuple[Array, Array, Mask]:
+    """Residuals (v, corners, 2) without what `also` explains, ∂pixel/∂pose (v, corners, 2, 6), and which count."""
+    used = adjustment.used[name][adjustment.posed]
+    residuals = np.zeros((*used.shape, 2))
+    residuals[used] = _projected(adjustment, name, also[-1], also)[0].reshape(-1, 2)
+    return residuals, adjustment.slopes(name)[1], used
+
+
+def _projected(
+    adjustment: Adjustment, name: str, extra: Array, also: Sequence[Array]
+) -> tuple[Array, Array, Array, int]:
+    """Residuals (n,) and columns (n, e) with poses, parameters and `also` taken out; the columns' lengths before; how
+    many directions `also` had."""
+    by_shared, by_pose = adjustment.slopes(name)
+    views, used = adjustment.posed, adjustment.used[name][adjustment.posed]
+    groups = [by_shared, *(columns[views] for columns in also), extra[views]]
+    lengths = [np.sqrt(np.sum(np.where(used[..., None, None], group, 0) ** 2, axis=(0, 1, 2))) for group in groups]
+    lengths = [np.where(length > 0, length, 1) for length in lengths]
+    left = _without_poses([*groups, adjustment.residuals[name][views][..., None]], by_pose, used)
+    known = 0
+    for index in range(len(groups) - 1):
+        axes = _axes(left[index] / lengths[index], APART if index else SAME)[0]
+        known += axes.shape[1] * (index > 0)
+        left = [each - axes @ (axes.T @ each) for each in left]
+    return left[-1][:, 0], left[-2], lengths[-1], known
 
 
 def _without_poses(groups: Sequence[Array], by_pose: Array, used: Mask) -> list[Array]:
@@ -129,9 +145,10 @@ def _without_poses(groups: Sequence[Array], by_pose: Array, used: Mask) -> list[
 
 def _axes(columns: Array, least: float) -> tuple[Array, Array]:
     """Orthonormal axes (n, k) of the span of columns (n, m), and the matrix (m, k) from coordinates to columns."""
-    U, singular, Vt = np.linalg.svd(columns, full_matrices=False)
-    kept = singular > least
-    return U[:, kept], Vt[kept].T / singular[kept]
+    squares, vectors = np.linalg.eigh(columns.T @ columns)  # far quicker than the columns' own singular values
+    kept = squares > least**2
+    into = vectors[:, kept] / np.sqrt(squares[kept])
+    return columns @ into, into
 
 
 def parameter_columns(adjustment: Adjustment, name: str, names: Sequence[str]) -> Array:

@@ -16,6 +16,7 @@ from camviz.files.calibration import Board
 from camviz.lenses.base import Array
 
 DECLARED = (("left", "right"), ("P0", "P1"), ("P2", "P3"), ("00", "01"), ("02", "03"))  # the last four are KITTI's
+ENOUGH = 6  # corners
 OVERLAP_DEG = 40.0  # between the axes of two cameras that are meant to see the same
 OWN_UNIT = ("COLMAP", "transforms.json", "Metashape cameras")  # formats whose lengths are not metres
 FLIPPED = RigidTransform.from_matrix(np.diag([1.0, -1, -1, 1]))  # from OpenCV's axes to OpenGL's and back
@@ -53,16 +54,14 @@ class Pair:
             return None
         if held[0].shape[1] != calibration.board.columns * calibration.board.rows:
             return None
-        both = np.all([np.isfinite(each).all(axis=-1).sum(axis=1) >= 6 for each in held], axis=0)
-        if not both.any():
-            return None
-        return {name: each[both] for name, each in zip((self.left, self.right), held, strict=True)}
+        return {self.left: held[0][self.views], self.right: held[1][self.views]} if self.views else None
 
     @cached_property
-    def views(self) -> Array:
-        """The numbers of those views."""
+    def views(self) -> list[int]:
+        """The numbers of the views in which both see enough of the board for its pose."""
         held = [self.evidence.calibration.detections[name] for name in (self.left, self.right)]
-        return np.flatnonzero(np.all([np.isfinite(each).all(axis=-1).sum(axis=1) >= 6 for each in held], axis=0))
+        both = np.all([np.isfinite(each).all(axis=-1).sum(axis=1) >= ENOUGH for each in held], axis=0)
+        return [int(view) for view in np.flatnonzero(both)]
 
     @cached_property
     def by_view(self) -> RigidTransform | None:
@@ -126,7 +125,7 @@ def distances(poses: RigidTransform, other: RigidTransform) -> Array:
 
 def references(evidence: Evidence) -> Iterator[tuple[str, RigidTransform, RigidTransform, str]]:
     """What a file says of a transform, and what other evidence says: a name, both transforms, and where it is from."""
-    for pair in pairs(evidence):
+    for pair in evidence.pairs:
         if pair.agreed is not None:
             yield f"{pair.right} from {pair.left}", pair.right_from_left, pair.agreed, "the boards that both saw"
     if evidence.compare is None:
