@@ -49,7 +49,7 @@ def disparity(
         raise ValueError(f"block_size must be an odd number from {least} to the picture's height, got {block_size}")
     match = {"BM": _block_matching, "SGM": _semi_global, "SGM + WLS": _filtered}[method]
     sixteenths = match(_grey(left), _grey(right), int(disparities), int(block_size), left)
-    found = sixteenths.astype(np.float32) / 16
+    found = sixteenths.astype(np.float32) / np.float32(16)
     found[sixteenths < 0] = np.nan
     found[:, : int(disparities)] = np.nan  # where a filter has made some up
     return found
@@ -107,7 +107,7 @@ def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tole
 
 
 def _block_matching(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:
-    matcher = cv2.StereoBM_create(numDisparities=disparities, blockSize=block_size)
+    matcher = cv2.StereoBM.create(numDisparities=disparities, blockSize=block_size)
     matcher.setUniquenessRatio(_UNIQUE)
     matcher.setDisp12MaxDiff(1)
     matcher.setSpeckleWindowSize(_SPECKLE[0])
@@ -135,7 +135,7 @@ def _filtered(left: Any, right: Any, disparities: int, block_size: int, picture:
 
 def _semi_global_matcher(disparities: int, block_size: int) -> Any:
     """Penalties as OpenCV's documentation advises: P1 = 8 and P2 = 32 for each pixel of the block."""
-    return cv2.StereoSGBM_create(
+    return cv2.StereoSGBM.create(
         numDisparities=disparities, blockSize=block_size, P1=8 * block_size**2, P2=32 * block_size**2,
         preFilterCap=63, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
@@ -21,6 +22,11 @@ def taken(camera: Camera, side: int) -> tuple[np.ndarray, bytes]:
     return _taken(camera.intrinsics.within(side), camera.lens, _pose(camera))
 
 
+def distances(camera: Camera, side: int) -> NDArray[np.float32]:
+    """How far (height, width) in metres along its ray every pixel of such a picture sees; NaN in the sky."""
+    return _distances(camera.intrinsics.within(side), camera.lens, _pose(camera))
+
+
 def landmarks(camera: Camera) -> Array:
     """Points (n, 3) of the garden's surfaces, none farther than 12 m, all over a camera's picture."""
     return _landmarks(camera.intrinsics, camera.lens, _pose(camera))
@@ -31,6 +37,14 @@ def _taken(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> tuple[np.ndarray, 
     image = snapshot(textured_scene(), Camera(intrinsics, lens, _placed(pose)))
     image.flags.writeable = False
     return image, jpeg(image)
+
+
+@lru_cache(maxsize=4)
+def _distances(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> NDArray[np.float32]:
+    camera = Camera(intrinsics, lens, _placed(pose))
+    _, distance = textured_scene().trace(camera.centre, camera.rays())
+    distance.flags.writeable = False
+    return distance
 
 
 @lru_cache(maxsize=4)
