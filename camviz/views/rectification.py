@@ -165,18 +165,18 @@ class RectificationView(View):
         now, found, score = self.stage, self.disparity_map(draft=draft), self.score(draft=draft)
         f = now.left.intrinsics.fx
         shifted = abs(now.doffs) > 0.05
-        second = f"{now.doffs:.1f} px" if shifted else f"{now.pair.baseline:.3f} m"
+        second = f"{now.doffs:.1f} px".replace("-", "−") if shifted else f"{now.pair.baseline:.3f} m"
         figures = {
             "f, doffs" if shifted else "f, B": f"{f:.0f} px, {second}",
             "rows differ by": f"{self.rows_apart():.1f} px",
-            "chosen": self._in_words(self.disparity, self.depth()),
+            "chosen, rectified": self._in_words(self.disparity, self.depth()),
             "measured at the mark": self._with_depth(self._at_mark(found)),
-            "true at the mark": self._with_depth(self._at_mark(self.true_disparity_map(draft=draft))),
         }
         if not score.compared:
             return {**figures, "no disparity": f"{100 * np.isnan(found).mean():.0f} % of the pixels"}
         return {
             **figures,
+            "true at the mark": self._with_depth(self._at_mark(self.true_disparity_map(draft=draft))),
             "no disparity": f"{100 * score.missing:.0f} % of the pixels",
             f"off by more than {WRONG:g} px": f"{100 * (score.bad - score.missing):.1f} %",
             "mean error": f"{score.mean_error:.2f} px" if np.isfinite(score.mean_error) else "none found",
@@ -319,7 +319,7 @@ class RectificationView(View):
             heat_panel(left, size.width, size.height, 0, self.disparities, "px", title="Disparity", note=self.method),
             heat_panel(right, size.width, size.height, low, high, unit, title=title,
                        note=formula if self.show == "depth" else note),
-            svg.text((20, 570), "hatched: no disparity", "note"),
+            svg.text((20, left.y + left.height + 18), "hatched: no disparity", "note"),
         ]  # fmt: skip
         marks = [ring(panel.place(self.uv_left) + (panel.x, panel.y), "red", 5) for panel in (left, right)]
         return "".join(blocks + (marks if size.contains(self.uv_left) else []))
