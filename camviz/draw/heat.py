@@ -41,7 +41,7 @@ def heat_panel(panel: Panel, width: int, height: int, low: float, high: float, u
     x = panel.x + panel.width + _GAP
     key = svg.image(f"{panel.name} key", x, panel.y, _BAR, panel.height)
     key += svg.rectangle(x, panel.y, _BAR, panel.height, "frame")
-    values = plot.ticks(low, high, panel.height / 40)
+    values = plot.ticks(low, high, panel.height / 35)
     places = panel.y + panel.height * (high - values) / (high - low)
     words = plot.written(values)
     if words:

@@ -54,9 +54,11 @@ def _metric_depth(found: Array, f: float, doffs: float, P_right: Array, parts: f
 
 
 def _depth_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """In every larger case one disparity is at infinity and one behind the cameras."""
+    """In every larger case one disparity is at infinity and one behind the cameras, under doffs of either sign."""
+    sign = rng.choice([-1, 1])
     for shape in SHAPES:
-        doffs = float(rng.uniform(5, 40) * rng.choice([-1, 1]))
+        sign = -sign
+        doffs = float(sign * rng.uniform(5, 40))
         d = rng.uniform(0, 100, shape) + max(0, 1 - doffs)
         if d.size > 1:
             d.flat[0], d.flat[1] = -doffs, -doffs - rng.uniform(1, 5)
@@ -154,9 +156,9 @@ DEPTH = Exercise(
     ),
     praise="With doffs = 0 it is the formula of every book; with it, it holds for the published pairs too.",
     misconceptions=(
-        Misconception(
-            lambda d, f, B, doffs: depth(d, f, B, 0.0),
-            "doffs is left out: it is the disparity of a point at infinity, with its sign turned.",
+        *(
+            Misconception(form, "doffs is left out: it is the disparity of a point at infinity, with its sign turned.")
+            for form in (lambda d, f, B, doffs: depth(d, f, B, 0.0), lambda d, f, B, doffs: _unchecked(d, f, B, 0.0))
         ),
         Misconception(
             lambda d, f, B, doffs: depth(d, f, B, -doffs),
@@ -192,7 +194,7 @@ BASELINE = Exercise(
     misconceptions=(
         Misconception(
             lambda Z, error, f, disparity_error: Z * disparity_error / (f * error),
-            "The error grows with the *square* of the depth: Z², not Z.",
+            "The error in metres grows with the *square* of the depth: Z², not Z.",
         ),
         Misconception(
             lambda Z, error, f, disparity_error: Z**2 * disparity_error / error,
@@ -205,10 +207,6 @@ BASELINE = Exercise(
         Misconception(
             lambda Z, error, f, disparity_error: Z**2 / (f * error),
             "The error of the disparity is left out, as if it were always one pixel.",
-        ),
-        Misconception(
-            lambda Z, error, f, disparity_error: Z**2 * disparity_error / (f * error * Z),
-            "You divided by the depth once too often: `error` is in metres, not a share of Z.",
         ),
     ),
 )

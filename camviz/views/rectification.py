@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
+import cv2
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -362,11 +363,16 @@ def _maps(
     """The disparities and the second map, as PNG."""
     found = stereo_pair.disparities(source, baseline, rectify, side, method, block, count)
     now = stereo_pair.stage(source, baseline, rectify)
-    low, high = stereo_pair.depth_limits(source)
-    first = heat_map(found, 0, count, "disparity")
+    first = heat_map(_small(found), 0, count, "disparity")
     if show == "depth":
-        return first, heat_map(now.depth(found), low, high, "depth")
+        return first, heat_map(_small(now.depth(found)), *stereo_pair.depth_limits(source), "depth")
     truth = stereo_pair.true_disparities(source, baseline, rectify, side)
     if show == "true depth":
-        return first, heat_map(now.depth(truth), low, high, "depth")
-    return first, heat_map(np.abs(found - truth), 0, 4, "error")
+        return first, heat_map(_small(now.depth(truth)), *stereo_pair.depth_limits(source), "depth")
+    return first, heat_map(_small(np.abs(found - truth)), 0, 4, "error")
+
+
+def _small(values: np.ndarray) -> np.ndarray:
+    """A map no finer than a screen shows it, which keeps a saved notebook light."""
+    scale = min(1.0, 1.5 * _MAP_WIDTH / values.shape[1])
+    return cv2.resize(values, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)

@@ -147,9 +147,14 @@ def _resampled(image: np.ndarray, original: Camera, camera: Camera, how: int, ou
         H = old.K @ original_from_camera.as_matrix() @ np.linalg.inv(new.K)
         size = (new.width, new.height)
         return cv2.warpPerspective(image, H, size, flags=how | cv2.WARP_INVERSE_MAP, borderValue=outside)
-    uv = seen_from_there(replace(original, intrinsics=old), replace(camera, intrinsics=new), new.grid())
-    uv = uv.astype(np.float32)
-    return cv2.remap(image, np.nan_to_num(uv, nan=-9), None, how, borderValue=outside)
+    # A lens bends smoothly: every fourth pixel of the map is computed, one more beyond each edge, the rest in between.
+    width, height = (4 * -(-size // 4) for size in (new.width, new.height))
+    u, v = (np.arange(-4, size + 4, 4) + 1.5 for size in (width, height))
+    nodes = np.stack(np.meshgrid(u, v), axis=-1)
+    uv = seen_from_there(replace(original, intrinsics=old), replace(camera, intrinsics=new), nodes)
+    map_uv = cv2.resize(uv.astype(np.float32), (width + 8, height + 8), interpolation=cv2.INTER_LINEAR)
+    map_uv = np.nan_to_num(map_uv[4 : 4 + new.height, 4 : 4 + new.width], nan=-9)
+    return cv2.remap(image, map_uv, None, how, borderValue=outside)
 
 
 # Disparities ---------------------------------------------------------------------------------------------------------
@@ -177,8 +182,10 @@ def true_disparities(source: Source, baseline: float, rectify: float, side: int)
     NaN where that is unknown and where it lies to the left of the right picture. For coarse pictures one pixel in four
     stands for all.
     """
-    step = 2 if side <= COARSE else 1
     now, seen = stage(source, baseline, rectify), pictures(source, baseline, rectify, side)
+    if np.isnan(seen.distances).all():
+        return seen.distances
+    step = 2 if side <= COARSE else 1
     small = now.left.intrinsics.within(max(seen.left.shape[:2]))
     uv = small.grid()[::step, ::step]
     rays = rotate(now.left.world_from_cam.rotation, now.left.lens.unproject(small.from_pixels(uv)))
