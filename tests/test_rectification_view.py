@@ -74,6 +74,15 @@ def test_rows_differ_before_and_not_after():
     assert VIEW.rows_apart() < 1e-9
 
 
+@pytest.mark.parametrize(("nearly", "end"), [(0.001, 0.0), (0.999, 1.0)])
+def test_nothing_jumps_at_either_end_of_the_way(nearly, end):
+    left, right = rig(BrownConrady(k1=-0.25, k2=0.06))
+    view = RectificationView.of(left, right)
+    points = left.centre + left.unproject([(30, 20), (290, 30), (160, 120), (40, 220)])
+    seen = [view.but(rectify=way).stage.left.project(points) for way in (nearly, end)]
+    np.testing.assert_allclose(*seen, atol=0.1)
+
+
 # The pictures --------------------------------------------------------------------------------------------------------
 
 
@@ -140,6 +149,16 @@ def test_the_truth_is_what_rays_of_the_rectified_camera_meet(draft, most):
     off = np.abs(truth - VIEW.stage.pair.focal_length * 0.25 / Z)
     assert np.nanmedian(off) < most
     assert np.nanpercentile(off, 90) < 1
+
+
+def test_what_lies_to_the_left_of_the_right_picture_has_no_true_disparity():
+    view = VIEW.but(baseline=0.6)
+    truth, distances = view.true_disparity_map(), stereo_pair.pictures(view.source, 0.6, 1.0, 480).distances
+    lost = np.isnan(truth) & np.isfinite(distances)
+    assert lost.any()
+    assert np.nanmin(np.arange(480) - truth) >= -0.5
+    points = view.stage.left.centre + distances[lost, None] * view.stage.left.rays()[lost]
+    assert (view.stage.right.project(points)[:, 0] < -0.4).all()
 
 
 def test_matching_along_rows_fails_as_taken_and_succeeds_rectified():

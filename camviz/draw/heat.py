@@ -32,10 +32,12 @@ def heat_key(colours: str) -> bytes:
     return png(np.ascontiguousarray(_table(colours)[::-4, None]))
 
 
-def heat_panel(panel: Panel, width: int, height: int, low: float, high: float, unit: str, **heading: str) -> str:
+def heat_panel(
+    panel: Panel, width: int, height: int, low: float, high: float, unit: str, marks: str = "", **heading: str
+) -> str:
     """The map attached under the panel's name, of so many pixels, hatched where it has none, and its key at the right.
 
-    The key is attached as "NAME key". `heading` is what `Panel.show` takes.
+    The key is attached as "NAME key". `marks` are drawn over the map, `heading` is what `Panel.show` takes.
     """
     content = _hatching(panel) + photograph(panel, panel.name, width, height, style="image-rendering:pixelated")
     x = panel.x + panel.width + _GAP
@@ -46,8 +48,8 @@ def heat_panel(panel: Panel, width: int, height: int, low: float, high: float, u
     words = plot.written(values)
     if words:
         words[-1] += f" {unit}"
-    marks = [svg.text((x + _BAR + 4, y + 4), one, "tick") for y, one in zip(places, words, strict=True)]
-    return panel.show(content, **heading) + key + "".join(marks)
+    labels = [svg.text((x + _BAR + 4, y + 4), one, "tick") for y, one in zip(places, words, strict=True)]
+    return panel.show(content + marks, **heading) + key + "".join(labels)
 
 
 def _hatching(panel: Panel) -> str:

@@ -51,7 +51,6 @@ def disparity(
     sixteenths = match(_grey(left), _grey(right), int(disparities), int(block_size), left)
     found = sixteenths.astype(np.float32) / np.float32(16)
     found[sixteenths < 0] = np.nan
-    found[:, : int(disparities)] = np.nan  # where a filter has made some up
     return found
 
 

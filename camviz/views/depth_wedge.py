@@ -29,7 +29,7 @@ def wedge_panel(
     panel = plot.plot_panel("wedge", *place, (0, right), (-0.5 * B, 1.85 * B))
     # The ray of the disparity's lower end runs from the right camera at (0, B) by (d - e) / f across for each metre.
     end = min(far, 2 * right)
-    edge = (end, B - end * max(disparity - plus_minus, 0) / f)
+    edge = (end, B - end * (disparity - plus_minus) / f)
     content = (
         plot.grid(panel)
         + svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange")
@@ -40,8 +40,8 @@ def wedge_panel(
         + svg.line(panel.place([(near, 0), (min(far, right), 0)]), "red thick")
         + svg.dots(panel.place([(Z, 0)]), "red", 8)
         + svg.dots(panel.place([(0, 0), (0, B)]), "ink", 9)
-        + svg.text(panel.place((0, B)) + (9, -6), "right", "orange halo")
-        + svg.text(panel.place((0, 0)) + (9, -6), "left", "blue halo")
+        + svg.text(panel.place((0, B)) + (9, -6), "right camera", "orange halo")
+        + svg.text((panel.width - 8, panel.place((0, 0))[1] - 7), "the left camera’s ray", "blue halo end")
         + svg.text((panel.width - 8, 16), notes[0], "note end halo")
         + svg.text((panel.width - 8, 33), notes[1], "red end halo")
         + svg.text((panel.width - 8, panel.height - 6), "a tooth for each pixel of disparity", "note end halo")

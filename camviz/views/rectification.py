@@ -316,14 +316,14 @@ class RectificationView(View):
         _, title, low, high, unit = self._second
         note = "" if self.source.photographs is None or self.source.distances is not None else "truth unknown"
         formula = "Z = fB / (d + doffs)" if abs(self.stage.doffs) > 0.05 else "Z = fB / d"
-        blocks = [
-            heat_panel(left, size.width, size.height, 0, self.disparities, "px", title="Disparity", note=self.method),
-            heat_panel(right, size.width, size.height, low, high, unit, title=title,
-                       note=formula if self.show == "depth" else note),
+        marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
+        return "".join([
+            heat_panel(left, size.width, size.height, 0, self.disparities, "px", marks[0],
+                       title="Disparity", note=self.method),
+            heat_panel(right, size.width, size.height, low, high, unit, marks[1],
+                       title=title, note=formula if self.show == "depth" else note),
             svg.text((20, left.y + left.height + 18), "hatched: no disparity", "note"),
-        ]  # fmt: skip
-        marks = [ring(panel.place(self.uv_left) + (panel.x, panel.y), "red", 5) for panel in (left, right)]
-        return "".join(blocks + (marks if size.contains(self.uv_left) else []))
+        ])  # fmt: skip
 
     def _wedge_panel(self) -> str:
         farthest = stereo_pair.depth_limits(self.source)[1]
