@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
-from camviz.cameras import Camera, Intrinsics, rotate
+from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import bends
 from camviz.lenses import BrownConrady, Lens, Perspective
 from camviz.lenses.base import Array
@@ -98,8 +98,8 @@ def between(start: Camera, end: Camera, way: float) -> Camera:
 
 def seen_from_there(camera: Camera, other: Camera, uv: ArrayLike) -> Array:
     """Where `camera` sees what `other`, standing in the same place, sees at pixels (..., 2); NaN where it does not."""
-    camera_from_other = camera.world_from_cam.rotation.inv() * other.world_from_cam.rotation
-    rays = rotate(camera_from_other, other.lens.unproject(other.intrinsics.from_pixels(uv)))
+    (R, _), (R_other, _) = camera.extrinsics, other.extrinsics
+    rays = other.lens.unproject(other.intrinsics.from_pixels(uv)) @ (R @ R_other.T).T
     return camera.intrinsics.to_pixels(camera.lens.project(rays))
 
 
@@ -143,8 +143,7 @@ def _resampled(image: np.ndarray, original: Camera, camera: Camera, how: int, ou
     side = max(image.shape[:2])
     old, new = original.intrinsics.within(side), camera.intrinsics.within(side)
     if not (bends(original.lens) or bends(camera.lens)):
-        original_from_camera = original.world_from_cam.rotation.inv() * camera.world_from_cam.rotation
-        H = old.K @ original_from_camera.as_matrix() @ np.linalg.inv(new.K)
+        H = old.K @ original.extrinsics[0] @ camera.extrinsics[0].T @ np.linalg.inv(new.K)
         size = (new.width, new.height)
         return cv2.warpPerspective(image, H, size, flags=how | cv2.WARP_INVERSE_MAP, borderValue=outside)
     # A lens bends smoothly: every fourth pixel of the map is computed, one more beyond each edge, the rest in between.
@@ -188,7 +187,7 @@ def true_disparities(source: Source, baseline: float, rectify: float, side: int)
     step = 2 if side <= COARSE else 1
     small = now.left.intrinsics.within(max(seen.left.shape[:2]))
     uv = small.grid()[::step, ::step]
-    rays = rotate(now.left.world_from_cam.rotation, now.left.lens.unproject(small.from_pixels(uv)))
+    rays = now.left.lens.unproject(small.from_pixels(uv)) @ now.left.extrinsics[0]
     points = now.left.centre + seen.distances[::step, ::step, None] * rays
     scale = now.left.intrinsics.width / small.width
     u_right = now.right.project(points)[..., 0]
