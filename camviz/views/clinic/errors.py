@@ -39,8 +39,8 @@ class ErrorsView(View):
         worst = int(np.nanargmax(self.errors))
         return (
             f"{len(self.errors)} views of {self.name}: view {worst + 1} has the largest error, "
-            f"{self.errors[worst]:.3g} px; the median is {np.nanmedian(self.errors):.3g} px. The file does not hold the "
-            "corners, so where in the picture the error is cannot be shown."
+            f"{self.errors[worst]:.3g} px; the median is {np.nanmedian(self.errors):.3g} px. The file does not hold "
+            "the corners, so where in the picture the error is cannot be shown."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
