@@ -1,0 +1,24 @@
+"""Calibration: boards found in pictures (`detect`), and the camera or the pair that saw them (`calibrate`).
+
+The names below are imported when they are first used: the processes that look for boards need none of the rest.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "Detections": "detection",
+    "detect": "detection",
+    "find_corners": "finding",
+    "MODELS": "solving",
+    "calibrate": "solving",
+    "calibrate_pair": "solving",
+}
+
+__all__ = ["MODELS", "Detections", "calibrate", "calibrate_pair", "detect", "find_corners"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'camviz.calibration' has no attribute {name!r}")
+    return getattr(import_module(f"camviz.calibration.{_HOME[name]}"), name)
