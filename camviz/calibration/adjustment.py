@@ -262,17 +262,18 @@ class Adjustment:
 
     # And where it leads ----------------------------------------------------------------------------------------------
 
-    def refined(self) -> Adjustment:
+    def refined(self, settled: float = SETTLED, most_steps: int = MOST_STEPS) -> Adjustment:
         """At the least sum of squares near by, by Levenberg's and Marquardt's method.
 
-        A corner that has an image at the start keeps one: a step that would carry it beyond a fold is shortened.
+        It ends after `most_steps`, or when a step promises to take off less than `settled` of the sum. A corner that
+        has an image at the start keeps one: a step that would carry it beyond a fold is shortened.
         """
         here, damping = self, 1e-3
-        for _ in range(MOST_STEPS):
+        for _ in range(most_steps):
             shared, views = here.normal_equations.damped(damping).solution()
             promised = shared @ here.normal_equations.shared_gradient
             promised += np.sum(views * here.normal_equations.gradients)
-            if not promised > SETTLED * here.sum_of_squares:
+            if not promised > settled * here.sum_of_squares:
                 break
             there = here._moved(shared, views)
             if there is not None and there._squares(here.used) <= here.sum_of_squares:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera
-from camviz.lenses import Lens
+from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import Array, as_points
 
 PINHOLE = ("fx", "fy", "cx", "cy", "skew")
@@ -42,8 +42,8 @@ def with_parameters(camera: Camera, values: dict[str, float]) -> Camera:
 def pixel_slopes(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) -> tuple[Array, Array, Array]:
     """Pixels (..., 2) of points (..., 3) in the camera's own frame, and their derivatives.
 
-    By the point, (..., 2, 3), and by the named intrinsic parameters, (..., 2, n): analytic in the camera matrix,
-    central differences through the lens. NaN where the point has no image.
+    By the point, (..., 2, 3), and by the named intrinsic parameters, (..., 2, n): analytic in the camera matrix
+    and in the point before a Brown–Conrady lens, central differences elsewhere. NaN where the point has no image.
     """
     points_cam = as_points(points_cam, 3, "points_cam")
     pixels, lens = camera.intrinsics, camera.lens
@@ -60,6 +60,10 @@ def pixel_slopes(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) ->
 
 def _ray_slopes(lens: Lens, rays: Array) -> Array:
     """∂xy/∂ray, (..., 2, 3)."""
+    if isinstance(lens, BrownConrady):
+        ideal = rays[..., :2] / rays[..., 2:]
+        by_ideal = np.concatenate([np.broadcast_to(np.eye(2), (*ideal.shape, 2)), -ideal[..., None]], axis=-1)
+        return lens.jacobian(ideal) @ (by_ideal / rays[..., 2, None, None])
     columns = [(lens.project(rays + step) - lens.project(rays - step)) / (2 * STEP) for step in STEP * np.eye(3)]
     return np.stack(columns, axis=-1)
 
@@ -77,6 +81,9 @@ def _lens_slope(lens: Any, name: str, rays: Array) -> Array:
     step = STEP * max(1.0, abs(value))
     lower, higher = _moved(lens, name, value - step), _moved(lens, name, value + step)
     width = getattr(higher, name) - getattr(lower, name)
+    if isinstance(lens, BrownConrady):  # its polynomial alone: where the domain ends takes a while to find
+        ideal = rays[..., :2] / rays[..., 2:]
+        return (higher.distort(ideal) - lower.distort(ideal)) / width
     return (higher.project(rays) - lower.project(rays)) / width
 
 
