@@ -44,9 +44,9 @@ def constraints(H: ArrayLike) -> Array:
     h₁ᵀ B h₂ = 0, and h₁ᵀ B h₁ = h₂ᵀ B h₂ (Zhang's eq. 3, 4 and 8). With H[2, 2] = 1 a row weighs as much as its board
     is large in the image.
     """
-    H = _matrix(H, "H")
-    H = H / H[2, 2]
-    return np.stack([_products(H[:, 0], H[:, 1]), _products(H[:, 0], H[:, 0]) - _products(H[:, 1], H[:, 1])])
+    h1, h2, h3 = _matrix(H, "H").T
+    h1, h2 = h1 / h3[2], h2 / h3[2]
+    return np.stack([_products(h1, h2), _products(h1, h1) - _products(h2, h2)])
 
 
 def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Array:

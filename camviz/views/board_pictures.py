@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, Self
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.slopes import parameter
 from camviz.calibration.zhang import board_pose, camera_matrix, focal_lengths, homography
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.files.calibration import Board
@@ -20,15 +21,14 @@ from camviz.lenses.base import Array, as_points
 from camviz.views.base import View, choice, slider, switch
 
 BOARD = Board(9, 6, 0.025)
-TRUTH = Camera(
-    Intrinsics(640, 480, 545.0, 543.0, 331.0, 233.0), BrownConrady(k1=-0.24, k2=0.07, p1=0.0008, p2=-0.0005)
-)
+TRUTH = Camera(Intrinsics(640, 480, 545.0, 543.0, 331.0, 233.0), BrownConrady(k1=-0.24, k2=0.07, p1=0.0008, p2=-0.0005))
 FREE = {
     "f, c, k1": ("fx", "fy", "cx", "cy", "k1"),
     "all": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"),
     "f, c": ("fx", "fy", "cx", "cy"),
     "f only": ("fx", "fy"),
 }
+INTRINSICS = FREE["all"]
 MOST, FRESH = 12, 6  # boards to calibrate with, and to judge by
 _ENOUGH = 12  # corners of a board: more than lie on one line of it
 _STEEPEST = np.cos(np.radians(75))  # of a board that is turned by hand
@@ -48,7 +48,9 @@ class BoardPictures(View):
 
     boards: int = slider(8, 1, MOST, 1, help="how many pictures of the board are taken")
     tilt: float = slider(30.0, 0.0, 45.0, 0.5, unit="°", help="of every board away from parallel to the image")
-    distance: float = slider(0.45, 0.25, 1.2, 0.01, unit="m", help="of the boards from the camera, give or take a third")
+    distance: float = slider(
+        0.45, 0.25, 1.2, 0.01, unit="m", help="of the boards from the camera, give or take a third"
+    )
     noise: float = slider(0.2, 0.0, 2.0, 0.05, unit="px", help="standard deviation of a corner's u and v")
     free: str = choice(*FREE, label="solve for", help="the intrinsics that are estimated; the others are held")
     draw: int = slider(1, 1, 50, 1, label="new noise", help="each number is another throw of the same dice")
@@ -61,6 +63,7 @@ class BoardPictures(View):
     photographs: tuple[NDArray[np.uint8], ...] = field(default=(), compare=False, repr=False)
     width: int = 640
     height: int = 480
+    settled: float = 1e-8  # of the sum of squares: what a step of the refinement must still promise to take off
 
     @classmethod
     def of(
@@ -115,7 +118,7 @@ class BoardPictures(View):
         if self.seen is not None:
             return self.seen
         uv = self._true_camera.project(transform_each(self.cam_from_board, self.board.corners))
-        uv = uv + self.noise * _dice(self.draw, len(self.board.corners))[: self.count]
+        uv = uv + self.noise * _dice(round(self.draw), len(self.board.corners))[: self.count]
         uv = np.where(self._true_camera.intrinsics.contains(uv)[..., None], uv, np.nan)
         enough = np.isfinite(uv[..., 0]).sum(axis=1) >= _ENOUGH
         return np.where(enough[:, None, None], uv, np.nan)
@@ -170,12 +173,61 @@ class BoardPictures(View):
     @cached_property
     def adjustment(self) -> Adjustment | None:
         """The calibration; None without a board."""
-        return self.start and self.start.refined(1e-7, 30)
+        return self.start and self.start.refined(self.settled, 40)
 
     @property
     def camera(self) -> Camera | None:
         """The camera that was estimated."""
         return self.adjustment.cameras["camera"] if self.adjustment else None
+
+    @cached_property
+    def estimates(self) -> dict[str, tuple[float, float]]:
+        """Value and standard deviation of every intrinsic by name; those that are held have no deviation."""
+        if self.adjustment is None or self.camera is None:
+            return {}
+        sigmas = dict(zip(FREE[self.free], np.sqrt(np.diag(self.adjustment.covariance)).tolist(), strict=True))
+        return {name: (parameter(self.camera, name), sigmas.get(name, 0.0)) for name in INTRINSICS}
+
+    @cached_property
+    def true(self) -> dict[str, float]:
+        """The true value of every intrinsic by name; empty for a real camera."""
+        return {name: parameter(self.truth, name) for name in INTRINSICS} if self.truth else {}
+
+    @cached_property
+    def estimated_poses(self) -> RigidTransform:
+        """cam_from_board of every board by the estimated camera; that of one left out is fitted to it alone."""
+        assert self.adjustment
+        assert self.camera
+        if self.used.all():
+            return self.adjustment.first_from_board
+        poses = _posed(self.camera, self.board, self.corners)
+        t, turn = poses.translation.copy(), poses.rotation.as_rotvec()
+        t[self.used] = self.adjustment.first_from_board.translation
+        turn[self.used] = self.adjustment.first_from_board.rotation.as_rotvec()
+        return RigidTransform.from_components(t, Rotation.from_rotvec(turn))
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Found less projected corners, (views, n, 2) in pixels; NaN where a corner was not seen."""
+        assert self.camera
+        return self.corners - self.camera.project(transform_each(self.estimated_poses, self.board.corners))
+
+    @cached_property
+    def per_board(self) -> Array:
+        """The RMS (views,) of each board in pixels; NaN for one that was not found."""
+        squared = np.sum(self.residuals**2, axis=-1)
+        found = np.isfinite(squared)
+        return np.sqrt(np.where(found, squared, 0).sum(axis=1) / np.where(found.any(axis=1), found.sum(axis=1), np.nan))
+
+    @cached_property
+    def correlation(self) -> float:
+        """Between the estimates of fx and of the picked board's distance along the axis; NaN where it is left out."""
+        assert self.adjustment
+        if not self.used[self.index]:
+            return float("nan")
+        a, i = self.adjustment, int(self.used[: self.index].sum())
+        variance_f, variance_z = a.covariance[0, 0], a.pose_covariance[i, 5, 5]
+        return float(a.cross_covariance[i, 5, 0] / np.sqrt(variance_f * variance_z))
 
     @cached_property
     def held_out(self) -> float:
@@ -186,8 +238,12 @@ class BoardPictures(View):
         """
         if self.camera is None:
             return float("nan")
-        errors = [self._judged(self.camera, uv) for uv in self.unseen]
-        return float(np.sqrt(np.nanmean(np.concatenate(errors)))) if errors else float("nan")
+        left = self.board.corners[:, 0] < middle_of(self.board)[0] + 1e-9
+        poses = _posed(self.camera, self.board, np.where(left[:, None], self.unseen, np.nan))
+        errors = self.camera.project(transform_each(poses, self.board.corners[~left])) - self.unseen[:, ~left]
+        squared = np.sum(errors**2, axis=-1)
+        known = np.isfinite(squared)
+        return float(np.sqrt(squared[known].mean())) if known.any() else float("nan")
 
     @cached_property
     def unseen(self) -> Array:
@@ -196,19 +252,7 @@ class BoardPictures(View):
             return self.corners[[self.index]] if self.leave_out else self.corners[:0]
         poses = _held(30.0, 0.45, self.board, self._true_camera, MOST + FRESH)[MOST:]
         uv = self._true_camera.project(transform_each(poses, self.board.corners))
-        return uv + self.noise * _dice(self.draw + 1000, len(self.board.corners))[:FRESH]
-
-    def _judged(self, camera: Camera, uv: Array) -> Array:
-        """Squared errors (n,) on the right half of a board whose pose was fitted to its left half."""
-        left = self.board.corners[:, 0] < middle_of(self.board)[0] + 1e-9
-        left, right = (half & np.isfinite(uv).all(axis=1) for half in (left, ~left))
-        if left.sum() < 6 or not right.any():
-            return np.empty(0)
-        K, lens = camera.intrinsics.K, camera.lens
-        coefficients = np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
-        _, turn, t = cv2.solvePnP(self.board.corners[left], uv[left], K, coefficients)
-        pose = RigidTransform.from_components(t.ravel(), Rotation.from_rotvec(turn.ravel()))
-        return np.sum((camera.at(pose.inv()).project(self.board.corners[right]) - uv[right]) ** 2, axis=1)
+        return uv + self.noise * _dice(round(self.draw) + 1000, len(self.board.corners))[:FRESH]
 
     # Boards moved by hand --------------------------------------------------------------------------------------------
 
@@ -237,10 +281,23 @@ def middle_of(board: Board) -> Array:
     return board.corners.mean(axis=0)
 
 
+def _posed(camera: Camera, board: Board, corners: Array) -> RigidTransform:
+    """cam_from_board of every board by its corners (views, n, 2) for a known camera; NaN for one with too few."""
+    assert isinstance(camera.lens, BrownConrady)
+    coefficients = np.array(astuple(camera.lens))
+    t, turn = np.full((len(corners), 3), np.nan), np.zeros((len(corners), 3))
+    for i, uv in enumerate(corners):
+        seen = np.isfinite(uv).all(axis=1)
+        if seen.sum() >= _ENOUGH:
+            _, rvec, tvec = cv2.solvePnP(board.corners[seen], uv[seen], camera.intrinsics.K, coefficients)
+            t[i], turn[i] = tvec.ravel(), rvec.ravel()
+    return RigidTransform.from_components(t, Rotation.from_rotvec(turn))
+
+
 @lru_cache(maxsize=4)
 def _dice(draw: int, corners: int) -> Array:
     """Errors of standard deviation 1, (MOST, corners, 2): the first boards' stay the same when there are more."""
-    return np.random.default_rng([6, round(draw)]).normal(size=(MOST, corners, 2))
+    return np.random.default_rng([6, draw]).normal(size=(MOST, corners, 2))
 
 
 @lru_cache(maxsize=16)
