@@ -21,7 +21,7 @@ from camviz.lenses.base import Array, as_points
 from camviz.views.base import View, choice, slider, switch
 
 BOARD = Board(9, 6, 0.025)
-TRUTH = Camera(Intrinsics(640, 480, 545.0, 543.0, 331.0, 233.0), BrownConrady(k1=-0.24, k2=0.07, p1=0.0008, p2=-0.0005))
+TRUTH = Camera(Intrinsics(640, 480, 545.0, 543.0, 331.0, 233.0), BrownConrady(k1=-0.24, k2=0.01, p1=0.0004, p2=-0.0003))
 FREE = {
     "f, c, k1": ("fx", "fy", "cx", "cy", "k1"),
     "all": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"),
