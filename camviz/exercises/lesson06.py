@@ -257,7 +257,7 @@ POSE = Exercise(
         "`M = np.linalg.inv(K) @ H; M = M * np.sign(M[2, 2]) / np.linalg.norm(M[:, 0])`. Then r₃ = r₁ × r₂, and "
         "`U @ Vt` of the SVD of [r₁ r₂ r₃] is the nearest rotation.",
     ),
-    praise="Known K, one picture: that is extrinsic calibration, and it is what every marker in augmented reality does.",
+    praise="Known K, one picture: that is extrinsic calibration, and what every marker in augmented reality does.",
     misconceptions=(
         Misconception(
             lambda H, K: _scaled_pose(H, K, lambda M: 1 / np.linalg.norm(M[:, 0])),

@@ -63,7 +63,7 @@ class BoardPictures(View):
     photographs: tuple[NDArray[np.uint8], ...] = field(default=(), compare=False, repr=False)
     width: int = 640
     height: int = 480
-    settled: float = 1e-8  # of the sum of squares: what a step of the refinement must still promise to take off
+    settled: float = 1e-12  # of the sum of squares: what a step of the refinement must still promise to take off
 
     @classmethod
     def of(

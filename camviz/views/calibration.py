@@ -18,7 +18,6 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
 from camviz.views.chessboard import outline, rim, squares
-from camviz.views.marks import on_photograph
 
 _MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 _CELLS = (16, 12)  # of the coverage map
@@ -113,9 +112,8 @@ class CalibrationView(BoardPictures):
     def _outlined(self, panel: Panel) -> str:
         """The picked board: its rows and columns of corners, in the order in which they are found."""
         uv = panel.place(self.corners[self.index]).reshape(self.board.rows, self.board.columns, 2)
-        class_ = "orange" if self.used[self.index] else "orange dashed"
-        drawn = [on_photograph([*uv, *uv.swapaxes(0, 1)], class_)] if self.photographs else []
-        return "".join(drawn) or svg.path([*uv, *uv.swapaxes(0, 1)], class_)
+        strength = " thin half" if self.photographs else "" if self.used[self.index] else " dashed"
+        return svg.path([*uv, *uv.swapaxes(0, 1)], f"orange{strength}")
 
     @property
     def magnified(self) -> float:
@@ -130,7 +128,7 @@ class CalibrationView(BoardPictures):
         residuals, found = self.residuals, self.corners
         starts, ends = panel.place(found), panel.place(found + self.magnified * residuals)
         others = np.arange(self.count) != self.index
-        faint = svg.segments(starts[others], ends[others], "red thin half")
+        faint = "" if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
         here = svg.dots(starts[self.index], "orange", 4) + svg.segments(starts[self.index], ends[self.index], "red")
         return faint + here
 
@@ -268,7 +266,9 @@ class CalibrationView(BoardPictures):
         if self.seen is not None or self.noise < _LOW:
             return ""
         x = 650 + 230 * _share(np.sqrt(2) * self.noise)
-        return svg.line([(x, 428), (x, 494)], "ink dashed") + svg.text((x, 507), "noise alone", "tick middle")
+        return svg.segments([(x, 430), (x, 474)], [(x, 448), (x, 492)], "ink") + svg.text(
+            (x, 507), "noise alone", "tick middle"
+        )
 
     def _per_board(self) -> str:
         errors = self.per_board
@@ -289,22 +289,20 @@ class CalibrationView(BoardPictures):
             parts.append(svg.text((940, 528), f"board {self.index + 1}: {_digits(chosen)} px", "note end"))
         return "".join(parts)
 
-    def _facts(self) -> str:
-        """fx, the picked board's distance Z, and their quotient, which is all that a flat-on board shows."""
-        parts = []
-        rows = [("true", self._lever(self.truth, self.cam_from_board))] if self.truth else []
-        rows += [("estimate", self._lever(self.camera, self.estimated_poses))]
-        for i, (name, words) in enumerate(rows):
-            parts.append(svg.text((650, 622 + 17 * i), name, "note"))
-            parts.append(svg.text((706, 622 + 17 * i), words, "number"))
-        words = f"correlation of fx with Z of board {self.index + 1}: {_signed(self.correlation)}"
-        return "".join(parts) + svg.text((650, 656), words if self.used[self.index] else "", "note")
+    def levers(self) -> list[str]:
+        """fx over the picked board's distance Z, which is all that a board held flat shows: true and estimated."""
+        rows = [("true", self.truth, self.cam_from_board)] if self.truth else []
+        rows += [("found", self.camera, self.estimated_poses)] if self.camera else []
+        return [f"{name:6}{self._lever(camera, poses)}" for name, camera, poses in rows]
 
-    def _lever(self, camera: Camera | None, poses: RigidTransform) -> str:
-        if camera is None:
-            return ""
+    def _lever(self, camera: Camera, poses: RigidTransform) -> str:
         f, z = camera.intrinsics.fx, transform(poses[self.index], middle_of(self.board))[2]
         return f"fx/Z = {_number('fx', f)}/{z:.3f} m = {f / z:.0f} px/m"
+
+    def _facts(self) -> str:
+        lines = [svg.text((650, 622 + 17 * i), words, "number") for i, words in enumerate(self.levers())]
+        words = f"correlation of fx with Z of board {self.index + 1}: {_signed(self.correlation)}"
+        return "".join(lines) + svg.text((650, 656), words if self.used[self.index] else "", "note")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
