@@ -13,8 +13,9 @@ import pytest
 from packaging.requirements import Requirement
 
 import camviz
-from camviz import command, doctor, working_copy
+from camviz import doctor, working_copy
 from camviz.command import main
+from camviz.commands import lab
 from camviz.working_copy import MANIFEST, lay_out
 
 DATA = Path(__file__).parent / "data"
@@ -407,8 +408,8 @@ def test_a_checkout_opens_its_own_lessons(jupyter, room, capsys):
 
 
 def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatch, capsys):
-    monkeypatch.setattr(command, "checkout_lessons", lambda: None)
-    monkeypatch.setattr(command, "lessons_source", lambda: lessons)
+    monkeypatch.setattr(lab, "checkout_lessons", lambda: None)
+    monkeypatch.setattr(lab, "lessons_source", lambda: lessons)
     assert main(["lab"]) == 0
     copy = room / "camviz-lessons"
     assert jupyter == [[f"--ServerApp.root_dir={copy}", str(copy / "00_start.ipynb")]]
@@ -417,8 +418,8 @@ def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatc
 
 def test_the_editions_do_not_overwrite_each_other(jupyter, room, lessons, monkeypatch, capsys):
     """The teacher's edition is not laid out over students' lessons, and opening it does not make it theirs."""
-    monkeypatch.setattr(command, "checkout_lessons", lambda: None)
-    monkeypatch.setattr(command, "lessons_source", lambda: lessons)
+    monkeypatch.setattr(lab, "checkout_lessons", lambda: None)
+    monkeypatch.setattr(lab, "lessons_source", lambda: lessons)
     assert main(["lab"]) == 0
     capsys.readouterr()
     assert "the students' lessons are in this one" in refused(capsys, room, "teacher", "camviz-lessons")
@@ -445,7 +446,7 @@ def test_lab_refuses_a_file_for_a_folder(jupyter, room, capsys):
 
 
 def test_lab_without_jupyterlab_says_how_to_get_it(room, monkeypatch, capsys):
-    monkeypatch.setattr(command, "find_spec", lambda name: None)
+    monkeypatch.setattr(lab, "find_spec", lambda name: None)
     assert main(["lab"]) == 1
     assert "pip install 'camviz[lab]'" in capsys.readouterr().err
     assert list(room.iterdir()) == []

@@ -14,6 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 import camviz
 from camviz import command
 from camviz.cameras import Camera, Intrinsics, transform
+from camviz.commands import convert
 from camviz.files import FORMATS, Board, Calibration, CalibrationError, alone, from_first_camera, write, writing
 from camviz.files.models import same_camera
 from camviz.lenses import (
@@ -397,5 +398,5 @@ def test_the_documentation_lists_every_format():
 
 
 def test_the_help_lists_every_format():
-    listed = [line.split()[0] for line in command.FORMATS.split("examples:")[0].splitlines()[1:] if line.strip()]
+    listed = [line.split()[0] for line in convert.FORMATS.split("examples:")[0].splitlines()[1:] if line.strip()]
     assert listed == list(FORMATS)

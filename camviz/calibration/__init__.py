@@ -7,15 +7,26 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
+    "CannotCalibrate": "detection",
     "Detections": "detection",
     "detect": "detection",
+    "detect_pair": "detection",
     "find_corners": "finding",
     "MODELS": "solving",
     "calibrate": "solving",
     "calibrate_pair": "solving",
 }
 
-__all__ = ["MODELS", "Detections", "calibrate", "calibrate_pair", "detect", "find_corners"]
+__all__ = [
+    "MODELS",
+    "CannotCalibrate",
+    "Detections",
+    "calibrate",
+    "calibrate_pair",
+    "detect",
+    "detect_pair",
+    "find_corners",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.arrowhead import Arrowhead
@@ -155,6 +155,10 @@ class Adjustment:
         """k, how many parameters there are with those of the poses."""
         return len(self.parameters) + len(POSE) * int(self.posed.sum())
 
+    def intrinsics(self, name: str) -> Array:
+        """The values (n,) of camera `name`'s `estimated` intrinsics."""
+        return np.array([parameter(self.cameras[name], key) for key in self.estimated[name]])
+
     def intrinsics_of(self, name: str) -> slice:
         """Where among `parameters` the intrinsics of camera `name` are."""
         start = 0
@@ -196,9 +200,8 @@ class Adjustment:
         residuals = self.residuals[name][views].copy()
         for values in (by_shared, by_pose, residuals):
             values[unused] = 0
-        rows = (int(views.sum()), -1)
-        shared = by_shared.reshape(rows[0], 2 * unused.shape[1], len(self.parameters))
-        return shared, by_pose.reshape(*rows, len(POSE)), residuals.reshape(rows)
+        rows = (int(views.sum()), 2 * unused.shape[1])
+        return by_shared.reshape(*rows, by_shared.shape[-1]), by_pose.reshape(*rows, len(POSE)), residuals.reshape(rows)
 
     def slopes(self, name: str) -> tuple[Array, Array]:
         """How camera `name`'s pixels follow the parameters, over the views that have a say.
@@ -249,30 +252,50 @@ class Adjustment:
 
     @cached_property
     def mean_twist_covariance(self) -> Array:
-        """Of the shared parameters and the mean of all views' twists together, (s + 6, s + 6).
+        """Of the shared parameters and the mean of all views' twists together, (s + 6, s + 6)."""
+        return self.joined_with_mean_twist(self.normal_equations.covariance)
+
+    def joined_with_mean_twist(self, shared: Array) -> Array:
+        """`mean_twist_covariance` if the shared parameters had the covariance `shared` (s, s) for σ = 1.
 
         With Wᵢ and Cᵢ of `Arrowhead`, a twist is -Wᵢ δ and noise of covariance Cᵢ⁻¹ that is its own. The mean of n:
         -W̄ δ, and noise of covariance Σ Cᵢ⁻¹/n².
         """
         normal = self.normal_equations
         follow = np.concatenate([np.eye(len(self.parameters)), -normal.levers.mean(axis=0)])
-        covariance = follow @ normal.covariance @ follow.T
+        covariance = follow @ shared @ follow.T
         covariance[-len(POSE) :, -len(POSE) :] += normal.block_inverses.mean(axis=0) / len(normal.block_inverses)
         return self.sigma**2 * covariance
 
-    # And where it leads ----------------------------------------------------------------------------------------------
+    # Parts of it, and where it leads ---------------------------------------------------------------------------------
 
-    def refined(self, settled: float = SETTLED, most_steps: int = MOST_STEPS) -> Adjustment:
-        """At the least sum of squares near by, by Levenberg's and Marquardt's method.
+    def only(self, views: ArrayLike) -> Adjustment:
+        """The same problem in some of its views, given by their numbers (n,) or as a mask (views,)."""
+        chosen = np.arange(self.views)[np.asarray(views)]
+        return replace(
+            self,
+            detections={name: seen[chosen] for name, seen in self.detections.items()},
+            first_from_board=self.first_from_board[chosen],
+            set_aside={name: mask[chosen] for name, mask in self.set_aside.items()},
+        )
+
+    def using(self, used: Mapping[str, Mask]) -> Adjustment:
+        """The same problem with a say for no other corners (views, corners) than those, by camera."""
+        return replace(self, set_aside={name: ~(used[name] & self.used[name]) for name in self.cameras})
+
+    def refined(
+        self, *, only_poses: bool = False, settled: float = SETTLED, most_steps: int = MOST_STEPS
+    ) -> Adjustment:
+        """At the least sum of squares near by, by Levenberg's and Marquardt's method; of the poses alone if so asked.
 
         It ends after `most_steps`, or when a step promises to take off less than `settled` of the sum. A corner that
         has an image at the start keeps one: a step that would carry it beyond a fold is shortened.
         """
-        here, damping = self, 1e-3
+        here, damping = replace(self, estimated=dict.fromkeys(self.cameras, ())) if only_poses else self, 1e-3
         for _ in range(most_steps):
-            shared, views = here.normal_equations.damped(damping).solution()
-            promised = shared @ here.normal_equations.shared_gradient
-            promised += np.sum(views * here.normal_equations.gradients)
+            normal = here.normal_equations
+            shared, views = normal.damped(damping).solution(only_views=only_poses)
+            promised = shared @ normal.shared_gradient + np.sum(views * normal.gradients)
             if not promised > settled * here.sum_of_squares:
                 break
             there = here._moved(shared, views)
@@ -282,7 +305,7 @@ class Adjustment:
                 damping *= 10
             else:
                 break
-        return here
+        return replace(here, estimated=self.estimated) if only_poses else here
 
     def _moved(self, shared: Array, twists: Array) -> Adjustment | None:
         """With its parameters changed; None where a lens does not take them or a corner in use loses its image."""

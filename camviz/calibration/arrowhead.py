@@ -34,12 +34,12 @@ class Arrowhead:
     def of(cls, by_shared: Array, by_view: Array, residuals: Array) -> Arrowhead:
         """From J's columns (v, n, s) and (v, n, m) and the residuals (v, n) of every view's n measurements."""
         transposed = np.swapaxes(by_shared, 1, 2)
-        columns, rows = by_shared.shape[2], by_shared.reshape(-1, by_shared.shape[2])
+        rows = by_shared.reshape(residuals.size, by_shared.shape[2])
         return cls(
             shared=rows.T @ rows,
             border=transposed @ by_view,
             blocks=np.swapaxes(by_view, 1, 2) @ by_view,
-            shared_gradient=rows.T @ residuals.ravel() if columns else np.zeros(0),
+            shared_gradient=rows.T @ residuals.ravel(),
             gradients=np.einsum("vnm,vn->vm", by_view, residuals),
         )
 
@@ -80,12 +80,13 @@ class Arrowhead:
         """Of the shared parameters, (s, s), for σ = 1."""
         return inverse(self.information)
 
-    def solution(self) -> tuple[Array, Array]:
-        """The shared parameters (s,) and the views' (v, m) with JᵀJ δ = Jᵀr."""
-        followed = np.einsum("vms,vm->s", self.levers, self.gradients)
-        shared = self.covariance @ (self.shared_gradient - followed)
-        views = np.einsum("vmn,vn->vm", self.block_inverses, self.gradients) - self.levers @ shared
-        return shared, views
+    def solution(self, *, only_views: bool = False) -> tuple[Array, Array]:
+        """The δ with JᵀJ δ = Jᵀr: shared (s,) and of the views (v, m); or of the views, with the shared ones kept."""
+        views = np.einsum("vmn,vn->vm", self.block_inverses, self.gradients)
+        if only_views:
+            return np.zeros_like(self.shared_gradient), views
+        shared = self.covariance @ (self.shared_gradient - np.einsum("vms,vm->s", self.levers, self.gradients))
+        return shared, views - self.levers @ shared
 
 
 def inverse(matrices: Array) -> Array:

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import signal
+import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
 
-from camviz.calibration.finding import find_corners
-from camviz.files.calibration import Board
+from camviz.calibration.finding import charuco_detector, find_corners, look
+from camviz.files.calibration import Board, Mask
 from camviz.lenses.base import Array
 
-__all__ = ["Detections", "detect", "find_corners"]
+__all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corners", "seen"]
 
 Progress = Callable[[int, int], object]
+Look = tuple[tuple[int, int] | None, Array | None, str]
+
+WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictures take
+
+
+class CannotCalibrate(ValueError):  # noqa: N818 - it says what is the case
+    """Pictures or corners that no camera can be calibrated from; the message is one sentence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +59,8 @@ class Detections:
             )
         if not self.places:
             object.__setattr__(self, "places", tuple(range(len(self.pictures))))
+        if len(self.places) != len(self.pictures):
+            raise ValueError(f"places must be {len(self.pictures)} indices, as there are pictures, got {self.places}")
 
 
 def detect(
@@ -53,30 +71,147 @@ def detect(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Detections:
-    """Find the board in pictures. Those without it, unreadable or of another size than most are skipped."""
-    names = [Path(path).name for path in paths]
-    found, sizes, skipped = {}, {}, {}
-    for place, path in enumerate(paths):
-        gray = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-        if gray is None:
-            skipped[place] = "it is not a picture that can be read"
-            continue
-        corners = find_corners(gray, board, finder)
-        if corners is None:
-            skipped[place] = "no board was found in it"
-            continue
-        found[place], sizes[place] = corners, gray.shape[::-1]
-        if progress:
-            progress(place + 1, len(paths))
-    if not found:
-        raise ValueError(f"no board with {board.columns}×{board.rows} inner corners was found")
-    ((width, height), _), *_ = Counter(sizes.values()).most_common()
-    places = tuple(place for place in found if sizes[place] == (width, height))
-    return Detections(
-        tuple(names[place] for place in places),
-        np.stack([found[place] for place in places]),
-        width,
-        height,
-        tuple((names[place], why) for place, why in skipped.items()),
-        places,
+    """Find a board in pictures, in `workers` processes (default: as many as there are processors, for many pictures).
+
+    Pictures without the board, those that cannot be read and those of another size than most are skipped. `progress` is
+    called with the numbers of pictures done and in all. `finder` is that of `find_corners`. Raises CannotCalibrate
+    where the board is in none of the pictures, or a process is lost.
+    """
+    return _gathered(_names(paths), _looked(paths, board, finder, workers, progress), board)
+
+
+def detect_pair(
+    left: Sequence[str | PathLike[str]],
+    right: Sequence[str | PathLike[str]],
+    board: Board,
+    *,
+    finder: str = "auto",
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[Detections, Detections]:
+    """`detect` in the pictures of two cameras at once; those with the same index are of one moment."""
+    if len(left) != len(right):
+        raise ValueError(f"right must have as many pictures as left, {len(left)}, got {len(right)}")
+    looks = _looked([*left, *right], board, finder, workers, progress)
+    return (
+        _gathered(_names(left), looks[: len(left)], board),
+        _gathered(_names(right), looks[len(left) :], board),
     )
+
+
+def seen(corners: Array) -> Mask:
+    """Which corners (..., 2) were seen, (...)."""
+    return np.asarray(np.isfinite(corners).all(axis=-1))
+
+
+def _looked(
+    paths: Sequence[str | PathLike[str]], board: Board, finder: str, workers: int | None, progress: Progress | None
+) -> list[Look]:
+    if not paths:
+        raise CannotCalibrate("there are no pictures to look for a board in")
+    if board.dictionary is not None:
+        charuco_detector(board)  # complains about a board that cannot be
+    looks: dict[int, Look] = {}
+    for place, found in _looks([str(path) for path in paths], board, finder, workers):
+        looks[place] = found
+        if progress:
+            progress(len(looks), len(paths))
+    return [looks[place] for place in range(len(paths))]
+
+
+def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Detections:
+    sizes = Counter(size for size, corners, _ in looks if corners is not None)
+    if not sizes:
+        raise CannotCalibrate(_nothing_found(names, looks, board))
+    size = max(sizes, key=lambda one: sizes[one])
+    found, skipped = {}, []
+    for place, (own_size, corners, why) in enumerate(looks):
+        if own_size is not None and own_size != size:
+            why = f"it has {own_size[0]}×{own_size[1]} pixels, most have {size[0]}×{size[1]}"  # type: ignore[index]
+        if why:
+            skipped.append((names[place], why))
+        else:
+            found[place] = corners
+    return Detections(
+        pictures=tuple(names[place] for place in found),
+        corners=np.stack(list(found.values())),  # type: ignore[arg-type]
+        width=size[0],  # type: ignore[index]
+        height=size[1],  # type: ignore[index]
+        skipped=tuple(skipped),
+        places=tuple(found),
+    )
+
+
+def _nothing_found(names: Sequence[str], looks: Sequence[Look], board: Board) -> str:
+    reasons = Counter(why for _, _, why in looks)
+    shown = ", ".join(names[:3]) + f" and {len(names) - 3} more" * (len(names) > 3)
+    if all(size is None for size, _, _ in looks):
+        why, _ = reasons.most_common(1)[0]
+        return f"none of the pictures can be used: {why} ({shown})"
+    kind = "chessboard" if board.dictionary is None else f"ChArUco board of {board.dictionary}"
+    return (
+        f"no {kind} with {board.columns}×{board.rows} inner corners ({board.columns + 1}×{board.rows + 1} squares) was "
+        f"found in any of {len(names)} pictures ({shown}): count the corners where four squares meet, "
+        "and see that the whole board with its white margin is in the picture"
+    )
+
+
+def _names(paths: Sequence[str | PathLike[str]]) -> list[str]:
+    """The files' names, and as much of the folders as tells them apart."""
+    names = [Path(path).name for path in paths]
+    return names if len(set(names)) == len(names) else [Path(path).as_posix() for path in paths]
+
+
+def _looks(paths: list[str], board: Board, finder: str, workers: int | None) -> Iterator[tuple[int, Look]]:
+    if workers is None:
+        workers = min(_processors(), len(paths) // WORTH_A_PROCESS)
+    if workers > 1 and len(paths) > 1:
+        yield from _in_processes(paths, board, finder, workers)
+    else:
+        for place, path in enumerate(paths):
+            yield place, look(path, board, finder)
+
+
+def _in_processes(paths: list[str], board: Board, finder: str, workers: int) -> Iterator[tuple[int, Look]]:
+    plain: Any = SimpleNamespace(**vars(board))  # what a process can unpack without importing half of camviz
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=cv2.setNumThreads, initargs=(1,))
+    try:
+        with _starting_processes():
+            futures = {pool.submit(look, path, plain, finder): place for place, path in enumerate(paths)}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    except BrokenProcessPool as error:
+        raise CannotCalibrate(
+            "a process that was looking for boards was ended from outside, perhaps because memory ran out: "
+            "try again with fewer processes at a time (--workers 1)"
+        ) from error
+    except BaseException:
+        for process in set(multiprocessing.active_children()) - before:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _starting_processes() -> Iterator[None]:
+    """Processes started here do not run the caller's script again, of which they need nothing; Ctrl-C is not theirs."""
+    main = sys.modules["__main__"]
+    held = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
+    block: Any = getattr(signal, "pthread_sigmask", lambda *_: set())  # inherited; not on Windows
+    mask = block(getattr(signal, "SIG_BLOCK", None), {signal.SIGINT})
+    try:
+        main.__spec__ = None
+        if "__file__" in held:
+            del main.__file__
+        yield
+    finally:
+        for name, value in held.items():
+            setattr(main, name, value)
+        block(getattr(signal, "SIG_SETMASK", None), mask)
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

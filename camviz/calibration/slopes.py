@@ -29,9 +29,9 @@ def parameter(camera: Camera, name: str) -> float:
 
 def with_parameters(camera: Camera, values: dict[str, float]) -> Camera:
     """The camera with other values of the named parameters. Raises ValueError where it cannot take them."""
-    pinhole = {name: value for name, value in values.items() if name in PINHOLE}
+    pinhole: dict[str, Any] = {name: float(value) for name, value in values.items() if name in PINHOLE}
+    bent: dict[str, Any] = {name: float(value) for name, value in values.items() if name not in PINHOLE}
     lens: Any = camera.lens
-    bent = {name: value for name, value in values.items() if name not in PINHOLE}
     return replace(
         camera,
         intrinsics=replace(camera.intrinsics, **pinhole),
@@ -42,8 +42,8 @@ def with_parameters(camera: Camera, values: dict[str, float]) -> Camera:
 def pixel_slopes(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) -> tuple[Array, Array, Array]:
     """Pixels (..., 2) of points (..., 3) in the camera's own frame, and their derivatives.
 
-    By the point, (..., 2, 3), and by the named intrinsic parameters, (..., 2, n): analytic in the camera matrix
-    and in the point before a Brown–Conrady lens, central differences elsewhere. NaN where the point has no image.
+    By the point, (..., 2, 3), and by the named intrinsic parameters, (..., 2, n): analytic in the camera matrix,
+    central differences through the lens. The pixel is NaN where the point has no image.
     """
     points_cam = as_points(points_cam, 3, "points_cam")
     pixels, lens = camera.intrinsics, camera.lens
@@ -60,12 +60,15 @@ def pixel_slopes(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) ->
 
 def _ray_slopes(lens: Lens, rays: Array) -> Array:
     """∂xy/∂ray, (..., 2, 3)."""
-    if isinstance(lens, BrownConrady):
-        ideal = rays[..., :2] / rays[..., 2:]
-        by_ideal = np.concatenate([np.broadcast_to(np.eye(2), (*ideal.shape, 2)), -ideal[..., None]], axis=-1)
-        return lens.jacobian(ideal) @ (by_ideal / rays[..., 2, None, None])
-    columns = [(lens.project(rays + step) - lens.project(rays - step)) / (2 * STEP) for step in STEP * np.eye(3)]
+    columns = [(_image(lens, rays + step) - _image(lens, rays - step)) / (2 * STEP) for step in STEP * np.eye(3)]
     return np.stack(columns, axis=-1)
+
+
+def _image(lens: Lens, rays: Array) -> Array:
+    """The lens's image, whether or not its polynomial folds on the way: to ask every lens of a difference is slow."""
+    if isinstance(lens, BrownConrady):
+        return lens.distort(rays[..., :2] / rays[..., 2:])
+    return lens.project(rays)
 
 
 def _pinhole_slope(name: str, xy: Array) -> Array:
@@ -81,10 +84,7 @@ def _lens_slope(lens: Any, name: str, rays: Array) -> Array:
     step = STEP * max(1.0, abs(value))
     lower, higher = _moved(lens, name, value - step), _moved(lens, name, value + step)
     width = getattr(higher, name) - getattr(lower, name)
-    if isinstance(lens, BrownConrady):  # its polynomial alone: where the domain ends takes a while to find
-        ideal = rays[..., :2] / rays[..., 2:]
-        return (higher.distort(ideal) - lower.distort(ideal)) / width
-    return (higher.project(rays) - lower.project(rays)) / width
+    return (_image(higher, rays) - _image(lower, rays)) / width
 
 
 def _moved(lens: Any, name: str, value: float) -> Any:

@@ -1,45 +1,48 @@
-"""From the corners of boards to cameras: OpenCV solves, and what it returns becomes a `Calibration`."""
+"""From the corners of boards to cameras: OpenCV solves, outliers are set aside, what is left is adjusted together."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
-from camviz.calibration.detection import Detections
-from camviz.cameras import Camera, Intrinsics, transform
-from camviz.files.calibration import Board, Calibration
-from camviz.lenses import BrownConrady
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.detection import CannotCalibrate, Detections, seen
+from camviz.calibration.models import MODELS, Model, Views, poses_from_rays
+from camviz.calibration.outliers import Masks, outliers, sentences
+from camviz.calibration.slopes import with_parameters
+from camviz.cameras import Camera
+from camviz.files.calibration import Board, Calibration, Mask
 from camviz.lenses.base import Array
 
-STANDARD = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+__all__ = ["MODELS", "calibrate", "calibrate_pair"]
+
 FEWEST_VIEWS = 3
-CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-12)
-
-
-@dataclass(frozen=True)
-class Model:
-    """A camera model: the intrinsic parameters that are solved for, and OpenCV's flags for them."""
-
-    parameters: tuple[str, ...]
-    flags: int = 0
-
-
-MODELS = {"standard": Model(STANDARD)}
+MOST_ROUNDS = 20
+TRIMMINGS = 10
+FOLDED = (
+    "the lens that fits the views folds inside the image: take views that reach into the corners of the image, "
+    "or a model with fewer parameters"
+)
 
 
 def calibrate(
     detections: Detections, board: Board, model: str = "standard", *, fixed: Sequence[str] = (), robust: bool = True
 ) -> Calibration:
-    """The camera, named "camera", that saw a board in at least three views."""
-    camera, cam_from_board = _solved(detections, board, MODELS[model])
-    return _calibration(
-        {"camera": camera}, {"camera": detections}, {"camera": cam_from_board}, board, MODELS[model].parameters
-    )
+    """The camera, named "camera", that saw a board in at least three views.
+
+    `model` is one of MODELS. Parameters that are `fixed` are not solved for: the principal point (cx, cy) stays in the
+    middle of the image, all others stay 0. With `robust`, corners and views that the rest contradicts are set aside:
+    see `camviz.calibration.outliers`. Raises CannotCalibrate where the views do not give a camera, ValueError for an
+    unknown model or parameter.
+    """
+    kind, estimated = _model(model, fixed)
+    adjustment = _alone("camera", detections, board, kind, estimated, robust)
+    return _calibration(adjustment, {"camera": detections}, detections.skipped)
 
 
 def calibrate_pair(
@@ -50,89 +53,214 @@ def calibrate_pair(
     *,
     fixed: Sequence[str] = (),
     robust: bool = True,
+    joint: bool = True,
 ) -> Calibration:
-    """The cameras "left" and "right" of a pair, from the views that both have; the left one's frame is the world."""
-    both = sorted(set(left.places) & set(right.places))
-    left, right = _only(left, both), _only(right, both)
-    solved = [_solved(detections, board, MODELS[model]) for detections in (left, right)]
-    objects, first = _lists(board, left.corners)
-    second = _lists(board, right.corners)[1]
-    matrices = [x for camera, _ in solved for x in (camera.intrinsics.K, _coefficients(camera))]
-    size = (left.width, left.height)
-    R, t = cv2.stereoCalibrate(
-        objects, first, second, *matrices, size, flags=cv2.CALIB_FIX_INTRINSIC, criteria=CRITERIA
-    )[5:7]
-    right_from_left = RigidTransform.from_components(np.ravel(t), Rotation.from_matrix(R))
-    cameras = {"left": solved[0][0], "right": solved[1][0].at(right_from_left.inv())}
-    poses = {"left": solved[0][1], "right": right_from_left * solved[0][1]}
-    return _calibration(cameras, {"left": left, "right": right}, poses, board, MODELS[model].parameters)
+    """The cameras "left" and "right" of a pair, from the views that both have; the left one's frame is the world.
+
+    Views are of one moment that have the same place among the pictures (`Detections.places`). All is solved for
+    together: both cameras, where the right one stands, and one pose of the board for each view. Without `joint` each
+    camera stays as it is when calibrated alone, and only the poses are solved for (OpenCV's CALIB_FIX_INTRINSIC).
+    Otherwise as `calibrate`.
+    """
+    kind, estimated = _model(model, fixed)
+    both = {"left": left, "right": right}
+    places = sorted(set(left.places) & set(right.places))
+    if len(places) < FEWEST_VIEWS:
+        raise CannotCalibrate(
+            f"at least {FEWEST_VIEWS} views in which both cameras see the board are needed, there are {len(places)}"
+        )
+    shared = {name: _only(detections, places) for name, detections in both.items()}
+    alone = {name: _alone(name, shared[name], board, kind, estimated, robust) for name in both}
+    pair = _paired(alone, board, estimated if joint else ())
+    pair = _robust(pair) if robust else _settled(pair)
+    if not joint:
+        pair = replace(pair, estimated=dict.fromkeys(both, estimated))
+    skipped = [picture for detections in both.values() for picture in detections.skipped]
+    for name, other in (("left", "right"), ("right", "left")):
+        lonely = set(both[name].places) - set(places)
+        names = [
+            picture for picture, place in zip(both[name].pictures, both[name].places, strict=True) if place in lonely
+        ]
+        skipped += [(picture, f"its partner of the {other} camera shows no board") for picture in names]
+    return _calibration(pair, shared, tuple(skipped))
 
 
-def _solved(detections: Detections, board: Board, model: Model) -> tuple[Camera, RigidTransform]:
-    if len(detections.corners) < FEWEST_VIEWS:
-        raise ValueError(f"detections must have at least {FEWEST_VIEWS} views, got {len(detections.corners)}")
-    objects, seen = _lists(board, detections.corners)
-    size = (detections.width, detections.height)
-    _, K, coefficients, rvecs, tvecs = cv2.calibrateCamera(
-        objects, seen, size, None, None, flags=model.flags, criteria=CRITERIA
+def _model(name: str, fixed: Sequence[str]) -> tuple[Model, tuple[str, ...]]:
+    """The model and the parameters that are to be estimated."""
+    if name not in MODELS:
+        raise ValueError(f"model must be one of {', '.join(MODELS)}, got {name!r}")
+    kind = MODELS[name]
+    free = [parameter for parameter in kind.parameters if parameter not in ("fx", "fy", "xi")]
+    for parameter in fixed:
+        if parameter not in free:
+            raise ValueError(f"fixed must be some of {', '.join(free)} of the model {name}, got {parameter!r}")
+    return kind, tuple(parameter for parameter in kind.parameters if parameter not in fixed)
+
+
+def _alone(
+    name: str, detections: Detections, board: Board, kind: Model, estimated: tuple[str, ...], robust: bool
+) -> Adjustment:
+    """One camera, solved for by OpenCV and adjusted."""
+    corners = detections.corners
+    if corners.shape[1] != board.columns * board.rows:
+        raise ValueError(
+            f"detections must have the {board.columns * board.rows} corners of the board, got {corners.shape}"
+        )
+    if len(corners) < FEWEST_VIEWS:
+        raise CannotCalibrate(
+            f"at least {FEWEST_VIEWS} views of the board are needed for a calibration, got {len(corners)}"
+        )
+    fixed = tuple(parameter for parameter in kind.parameters if parameter not in estimated)
+
+    def begun(aside: Mask) -> Adjustment:
+        camera, poses = _solved(detections, board, kind, fixed, aside)
+        return Adjustment(board, {name: camera}, {name: corners}, poses, {name: estimated}, {name: aside})
+
+    start = begun(np.zeros(corners.shape[:2], dtype=bool))
+    return _robust(start, lambda masks: begun(masks[name])) if robust else _settled(start)
+
+
+def _solved(
+    detections: Detections, board: Board, kind: Model, fixed: tuple[str, ...], aside: Mask
+) -> tuple[Camera, RigidTransform]:
+    """OpenCV's solution from the corners that are not set aside; a view that is has the pose of all its corners."""
+    there = seen(detections.corners)
+    use = np.asarray((there & ~aside).any(axis=1))
+    size = detections.width, detections.height
+    try:
+        camera, poses = kind.solve(Views.of(board, detections.corners[use], (there & ~aside)[use], *size), fixed)
+        middle = {"cx": (size[0] - 1) / 2, "cy": (size[1] - 1) / 2}
+        camera = with_parameters(camera, {parameter: middle.get(parameter, 0.0) for parameter in fixed})
+        if use.all():
+            return camera, poses
+        others = Views.of(board, detections.corners[~use], there[~use], *size)
+        silent = poses_from_rays(camera, others.points, others.pixels)
+        order = np.argsort(np.concatenate([np.flatnonzero(use), np.flatnonzero(~use)]))
+    except (cv2.error, ValueError) as error:
+        raise CannotCalibrate(
+            f"the views of the board do not give a camera of this model ({_first_line(error)}): take views that are "
+            "tilted against each other and reach into the corners of the image, or a simpler model"
+        ) from error
+    return camera, RigidTransform.concatenate([poses, silent])[order]
+
+
+def _paired(alone: Mapping[str, Adjustment], board: Board, estimated: tuple[str, ...]) -> Adjustment:
+    """Two cameras as a pair: the right one stands where the middle of the views has it."""
+    left, right = alone.values()
+    right_from_left = right.first_from_board * left.first_from_board.inv()
+    apart = np.linalg.norm(right_from_left.translation - np.median(right_from_left.translation, axis=0), axis=1)
+    right_camera = right.cameras["right"].at(right_from_left[int(np.argmin(apart))].inv())
+    poses = [left.first_from_board, right_from_left[int(np.argmin(apart))].inv() * right.first_from_board]
+    better = np.argmax([left.used["left"].sum(axis=1), right.used["right"].sum(axis=1)], axis=0)
+    return Adjustment(
+        board,
+        {"left": left.cameras["left"], "right": right_camera},
+        {**left.detections, **right.detections},
+        RigidTransform.concatenate([poses[camera][view] for view, camera in enumerate(better)]),
+        dict.fromkeys(alone, estimated),
+        {**left.set_aside, **right.set_aside},
     )
-    camera = Camera(Intrinsics.from_matrix(K, *size), BrownConrady.from_coefficients(coefficients))
-    rotations = Rotation.from_rotvec(np.reshape(rvecs, (-1, 3)))
-    return camera, RigidTransform.from_components(np.reshape(tvecs, (-1, 3)), rotations)
 
 
-def _lists(board: Board, corners: Array) -> tuple[list[Array], list[Array]]:
-    """What OpenCV takes: for each view the board's points and the pixels of the corners that were seen."""
-    seen = np.isfinite(corners).all(-1)
-    points = board.corners.astype(np.float32)
-    pixels = corners.astype(np.float32)
-    return [points[one] for one in seen], [view[one] for view, one in zip(pixels, seen, strict=True)]
+def _robust(adjustment: Adjustment, begin_anew: Callable[[Masks], Adjustment] | None = None) -> Adjustment:
+    """Solved, judged and solved again until no corner changes sides; the second time from the beginning."""
+    at_first = begin_anew is not None
+    for turn in range(MOST_ROUNDS):
+        adjustment = _settled(adjustment)
+        found = outliers(adjustment, at_first=at_first and turn == 0)
+        if turn > MOST_ROUNDS / 2:  # should some go to and fro, they go
+            found = {name: mask | adjustment.set_aside[name] for name, mask in found.items()}
+        same = all(np.array_equal(mask, adjustment.set_aside[name]) for name, mask in found.items())
+        if same and not (at_first and turn == 0):
+            return adjustment
+        _refuse_too_few(adjustment, found)
+        adjustment = begin_anew(found) if begin_anew and turn == 0 else replace(adjustment, set_aside=found)
+    return _settled(adjustment)
 
 
-def _coefficients(camera: Camera) -> Array:
-    lens = camera.lens
-    assert isinstance(lens, BrownConrady)
-    return np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
+def _settled(adjustment: Adjustment) -> Adjustment:
+    """At the least squares; a view without a say is given the pose that suits its own corners best."""
+    try:
+        adjustment = adjustment.refined()
+    except np.linalg.LinAlgError as error:  # a corner on the very fold of the lens
+        raise CannotCalibrate(FOLDED) from error
+    if sum(mask.sum() for mask in adjustment.used.values()) < sum(mask.sum() for mask in _wanted(adjustment)) / 2:
+        raise CannotCalibrate(FOLDED)
+    poses = list(adjustment.first_from_board)
+    for view in np.flatnonzero(~adjustment.posed):
+        poses[view] = _trimmed(adjustment, int(view)).first_from_board[0]
+    return replace(adjustment, first_from_board=RigidTransform.concatenate(poses))
+
+
+def _wanted(adjustment: Adjustment) -> list[Mask]:
+    """By camera, which corners (views, corners) are seen and not set aside."""
+    return [seen(corners) & ~adjustment.set_aside[name] for name, corners in adjustment.detections.items()]
+
+
+def _trimmed(adjustment: Adjustment, view: int) -> Adjustment:
+    """One view alone, its pose fitted to the better half of its corners (least trimmed squares, Rousseeuw 1984)."""
+    detections = {name: corners[view : view + 1] for name, corners in adjustment.detections.items()}
+    alone = replace(
+        adjustment,
+        detections=detections,
+        first_from_board=adjustment.first_from_board[view : view + 1],
+        estimated=dict.fromkeys(detections, ()),
+        set_aside={},
+    )
+    for _ in range(TRIMMINGS):
+        alone = alone.refined()
+        distances = {name: np.linalg.norm(residuals, axis=-1) for name, residuals in alone.residuals.items()}
+        middle = np.nanmedian(np.concatenate(list(distances.values()), axis=1))
+        alone = replace(alone, set_aside={name: distance > middle for name, distance in distances.items()})
+    return alone
+
+
+def _refuse_too_few(adjustment: Adjustment, aside: Masks) -> None:
+    for name, mask in aside.items():
+        left = int((seen(adjustment.detections[name]) & ~mask).any(axis=1).sum())
+        if left < FEWEST_VIEWS:
+            raise CannotCalibrate(
+                f"the views contradict each other: only {left} of {len(mask)} of the camera {name} would agree on one "
+                "camera; see that the board is the one named and lies still, and that zoom and focus are locked"
+            )
 
 
 def _only(detections: Detections, places: Sequence[int]) -> Detections:
     rows = [detections.places.index(place) for place in places]
     names = tuple(detections.pictures[row] for row in rows)
-    return Detections(
-        names, detections.corners[rows], detections.width, detections.height, detections.skipped, tuple(places)
-    )
+    return replace(detections, pictures=names, corners=detections.corners[rows], places=tuple(places))
 
 
 def _calibration(
-    cameras: dict[str, Camera],
-    detections: dict[str, Detections],
-    poses: dict[str, RigidTransform],
-    board: Board,
-    estimated: tuple[str, ...],
+    adjustment: Adjustment, detections: Mapping[str, Detections], skipped: tuple[tuple[str, str], ...]
 ) -> Calibration:
-    errors, aside = {}, {}
-    for name, camera in cameras.items():
-        points_cam = transform_views(poses[name], board.corners)
-        predicted = Camera(camera.intrinsics, camera.lens).project(points_cam)
-        squared = np.sum((detections[name].corners - predicted) ** 2, axis=-1)
-        errors[name] = np.sqrt(np.nanmean(squared, axis=1))
-        aside[name] = np.zeros(squared.shape, dtype=bool)
-    skipped = tuple(dict.fromkeys(pair for each in detections.values() for pair in each.skipped))
+    pictures = {name: each.pictures for name, each in detections.items()}
     return Calibration(
-        cameras,
+        adjustment.cameras,
         Path(),
         "camviz",
-        board,
-        detections={name: each.corners for name, each in detections.items()},
-        cam_from_board=poses,
-        per_view_errors=errors,
-        pictures={name: each.pictures for name, each in detections.items()},
-        set_aside=aside,
-        estimated=dict.fromkeys(cameras, estimated),
+        adjustment.board,
+        detections=adjustment.detections,
+        cam_from_board={
+            name: camera.cam_from_world * adjustment.first_from_board for name, camera in adjustment.cameras.items()
+        },
+        per_view_errors={name: _per_view_errors(adjustment, name) for name in adjustment.cameras},
+        notes=sentences(adjustment, pictures),
+        pictures=pictures,
+        set_aside=adjustment.set_aside,
+        estimated=adjustment.estimated,
+        intrinsics_covariance={name: adjustment.intrinsics_covariance(name) for name in adjustment.cameras},
         skipped=skipped,
     )
 
 
-def transform_views(cam_from_board: RigidTransform, points: Array) -> Array:
-    """Board points (corners, 3) in the camera's frame of each view, (views, corners, 3)."""
-    return np.stack([transform(pose, points) for pose in cam_from_board])
+def _per_view_errors(adjustment: Adjustment, name: str) -> Array:
+    """RMS (views,) in pixels over the corners in use, and over all of a view that was set aside."""
+    squared = np.sum(adjustment.residuals[name] ** 2, axis=-1)
+    used = adjustment.used[name]
+    counted = np.where(used.any(axis=1, keepdims=True), used, np.isfinite(squared))
+    return np.sqrt(np.sum(squared, axis=1, where=counted) / counted.sum(axis=1))
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(getattr(error, "err", error)).split())[:120]

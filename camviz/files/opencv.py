@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
+import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
@@ -20,6 +22,8 @@ DISTORTION = "distortioncoefficients|distortioncoeffs|distcoeffs|distcoeff|disto
 WIDTH, HEIGHT, SIZE = "(image|img)?width", "(image|img)?height", "(image|img)size|resolution"
 ROTATION, TRANSLATION = "r|rotation|rotationmatrix", "t|translation|translationvector"
 EXTRINSICS, ERRORS, DETECTIONS = "extrinsicparameters", "perviewreprojectionerrors", "imagepoints"
+PICTURES, ASIDE = "picturenames", "setaside"
+ESTIMATED, COVARIANCE = "estimatedparameters", "intrinsicscovariance"
 
 PAIRS = ({"0", "1"}, {"1", "2"}, {"l", "r"}, {"left", "right"})
 FOUR_COEFFICIENTS = (
@@ -52,8 +56,7 @@ def _read_one(section: Section, path: Path, size: tuple[int, int] | None, tag: s
     if key := _find(section, ROTATION):
         section.rotation(key)
         notes.append("R and T are not used: the file holds one camera, and it stands at the origin.")
-    views: dict[str, Any] = {field: {name: value} for field, value in _views(section).items()}
-    return Calibration({name: camera}, path, "OpenCV FileStorage", _board(section), notes=tuple(notes), **views)
+    return Calibration({name: camera}, path, "OpenCV FileStorage", **_recorded(section, {name: tag}, notes))
 
 
 def _read_pair(section: Section, path: Path, size: tuple[int, int] | None, left: str, right: str) -> Calibration:
@@ -70,7 +73,8 @@ def _read_pair(section: Section, path: Path, size: tuple[int, int] | None, left:
         "left": _camera(section, left, width, height),
         "right": _camera(section, right, width, height).at(right_from_left.inv()),
     }
-    return Calibration(cameras, path, "OpenCV FileStorage, stereo", _board(section), notes=tuple(notes))
+    recorded = _recorded(section, {"left": left, "right": right}, notes)
+    return Calibration(cameras, path, "OpenCV FileStorage, stereo", **recorded)
 
 
 def image_size(section: Section, given: tuple[int, int] | None) -> tuple[int, int]:
@@ -133,32 +137,89 @@ def _right_from_left(section: Section) -> RigidTransform | None:
     return RigidTransform.from_components(t, section.rotation(rotation or "R"))
 
 
+def _recorded(section: Section, tags: dict[str, str], notes: list[str]) -> dict[str, Any]:
+    """All that a calibration holds beside its cameras, whose names have the tags of their keys."""
+    by_name: dict[str, dict[str, Any]] = {}
+    for name, tag in tags.items():
+        for field, value in (_views(section, tag) | _solution(section, tag)).items():
+            by_name.setdefault(field, {})[name] = value
+    warp = np.array(section.vector("board_warp", [2], "sagittas along x and y")) if "board_warp" in section else None
+    if warp is not None:
+        warp.flags.writeable = False
+    skipped = words(section, "skipped_pictures")
+    if len(skipped) % 2:
+        raise section.error("skipped_pictures", "pairs of a picture and a reason", f"{len(skipped)} words")
+    pairs = tuple(zip(skipped[::2], skipped[1::2], strict=True))
+    said = (*notes, *words(section, "notes"))
+    return by_name | {"board": _board(section), "board_warp": warp, "skipped": pairs, "notes": said}
+
+
+def words(section: Section, key: str) -> tuple[str, ...]:
+    """A list of words, in which OpenCV's troublesome characters are written %XX; empty where there is none."""
+    if key not in section:
+        return ()
+    value = section.values[key]
+    listed = value if isinstance(value, list) else [value]
+    return tuple(unquote(Section({str(i): one}, section.where(key)).text(str(i))) for i, one in enumerate(listed))
+
+
 def _board(section: Section) -> Board | None:
     keys = [_find(section, name) for name in ("boardwidth", "boardheight", "squaresize")]
     width, height, square = keys
     if width is None or height is None or square is None:
         return None
     with explained(section.where("board")):
-        return Board(section.whole(width, 1000), section.whole(height, 1000), section.number(square))
+        marker = section.number("marker_size") if "marker_size" in section else None
+        dictionary = section.text("marker_dictionary") if "marker_dictionary" in section else None
+        return Board(
+            section.whole(width, 1000), section.whole(height, 1000), section.number(square), marker, dictionary
+        )
 
 
-def _views(section: Section) -> dict[str, Any]:
-    """What the file keeps of each view: detections, board poses, errors; all of the same number of views."""
+def _views(section: Section, tag: str) -> dict[str, Any]:
+    """What the file keeps of each view of a camera: corners, poses, errors …; all of the same number of views."""
     views: dict[str, Any] = {}
-    if key := _find(section, DETECTIONS):
+    if key := _find(section, DETECTIONS, tag):
         views["detections"] = _detections(section, key)
-    if key := _find(section, EXTRINSICS):
+    if key := _find(section, EXTRINSICS, tag):
         views["cam_from_board"] = _board_poses(section, key)
-    if key := _find(section, ERRORS):
+    if key := _find(section, ERRORS, tag):
         views["per_view_errors"] = section.array(key).ravel()
+    if key := _find(section, PICTURES, tag):
+        views["pictures"] = words(section, key)
+    if key := _find(section, ASIDE, tag):
+        views["set_aside"] = _mask(section, key, views.get("detections"))
     counts = {field: len(values) for field, values in views.items()}
     if len(set(counts.values())) > 1:
         held = ", ".join(f"{count} {field}" for field, count in counts.items())
         raise CalibrationError(f"expected the same number of views everywhere, got {held}")
     for values in views.values():
-        if not isinstance(values, RigidTransform):
+        if isinstance(values, np.ndarray):
             values.flags.writeable = False
     return views
+
+
+def _solution(section: Section, tag: str) -> dict[str, Any]:
+    """Which intrinsics of a camera were estimated, and their covariance."""
+    solution: dict[str, Any] = {}
+    if key := _find(section, ESTIMATED, tag):
+        solution["estimated"] = words(section, key)
+        if not all(re.fullmatch("[a-z]+(_[xy]|[0-9])?", name) for name in solution["estimated"]):
+            raise section.error(key, "names such as fx, cx and k1", ", ".join(solution["estimated"])[:60])
+    if key := _find(section, COVARIANCE, tag):
+        count = len(solution.get("estimated", ()))
+        solution["intrinsics_covariance"] = section.matrix(key, count, count)
+        solution["intrinsics_covariance"].flags.writeable = False
+    return solution
+
+
+def _mask(section: Section, key: str, detections: Any) -> Any:
+    """Ones for the corners of `detections` that were set aside, zeros for the others."""
+    mask = section.array(key)
+    if detections is None or mask.shape != detections.shape[:2] or not np.isin(mask, (0, 1)).all():
+        expected = "of image_points" if detections is None else "×".join(map(str, detections.shape[:2]))
+        raise section.error(key, f"a 0 or a 1 for each of the corners {expected}", "×".join(map(str, mask.shape)))
+    return mask == 1
 
 
 def _detections(section: Section, key: str) -> Any:

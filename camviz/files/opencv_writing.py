@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -43,7 +45,8 @@ def write(calibration: Calibration, path: Path) -> bytes:
 def _one(calibration: Calibration) -> dict[str, Any]:
     ((name, camera),) = calibration.cameras.items()
     values = _size(camera) | ({"camera_name": name} if name != "camera" else {})
-    return values | _camera(name, camera, "camera_matrix", "distortion_coefficients", "") | _views(calibration, name)
+    values |= _camera(name, camera, "camera_matrix", "distortion_coefficients", "")
+    return values | _recorded(calibration) | _views(calibration, name, "")
 
 
 def _pair(calibration: Calibration) -> dict[str, Any]:
@@ -56,7 +59,8 @@ def _pair(calibration: Calibration) -> dict[str, Any]:
             f"{TITLE} holds a pair of one kind, and only one of {left_name}, {right_name} is a fisheye"
         )
     pose = right.cam_from_world
-    return _size(left) | first | second | {"R": pose.rotation.as_matrix(), "T": np.reshape(pose.translation, (3, 1))}
+    values = _size(left) | first | second | {"R": pose.rotation.as_matrix(), "T": np.reshape(pose.translation, (3, 1))}
+    return values | _recorded(calibration) | _views(calibration, left_name, "1") | _views(calibration, right_name, "2")
 
 
 def _size(camera: Camera) -> dict[str, Any]:
@@ -74,19 +78,40 @@ def _camera(name: str, camera: Camera, matrix: str, distortion: str, tag: str) -
     return {matrix: same.intrinsics.K, distortion: np.array([list(coefficients.values())]), **extra}
 
 
-def _views(calibration: Calibration, name: str) -> dict[str, Any]:
+def _recorded(calibration: Calibration) -> dict[str, Any]:
+    """What belongs to no single camera."""
     values: dict[str, Any] = {}
     if board := calibration.board:
         values |= {"board_width": board.columns, "board_height": board.rows, "square_size": float(board.square_size)}
-    if name in calibration.detections:
-        values["image_points"] = np.ascontiguousarray(calibration.detections[name])
+        if board.marker_size is not None:
+            values |= {"marker_size": float(board.marker_size), "marker_dictionary": board.dictionary}
+    if calibration.board_warp is not None:
+        values["board_warp"] = np.reshape(calibration.board_warp, (1, 2))
+    if calibration.skipped:
+        values["skipped_pictures"] = [word for picture_and_why in calibration.skipped for word in picture_and_why]
+    return values | ({"notes": list(calibration.notes)} if calibration.notes else {})
+
+
+def _views(calibration: Calibration, name: str, tag: str) -> dict[str, Any]:
+    """What was recorded of one camera, under keys that end in its tag."""
+    values: dict[str, Any] = {}
+    if name in calibration.pictures:
+        values["picture_names"] = list(calibration.pictures[name])
+    if name in calibration.per_view_errors:
+        values["per_view_reprojection_errors"] = np.reshape(calibration.per_view_errors[name], (-1, 1))
     if name in calibration.cam_from_board:
         poses = calibration.cam_from_board[name]
         vectors = np.column_stack([np.atleast_2d(poses.rotation.as_rotvec()), np.atleast_2d(poses.translation)])
         values["extrinsic_parameters"] = np.ascontiguousarray(vectors)
-    if name in calibration.per_view_errors:
-        values["per_view_reprojection_errors"] = np.reshape(calibration.per_view_errors[name], (-1, 1))
-    return values
+    if name in calibration.estimated:
+        values["estimated_parameters"] = list(calibration.estimated[name])
+    if name in calibration.intrinsics_covariance:
+        values["intrinsics_covariance"] = np.ascontiguousarray(calibration.intrinsics_covariance[name])
+    if name in calibration.detections:
+        values["image_points"] = np.ascontiguousarray(calibration.detections[name])
+    if name in calibration.set_aside:
+        values["set_aside"] = np.ascontiguousarray(calibration.set_aside[name], dtype=np.uint8)
+    return {f"{key}{tag}": value for key, value in values.items()}
 
 
 def _stored(values: dict[str, Any], suffix: str) -> bytes:
@@ -95,5 +120,18 @@ def _stored(values: dict[str, Any], suffix: str) -> bytes:
     ending = suffix if suffix in (".xml", ".json") else ".yml"
     storage = cv2.FileStorage(f"calibration{ending}", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     for key, value in values.items():
-        storage.write(key, value)
+        if isinstance(value, list):
+            storage.startWriteStruct(key, cv2.FileNode_SEQ)
+            for word in value:
+                storage.write("", _escaped(word))
+            storage.endWriteStruct()
+        else:
+            storage.write(key, value)
     return str(storage.releaseAndGetString()).encode()
+
+
+def _escaped(word: str) -> str:
+    """With %XX for characters of which FileStorage makes invalid YAML, and for words that it would not keep as such."""
+    if word.lower() in ("", "true", "false", "null", "~", "nan", "inf"):
+        return "".join(f"%{byte:02X}" for byte in word.encode())
+    return re.sub(r"[^\w ./,:;()×-]", lambda found: quote(found[0], safe=""), word)

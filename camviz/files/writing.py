@@ -51,6 +51,17 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
 )
 
 
+BY_CAMERA = (
+    "detections",
+    "cam_from_board",
+    "per_view_errors",
+    "pictures",
+    "set_aside",
+    "estimated",
+    "intrinsics_covariance",
+)
+
+
 def write(calibration: Calibration, path: str | PathLike[str], format: str) -> tuple[str, ...]:
     """Write a calibration in one of FORMATS and return in sentences what the format could not hold beside the cameras.
 
@@ -75,8 +86,7 @@ def alone(calibration: Calibration, name: str) -> Calibration:
         names = ", ".join(calibration.cameras)
         raise CalibrationError(f"{calibration.source}: expected one of the cameras {names}, got {name!r}")
     views: dict[str, Any] = {
-        field: {key: value for key, value in getattr(calibration, field).items() if key == name}
-        for field in ("detections", "cam_from_board", "per_view_errors")
+        field: {key: value for key, value in getattr(calibration, field).items() if key == name} for field in BY_CAMERA
     }
     return replace(calibration, cameras={name: calibration.cameras[name]}, **views)
 
@@ -161,6 +171,12 @@ def _missing(calibration: Calibration, back: Calibration) -> list[str]:
         "detections": "the detected corners",
         "cam_from_board": "the poses of the board",
         "per_view_errors": "the errors of the views",
+        "pictures": "the names of the pictures",
+        "set_aside": "which corners were set aside",
+        "estimated": "which parameters were estimated",
+        "intrinsics_covariance": "their covariance",
+        "board_warp": "the bend of the board",
+        "skipped": "the pictures that were skipped",
         "world_from_imu": "the place of the IMU",
     }
     lost = [said for field, said in kinds.items() if _held(calibration, field) and not _held(back, field)]
@@ -169,4 +185,4 @@ def _missing(calibration: Calibration, back: Calibration) -> list[str]:
 
 def _held(calibration: Calibration, field: str) -> bool:
     value = getattr(calibration, field)
-    return value is not None and value != {}
+    return value is not None and not (isinstance(value, (Mapping, tuple)) and not value)

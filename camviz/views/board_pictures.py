@@ -173,7 +173,7 @@ class BoardPictures(View):
     @cached_property
     def adjustment(self) -> Adjustment | None:
         """The calibration; None without a board."""
-        return self.start and self.start.refined(self.settled, 40)
+        return self.start and self.start.refined(settled=self.settled, most_steps=40)
 
     @property
     def camera(self) -> Camera | None:

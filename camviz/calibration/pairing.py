@@ -1,0 +1,61 @@
+"""Which picture of the left camera was taken together with which of the right one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from camviz.calibration.detection import CannotCalibrate
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pictures of two cameras in the order of their moments, and those without a partner, with the reason."""
+
+    left: tuple[Path, ...]
+    right: tuple[Path, ...]
+    lonely: tuple[tuple[str, str], ...] = ()
+
+
+def paired(left: Sequence[Path], right: Sequence[Path]) -> Pairs:
+    """Pictures of the same name are of one moment, else those with the same last number in their names, else by order.
+
+    Order decides only where there are as many pictures of one camera as of the other. Raises CannotCalibrate where
+    nothing tells the partners.
+    """
+    for key in (_name, _last_number):
+        first, second = _by_key(left, key), _by_key(right, key)
+        if first and second and first.keys() & second.keys():
+            together = [each for each in first if each in second]
+            alone = [(path, "right") for each, path in first.items() if each not in second]
+            alone += [(path, "left") for each, path in second.items() if each not in first]
+            return Pairs(
+                tuple(first[each] for each in together),
+                tuple(second[each] for each in together),
+                tuple(
+                    (path.name, f"it has no partner among the pictures of the {other} camera") for path, other in alone
+                ),
+            )
+    if len(left) != len(right):
+        raise CannotCalibrate(
+            f"there are {len(left)} pictures of the left camera and {len(right)} of the right one, and their names do "
+            "not tell the pairs: give pictures of one moment the same number, as in left01.jpg and right01.jpg"
+        )
+    return Pairs(tuple(left), tuple(right))
+
+
+def _by_key(paths: Sequence[Path], key: Callable[[Path], str]) -> dict[str, Path] | None:
+    """The pictures by their keys; None unless every one has a key of its own."""
+    found = {key(path): path for path in paths}
+    return found if len(found) == len(paths) and "" not in found else None
+
+
+def _name(path: Path) -> str:
+    return path.stem
+
+
+def _last_number(path: Path) -> str:
+    numbers = re.findall(r"\d+", path.stem)
+    return str(int(numbers[-1])) if numbers else ""

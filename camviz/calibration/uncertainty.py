@@ -1,0 +1,80 @@
+"""How far off a projected pixel may be because the calibration is only an estimate: noise of corners, carried on.
+
+What is left out: that the lens may not be what the model says. Uncertainty is small, and wrong, for a wrong model.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.calibration.adjustment import Adjustment, twist_slopes
+from camviz.calibration.slopes import pixel_slopes
+from camviz.cameras import rotate
+from camviz.lenses.base import Array, as_points
+
+
+def projection_covariance(
+    adjustment: Adjustment, uv: ArrayLike, distance: float = inf, camera: str | None = None
+) -> Array:
+    """The covariance (..., 2, 2) in px² of where the point that pixel uv (..., 2) shows would be seen, solved anew.
+
+    The point is `distance` metres along the pixel's ray. It keeps its place relative to the boards, which is all that
+    two solutions have in common, and every board has an opinion of where that is: the camera sees the mean of them
+    (mrcal's recipe, mrcal.secretsauce.net/uncertainty.html). With the camera's own frame held fixed instead, a shift of
+    its principal point would count as an error, though the camera need only be turned to make up for it.
+    """
+    slopes = projection_slopes(adjustment, uv, distance, camera)
+    return slopes @ adjustment.mean_twist_covariance @ np.swapaxes(slopes, -1, -2)
+
+
+def projection_uncertainty(
+    adjustment: Adjustment, uv: ArrayLike, distance: float = inf, camera: str | None = None
+) -> Array:
+    """The standard deviation (...,) in pixels of `projection_covariance`, in its worst direction: √λ_max."""
+    return worst_deviation(projection_covariance(adjustment, uv, distance, camera))
+
+
+def mean_deviation(covariance: Array) -> Array:
+    """√((λ₁ + λ₂)/2) (...,) of covariances (..., 2, 2): what mrcal calls rms-stdev."""
+    return np.sqrt(np.trace(covariance, axis1=-2, axis2=-1) / 2)
+
+
+def worst_deviation(covariance: Array) -> Array:
+    """√λ_max (...,) of covariances (..., 2, 2): what mrcal calls worstdirection-stdev."""
+    mean = (covariance[..., 0, 0] + covariance[..., 1, 1]) / 2
+    half = (covariance[..., 0, 0] - covariance[..., 1, 1]) / 2
+    return np.sqrt(mean + np.hypot(half, covariance[..., 0, 1]))
+
+
+def projection_slopes(adjustment: Adjustment, uv: ArrayLike, distance: float = inf, camera: str | None = None) -> Array:
+    """∂q⁺/∂(shared parameters, mean twist of the boards), (..., 2, s + 6), at pixels uv (..., 2).
+
+    A board's twist (ω, τ) takes the point p it holds, in the first camera's frame, to p + ω × p + τ, whichever board
+    it is: so only the mean of all twists counts. The projection does not see the length of p, and everything is
+    divided by the distance d: [-[p]ₓ | 1] becomes [-[p/d]ₓ | 1/d], and at infinity rotations alone remain.
+    """
+    if not distance > 0:
+        raise ValueError(f"distance must be positive, in metres, or infinity, got {distance}")
+    name = next(iter(adjustment.cameras)) if camera is None else camera
+    intrinsics, place = adjustment.intrinsics_of(name), adjustment.place_of(name)
+    seen_by = adjustment.cameras[name]
+    rays_cam = seen_by.lens.unproject(seen_by.intrinsics.from_pixels(as_points(uv, 2, "uv")))
+    _, by_ray, by_intrinsics = pixel_slopes(seen_by, rays_cam, adjustment.estimated[name])
+
+    slopes = np.zeros((*rays_cam.shape[:-1], 2, len(adjustment.parameters) + 6))
+    slopes[..., intrinsics] = by_intrinsics
+    if place:
+        slopes[..., place] = by_ray @ _scaled_twist_slopes(rays_cam, distance)
+    rays_first = rotate(seen_by.world_from_cam.rotation, rays_cam) + seen_by.centre / distance
+    by_first = by_ray @ seen_by.cam_from_world.rotation.as_matrix()
+    slopes[..., -6:] = by_first @ _scaled_twist_slopes(rays_first, distance)
+    return slopes
+
+
+def _scaled_twist_slopes(points: Array, distance: float) -> Array:
+    slopes = twist_slopes(points)
+    slopes[..., 3:] /= distance
+    return slopes

@@ -1,0 +1,205 @@
+"""`camviz calibrate`: from pictures of a board to a calibration file."""
+
+from __future__ import annotations
+
+import argparse
+import glob
+import re
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, refuse_output
+
+if TYPE_CHECKING:
+    from camviz.files import Board, Calibration
+
+CALIBRATE = """\
+Finds a chessboard or a ChArUco board in pictures and solves for the camera that took them, or with --right for a pair
+of cameras. IMAGES are files, folders, or patterns such as 'left*.jpg'. Pictures without the board, of another size, or
+that cannot be read are named and skipped. Corners and whole views that contradict the rest are set aside, named, and
+kept in the file. What is written is OpenCV's YAML, with all that a later inspection needs.
+
+The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
+(left07.jpg and right07.jpg), else by their order.
+"""
+EPILOG = """\
+models:
+  standard    k1 k2 p1 p2 k3: most cameras
+  rational    and k4 k5 k6: wide angles, with many views that reach into the corners of the image
+  thin-prism  and s1 s2 s3 s4 beside the standard ones: tilted or decentred lenses
+  fisheye     k1 k2 k3 k4 of Kannala and Brandt, as cv2.fisheye has it
+  omni        xi k1 k2 p1 p2 of the unified sphere, as cv2.omnidir has it
+
+examples:
+  camviz calibrate left*.jpg --board 9x6 --square-mm 25
+  camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
+  camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
+"""
+MODELS = ("standard", "rational", "thin-prism", "fisheye", "omni")
+FINDERS = ("auto", "sectors", "classic")
+PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
+
+
+def add(commands: Any) -> None:
+    command = add_command(commands, "calibrate", calibrate, "calibrate a camera or a pair from pictures", CALIBRATE)
+    command.epilog = EPILOG
+    command.add_argument("images", metavar="IMAGES", nargs="+", help="pictures, folders of them, or patterns")
+    command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
+    add_board(command)
+    command.add_argument("--model", choices=MODELS, default="standard", help="which lens (default: standard)")
+    command.add_argument("--fix", metavar="NAMES", default="", help="parameters not to solve for, such as k3 or p1,p2")
+    command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
+    command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
+    command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
+    command.add_argument(
+        "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
+    )
+
+
+def calibrate(options: argparse.Namespace) -> int:
+    """Detect, solve and write the calibration, whole or not at all."""
+    from camviz.calibration import CannotCalibrate
+    from camviz.files import CalibrationError
+    from camviz.files.writing import write
+
+    board = board_of(options)
+    left = pictures(options.images)
+    right = pictures(options.right) if options.right else []
+    refuse_output(options.output, "calibration", *left, *right)
+    try:
+        calibration = _pair(left, right, board, options) if right else _single(left, board, options)
+        write(calibration, options.output, "opencv")
+    except CannotCalibrate as error:
+        raise Refusal(f"{error}.") from error
+    except CalibrationError as error:
+        raise Refusal(str(error)) from error
+    except OSError as error:
+        raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
+    for sentence in report(calibration):
+        print(sentence)
+    print(f"{options.output}: written.")
+    return OK
+
+
+def pictures(words: Sequence[str]) -> list[Path]:
+    """The files that words name: themselves, those of a folder, or those of a pattern; each once, in natural order."""
+    found: dict[Path, None] = {}
+    for word in words:
+        if "\0" in word:
+            raise Refusal(f"{word!r} is not a file name.")
+        path = Path(word)
+        if path.is_dir():
+            paths = sorted((each for each in path.iterdir() if PICTURES.fullmatch(each.suffix)), key=_natural)
+            if not paths:
+                raise Refusal(f"{path}: there are no pictures in this folder.")
+        elif path.exists():
+            paths = [path]
+        else:
+            paths = sorted(map(Path, glob.glob(word)), key=_natural)
+            if not paths:
+                what = "no picture fits this pattern" if glob.has_magic(word) else "there is no such picture or folder"
+                raise Refusal(f"{word}: {what}.")
+        found |= dict.fromkeys(paths)
+    return list(found)
+
+
+def report(calibration: Calibration) -> list[str]:
+    """What came out, in sentences."""
+    said = [f"{picture}: skipped, {why}." for picture, why in calibration.skipped]
+    said += calibration.notes
+    for name, camera in calibration.cameras.items():
+        deviations = np.sqrt(np.diag(calibration.intrinsics_covariance[name]))
+        of = dict(zip(calibration.estimated[name], deviations, strict=True))
+        grid = camera.intrinsics
+        values = [
+            f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]:.2f}" if key in of else "")
+            for key in ("fx", "fy", "cx", "cy")
+        ]
+        used = np.isfinite(calibration.detections[name]).all(axis=-1) & ~calibration.set_aside[name]
+        squares = calibration.per_view_errors[name] ** 2 * used.sum(axis=1)
+        rms = np.sqrt(squares.sum() / used.sum())
+        views = int(used.any(axis=1).sum())
+        said.append(
+            f"{name}: {', '.join(values)} px; RMS error {rms:.3f} px over {used.sum()} corners in {views} views."
+        )
+    if "right" in calibration.cameras:
+        x, y, z = 1000 * calibration.cameras["right"].centre
+        length = np.sqrt(x * x + y * y + z * z)
+        said.append(f"right stands {length:.2f} mm from left: x = {x:.2f}, y = {y:.2f}, z = {z:.2f} mm in its frame.")
+    return said
+
+
+def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Calibration:
+    from camviz.calibration import calibrate, detect
+
+    with Bar() as bar:
+        detections = detect(paths, board, finder=options.finder, workers=options.workers, progress=bar)
+    return _solved(lambda: calibrate(detections, board, options.model, **_how(options)), detections.skipped)
+
+
+def _pair(left: list[Path], right: list[Path], board: Board, options: argparse.Namespace) -> Calibration:
+    from camviz.calibration import calibrate_pair, detect_pair
+    from camviz.calibration.pairing import paired
+
+    pairs = paired(left, right)
+    with Bar() as bar:
+        both = detect_pair(pairs.left, pairs.right, board, finder=options.finder, workers=options.workers, progress=bar)
+    skipped = both[0].skipped + both[1].skipped + pairs.lonely
+    calibration = _solved(lambda: calibrate_pair(*both, board, options.model, **_how(options)), skipped)
+    return replace(calibration, skipped=calibration.skipped + pairs.lonely)
+
+
+def _solved(solve: Callable[[], Calibration], skipped: Sequence[tuple[str, str]]) -> Calibration:
+    """The solution; where there is none, the complaint names the pictures that are missing in it."""
+    from camviz.calibration import CannotCalibrate
+
+    try:
+        return solve()
+    except CannotCalibrate as error:
+        named = ", ".join(f"{picture} ({why})" for picture, why in skipped[:3])
+        more = f" and {len(skipped) - 3} more" * (len(skipped) > 3)
+        raise Refusal(f"{error}{'; skipped: ' * bool(skipped)}{named}{more}.") from error
+    except ValueError as error:  # a parameter to fix that the model does not have
+        if not str(error).startswith("fixed"):
+            raise
+        raise Refusal(f"{error}.") from error
+
+
+def _how(options: argparse.Namespace) -> dict[str, Any]:
+    return {"fixed": tuple(re.findall(r"[^,\s]+", options.fix)), "robust": not options.keep_outliers}
+
+
+def _natural(path: Path) -> tuple[Any, ...]:
+    """left2 before left10."""
+    return tuple(int(part) if part.isdigit() else part for part in re.split(r"([0-9]+)", path.name.lower()))
+
+
+def _count(text: str) -> int:
+    if not re.fullmatch("[0-9]{1,3}", text) or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a number of processes from 1 to 999, got {text!r}")
+    return int(text)
+
+
+class Bar:
+    """A bar on stderr, where that is a terminal, that grows with the pictures and goes when all is done."""
+
+    WIDTH = 30
+
+    def __enter__(self) -> Bar:
+        self.shown = sys.stderr.isatty()
+        return self
+
+    def __call__(self, done: int, count: int) -> None:
+        if self.shown:
+            full = self.WIDTH * done // count
+            bar = "█" * full + "░" * (self.WIDTH - full)
+            print(f"\r{bar} {done} of {count} pictures", end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self.shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,27 @@
+"""`camviz doctor`: what this machine can do."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from camviz.commands.common import LACKING, OK, add_command
+
+DOCTOR = """\
+Says what camviz finds on this machine, line by line: what works, what works less well, what is missing, and what to
+do about it. Solid 3D is tried in a process of its own, so that asking cannot do harm.
+"""
+
+
+def add(commands: Any) -> None:
+    command = add_command(commands, "doctor", doctor, "say what this machine can do, and how to mend it", DOCTOR)
+    command.add_argument("--json", action="store_true", help="the same for programs")
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """Print what was found; the status tells whether something that is needed is missing."""
+    from camviz import doctor as examination
+
+    findings = examination.examine()
+    print(examination.as_json(findings) if options.json else examination.as_text(findings))
+    return LACKING if any(finding.status == "missing" for finding in findings) else OK

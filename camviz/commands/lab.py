@@ -1,0 +1,53 @@
+"""`camviz lab`: the lessons in JupyterLab."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import camviz
+from camviz.commands.common import LACKING, OK, Refusal, add_command
+from camviz.working_copy import checkout_lessons, edition, lay_out, lessons_source
+
+LAB = """\
+Opens the lessons in JupyterLab. In a checkout of the repository these are the lessons there. Otherwise they are
+laid out in DIR, and laid out again only where you have not changed them: what you wrote is never overwritten. A new
+version of a lesson you did change is put beside it.
+"""
+
+
+def add(commands: Any) -> None:
+    command = add_command(commands, "lab", lab, "open the lessons in JupyterLab", LAB)
+    command.usage = "camviz lab [-h] [--no-browser] [DIR] [-- JUPYTER-OPTIONS]"
+    command.add_argument("directory", metavar="DIR", nargs="?", type=Path, help="where (default: ./camviz-lessons)")
+    command.add_argument("--no-browser", action="store_true", help="only serve them and print the address")
+
+
+def lab(options: argparse.Namespace, beyond: list[str]) -> int:
+    """Open JupyterLab on the checkout's lessons, or on a working copy."""
+    if find_spec("jupyterlab") is None:
+        raise Refusal("JupyterLab is not installed; `pip install 'camviz[lab]'` brings it.", LACKING)
+    source = lessons_source()
+    if source is None:
+        raise Refusal("the lessons are not part of this installation; `pip install camviz` brings them.", LACKING)
+    folder = options.directory or checkout_lessons() or Path("camviz-lessons")
+    if folder.exists() and not folder.is_dir():
+        raise Refusal(f"{folder}: expected a folder for the lessons, this is a file.")
+    if not (folder.exists() and folder.samefile(source)) and edition(folder) != "teacher":
+        for sentence in lay_out(source, folder, camviz.__version__):
+            print(sentence)
+    return _start_jupyter(folder.resolve(), ["--no-browser"] * options.no_browser + beyond)
+
+
+def _start_jupyter(folder: Path, extra: list[str]) -> int:
+    """JupyterLab in this process, so that Ctrl-C and the terminal are its own."""
+    from jupyterlab.labapp import LabApp
+
+    if lessons := checkout_lessons():  # which need not be installed for its lessons to import it
+        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(lessons.parent), os.environ.get("PYTHONPATH")]))
+    first = sorted(folder.glob("00*.ipynb"))[:1]
+    LabApp.launch_instance([f"--ServerApp.root_dir={folder}", *extra, *map(str, first)])
+    return OK

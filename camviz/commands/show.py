@@ -1,0 +1,48 @@
+"""`camviz show`: a page that shows a calibration."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from camviz.commands.common import OK, Refusal, add_command, loaded, refuse_output, size, write_whole
+
+SHOW = """\
+Writes one HTML page that shows the cameras of a calibration: where they stand and what they see, how their lenses
+bend straight lines, and how their pictures are tied together. The page holds everything it needs and opens offline.
+
+Reads OpenCV FileStorage (one camera or a pair), ROS CameraInfo, Kalibr camchains, COLMAP models (their folder too),
+mrcal, nerfstudio, EuRoC, Basalt, KITTI, MATLAB (as JSON) and Metashape files; the content tells which it is. The file
+is only read: nothing in it is run, and it is not changed.
+"""
+
+
+def add(commands: Any) -> None:
+    command = add_command(commands, "show", show, "write a page that shows a calibration", SHOW)
+    command.add_argument("file", metavar="FILE", type=Path, help="the calibration")
+    command.add_argument("-o", "--output", metavar="OUT.html", type=Path, help="the page (default: FILE's name, .html)")
+    command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
+
+
+def show(options: argparse.Namespace) -> int:
+    """Write the page of a calibration, whole or not at all."""
+    refuse_renderer()
+    calibration = loaded(options.file, options.size)
+    output = options.output or Path(options.file.stem + ".html")
+    refuse_output(output, "page", options.file)
+    from camviz.page import write_page
+
+    write_whole(output, lambda path: write_page(calibration, path))
+    for note in calibration.notes:
+        print(note)
+    print(f"{output}: open it in a browser.")
+    return OK
+
+
+def refuse_renderer() -> None:
+    from camviz.doctor import renderer
+
+    finding = renderer()
+    if finding.status != "ok":
+        raise Refusal(f"{finding.name}: {finding.detail}; {finding.remedy}.")

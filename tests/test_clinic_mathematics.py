@@ -1,0 +1,291 @@
+"""Facts about what the clinic asks: of unseen views, bent boards, the next board, depth and sorted residuals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from boards import BOARD, CAMERA, RIGHT, board_poses, noisy, truth
+from scipy.spatial.transform import RigidTransform
+from scipy.stats import kstest
+
+from camviz.calibration.board_warp import warp_test
+from camviz.calibration.cross_validation import halves, held_out
+from camviz.calibration.difference import difference
+from camviz.calibration.guidance import candidate_poses, next_board_poses, outline, tilt_deg
+from camviz.calibration.residual_statistics import (
+    board_displacements,
+    correlation,
+    correlation_with_depth,
+    coverage,
+    covered,
+    direction_profile,
+    radial_profile,
+    robust_sigma,
+    robust_z,
+    view_rms,
+)
+from camviz.calibration.slopes import with_parameters
+from camviz.calibration.stereo_depth import depth_uncertainty
+from camviz.cameras import transform
+from camviz.twoview import triangulate
+
+SIGMA = 0.2
+
+
+def shifted(camera, **changes):
+    """A camera with some of its intrinsics changed by so much."""
+    return with_parameters(camera, {name: getattr(camera.intrinsics, name) + step for name, step in changes.items()})
+
+
+# Views it has not seen ------------------------------------------------------------------------------------------------
+
+
+def test_halves_of_a_healthy_set_differ_by_noise_alone() -> None:
+    """40 sets: the probabilities are uniform (Kolmogorov-Smirnov, one in a thousand), and the ratio is about 1."""
+    rng = np.random.default_rng(1)
+    found = [halves(noisy(truth(board_poses(rng, 12)), rng, SIGMA).refined(), grid=(12, 9)) for _ in range(40)]
+    assert kstest([one.probability for one in found], "uniform").pvalue > 1e-3
+    assert 0.4 < np.median([one.ratio for one in found]) < 1.2
+
+
+def test_halves_disagree_after_the_focus_has_moved() -> None:
+    """The last six of twelve views with a focal length 3 % longer."""
+    rng = np.random.default_rng(2)
+    poses = board_poses(rng, 12)
+    before, after = truth(poses), truth(poses, {"camera": shifted(CAMERA, fx=16, fy=16)})
+    joined = np.where((np.arange(12) < 6)[:, None, None], before.detections["camera"], after.detections["camera"])
+    found = halves(noisy(replace(before, detections={"camera": joined}), rng, SIGMA).refined())
+    assert found.probability < 1e-6
+    assert found.ratio > 3
+
+
+def test_halves_need_three_views_each() -> None:
+    problem = noisy(truth(board_poses(np.random.default_rng(0), 5)), np.random.default_rng(0), SIGMA)
+    with pytest.raises(ValueError, match="at least 3 views, got 2 and 3"):
+        halves(problem)
+
+
+@pytest.mark.parametrize("folds", [None, 5])
+def test_corners_held_out_of_a_healthy_set_are_off_as_foretold(folds) -> None:
+    """Ten sets of twelve views: the errors are those that noise, pose and camera should give, within 5 %."""
+    rng = np.random.default_rng(3)
+    problems = [noisy(truth(board_poses(rng, 12)), rng, SIGMA).refined() for _ in range(10)]
+    found = [held_out(problem, folds=folds) for problem in problems]
+    assert np.mean([one.ratio for one in found]) == pytest.approx(1, abs=0.05)
+    assert np.mean([one.rms / one.expected_rms for one in found]) == pytest.approx(1, abs=0.07)
+
+
+def test_corners_held_out_show_what_poses_have_made_up_for() -> None:
+    """cx wrong by 50 px: fitted again, the poses hide most of it; corners that they were not fitted to do not."""
+    rng = np.random.default_rng(4)
+    healthy = noisy(truth(board_poses(rng, 12)), rng, SIGMA).refined()
+    wrong = replace(healthy, cameras={"camera": shifted(healthy.cameras["camera"], cx=50)}).refined(only_poses=True)
+    assert held_out(healthy).ratio < 1.1
+    assert held_out(wrong).ratio > 2.5
+    assert held_out(wrong).rms / held_out(healthy).rms > 1.2 * wrong.rms / healthy.rms
+    assert held_out(wrong).per_view.shape == (12,)
+
+
+# A bent board ---------------------------------------------------------------------------------------------------------
+
+
+def test_flat_boards_are_called_bent_no_oftener_than_was_said() -> None:
+    """100 flat boards: the probabilities are uniform; at a rate of 5 % there are at most 13 false alarms (99.9 %)."""
+    rng = np.random.default_rng(5)
+    tests = [warp_test(noisy(truth(board_poses(rng, 6)), rng, SIGMA)) for _ in range(100)]
+    assert kstest([one.probability for one in tests], "uniform").pvalue > 1e-3
+    assert sum(one.bowed(0.05) for one in tests) <= 13
+    assert sum(one.bowed() for one in tests) <= 2
+
+
+def test_a_bent_board_is_found_and_measured() -> None:
+    """Sagittas of 0.4 and -0.2 mm, within four of the deviations that are given with them."""
+    rng = np.random.default_rng(6)
+    bent = truth(board_poses(rng, 10), warp=np.array([4e-4, -2e-4]))
+    found = warp_test(noisy(replace(bent, warp=None), rng, SIGMA))
+    assert found.bowed(1e-6)
+    assert np.all(np.abs(found.warp_mm - [0.4, -0.2]) < 4 * found.deviation_mm)
+    assert np.all(found.deviation_mm < 0.05)
+    assert 0.4 < found.bend_mm < 0.7
+    assert found.bent.rms < found.flat.rms
+
+
+# The next board -------------------------------------------------------------------------------------------------------
+
+
+def test_candidates_show_the_whole_board() -> None:
+    poses = candidate_poses(CAMERA, BOARD)
+    assert len(poses) > 100
+    uv = np.array([CAMERA.project(transform(pose, outline(BOARD))) for pose in poses])
+    assert np.all((uv > -0.5) & (uv < [639.5, 479.5]))
+
+
+@pytest.fixture(scope="module")
+def parallel():
+    """Five views of boards that all face the camera, as beginners hold them."""
+    rng = np.random.default_rng(7)
+    return noisy(truth(board_poses(rng, 5, tilt=0.03)), rng, SIGMA).refined()
+
+
+def test_after_parallel_boards_a_tilted_one_is_asked_for(parallel) -> None:
+    best, *_, worst = next_board_poses(parallel, uv=[[320, 240], [200, 150]], distance=0.5)
+    assert best.tilt_deg > 20
+    assert best.after < best.before
+    assert worst.after <= worst.before
+    both = RigidTransform.concatenate([best.cam_from_board, worst.cam_from_board])
+    assert np.allclose([best.tilt_deg, worst.tilt_deg], tilt_deg(both, BOARD))
+
+
+def test_what_is_foretold_of_a_board_is_what_its_picture_brings(parallel) -> None:
+    """With the corners of the best and of the worst candidate added and solved anew 15 times, the camera's difference
+    from the truth is as much smaller as was said: the best is better than the worst, and by how much to 40 %."""
+    rng = np.random.default_rng(8)
+    ranked = next_board_poses(parallel)
+    errors = {}
+    for name, candidate in (("best", ranked[0]), ("worst", ranked[-1])):
+        poses = RigidTransform.concatenate([parallel.first_from_board, candidate.cam_from_board])
+        exact = replace(truth(poses), estimated=parallel.estimated)
+        solutions = [noisy(exact, rng, SIGMA).refined() for _ in range(15)]
+        maps = [difference(CAMERA, one.cameras["camera"], grid=(12, 9), within=400).length for one in solutions]
+        errors[name] = np.sqrt(np.nanmean(np.square(maps)))
+    assert errors["best"] < 0.8 * errors["worst"]
+    assert errors["best"] / errors["worst"] == pytest.approx(ranked[0].after / ranked[-1].after, rel=0.4)
+
+
+def test_a_candidate_that_is_not_whole_in_the_picture_is_refused(parallel) -> None:
+    aside = RigidTransform.from_translation([[1.0, 0, 0.3]])
+    with pytest.raises(ValueError, match=r"numbers \[0\]"):
+        next_board_poses(parallel, aside)
+
+
+# Depth ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return truth(board_poses(np.random.default_rng(9), 8), {"left": CAMERA, "right": RIGHT})
+
+
+def test_matching_noise_grows_with_the_square_of_the_distance(pair) -> None:
+    """σ_Z = Z² σ_d/(f B): for this pair, which is all but rectified, within 5 %."""
+    found = depth_uncertainty(pair, [0.5, 1, 2, 4], 0.5)
+    expected = 0.5 * found.depth**2 / (530 * np.linalg.norm(RIGHT.centre))
+    assert np.allclose(found.from_matching, expected, rtol=0.05)
+
+
+@pytest.mark.parametrize("uv", [None, (150.0, 340.0)])
+def test_depth_scatters_as_foretold(pair, uv) -> None:
+    """80 noisy calibrations, noise in the match, the point found by camviz's triangulation: σ_Z within 30 %."""
+    rng = np.random.default_rng(10)
+    depths = np.array([0.5, 1.5])
+    pixel = np.array([319.5, 239.5] if uv is None else uv)
+    ray = CAMERA.unproject(pixel)
+    points = depths[:, None] * ray / ray[2]
+    matched = RIGHT.project(points)
+    calibrated, both = [], []
+    for _ in range(80):
+        one = noisy(pair, rng, SIGMA).refined()
+        left, right = one.cameras["left"], one.cameras["right"]
+        for found, match in ((calibrated, 0.0), (both, 0.3)):
+            noise = match * rng.normal(size=(2, 1)) * [1, 0]
+            uvs = np.stack([np.tile(pixel, (2, 1)), matched + noise])
+            found.append(triangulate([left, right], uvs)[:, 2])
+    expected = depth_uncertainty(one, depths, 0.3, uv=uv)
+    scale = SIGMA / one.sigma
+    assert np.allclose(np.std(calibrated, axis=0), scale * expected.from_calibration, rtol=0.3)
+    assert np.allclose(np.std(both, axis=0), expected.total, rtol=0.3)
+
+
+# Residuals, sorted ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def solved():
+    rng = np.random.default_rng(12)
+    return noisy(truth(board_poses(rng, 10)), rng, SIGMA).refined()
+
+
+def test_rms_of_views_and_of_everything_agree(solved) -> None:
+    residuals = solved.residuals["camera"]
+    rms = view_rms(residuals)
+    seen = np.isfinite(residuals).all(-1).sum(axis=1)
+    assert np.sqrt(np.sum(rms**2 * seen) / seen.sum()) == pytest.approx(solved.rms)
+    unseen = np.full((2, 54, 2), np.nan)
+    assert np.isnan(view_rms(unseen)).all()
+
+
+def test_wild_corners_stand_out_and_do_not_hide_each_other(solved) -> None:
+    residuals = solved.residuals["camera"].copy()
+    assert robust_sigma(residuals) == pytest.approx(SIGMA, rel=0.1)
+    share = np.mean(robust_z(residuals)[np.isfinite(residuals).all(-1)] > 3.7)
+    assert share < 0.01
+    residuals[2, :50] = 20
+    z = robust_z(residuals)
+    assert z[2, :50].min() > 50
+    assert np.nanmax(z[3]) < 6
+
+
+def test_a_radial_error_shows_in_the_radial_profile_alone() -> None:
+    """Residuals of 0.3 px outwards beyond 200 px, nothing within; and a quarter turn of them is tangential."""
+    rng = np.random.default_rng(13)
+    uv = rng.uniform([0, 0], [640, 480], (4000, 2))
+    arm = uv - [320, 240]
+    radius = np.linalg.norm(arm, axis=-1, keepdims=True)
+    outwards = np.where(radius > 200, 0.3, 0) * arm / radius
+    noise = rng.normal(0, 0.05, uv.shape)
+    profile = radial_profile(outwards + noise, uv, [320, 240])
+    far = profile.radius > 230
+    assert np.all(np.abs(profile.radial[far] - 0.3) < 5 * profile.deviation[far])
+    assert np.all(np.abs(profile.radial[profile.radius < 180]) < 5 * profile.deviation[profile.radius < 180])
+    assert np.all(np.abs(profile.tangential) < 5 * profile.deviation)
+    clockwise = outwards[:, ::-1] * [-1, 1]
+    assert np.all(radial_profile(clockwise + noise, uv, [320, 240]).tangential[far] > 0.25)
+    assert profile.count.sum() == 4000
+
+
+def test_directions_are_counted_from_plus_u_on_clockwise() -> None:
+    residuals = [[1, 0.1], [0.1, 1], [-1, 0.1], [0.1, -1], [0.2, -1], [np.nan, 0]]
+    assert direction_profile(residuals, 4).tolist() == [2, 1, 0, 2]
+
+
+def test_a_corner_printed_wrong_is_found_on_the_board(solved) -> None:
+    """Corner 20 of every view 1 mm to the right of where it should be: the mean displacement says so."""
+    corners = BOARD.corners
+    corners[20, 0] += 1e-3
+    uv = solved.detections["camera"].copy()
+    points = np.array([transform(pose, corners[20]) for pose in solved.first_from_board])
+    uv[:, 20] = solved.cameras["camera"].project(points)
+    found = replace(solved, detections={"camera": uv}).refined()
+    mean = np.nanmean(board_displacements(found, "camera"), axis=0)
+    assert np.argmax(np.linalg.norm(mean, axis=-1)) == 20
+    assert np.allclose(mean[20], [1e-3, 0], atol=1.5e-4)
+
+
+def test_coverage_counts_cells() -> None:
+    counts = coverage([[0, 0], [0, 0], [639, 479], [np.nan, 3], [700, 3]], 640, 480, (4, 2))
+    assert counts.tolist() == [[2, 0, 0, 0], [0, 0, 0, 1]]
+    assert covered(counts) == 0.25
+
+
+def test_parallel_boards_show_in_the_correlation_of_f_and_z(parallel, solved) -> None:
+    names, bad = correlation_with_depth(parallel, "camera", 0)
+    good = correlation_with_depth(solved, "camera", 0)[1]
+    assert names[-1] == "Z"
+    assert np.allclose(np.diag(bad), 1)
+    assert bad[0, -1] > 0.99
+    assert good[0, -1] < 0.97
+    assert np.allclose(correlation(solved.covariance), good[:-1, :-1])
+
+
+def test_correlation_of_f_and_z_is_that_of_many_solutions(solved) -> None:
+    """40 solutions from fresh noise: the sample's correlation within three of its deviations (Fisher's z)."""
+    rng = np.random.default_rng(14)
+    exact = truth(board_poses(rng, 5))
+    samples = []
+    for _ in range(40):
+        one = noisy(exact, rng, SIGMA).refined()
+        z = transform(one.first_from_board[0], BOARD.corners.mean(axis=0))[2]
+        samples.append([one.cameras["camera"].intrinsics.fx, z])
+    expected = correlation_with_depth(one, "camera", 0)[1][0, -1]
+    measured = np.corrcoef(np.transpose(samples))[0, 1]
+    assert abs(np.arctanh(measured) - np.arctanh(expected)) < 3 / np.sqrt(37)
