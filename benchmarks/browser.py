@@ -30,7 +30,8 @@ COLUMNS = ("median ms", "p95 ms", "drag fps", "settled ms")
 
 def notebook(renderer: str) -> nbformat.NotebookNode:
     """The three explorers, then their naive equivalents; the first cell prints the kernel's process."""
-    start = f"import os, sys\nos.environ['CAMVIZ_RENDERER'] = {renderer!r}\nsys.path.append({str(HERE)!r})\n"
+    asked = "wire" if renderer == "wire" else ""  # solid is what nobody needs to ask for
+    start = f"import os, sys\nos.environ['CAMVIZ_RENDERER'] = {asked!r}\nsys.path.append({str(HERE)!r})\n"
     cells = [start + "from camviz.widgets import explore\nprint(os.getpid())"]
     for view in SLIDERS:
         module = view.removesuffix("View").lower()
@@ -75,6 +76,7 @@ def report(open_notebook: Notebook, renderer: str, changes: int, memory: int) ->
     if failed:
         raise RuntimeError(f"{failed[0]['ename']}: {failed[0]['evalue']}")
     kernel = psutil.Process(int(cells[0]["outputs"][0]["text"]))
+    open_notebook.page.wait_for_timeout(5000)  # what JupyterLab does after a notebook was opened
     open_notebook.page.add_script_tag(path=HERE / "stopwatch.js")
     explorers = open_notebook.page.query_selector_all(".camviz-explorer")
     naives = open_notebook.page.query_selector_all(".widget-interact")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import isfinite, radians, tan
 
 import numpy as np
@@ -144,15 +145,25 @@ class Camera:
         """The extrinsics [R | t] of the textbooks; t = -R C."""
         return self.world_from_cam.inv()
 
+    @cached_property
+    def extrinsics(self) -> tuple[Array, Array]:
+        """R (3, 3), whose rows are the camera's axes in the world, and t (3,) of [R | t]."""
+        world_from_cam = self.world_from_cam.as_matrix()
+        R = world_from_cam[:3, :3].T
+        t = -R @ world_from_cam[:3, 3]
+        R.flags.writeable = t.flags.writeable = False
+        return R, t
+
     def project(self, points_world: ArrayLike) -> Array:
         """Pixels (..., 2) of world points (..., 3) in metres, K ∘ lens ∘ cam_from_world; NaN where there is none."""
-        points_cam = transform(self.cam_from_world, points_world)
+        R, t = self.extrinsics
+        points_cam = as_points(points_world, 3, "points_world") @ R.T + t
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
     def unproject(self, uv: ArrayLike) -> Array:
         """Unit rays (..., 3) in the world, from the centre through pixels (..., 2); NaN where there is no ray."""
-        rays_cam = self.lens.unproject(self.intrinsics.from_pixels(uv))
-        return rotate(self.world_from_cam.rotation, rays_cam)
+        R, _ = self.extrinsics
+        return self.lens.unproject(self.intrinsics.from_pixels(uv)) @ R
 
     def rays(self) -> Array:
         """The unit ray (height, width, 3) in the world of every pixel."""
@@ -209,7 +220,8 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> R
 
 def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
     """Points (..., 3) taken by a rigid transform; scipy's `apply` takes only (n, 3)."""
-    return rotate(to_from.rotation, as_points(points, 3, "points")) + to_from.translation
+    matrix = to_from.as_matrix()
+    return as_points(points, 3, "points") @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:

@@ -7,6 +7,7 @@ import pytest
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.scenes import render, textured_scene, to_display
+from camviz.views import garden
 from camviz.views.distortion import DistortionView, _grid_lines
 
 
@@ -63,11 +64,11 @@ def test_a_corner_moves_as_far_as_opencv_says():
 
 def test_straightening_the_picture_gives_what_a_perfect_lens_would_have_seen():
     view = DistortionView(k1=-0.28, k2=0.07, show="undistorted")
-    straight = view.image(draft=True)
-    perfect = to_display(render(textured_scene(), Camera(view.intrinsics.resized(256, 192))))
-    inner = np.s_[24:168, 32:224]  # away from the border, where both have light
+    straight = view.image(draft=False)
+    perfect = to_display(render(textured_scene(), Camera(view.intrinsics.within(garden.FINE))))
+    inner = np.s_[40:272, 52:364]  # away from the border, where both have light
     assert cv2.PSNR(straight[inner], perfect[inner]) > 23
-    bent = view.but(show="distorted").image(draft=True)
+    bent = view.but(show="distorted").image(draft=False)
     assert cv2.PSNR(bent[inner], perfect[inner]) < 18
 
 

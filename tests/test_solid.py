@@ -147,7 +147,8 @@ def test_pictures_asked_for_from_many_threads_are_all_right():
     for thread in threads:
         thread.join()
     for side, data in seen.items():
-        assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR).shape == (side, side, 3)
+        pixels = round(solid.DRAFT * side)
+        assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR).shape == (pixels, pixels, 3)
 
 
 @needs_opengl
@@ -156,7 +157,7 @@ def test_a_draft_is_coarser_than_the_finished_picture():
     for draft in (True, False):
         _, photographs = draw_space(PANEL, [Face(SQUARE)], EYE, renderer="solid", draft=draft)
         sizes.append(cv2.imdecode(np.frombuffer(photographs["space-solid"], np.uint8), cv2.IMREAD_COLOR).shape[1])
-    assert sizes == [480, 480 * solid.FINE]
+    assert sizes == [480 * solid.DRAFT, 480 * solid.FINE]
 
 
 @needs_opengl

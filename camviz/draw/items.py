@@ -160,7 +160,7 @@ def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid"
 def _reach(camera: Camera, uv: Array) -> Array:
     """Vectors from the centre along the rays of pixels `uv`, to z = 1 or, for a wide lens, to the unit sphere."""
     rays = camera.unproject(uv)
-    forward = camera.world_from_cam.rotation.as_matrix()[:, 2]
+    forward = camera.extrinsics[0][2]
     z = camera.unproject(camera.intrinsics.border(SIDE)) @ forward
     flat = np.isfinite(z).all() and z.min() > 0.25
     return rays / (rays @ forward)[..., None] if flat else rays
@@ -174,7 +174,7 @@ def _mesh(camera: Camera, rows: int, columns: int) -> Array:
 
 def _up_marker(camera: Camera, top: Array, depth: float, colour: str) -> Item:
     """A small triangle above the middle of the rim's upper edge."""
-    right, down, _ = 0.1 * depth * camera.world_from_cam.rotation.as_matrix().T
+    right, down, _ = 0.1 * depth * camera.extrinsics[0]
     return Face(top - [0.2 * down + right, 0.2 * down - right, 1.5 * down], colour, 0.9)
 
 

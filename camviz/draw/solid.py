@@ -33,19 +33,21 @@ COLOURS = {
     "blue": "#2b8cd0", "orange": "#e0752e", "green": "#12a57e", "red": "#e0407f", "sky": "#58aee6", "yellow": "#d6a520",
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
-FINE = 1.5
-SLOW = 0.08  # seconds that a draft may take before wireframes take its place
+DRAFT, FINE = 0.65, 1.25
+SLOW = (
+    0.01  # seconds for one pixel a picture unit, beyond which drafts are wireframes: a fifth of a change's time
+)
 _BACKGROUND = 128
 
 
 def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> tuple[str, dict[str, bytes]]:
     """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
 
-    The photograph has FINE pixels per picture unit, as a draft one.
+    The photograph has FINE pixels per picture unit, or DRAFT.
     """
-    shot = _stage().submit(_shoot, sight, items, 1.0 if draft else FINE).result()
+    shot = _stage().submit(_shoot, sight, items, DRAFT if draft else FINE).result()
     fragment, photographs = _cut_out(shot, sight, name)
-    fragment += "".join(draw_lines(sight, items, hidden=shot.hides).values()) + draw_marks(sight, items, shot.hides)
+    fragment += draw_lines(sight, items, shot.hides) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
 
 

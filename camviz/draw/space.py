@@ -84,22 +84,27 @@ def draw_space(
     draft: bool = False,
     renderer: str | None = None,
     frame: RigidTransform | None = None,
+    scenery: tuple[Item, ...] = (),
 ) -> tuple[str, dict[str, bytes]]:
-    """The content of a panel, and the photographs it needs.
+    """The content of a panel, and the photographs it needs: the `scenery`, of `scene_items`, and the items in it.
 
     `renderer` is "solid" or "wire"; left out, it is solid wherever OpenGL works, unless the environment variable
     CAMVIZ_RENDERER says "wire". Both show the same points at the same places. `frame` is world_from_frame where the eye
     stands in another frame than the world's. Raises ValueError for another renderer.
     """
-    camera = eye.camera(round(panel.width), round(panel.height))
+    sight = _sight(eye, round(panel.width), round(panel.height))
     if frame is not None:
-        camera = camera.at(frame * camera.world_from_cam)
-    sight = Sight(camera, eye.distance)
+        sight = Sight(sight.camera.at(frame * sight.camera.world_from_cam), eye.distance)
     if chosen_renderer(renderer, draft) == "solid":
         from camviz.draw.solid import draw_solid
 
-        return draw_solid(sight, items, panel.name, draft)
-    return draw_wire(sight, items, panel.name, scale=1 if draft else 2)
+        return draw_solid(sight, [*scenery, *items], panel.name, draft)
+    return draw_wire(sight, items, panel.name, 0.7 if draft else 2, scenery)
+
+
+@lru_cache(maxsize=4)
+def _sight(eye: Eye, width: int, height: int) -> Sight:
+    return Sight(eye.camera(width, height), eye.distance)
 
 
 @lru_cache(maxsize=4)

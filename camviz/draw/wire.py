@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,20 +30,15 @@ def nothing_hides(px: Array, depth: Array) -> np.ndarray:
     return np.zeros(len(px), dtype=bool)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sight:
     """The onlooker's camera and how far it looks: what is `distance` metres deep is drawn at ordinary strength."""
 
     camera: Camera
     distance: float
 
-    @cached_property
-    def _extrinsics(self) -> tuple[Array, Array]:
-        cam_from_world = self.camera.cam_from_world
-        return cam_from_world.rotation.as_matrix(), cam_from_world.translation
-
     def points_cam(self, points_world: Array) -> Array:
-        R, t = self._extrinsics
+        R, t = self.camera.extrinsics
         return points_world @ R.T + t
 
     def place(self, points_cam: Array) -> Array:
@@ -67,11 +62,22 @@ class Pieces:
     hidden: np.ndarray
 
 
-def draw_wire(sight: Sight, items: Sequence[Item], name: str, scale: float = 1) -> tuple[str, dict[str, bytes]]:
-    """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …"""
-    fills = sorted(_fills(sight, items, name, scale), key=lambda fill: -fill[0])
+Fill = tuple[float, str, dict[str, bytes]]  # depth, fragment, attached pictures
+
+
+def draw_wire(
+    sight: Sight, items: Sequence[Item], name: str, scale: float = 1, scenery: tuple[Item, ...] = ()
+) -> tuple[str, dict[str, bytes]]:
+    """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …
+
+    What is seen of the `scenery`, lines and faces that do not change, is kept while the onlooker stands still.
+    """
+    stage, kept = _scenery(sight, scenery)
+    fills = sorted([*kept, *_fills(sight, items, name, scale)], key=lambda fill: -fill[0])
     depths = np.array([depth for depth, _, _ in fills])
-    strokes = draw_lines(sight, items, depths)
+    behind, lines = _lines(scenery), _lines(items)
+    pieces = _joined(stage, len(behind), cut(sight, lines, nothing_hides, fine=False))
+    strokes = _strokes(sight, [*behind, *lines], pieces, depths)
     layers = [strokes.get(0, "")]
     for i, (_, fragment, _) in enumerate(fills):
         layers += [fragment, strokes.get(i + 1, "")]
@@ -79,24 +85,35 @@ def draw_wire(sight: Sight, items: Sequence[Item], name: str, scale: float = 1) 
     return "".join(layers) + draw_marks(sight, items), photographs
 
 
-def draw_lines(
-    sight: Sight, items: Sequence[Item], fills: Array | None = None, hidden: Hidden = nothing_hides
-) -> dict[int, str]:
-    """The lines, keyed by how many of the filled things at depths `fills` (descending) they come after."""
-    lines = [item for item in items if isinstance(item, Line)]
+def draw_lines(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
+    """The lines alone, faint where something solid hides them."""
+    lines = _lines(items)
     pieces = cut(sight, lines, hidden, fine=hidden is not nothing_hides)
-    depths = np.empty(0) if fills is None else fills
-    slot = (
-        np.searchsorted(-depths, -0.98 * pieces.depth, side="left") if len(depths) else np.zeros(len(pieces.depth), int)
-    )
+    return "".join(_strokes(sight, lines, pieces, np.empty(0)).values())
+
+
+@lru_cache(maxsize=4)
+def _scenery(sight: Sight, items: tuple[Item, ...]) -> tuple[Pieces, list[Fill]]:
+    return cut(sight, _lines(items), nothing_hides, fine=False), list(_fills(sight, items, "scenery", 1))
+
+
+def _lines(items: Sequence[Item]) -> list[Line]:
+    return [item for item in items if isinstance(item, Line)]
+
+
+def _strokes(sight: Sight, lines: Sequence[Line], pieces: Pieces, depths: Array) -> dict[int, str]:
+    """The lines, keyed by how many of the filled things at `depths` (descending) they come after."""
+    slot = np.searchsorted(-depths, -0.98 * pieces.depth, side="left")
     level = np.where(pieces.hidden, -1, sight.strength(pieces.depth))
     pens = {pen: i for i, pen in enumerate(dict.fromkeys((line.class_, line.width) for line in lines))}
     pen = np.array([pens[line.class_, line.width] for line in lines], dtype=int)[pieces.line]
+    key = (slot * (LEVELS + 1) + level + 1) * len(pens) + pen
     layers: dict[int, str] = {}
     names = list(pens)
-    for key, chosen in _groups(np.stack([slot, level, pen], axis=-1)):
-        class_, width = names[key[2]]
-        layers[key[0]] = layers.get(key[0], "") + _stroke(pieces, chosen, class_, width, key[1])
+    for group, data in _path_data(pieces, key):
+        rest, which = divmod(group, len(pens))
+        slot_, strength = divmod(rest, LEVELS + 1)
+        layers[slot_] = layers.get(slot_, "") + _stroke(data, *names[which], strength - 1)
     last = max(layers, default=0)
     layers[last] = layers.get(last, "") + "".join(_heads(sight, lines))
     return layers
@@ -136,6 +153,15 @@ def cut(sight: Sight, lines: Sequence[Line], hidden: Hidden, fine: bool) -> Piec
     return Pieces(px[:, [0, 2]], depth[:, 1], line[whole], segment[whole], hidden(px[:, 1], depth[:, 1]))
 
 
+def _joined(first: Pieces, lines: int, then: Pieces) -> Pieces:
+    """The pieces of `lines` lines, then those of others."""
+    both = {name: np.concatenate([getattr(first, name), getattr(then, name)]) for name in vars(first)}
+    count = len(first.line)
+    both["line"][count:] += lines
+    both["segment"][count:] += 1 + first.segment.max(initial=0)
+    return Pieces(**both)
+
+
 def _segments(sight: Sight, lines: Sequence[Line]) -> tuple[Array, Array, np.ndarray]:
     if not lines:
         return np.empty((0, 3)), np.empty((0, 3)), np.empty(0, int)
@@ -165,33 +191,34 @@ def _pyramid(sight: Sight) -> Array:
     return np.array([(0, 0, 1, NEAR), (1, 0, x, 0), (-1, 0, x, 0), (0, 1, y, 0), (0, -1, y, 0)])
 
 
-def _groups(keys: np.ndarray) -> Iterator[tuple[list[int], np.ndarray]]:
-    """Equal rows of keys (n, k) in ascending order: the row, and where it occurs."""
-    order = np.lexsort(keys.T[::-1])
-    ordered = keys[order]
-    borders = np.flatnonzero((ordered[1:] != ordered[:-1]).any(axis=-1)) + 1
-    for chosen in np.split(order, borders) if len(order) else []:
-        yield keys[chosen[0]].tolist(), np.sort(chosen)
-
-
-def _stroke(pieces: Pieces, chosen: np.ndarray, class_: str, width: float, level: int) -> str:
+def _stroke(data: str, class_: str, width: float, level: int) -> str:
     nearness = max(level, 0) / (LEVELS - 1)
     opacity = 0.16 if level < 0 else 0.55 + 0.45 * nearness
     style = f"stroke-width:{width * (0.75 + 0.5 * nearness):.2f};stroke-opacity:{opacity:.2f}"
-    return svg.element("path", d=_data(pieces, chosen), class_=class_, style=style)
+    return svg.element("path", d=data, class_=class_, style=style)
 
 
-def _data(pieces: Pieces, chosen: np.ndarray) -> str:
-    """Path data: consecutive pieces of one segment become one stroke, strokes that touch become one line."""
-    segment = pieces.segment[chosen]
-    broken = (chosen[1:] != chosen[:-1] + 1) | (segment[1:] != segment[:-1])
-    firsts, lasts = chosen[np.concatenate([_YES, broken])], chosen[np.concatenate([broken, _YES])]
-    strokes = np.concatenate([pieces.ends[firsts, 0], pieces.ends[lasts, 1]], axis=-1).round(1)
-    touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1)])
-    return "".join(
+def _path_data(pieces: Pieces, key: np.ndarray) -> Iterator[tuple[int, str]]:
+    """Of all pieces with one key, in ascending order of keys: the key, and their path data.
+
+    Consecutive pieces of one segment become one stroke, strokes that touch become one line.
+    """
+    order = np.argsort(key, kind="stable")
+    if not len(order):
+        return
+    key, segment = key[order], pieces.segment[order]
+    broken = (key[1:] != key[:-1]) | (order[1:] != order[:-1] + 1) | (segment[1:] != segment[:-1])
+    firsts, lasts = np.concatenate([_YES, broken]), np.concatenate([broken, _YES])
+    strokes = np.concatenate([pieces.ends[order[firsts], 0], pieces.ends[order[lasts], 1]], axis=-1).round(1)
+    key = key[firsts]
+    touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1) & (key[1:] == key[:-1])])
+    words = [
         f"L{c:g},{d:g}" if touch else f"M{a:g},{b:g}L{c:g},{d:g}"
         for (a, b, c, d), touch in zip(strokes.tolist(), touches.tolist(), strict=True)
-    )
+    ]
+    starts = np.flatnonzero(np.concatenate([_YES, key[1:] != key[:-1]])).tolist()
+    for start, end in zip(starts, [*starts[1:], len(words)], strict=True):
+        yield int(key[start]), "".join(words[start:end])
 
 
 def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
@@ -210,10 +237,8 @@ def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
                 )
 
 
-def _fills(
-    sight: Sight, items: Sequence[Item], name: str, scale: float
-) -> Iterator[tuple[float, str, dict[str, bytes]]]:
-    """Depth, fragment and attached pictures of every face and sheet in view."""
+def _fills(sight: Sight, items: Sequence[Item], name: str, scale: float) -> Iterator[Fill]:
+    """Every face and sheet in view."""
     for i, item in enumerate(items):
         if isinstance(item, Face):
             vertices = _cut_near(sight.points_cam(item.vertices))

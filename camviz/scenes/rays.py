@@ -74,7 +74,7 @@ class Runs:
 
     def moved(self, world_from_cam: RigidTransform) -> Runs:
         """The same rays of a camera whose centre was the origin, where the camera stands now."""
-        turn = world_from_cam.rotation.as_matrix().astype(np.float32)
+        turn = world_from_cam.as_matrix()[:3, :3].astype(np.float32)
         centre = np.asarray(world_from_cam.translation, dtype=float)[:, None]
         directions = (turn @ self.directions.reshape(3, -1)).reshape(self.directions.shape)
         return replace(

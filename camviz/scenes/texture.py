@@ -51,8 +51,8 @@ class Texture:
         if not np.any(level):
             return self._look_up(s, r, np.zeros((), dtype=np.intp))
         fine = np.broadcast_to(level, s.shape).astype(np.intp)
-        near = self._look_up(s, r, fine)
-        far = self._look_up(s, r, np.minimum(fine + 1, self._places.shape[1] - 1))
+        both = np.minimum(np.stack([fine, fine + 1]), self._places.shape[1] - 1)
+        near, far = self._look_up(s, r, both).reshape(2, -1, 3)
         far -= near
         far *= (level - fine).astype(np.float32)[..., None]
         near += far
@@ -62,7 +62,7 @@ class Texture:
         left, top, width, height = self._places.take(level, axis=1)
         x = _texel(s, width, self.repeat)
         y = _texel(r, height, self.repeat)
-        return _remap(self._mosaic, x + left, y + top)
+        return _remap(self._mosaic, (x + left).ravel(), (y + top).ravel())
 
 
 def _in_steps(light: NDArray[Any]) -> Steps:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from functools import cache, cached_property
+from functools import cached_property
 from math import atan, atan2, cos, degrees, hypot, inf, isfinite, pi, sin, tan
 from typing import Any, ClassVar
 
@@ -20,7 +20,8 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import on_plane, unit
-from camviz.scenes import Scene, snapshot, textured_scene
+from camviz.scenes import snapshot, textured_scene
+from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
@@ -163,9 +164,9 @@ class DistortionView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def image(self, *, draft: bool) -> np.ndarray:
-        small = Camera(self.intrinsics.within(256 if draft else 480), self.camera.lens)
+        small = Camera(self.intrinsics.within(garden.DRAFT if draft else garden.FINE), self.camera.lens)
         if self.photograph is None:
-            picture = snapshot(_scene(), small)
+            picture = garden.glimpse(small) if draft else snapshot(textured_scene(), small)
         else:
             picture = cv2.resize(
                 self.photograph, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA
@@ -356,8 +357,3 @@ def _pixel_grid(intrinsics: Intrinsics, most: int) -> np.ndarray:
     u = np.linspace(-0.5, intrinsics.width - 0.5, columns)
     v = np.linspace(-0.5, intrinsics.height - 0.5, rows)
     return np.stack(np.meshgrid(u, v), axis=-1)
-
-
-@cache
-def _scene() -> Scene:
-    return textured_scene()

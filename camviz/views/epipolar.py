@@ -126,7 +126,9 @@ class EpipolarView(TwoCameras):
         """What the two cameras see, as pixels and as JPEG."""
         if self.photographs is None:
             cameras = {"left": self.left, "right": self.right}
-            taken = {name: garden.taken(camera, 256 if draft else 480) for name, camera in cameras.items()}
+            taken = {
+                name: garden.taken(camera, garden.DRAFT if draft else garden.FINE) for name, camera in cameras.items()
+            }
         else:
             taken = {
                 name: (image, jpeg(image)) for name, image in zip(("left", "right"), self.photographs, strict=True)
@@ -166,8 +168,8 @@ class EpipolarView(TwoCameras):
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
         if not self.baseline:
             return ""
-        forward = self.left.world_from_cam.rotation.as_matrix()
-        along, first = self._plane_axes(forward[:, 2] if abs(self._along @ forward[:, 2]) < 0.9 else forward[:, 0])
+        axes = self.left.extrinsics[0]
+        along, first = self._plane_axes(axes[2] if abs(self._along @ axes[2]) < 0.9 else axes[0])
         turn = np.arange(_PLANES) * (2 * np.pi / _PLANES)
         across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(along, first)
         lines = clipped(panel, panel.place(camera.project(camera.centre + _half_planes(along, across, 40))))
@@ -239,7 +241,9 @@ class EpipolarView(TwoCameras):
 
     def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("space", 20, 409, 500, 200)
-        content, sheets = draw_space(panel, self._space_items(images), self._onlooker, draft=draft, renderer="wire")
+        scenery = () if self.photographs else scene_items(textured_scene(), "wire")
+        items, eye = self._space_items(images), self._onlooker
+        content, sheets = draw_space(panel, items, eye, draft=draft, renderer="wire", scenery=scenery)
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
         shown = panel.show(content, title="The epipolar plane", hint="drag to turn", drag="orbit", label=label)
         return shown, sheets
@@ -260,7 +264,6 @@ class EpipolarView(TwoCameras):
         left, right, point, s = self.left.centre, self.right.centre, self.point, self._nearness
         ray = np.array([left, left + max(8.0 * s, self.depth) * self.left.unproject([self.u, self.v])])
         return [
-            *(() if self.photographs else scene_items(textured_scene(), "wire")),
             *camera_body(self.left, 0.6 * s, image=images["left"], colour="blue"),
             *camera_body(self.right, 0.6 * s, image=images["right"], colour="orange"),
             Label(left + (0, 0.22 * s, 0), "left", "label blue"),

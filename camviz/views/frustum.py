@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import atan, degrees, radians, tan
 from typing import Any, ClassVar, Self
 
@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
-from camviz.draw.picture import Picture, jpeg
+from camviz.draw.picture import Picture
 from camviz.draw.space import (
     Dots,
     Eye,
@@ -29,7 +29,8 @@ from camviz.draw.space import (
 )  # fmt: skip
 from camviz.lenses import Lens, Perspective
 from camviz.lenses.base import Array
-from camviz.scenes import board_corners, snapshot, textured_scene
+from camviz.scenes import board_corners, textured_scene
+from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.marks import clipped
 
@@ -112,10 +113,10 @@ class FrustumView(View):
 
     def numbers(self) -> dict[str, Array]:
         """R (3, 3) and t (3,) of the extrinsics, the centre C (3,), and K (3, 3)."""
-        extrinsics = self.camera.cam_from_world
+        R, t = self.camera.extrinsics
         return {
-            "R": extrinsics.rotation.as_matrix(),
-            "t": np.asarray(extrinsics.translation),
+            "R": R,
+            "t": t,
             "C": self.camera.centre,
             "K": self.camera.intrinsics.K,
         }
@@ -133,24 +134,18 @@ class FrustumView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        image = self._image(draft)
+        image, taken = garden.taken(self.camera, garden.DRAFT if draft else garden.FINE)
         world, photographs = self._world_panel(image, draft)
         body = svg.rectangle(0, 0, 960, 580, "paper") + world + self._picture_panel() + self._numbers_panel()
-        return Picture(body, 960, 580, self.title, self.description(), {**photographs, "camera": jpeg(image)})
-
-    def _image(self, draft: bool) -> np.ndarray:
-        k, pose = self.camera.intrinsics, self.camera.world_from_cam
-        return _taken(
-            k.within(256 if draft else 480), self.lens, tuple(pose.translation), tuple(pose.rotation.as_quat())
-        )
+        return Picture(body, 960, 580, self.title, self.description(), photographs | {"camera": taken})
 
     def _world_panel(self, image: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("world", 20, 34, 540, 400)
         from_camera = self.seen_from == "camera view"
-        frame = self.camera.world_from_cam if from_camera else RigidTransform.identity()
+        frame = self.camera.world_from_cam if from_camera else None
         renderer = chosen_renderer(draft=draft)
-        items = [*scene_items(textured_scene(), renderer), *self._items(image)]
-        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer=renderer, frame=frame)
+        seen = {"frame": frame, "scenery": scene_items(textured_scene(), renderer)}
+        content, photographs = draw_space(panel, self._items(image), self.eye, draft=draft, renderer=renderer, **seen)
         title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
         return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs
@@ -231,15 +226,8 @@ class FrustumView(View):
         return self.but(yaw_deg=round(yaw, 2), pitch_deg=round(min(90.0, max(-90.0, self.pitch_deg + up_deg)), 2))
 
 
-@lru_cache(maxsize=2)
-def _taken(intrinsics: Intrinsics, lens: Lens, centre: tuple[float, ...], quaternion: tuple[float, ...]) -> np.ndarray:
-    """The picture of the scene; kept, for the onlooker may walk around while the camera stands."""
-    pose = RigidTransform.from_components(np.array(centre), Rotation.from_quat(quaternion))
-    return snapshot(textured_scene(), Camera(intrinsics, lens, pose))
-
-
 def _up(camera: Camera) -> Array:
-    return -camera.world_from_cam.rotation.as_matrix()[:, 1]
+    return -camera.extrinsics[0][1]
 
 
 def _hfov_deg(intrinsics: Intrinsics) -> float:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 
+import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
-from camviz.lenses import Lens
+from camviz.lenses import Equirectangular, Lens
 from camviz.lenses.base import Array
-from camviz.scenes import snapshot, textured_scene
+from camviz.scenes import snapshot, textured_scene, to_display
+from camviz.scenes.scene import NEUTRAL
+
+DRAFT, FINE = (
+    208,
+    416,
+)  # pixels on the longer side; at 4:3 the tracer takes a draft as one block of rays and a fine picture as four
 
 Pose = tuple[float, ...]
 
@@ -19,6 +26,24 @@ Pose = tuple[float, ...]
 def taken(camera: Camera, side: int) -> tuple[np.ndarray, bytes]:
     """The picture that a camera takes of the garden, `side` pixels on its longer side, uint8 RGB, and it as JPEG."""
     return _taken(camera.intrinsics.within(side), camera.lens, _pose(camera))
+
+
+def glimpse(camera: Camera) -> np.ndarray:
+    """What a camera at the world's origin sees, looked up in one all-round picture: softer, in a third of the time."""
+    around, picture, nothing = _all_round()
+    uv = np.nan_to_num(around.project(camera.rays()), nan=-9).astype(np.float32)
+    return cv2.remap(picture, uv, None, cv2.INTER_LINEAR, borderValue=nothing)
+
+
+@cache
+def _all_round() -> tuple[Camera, np.ndarray, tuple[int, ...]]:
+    """A camera at the origin that sees every way, the picture it takes, its edges joined, and the colour of no ray."""
+    width = 1024
+    f = width / (2 * np.pi)
+    around = Camera(Intrinsics(width, width // 2, f, f, (width - 1) / 2, (width // 2 - 1) / 2), Equirectangular())
+    picture = cv2.copyMakeBorder(snapshot(textured_scene(), around), 1, 1, 1, 1, cv2.BORDER_WRAP)
+    k = around.intrinsics.cropped(-1, -1, width + 2, width // 2 + 2)
+    return Camera(k, around.lens), picture, tuple(to_display(np.full(3, NEUTRAL, np.float32)).tolist())
 
 
 def landmarks(camera: Camera) -> Array:
@@ -43,8 +68,8 @@ def _landmarks(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> Array:
 
 
 def _pose(camera: Camera) -> Pose:
-    return (*camera.world_from_cam.translation.tolist(), *camera.world_from_cam.rotation.as_quat().tolist())
+    return tuple(camera.world_from_cam.as_matrix().ravel().tolist())
 
 
 def _placed(pose: Pose) -> RigidTransform:
-    return RigidTransform.from_components(pose[:3], Rotation.from_quat(pose[3:]))
+    return RigidTransform.from_matrix(np.reshape(pose, (4, 4)))

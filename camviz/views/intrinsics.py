@@ -268,11 +268,12 @@ class IntrinsicsView(View):
 
     def _space_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("space", 480, 34, 460, 330)
-        items = [*scene_items(balloon_scene(), "wire"), *self._frustum(), *self._line_of_sight()]
+        items = [*self._frustum(), *self._line_of_sight()]
         span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
         target = (0.0, 0.2, float(BALLOON[2] - 0.49 * span))
         eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
-        content, photographs = draw_space(panel, items, eye, draft=draft, renderer="wire")
+        scenery = scene_items(balloon_scene(), "wire")
+        content, photographs = draw_space(panel, items, eye, draft=draft, renderer="wire", scenery=scenery)
         label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
         drawn = panel.show(content, title="The rays it picks out", hint="drag to turn", drag="orbit", label=label)
         return drawn, photographs

@@ -1,7 +1,7 @@
 // The pane of every visualizer: controls and a picture. It draws nothing itself and knows no mathematics:
 // it tells the kernel what the reader wants and shows the picture that comes back.
 
-const SETTLE_MS = 40;   // idle time after which a draft is replaced by the fine picture
+const SETTLE_MS = 10;   // idle time after which a draft is replaced by the fine picture
 const LATE_MS = 6000;   // silence of the kernel after which the reader is told
 const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
 
@@ -53,7 +53,6 @@ function render({ model, el }) {
     stopHands();
     model.off("change:values", showValues);
     model.off("change:frame", showFrame);
-    picture.urls?.forEach(URL.revokeObjectURL);
   };
 }
 
@@ -95,24 +94,33 @@ function asker(model, root, late) {
   return ask;
 }
 
-// Photographs are decoded before the picture is replaced: no flash, no half-drawn state.
+// Photographs are loaded before the picture is replaced: no flash, no half-drawn state. They travel as data: addresses,
+// for a blob's address is resolved by another process, which takes longer than all the rest of this function.
 async function swap(picture, frame) {
   let svg = frame.svg;
-  const urls = [];
   await Promise.all(Object.entries(frame.photographs ?? {}).map(async ([name, data]) => {
-    const url = URL.createObjectURL(new Blob([data]));
-    urls.push(url);
-    svg = svg.replaceAll(`"attached:${name}"`, `"${url}"`);
-    const image = new Image();
-    image.src = url;
-    await image.decode().catch(() => {});
+    const address = dataAddress(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
+    svg = svg.replaceAll(`"attached:${name}"`, `"${address}"`);
+    await loaded(address);
   }));
   const focused = picture.contains(document.activeElement) ? document.activeElement.dataset.drag : null;
   picture.innerHTML = svg;
   keepKeys(picture);
   if (focused) picture.querySelector(`[data-drag="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
-  picture.urls?.forEach(URL.revokeObjectURL);
-  picture.urls = urls;
+}
+
+function dataAddress(bytes) {
+  let text = "";
+  for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
+  return `data:image/${bytes[0] === 0x89 ? "png" : "jpeg"};base64,${btoa(text)}`;
+}
+
+function loaded(address) {
+  const image = new Image();
+  return new Promise((done) => {
+    image.onload = image.onerror = () => done(image);
+    image.src = address;
+  });
 }
 
 // Pointer and keys on the picture's handles, in the picture's own units.

@@ -46,6 +46,9 @@ def jupyterlab(folder: Path, home: Path, **environment: str) -> Iterator[str]:
     """The address, up to a path, of a JupyterLab server that serves `folder` and keeps its files in `home`."""
     (home / "app").mkdir(parents=True, exist_ok=True)
     (home / "app/overrides.json").write_text(QUIET)
+    extensions = home / "jupyter_config_dir/jupyter_server_config.d"  # where an installed camviz puts its own
+    extensions.mkdir(parents=True, exist_ok=True)
+    shutil.copy(ROOT / "jupyter/camviz.json", extensions)
     port, token = _free_port(), secrets.token_hex(16)
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--expose-app-in-browser"]
     command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0", f"--ServerApp.root_dir={folder}"]
@@ -110,7 +113,7 @@ def _private(home: Path) -> dict[str, str]:
     names += ("JUPYTERLAB_SETTINGS_DIR", "JUPYTERLAB_WORKSPACES_DIR")
     kept = {name: str(home / name.lower()) for name in names}
     paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, **kept, "JUPYTER_NO_CONFIG": "1", "PYTHONPATH": os.pathsep.join(paths)}
+    return {**os.environ, **kept, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def _free_port() -> int:

@@ -1,0 +1,64 @@
+"""The garden's quick pictures against traced ones, and the connection that carries them."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz import server
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, KannalaBrandt, Perspective
+from camviz.views import garden
+
+VIEW = Intrinsics.from_fov(640, 480, 90).within(garden.DRAFT)
+
+
+@pytest.mark.parametrize("lens", [Perspective(), BrownConrady(-0.28, 0.07), BrownConrady(0.3), KannalaBrandt()])
+def test_a_glimpse_shows_what_the_tracer_shows(lens):
+    camera = Camera(VIEW, lens, RigidTransform.from_rotation(Rotation.from_euler("y", 20, degrees=True)))
+    traced, _ = garden.taken(camera, garden.DRAFT)
+    softened = cv2.GaussianBlur(traced, (0, 0), 0.7)
+    assert cv2.PSNR(cv2.GaussianBlur(garden.glimpse(camera), (0, 0), 0.7), softened) > 29
+    turned = camera.at(RigidTransform.from_rotation(Rotation.from_euler("y", 20.5, degrees=True)))  # one pixel aside
+    assert cv2.PSNR(garden.glimpse(turned), softened) < 27
+
+
+def test_a_glimpse_has_a_join_behind_the_camera_that_nobody_sees():
+    back = RigidTransform.from_rotation(Rotation.from_euler("y", 180, degrees=True))
+    near = Intrinsics.from_fov(208, 156, 15)  # each texel of the all-round picture spreads over several pixels
+    seen = garden.glimpse(Camera(near, Perspective(), back)).astype(int)
+    step = np.abs(np.diff(seen, axis=1)).mean(axis=(0, 2))
+    assert step[near.width // 2 - 8 : near.width // 2 + 8].max() < 2 * np.median(step) + 1
+
+
+def test_pixels_without_a_ray_are_grey_in_a_glimpse_as_in_a_traced_picture():
+    camera = Camera(VIEW, BrownConrady(-0.6))
+    traced, _ = garden.taken(camera, garden.DRAFT)
+    assert np.isnan(camera.rays()[0, 0]).all()
+    np.testing.assert_array_equal(garden.glimpse(camera)[0, 0], traced[0, 0])
+
+
+def test_the_server_sends_pictures_without_waiting_for_the_browsers_acknowledgement():
+    calls = []
+
+    class Connection:
+        websocket_handler = SimpleNamespace(set_nodelay=lambda on: calls.append(("nodelay", on)))
+
+        def connect(self):
+            calls.append(("connect",))
+            return "connected"
+
+    app = SimpleNamespace(kernel_websocket_connection_class=Connection, web_app=SimpleNamespace(settings={}))
+    server._load_jupyter_server_extension(app)
+    assert app.web_app.settings["kernel_websocket_connection_class"]().connect() == "connected"
+    assert calls == [("nodelay", True), ("connect",)]
+
+
+def test_an_installation_switches_the_server_extension_on():
+    shipped = json.loads((Path(__file__).parents[1] / "jupyter/camviz.json").read_text())
+    (module,) = shipped["ServerApp"]["jpserver_extensions"]
+    assert module == server._jupyter_server_extension_points()[0]["module"] == server.__name__
