@@ -1,14 +1,16 @@
 """The calibration visualizer estimates what OpenCV does, tells the truth about it, and lets boards be moved by hand."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from camviz.cameras import transform
+from camviz.cameras import Camera, transform
 from camviz.files.calibration import Board
+from camviz.lenses import BrownConrady
 from camviz.views.board_pictures import FREE, TRUTH
 from camviz.views.calibration import CalibrationView
 
@@ -67,6 +69,16 @@ def test_without_noise_the_true_camera_comes_out():
     for name, (value, _) in view.estimates.items():
         assert value == pytest.approx(view.true[name], abs=2e-4)
     assert view.held_out < 1e-3
+
+
+@pytest.mark.parametrize("draw", range(1, 7))
+def test_hardly_tilted_boards_are_refined_to_the_minimum_wherever_the_search_begins(draw):
+    """The sum of squares has a long, curved valley there: from the truth, and from a usual camera, to one place."""
+    view = CalibrationView(tilt=2.0, draw=draw)
+    nearly_true = Camera(TRUTH.intrinsics, BrownConrady(k1=TRUTH.lens.k1))
+    problem = replace(view.start, cameras={"camera": nearly_true}, first_from_board=view.cam_from_board)
+    value, sigma = view.estimates["fx"]
+    assert problem.refined().cameras["camera"].intrinsics.fx == pytest.approx(value, abs=0.01 * sigma)
 
 
 def test_sigma_is_the_spread_of_the_estimates_over_many_throws():
@@ -166,7 +178,7 @@ def test_every_control_changes_the_picture_from_end_to_end(name):
 
 def test_a_draft_has_the_fine_picture_s_numbers_to_a_fraction_of_sigma():
     for state in ({}, {"tilt": 2.0}, {"free": "all"}, {"boards": 2}):
-        fine, draft = CalibrationView(**state), CalibrationView(**state, settled=1e-4)
+        fine, draft = CalibrationView(**state), CalibrationView(**state, coarse=True)
         value, sigma = fine.estimates["fx"]
         assert abs(draft.estimates["fx"][0] - value) < 0.3 * sigma
 

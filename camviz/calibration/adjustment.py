@@ -302,7 +302,7 @@ class Adjustment:
             if there is not None and there._squares(here.used) <= here.sum_of_squares:
                 here, damping = there, damping / 10
             elif damping < 1e12:
-                damping *= 10
+                damping *= 2  # less up than down: it comes along a curved valley faster (Transtrum & Sethna 2012)
             else:
                 break
         return replace(here, estimated=self.estimated) if only_poses else here

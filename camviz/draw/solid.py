@@ -34,9 +34,7 @@ COLOURS = {
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
 DRAFT, FINE = 0.65, 1.25
-SLOW = (
-    0.01  # seconds for one pixel a picture unit, beyond which drafts are wireframes: a fifth of a change's time
-)
+SLOW = 0.01  # seconds for one pixel a picture unit, beyond which drafts are wireframes: a fifth of a change's time
 _BACKGROUND = 128
 
 

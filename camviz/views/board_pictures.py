@@ -63,7 +63,7 @@ class BoardPictures(View):
     photographs: tuple[NDArray[np.uint8], ...] = field(default=(), compare=False, repr=False)
     width: int = 640
     height: int = 480
-    settled: float = 1e-12  # of the sum of squares: what a step of the refinement must still promise to take off
+    coarse: bool = False  # refine to a fraction of σ only, for dragging
 
     @classmethod
     def of(
@@ -173,7 +173,8 @@ class BoardPictures(View):
     @cached_property
     def adjustment(self) -> Adjustment | None:
         """The calibration; None without a board."""
-        return self.start and self.start.refined(settled=self.settled, most_steps=40)
+        settled, most_steps = (1e-4, 15) if self.coarse else (1e-12, 60)
+        return self.start and self.start.refined(settled=settled, most_steps=most_steps)
 
     @property
     def camera(self) -> Camera | None:

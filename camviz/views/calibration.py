@@ -68,7 +68,7 @@ class CalibrationView(BoardPictures):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        view = self.but(settled=1e-4) if draft else self
+        view = self.but(coarse=True) if draft else self
         space, attached = view._space(draft)
         photographs = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
         body = svg.rectangle(0, 0, 960, 660, "paper") + view._image() + space + view._estimates() + view._errors()
@@ -221,7 +221,7 @@ class CalibrationView(BoardPictures):
 
     def _dot(self, name: str, row: int) -> str:
         value, sigma = self.estimates.get(name, (np.nan, np.nan))
-        unit = self._pixels_per(name)
+        unit = self._pixels_per[name]
         error = (value - self.true[name]) * unit if self.truth else 0.0
         free = name in FREE[self.free]
         if not np.isfinite(error) or (not free and not self.truth):
@@ -236,15 +236,16 @@ class CalibrationView(BoardPictures):
         edge, inward = (_STRIP.width - 2, -11) if at[0] > 0 else (2, 11)
         return spread + svg.polygon([(edge, y), (edge + inward, y - 6), (edge + inward, y + 6)], "fill-blue")
 
-    def _pixels_per(self, name: str) -> float:
+    @cached_property
+    def _pixels_per(self) -> dict[str, float]:
         """How far, in pixels, the image's corner moves when a coefficient changes by 1; 1 for fx, fy, cx and cy."""
-        if name in _PIXELS:
-            return 1.0
-        camera = self._true_camera if self.truth else self.camera or self._true_camera
-        pixels = camera.intrinsics
-        corner = camera.lens.unproject(pixels.from_pixels([(-0.5, -0.5)]))[0]
-        ideal = (corner[:2] / corner[2]) if np.isfinite(corner).all() else pixels.from_pixels([-0.5, -0.5])
-        return float(pixels.fx * np.linalg.norm(BrownConrady(**{name: 1.0}).distort(ideal) - ideal))
+        camera = self.truth or self.camera or self._true_camera
+        at = camera.intrinsics.from_pixels((-0.5, -0.5))
+        ray = camera.lens.unproject(at)
+        ideal = ray[:2] / ray[2] if np.isfinite(ray).all() else at  # the corner may lie beyond a fold
+        moved = {name: BrownConrady(**{name: 1.0}).distort(ideal) - ideal for name in INTRINSICS if name not in _PIXELS}
+        scaled = {name: float(camera.intrinsics.fx * np.linalg.norm(shift)) for name, shift in moved.items()}
+        return dict.fromkeys(_PIXELS, 1.0) | scaled
 
     # The errors ------------------------------------------------------------------------------------------------------
 
