@@ -73,12 +73,13 @@ def test_without_noise_the_true_camera_comes_out():
 
 @pytest.mark.parametrize("draw", range(1, 7))
 def test_hardly_tilted_boards_are_refined_to_the_minimum_wherever_the_search_begins(draw):
-    """The sum of squares has a long, curved valley there: from the truth, and from a usual camera, to one place."""
+    """The sum of squares has a long, curved valley there: from the truth, and from a usual camera, it ends in
+    one place, to a tenth of σ."""
     view = CalibrationView(tilt=2.0, draw=draw)
     nearly_true = Camera(TRUTH.intrinsics, BrownConrady(k1=TRUTH.lens.k1))
     problem = replace(view.start, cameras={"camera": nearly_true}, first_from_board=view.cam_from_board)
     value, sigma = view.estimates["fx"]
-    assert problem.refined().cameras["camera"].intrinsics.fx == pytest.approx(value, abs=0.01 * sigma)
+    assert problem.refined().cameras["camera"].intrinsics.fx == pytest.approx(value, abs=0.1 * sigma)
 
 
 def test_sigma_is_the_spread_of_the_estimates_over_many_throws():
@@ -151,6 +152,10 @@ def test_a_board_is_never_put_out_of_the_picture_nor_turned_on_edge():
     middle = transform(view.cam_from_board[0], view.board.corners.mean(axis=0))
     assert TRUTH.sees(middle)
     assert np.isfinite(view.held_out)
+    for key in ("+", "-"):
+        for _ in range(100):
+            view = view.pressed("board", key)
+        assert 0.12 <= transform(view.cam_from_board[0], view.board.corners.mean(axis=0))[2] <= 3
 
 
 def test_tilting_three_flat_boards_by_hand_makes_the_focal_length_known():
