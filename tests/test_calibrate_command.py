@@ -145,7 +145,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):
     shots(room / "shots")
     stop = "import os, signal; os.killpg(0, signal.SIGINT)"
     code = {
-        "detection": "import camviz.commands.calibrate as c\nclass B(c.Bar):\n    def __call__(self, *_): STOP\nc.Bar = B",
+        "detection": "import camviz.commands.calibrate as c\ndef new(*_):\n    STOP\nc.Bar.__call__ = new",
         "solving": "import camviz.calibration.solving as s\ndef new(a):\n    STOP\ns._settled = new",
     }[stage].replace("STOP", stop)
     words = ["calibrate", "shots", *WORDS, "--workers", "2"]

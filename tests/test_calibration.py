@@ -271,10 +271,10 @@ def test_outlier_corners_and_a_wrong_view_are_set_aside_and_nothing_else():
 
 def test_a_healthy_set_loses_almost_nothing():
     lost = 0
-    for seed in range(10):
+    for seed in range(5):
         found = calibrate(seen_by(TRUTH["standard"], np.random.default_rng(100 + seed), views=12)[0], BOARD)
         lost += found.set_aside["camera"].sum()
-    assert lost <= 4  # 0.1 of 648 corners each are expected, 1 in all
+    assert lost <= 3  # 0.1 of 648 corners each are expected, half a corner in all
 
 
 def test_a_pair_is_found_as_it_stands_and_views_of_one_camera_only_are_named():

@@ -183,9 +183,9 @@ def test_show_names_the_page_after_the_file_or_as_told(room, page, capsys):
 def test_show_replaces_its_own_page_but_not_the_calibration(capsys, room, page):
     file = room / "camera.html"
     file.write_bytes((DATA / "opencv_stereo.xml").read_bytes())
-    assert "overwrite the calibration" in refused(capsys, room, "show", str(file))
+    assert "would overwrite" in refused(capsys, room, "show", str(file))
     (room / "link.html").symlink_to(file)
-    assert "overwrite the calibration" in refused(capsys, room, "show", str(file), "-o", "link.html")
+    assert "would overwrite" in refused(capsys, room, "show", str(file), "-o", "link.html")
     assert file.read_bytes() == (DATA / "opencv_stereo.xml").read_bytes()
     for _ in range(2):
         assert main(["show", str(file), "-o", "page.html"]) == 0

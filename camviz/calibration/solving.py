@@ -168,7 +168,7 @@ def _robust(adjustment: Adjustment, begin_anew: Callable[[Masks], Adjustment] | 
     for turn in range(MOST_ROUNDS):
         adjustment = _settled(adjustment)
         found = outliers(adjustment, at_first=at_first and turn == 0)
-        if turn > MOST_ROUNDS / 2:  # should some go to and fro, they go
+        if turn > MOST_ROUNDS / 2:  # one that changes sides again and again goes
             found = {name: mask | adjustment.set_aside[name] for name, mask in found.items()}
         same = all(np.array_equal(mask, adjustment.set_aside[name]) for name, mask in found.items())
         if same and not (at_first and turn == 0):
