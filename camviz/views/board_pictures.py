@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, Self
@@ -60,7 +61,7 @@ class BoardPictures(View):
     board: Board = BOARD
     truth: Camera | None = field(default=TRUTH, compare=False)
     seen: Array | None = field(default=None, compare=False, repr=False)
-    photographs: tuple[NDArray[np.uint8], ...] = field(default=(), compare=False, repr=False)
+    photographs: Sequence[NDArray[np.uint8]] = field(default=(), compare=False, repr=False)
     width: int = 640
     height: int = 480
     coarse: bool = False  # refine to a fraction of σ only, for dragging
@@ -72,7 +73,7 @@ class BoardPictures(View):
         board: Board,
         width: int,
         height: int,
-        photographs: tuple[NDArray[np.uint8], ...] = (),
+        photographs: Sequence[NDArray[np.uint8]] = (),
         **state: Any,
     ) -> Self:
         """The view of a real camera's corners (views, board.columns * board.rows, 2), NaN where one was not seen.
@@ -85,7 +86,7 @@ class BoardPictures(View):
             raise ValueError(f"corners must have shape (views, {wanted}, 2), got {corners.shape}")
         if photographs and len(photographs) != len(corners):
             raise ValueError(f"photographs must be as many as the {len(corners)} views, got {len(photographs)}")
-        given: dict[str, Any] = {"board": board, "width": width, "height": height, "photographs": tuple(photographs)}
+        given: dict[str, Any] = {"board": board, "width": width, "height": height, "photographs": photographs}
         return cls(boards=len(corners), truth=None, seen=corners, **given, **state)
 
     # What the camera saw ---------------------------------------------------------------------------------------------

@@ -142,8 +142,10 @@ class CalibrationView(BoardPictures):
         if self.seen is not None:
             return ""
         middle, tip = panel.place(self._grips)
+        tip = np.clip(np.where(np.isfinite(tip), tip, middle), 10, np.array([panel.width, panel.height]) - 10)
         words = "A stick upright on the board: drag it, or press the arrow keys, to tilt the board"
-        knob = svg.dots([tip], "paper-dot", 15) + svg.dots([tip], "orange", 11)
+        hand = svg.element("circle", cx=tip[0], cy=tip[1], r=16, fill_opacity=0, class_="card")
+        knob = hand + svg.dots([tip], "paper-dot", 15) + svg.dots([tip], "orange", 11)
         grip = svg.group(knob, data_drag="tilt", tabindex=0, role="group", aria_label=words)
         return svg.line([middle, tip], "orange thick") + svg.dots([middle], "orange", 6) + grip
 
