@@ -10,6 +10,7 @@ from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
 from camviz.views.intrinsics import IntrinsicsView
 from camviz.views.pinhole import PinholeView
+from camviz.views.rectification import RectificationView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(
@@ -24,6 +25,7 @@ PICTURES = {
     "fold": DistortionView.of(PUBLISHED),
     "calibration": CalibrationView(tilt=2.0),
     "epipolar": EpipolarView(),
+    "rectification": RectificationView(),
 }
 
 if __name__ == "__main__":

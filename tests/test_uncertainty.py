@@ -152,7 +152,7 @@ def test_covariance_is_mrcals_all_over_the_image(corners, mrcals, distance) -> N
 def test_difference_is_mrcals(mrcals, distance, weighted) -> None:
     """Within 2 %, or 0.005 px where there is next to none, at 99 of 100 pixels.
 
-    The cost, of fourth powers, is so flat that mrcal's optimiser now and then stops before the bottom: then ours is lower.
+    The cost, of fourth powers, is so flat that mrcal now and then stops before the bottom: then ours is lower.
     """
     models = [(values[:4], values[4:]) for values in mrcals["intrinsics"]]
     first, second = (Camera(Intrinsics(640, 480, *p), BrownConrady.from_coefficients(d)) for p, d in models)

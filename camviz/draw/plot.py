@@ -20,11 +20,11 @@ def axes(panel: Panel, xlabel: str, ylabel: str) -> str:
     xs, ys = _ticks(panel.left, panel.right, panel.width), _ticks(panel.bottom, panel.top, panel.height)
     parts = [
         svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
-        for px, words in zip(panel.place(_pairs(xs, panel.top))[:, 0], _written(xs), strict=True)
+        for px, words in zip(panel.place(_pairs(xs, panel.top))[:, 0], written(xs), strict=True)
     ]
     parts += [
         svg.text((panel.x - 6, panel.y + py + 4), words, "tick end")
-        for py, words in zip(panel.place(_pairs(panel.left, ys))[:, 1], _written(ys), strict=True)
+        for py, words in zip(panel.place(_pairs(panel.left, ys))[:, 1], written(ys), strict=True)
     ]
     parts.append(svg.text((panel.x + panel.width / 2, panel.y + panel.height + 34), xlabel, "note middle"))
     x, y = panel.x - 40, panel.y + panel.height / 2
@@ -82,7 +82,8 @@ def _ticks(low: float, high: float, length: float) -> np.ndarray:
     return ticks(low, high, length / 50)
 
 
-def _written(values: np.ndarray) -> list[str]:
+def written(values: np.ndarray) -> list[str]:
+    """Evenly spaced values as text, with as many decimals as tell them apart."""
     step = float(np.min(np.diff(values))) if len(values) > 1 else 1.0
     decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
     return [f"{value:.{decimals}f}".replace("-", "−") if abs(value) > step / 1e6 else "0" for value in values]
