@@ -4,6 +4,7 @@ from pathlib import Path
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
+from camviz.views.calibration import CalibrationView
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
@@ -22,6 +23,7 @@ PICTURES = {
     "frustum": FrustumView(),
     "distortion": DistortionView(k1=-0.28, k2=0.07),
     "fold": DistortionView.of(PUBLISHED),
+    "calibration": CalibrationView(tilt=2.0),
     "epipolar": EpipolarView(),
     "rectification": RectificationView(),
 }
