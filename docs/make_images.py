@@ -9,6 +9,7 @@ from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
 from camviz.views.intrinsics import IntrinsicsView
 from camviz.views.pinhole import PinholeView
+from camviz.views.rectification import RectificationView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(
@@ -22,6 +23,7 @@ PICTURES = {
     "distortion": DistortionView(k1=-0.28, k2=0.07),
     "fold": DistortionView.of(PUBLISHED),
     "epipolar": EpipolarView(),
+    "rectification": RectificationView(),
 }
 
 if __name__ == "__main__":
