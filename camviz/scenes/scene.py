@@ -171,7 +171,7 @@ def _strips(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Runs, ...], float]:
     return tuple(strips), float(np.median(apart)) if apart.size else 0.0
 
 
-_kept_strips = lru_cache(maxsize=2)(_strips)  # while the camera only moves; few, for a class shares one memory
+_kept_strips = lru_cache(maxsize=1)(_strips)  # while the camera only moves; one, for a class shares one memory
 
 
 def _rows(pixels: Intrinsics) -> int:
