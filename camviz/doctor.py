@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -108,14 +109,25 @@ def widgets() -> Iterator[Finding]:
     """Whether JupyterLab will find the browser's half of the widgets."""
     try:
         from jupyter_core.paths import jupyter_path
-        from jupyterlab_server.config import get_page_config
     except ImportError:
         return
-    folders = jupyter_path("labextensions")
-    disabled = get_page_config(folders).get("disabledExtensions", [])  # a list, or truth values by name
-    off = {name for name in disabled if not isinstance(disabled, dict) or disabled[name]}
+    folders, off = jupyter_path("labextensions"), _disabled()
     for extension, distribution in WIDGET_EXTENSIONS.items():
         yield _widget(extension, distribution, folders, extension in off)
+
+
+def _disabled() -> set[str]:
+    """The extensions that are switched off. A process of its own asks JupyterLab, whose import takes 30 MB."""
+    program = (
+        "import json, jupyter_core.paths as paths, jupyterlab_server.config as config\n"
+        "page = config.get_page_config(paths.jupyter_path('labextensions'))\n"
+        "print(json.dumps(page.get('disabledExtensions', [])))"
+    )
+    asked = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    if asked.returncode:
+        return set()
+    disabled = json.loads(asked.stdout)  # a list, or truth values by name
+    return {name for name in disabled if not isinstance(disabled, dict) or disabled[name]}
 
 
 def _widget(extension: str, distribution: str, folders: list[str], disabled: bool) -> Finding:

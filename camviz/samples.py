@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class Pictures:
     """
 
     names: tuple[str, ...]
-    pictures: tuple[NDArray[np.uint8], ...]
+    pictures: Sequence[NDArray[np.uint8]]
     square_size: float  # metres
     real: bool
     sentence: str
@@ -100,7 +101,7 @@ def chessboard_pictures(side: str = "left", count: int = 13) -> Pictures:
         raise ValueError(f"side must be 'left' or 'right', got {side!r}")
     names = tuple(name for name in REGISTRY if name.startswith(side) and name.endswith(".jpg"))[:count]
     try:
-        pictures = tuple(_picture(sample(name)) for name in names)
+        pictures = _Photographs(tuple(sample(name) for name in names))
     except SampleUnavailable as reason:
         return _rendered(names, side, f"{reason} The virtual camera's pictures take their place.")
     credit = "Photographs from OpenCV's samples (samples/data at 4.6.0), Apache-2.0."
@@ -138,11 +139,26 @@ def _fetched(name: str) -> Path:
         ) from error
 
 
-def _picture(path: Path) -> NDArray[np.uint8]:
-    import cv2
+@dataclass(frozen=True)
+class _Photographs(Sequence[NDArray[np.uint8]]):
+    """Photographs that are decoded when they are looked at: all of them at once would take a megabyte each."""
 
-    picture: Any = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    return np.ascontiguousarray(picture[..., ::-1])
+    paths: tuple[Path, ...]
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    @overload
+    def __getitem__(self, index: int) -> NDArray[np.uint8]: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[NDArray[np.uint8]]: ...
+    def __getitem__(self, index: int | slice) -> NDArray[np.uint8] | Sequence[NDArray[np.uint8]]:
+        if isinstance(index, slice):
+            return _Photographs(self.paths[index])
+        import cv2
+
+        picture: Any = cv2.imread(str(self.paths[index]), cv2.IMREAD_COLOR)
+        return np.ascontiguousarray(picture[..., ::-1])
 
 
 def _rendered(names: tuple[str, ...], side: str, sentence: str) -> Pictures:

@@ -41,9 +41,9 @@ def shifted(camera, **changes):
 
 
 def test_halves_of_a_healthy_set_differ_by_noise_alone() -> None:
-    """40 sets: the probabilities are uniform (Kolmogorov-Smirnov, one in a thousand), and the ratio is about 1."""
+    """25 sets: the probabilities are uniform (Kolmogorov-Smirnov, one in a thousand), and the ratio is about 1."""
     rng = np.random.default_rng(1)
-    found = [halves(noisy(truth(board_poses(rng, 12)), rng, SIGMA).refined(), grid=(12, 9)) for _ in range(40)]
+    found = [halves(noisy(truth(board_poses(rng, 12)), rng, SIGMA).refined(), grid=(12, 9)) for _ in range(25)]
     assert kstest([one.probability for one in found], "uniform").pvalue > 1e-3
     assert 0.4 < np.median([one.ratio for one in found]) < 1.2
 
@@ -75,6 +75,13 @@ def test_corners_held_out_of_a_healthy_set_are_off_as_foretold(folds) -> None:
     assert np.mean([one.rms / one.expected_rms for one in found]) == pytest.approx(1, abs=0.07)
 
 
+def test_what_a_camera_of_few_views_foretells_is_as_uncertain_as_was_said() -> None:
+    """Cameras of four views asked of the fifth, 8 sets: most of the error is the camera's, and it is as foretold."""
+    rng = np.random.default_rng(15)
+    problems = [noisy(truth(board_poses(rng, 5)), rng, SIGMA).refined() for _ in range(8)]
+    assert np.mean([held_out(problem, folds=5).ratio for problem in problems]) == pytest.approx(1, abs=0.08)
+
+
 def test_corners_held_out_show_what_poses_have_made_up_for() -> None:
     """cx wrong by 50 px: fitted again, the poses hide most of it; corners that they were not fitted to do not."""
     rng = np.random.default_rng(4)
@@ -90,11 +97,11 @@ def test_corners_held_out_show_what_poses_have_made_up_for() -> None:
 
 
 def test_flat_boards_are_called_bent_no_oftener_than_was_said() -> None:
-    """100 flat boards: the probabilities are uniform; at a rate of 5 % there are at most 13 false alarms (99.9 %)."""
+    """60 flat boards: the probabilities are uniform; at a rate of 5 % there are at most 9 false alarms (99.9 %)."""
     rng = np.random.default_rng(5)
-    tests = [warp_test(noisy(truth(board_poses(rng, 6)), rng, SIGMA)) for _ in range(100)]
+    tests = [warp_test(noisy(truth(board_poses(rng, 6)), rng, SIGMA)) for _ in range(60)]
     assert kstest([one.probability for one in tests], "uniform").pvalue > 1e-3
-    assert sum(one.bowed(0.05) for one in tests) <= 13
+    assert sum(one.bowed(0.05) for one in tests) <= 9
     assert sum(one.bowed() for one in tests) <= 2
 
 

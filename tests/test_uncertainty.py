@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from boards import BOARD, CAMERA, RIGHT, board_poses, noisy, truth
+from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment
@@ -20,6 +21,7 @@ from camviz.calibration.slopes import pixel_slopes
 from camviz.calibration.uncertainty import (
     mean_deviation,
     projection_covariance,
+    projection_slopes,
     projection_uncertainty,
     worst_deviation,
 )
@@ -190,6 +192,25 @@ def test_implied_motion_is_found_at_a_finite_distance() -> None:
     assert np.allclose(found.as_matrix(), motion.as_matrix(), atol=1e-6)
 
 
+def test_wild_rays_pull_no_more_than_hubers_loss_lets_them() -> None:
+    """A tenth of the rays 20° off: the rotation is that of scipy.optimize.least_squares with mrcal's cost."""
+    rng = np.random.default_rng(3)
+    points = unit(rng.normal(size=(200, 3)) + [0, 0, 4])
+    rays = transform(RigidTransform.from_rotation(Rotation.from_rotvec([0.01, 0.02, -0.03])), points)
+    rays = unit(rays + rng.normal(0, 0.01, rays.shape))
+    rays[:20] = Rotation.from_rotvec([0, np.deg2rad(20), 0]).apply(rays[:20])
+
+    def squared_angles(rotvec):
+        return np.sum((Rotation.from_rotvec(rotvec).apply(points) - rays) ** 2, axis=-1)
+
+    limit = np.deg2rad(5) ** 2
+    expected = least_squares(squared_angles, np.zeros(3), loss="huber", f_scale=limit, xtol=1e-15, gtol=1e-15).x
+    found = aligned(points, rays, np.ones(200), turn_only=True).rotation.as_rotvec()
+    assert np.allclose(found, expected, atol=1e-5)
+    everything = least_squares(squared_angles, np.zeros(3)).x
+    assert np.linalg.norm(everything - expected) > 1e-3
+
+
 @pytest.mark.parametrize("bad", [0, -1, float("nan")])
 def test_a_distance_that_is_none_is_refused(bad) -> None:
     with pytest.raises(ValueError, match="distance"):
@@ -240,6 +261,25 @@ def test_covariance_is_the_scatter_of_many_solutions(cameras, distance, estimate
     expected = (SIGMA / one.sigma) ** 2 * projection_covariance(one, uv, distance, name)
     ratio = np.trace(measured, axis1=1, axis2=2) / np.trace(expected, axis1=1, axis2=2)
     assert np.all((ratio > 0.75**2) & (ratio < 1.25**2)), ratio
+
+
+@pytest.mark.parametrize("distance", [inf, 0.3])
+def test_slopes_are_those_of_the_mean_opinion(distance) -> None:
+    """Every shared parameter, and one twist given to all boards, moved a little: the right camera's pixels follow."""
+    exact = truth(board_poses(np.random.default_rng(0), 4), {"left": CAMERA, "right": RIGHT})
+    uv = np.array([[320.0, 240], [150, 130], [500, 380]])
+    far = 1e5 if distance == inf else distance
+    points = RIGHT.centre + far * RIGHT.unproject(uv)
+
+    def seen(change):
+        there = exact._moved(change[:-6], np.tile(change[-6:], (4, 1)))
+        opinions = there.first_from_board * exact.first_from_board.inv()
+        mean = np.mean([transform(opinion, points) for opinion in opinions], axis=0)
+        return there.cameras["right"].project(mean)
+
+    steps = 1e-5 * np.eye(len(exact.parameters) + 6)
+    expected = np.stack([(seen(step) - seen(-step)) / 2e-5 for step in steps], axis=-1)
+    assert np.allclose(projection_slopes(exact, uv, distance, "right"), expected, rtol=1e-4, atol=0.02)
 
 
 def test_poses_held_fixed_would_say_something_else(solved) -> None:

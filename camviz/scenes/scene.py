@@ -20,6 +20,7 @@ from camviz.scenes.texture import Texture
 from camviz.scenes.wireframe import Wireframe
 
 BLOCK = 1 << 15  # rays traced together: few enough to stay in the processor's cache
+KEPT = 640 * 480  # rays of a camera that are kept at most, in single precision: 4 MB
 NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be mistaken for a hole in the scene
 
 
@@ -134,7 +135,8 @@ def snapshot(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
 def _traced(scene: Scene, camera: Camera) -> Iterator[tuple[slice, Floats]]:
     """The picture in strips: which rows, and their linear light (rows, width, 3)."""
     pixels = camera.intrinsics
-    strips, spread = _strips(pixels, camera.lens)
+    small = pixels.width * pixels.height <= KEPT
+    strips, spread = _kept_strips(pixels, camera.lens) if small else _strips(pixels, camera.lens)
     for i, runs in enumerate(strips):
         top, bottom = i * _rows(pixels), min((i + 1) * _rows(pixels), pixels.height)
         light, _ = scene.follow(runs.moved(camera.world_from_cam), spread, (bottom - top) * pixels.width)
@@ -156,12 +158,8 @@ def _require_rays(origins: Array, directions: Array) -> None:
         raise ValueError(f"directions must be unit vectors, got one of length {wrong[0]:g}")
 
 
-@lru_cache(maxsize=2)
 def _strips(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Runs, ...], float]:
-    """A camera's rays, as seen by itself, in strips of `_rows` rows, and the typical angle between neighbours.
-
-    Kept while the camera only moves: in single precision, and few of them, for a class shares one machine's memory.
-    """
+    """A camera's rays, as seen by itself, in strips of `_rows` rows, and the typical angle between neighbours."""
     strips, steps = [], []
     for top in range(0, pixels.height, _rows(pixels)):
         strip = pixels.cropped(0, top, pixels.width, min(_rows(pixels), pixels.height - top))
@@ -171,6 +169,9 @@ def _strips(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Runs, ...], float]:
     apart = np.concatenate(steps)
     apart = apart[np.isfinite(apart)]
     return tuple(strips), float(np.median(apart)) if apart.size else 0.0
+
+
+_kept_strips = lru_cache(maxsize=2)(_strips)  # while the camera only moves; few, for a class shares one memory
 
 
 def _rows(pixels: Intrinsics) -> int:

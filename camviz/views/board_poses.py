@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -36,7 +37,7 @@ class BoardPosesView(View):
     board: Board = _NINE_BY_SIX
     still: str = choice("board", "camera", label="what stands still", help="the board, or the camera")
     picture: int = slider(1, 1, 13, 1, label="picture", help="which of the pictures is picked out, in orange")
-    photographs: tuple[NDArray[np.uint8], ...] = field(default=(), compare=False, repr=False)
+    photographs: Sequence[NDArray[np.uint8]] = field(default=(), compare=False, repr=False)
     eye: Eye = Eye(distance=0.9, yaw_deg=-50, pitch_deg=20)
 
     def __post_init__(self) -> None:

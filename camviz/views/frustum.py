@@ -144,8 +144,10 @@ class FrustumView(View):
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else None
         renderer = chosen_renderer(draft=draft)
-        seen = {"frame": frame, "scenery": scene_items(textured_scene(), renderer)}
-        content, photographs = draw_space(panel, self._items(image), self.eye, draft=draft, renderer=renderer, **seen)
+        items, scenery = self._items(image), scene_items(textured_scene(), renderer)
+        content, photographs = draw_space(
+            panel, items, self.eye, draft=draft, renderer=renderer, frame=frame, scenery=scenery
+        )
         title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
         return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs

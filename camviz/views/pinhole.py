@@ -266,7 +266,7 @@ class PinholeView(View):
         return "".join(rows)
 
 
-@lru_cache(maxsize=6)
+@lru_cache(maxsize=2)
 def _sharp(depth_mm: float, object_m: float, width: int) -> np.ndarray:
     """What an ideal point for a hole would see: linear light."""
     light = render(textured_scene(), PinholeView(depth_mm=depth_mm, object_m=object_m).camera(width))

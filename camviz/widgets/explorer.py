@@ -10,6 +10,7 @@ import traitlets
 
 from camviz.draw.picture import style
 from camviz.views.base import Control, View
+from camviz.widgets.memory import give_back, give_back_after_cells
 from camviz.widgets.still import StillWidget
 
 _HERE = files("camviz.widgets")
@@ -39,6 +40,7 @@ class Explorer(StillWidget):
         super().__init__(controls=described, **_shown(view, controls, answers=0, draft=False))
         self._controls = controls
         self.on_msg(self._receive)
+        give_back_after_cells()
 
     def set(self, **changes: Any) -> Explorer:
         """Change the view's fields and redraw; errors are raised here, where the code is."""
@@ -50,6 +52,8 @@ class Explorer(StillWidget):
         with self.hold_sync():
             self.view = view
             self.values, self.frame = shown["values"], shown["frame"]
+        if not draft:
+            give_back()
 
     def _receive(self, _widget: object, message: dict[str, Any], _buffers: object) -> None:
         try:

@@ -1,0 +1,30 @@
+"""Memory that a picture needed goes back to the system."""
+
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import numpy as np, psutil
+from IPython.core.interactiveshell import InteractiveShell
+shell = InteractiveShell.instance()
+from camviz.widgets.memory import give_back_after_cells
+give_back_after_cells()
+give_back_after_cells()
+rss = lambda: psutil.Process().memory_info().rss / 2**20
+scraps = [np.ones(8000) for _ in range(2000)]   # 128 MB in pieces that the C library keeps for itself when freed
+full = rss()
+kept, scraps = scraps[-1], None
+shell.events.trigger("post_run_cell", None)
+print(full - rss(), len([f for f in shell.events.callbacks["post_run_cell"] if f.__name__ == "give_back"]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only glibc can be asked to give memory back")
+def test_what_a_cell_no_longer_needs_is_given_back_after_it():
+    freed, hooks = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert float(freed) > 100
+    assert int(hooks) == 1
