@@ -31,15 +31,20 @@ def write_page(calibration: Calibration, path: str | Path) -> None:
 
 def page(calibration: Calibration) -> str:
     """The page as HTML text: the cameras' numbers, then their frusta, their distortion and their epipolar geometry."""
-    name = escape(calibration.source.name)
-    sections = [_numbers(calibration), *_frusta(calibration), *_distortions(calibration), *_epipolar(calibration)]
+    sections = [numbers_table(calibration), *_frusta(calibration), *_distortions(calibration), *_epipolar(calibration)]
+    return document(calibration.source.name, f"<p>{escape(calibration.format)}</p>{''.join(sections)}")
+
+
+def document(title: str, body: str, *, layout: str = "", script: str = "") -> str:
+    """A whole HTML page around its body, in the style of every picture; more `layout` (CSS) and `script` go inside."""
+    name = escape(title)
+    code = f"<script>{script}</script>" if script else ""
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name} · camviz</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{style()}{_layout()}</style></head>"
-        f"<body><h1>{name}</h1><p>{escape(calibration.format)}</p>{''.join(sections)}"
+        f"<style>{style()}{_layout()}{layout}</style></head><body><h1>{name}</h1>{body}"
         f"<footer>Made by camviz {__version__}. Pixels count from the centre of the first one; metres; "
-        f"x right, y down, z forward.</footer></body></html>\n"
+        f"x right, y down, z forward.</footer>{code}</body></html>\n"
     )
 
 
@@ -47,7 +52,8 @@ def _layout() -> str:
     return (files("camviz") / "page.css").read_text(encoding="utf-8")
 
 
-def _numbers(calibration: Calibration) -> str:
+def numbers_table(calibration: Calibration) -> str:
+    """The cameras' numbers as a table, and what the file's notes say."""
     head = "".join(f"<th>{title}</th>" for title in ("camera", "image", "fx", "fy", "cx", "cy", "lens"))
     rows = "".join(_row(name, camera) for name, camera in calibration.cameras.items())
     notes = "".join(f'<p class="note">{escape(note)}</p>' for note in calibration.notes)
@@ -75,7 +81,7 @@ def _lens(lens: Lens) -> str:
 def _frusta(calibration: Calibration) -> Iterator[str]:
     yield "<h2>What the camera sees</h2><p>The camera in camviz's garden, through its own lens and pixels.</p>"
     for name, camera in calibration.cameras.items():
-        yield _figure(name, FrustumView.of(camera.at(RigidTransform.identity())).figure())
+        yield figure(name, FrustumView.of(camera.at(RigidTransform.identity())).figure())
 
 
 def _distortions(calibration: Calibration) -> Iterator[str]:
@@ -84,7 +90,7 @@ def _distortions(calibration: Calibration) -> Iterator[str]:
         "already are, and pixels beyond it have no ray at all.</p>"
     )
     for name, camera in calibration.cameras.items():
-        yield _figure(name, DistortionView.of(camera).figure())
+        yield figure(name, DistortionView.of(camera).figure())
 
 
 def _epipolar(calibration: Calibration) -> Iterator[str]:
@@ -92,14 +98,14 @@ def _epipolar(calibration: Calibration) -> Iterator[str]:
     pairs = [pair for pair in combinations(calibration.cameras, 2) if _apart(calibration, *pair)]
     for left, right in pairs:
         view = EpipolarView.of(calibration.cameras[left], calibration.cameras[right])
-        yield _figure(f"{left} and {right}", view.figure())
+        yield figure(f"{left} and {right}", view.figure())
     if not pairs:
         yield (
             f"<p>The file does not say how one camera stands to another, so each is shown with its own copy "
             f"{SIDE_STEP * 100:.0f} cm to its right.</p>"
         )
         for name, camera in calibration.cameras.items():
-            yield _figure(name, EpipolarView.of(camera, camera.at(_stepped_aside(camera))).figure())
+            yield figure(name, EpipolarView.of(camera, camera.at(_stepped_aside(camera))).figure())
 
 
 def _apart(calibration: Calibration, a: str, b: str) -> bool:
@@ -110,5 +116,7 @@ def _stepped_aside(camera: Camera) -> RigidTransform:
     return camera.world_from_cam * RigidTransform.from_translation([SIDE_STEP, 0, 0])
 
 
-def _figure(name: str, picture: Picture) -> str:
-    return f"<figure><figcaption>{escape(name)}</figcaption>{picture.embedded()}</figure>"
+def figure(name: str, picture: Picture) -> str:
+    """A picture under its caption."""
+    caption = f"<figcaption>{escape(name)}</figcaption>" if name else ""
+    return f"<figure>{caption}{picture.embedded()}</figure>"

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from camviz.clinic.catalogue import SEVERITIES, Check, Finding, Kind, Lacking, f
 from camviz.clinic.evidence import Evidence
 from camviz.files import CalibrationError, load
 from camviz.files.calibration import Calibration
+
+if TYPE_CHECKING:
+    from camviz.clinic.live import LiveInspection
 
 __all__ = ["CHECKS", "Finding", "Inspection", "Kind", "inspect", "inspect_file", "kinds"]
 
@@ -112,6 +115,15 @@ class Inspection:
 
     def __str__(self) -> str:
         return self.as_text()
+
+    def explore(self, images: str | PathLike[str] | None = None) -> LiveInspection:
+        """The findings with every view of the clinic, for a notebook; `images` is the folder of the pictures."""
+        from camviz.clinic.live import LiveInspection
+
+        return LiveInspection(self, images)
+
+    def _ipython_display_(self) -> None:
+        self.explore()._ipython_display_()
 
 
 def inspect(

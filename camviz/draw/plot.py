@@ -7,6 +7,8 @@ import numpy as np
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 
+Ticks = Sequence[tuple[float, str]]
+
 
 def plot_panel(
     name: str, x: float, y: float, width: float, height: float, xlim: tuple[float, float], ylim: tuple[float, float]
@@ -15,16 +17,20 @@ def plot_panel(
     return Panel(name, x, y, width, height, xlim[0], xlim[1], ylim[1], ylim[0])
 
 
-def axes(panel: Panel, xlabel: str, ylabel: str) -> str:
-    """Tick labels and axis names around a plot panel, to stand beside `panel.show(grid(panel) + …)`."""
-    xs, ys = _ticks(panel.left, panel.right, panel.width), _ticks(panel.bottom, panel.top, panel.height)
+def axes(panel: Panel, xlabel: str, ylabel: str, xticks: Ticks | None = None, yticks: Ticks | None = None) -> str:
+    """Tick labels and axis names around a plot panel, to stand beside `panel.show(grid(panel) + …)`.
+
+    Ticks are found where none are given as (place, words), as for a logarithmic axis.
+    """
+    xs = _found(panel.left, panel.right, panel.width) if xticks is None else xticks
+    ys = _found(panel.bottom, panel.top, panel.height) if yticks is None else yticks
     parts = [
         svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
-        for px, words in zip(panel.place(_pairs(xs, panel.top))[:, 0], _written(xs), strict=True)
+        for px, (_, words) in zip(panel.place(_pairs(_places(xs), panel.top))[:, 0], xs, strict=True)
     ]
     parts += [
         svg.text((panel.x - 6, panel.y + py + 4), words, "tick end")
-        for py, words in zip(panel.place(_pairs(panel.left, ys))[:, 1], _written(ys), strict=True)
+        for py, (_, words) in zip(panel.place(_pairs(panel.left, _places(ys)))[:, 1], ys, strict=True)
     ]
     parts.append(svg.text((panel.x + panel.width / 2, panel.y + panel.height + 34), xlabel, "note middle"))
     x, y = panel.x - 40, panel.y + panel.height / 2
@@ -32,9 +38,10 @@ def axes(panel: Panel, xlabel: str, ylabel: str) -> str:
     return "".join(parts)
 
 
-def grid(panel: Panel) -> str:
+def grid(panel: Panel, xticks: Ticks | None = None, yticks: Ticks | None = None) -> str:
     """Grid lines at the ticks, and the axes x = 0 and y = 0 where they are inside."""
-    xs, ys = _ticks(panel.left, panel.right, panel.width), _ticks(panel.bottom, panel.top, panel.height)
+    xs = _places(_found(panel.left, panel.right, panel.width) if xticks is None else xticks)
+    ys = _places(_found(panel.bottom, panel.top, panel.height) if yticks is None else yticks)
     lines = [_pairs(x, (panel.bottom, panel.top)) for x in xs] + [_pairs((panel.left, panel.right), y) for y in ys]
     zeros = [_pairs(0, (panel.bottom, panel.top))] if panel.left <= 0 <= panel.right else []
     zeros += [_pairs((panel.left, panel.right), 0)] if panel.bottom <= 0 <= panel.top else []
@@ -46,6 +53,30 @@ def curve(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
     points = panel.place(np.stack([x, y], axis=-1))
     outside = (np.abs(points[:, 1] - panel.height / 2) > 3 * panel.height)[:, None]
     return svg.line(np.where(outside, np.nan, points), class_)
+
+
+def bars(panel: Panel, left: np.ndarray, right: np.ndarray, top: np.ndarray, class_: str) -> str:
+    """Upright bars from 0, between `left` and `right` and as high as `top`, each (n,), as one element; NaN has none."""
+    known = np.isfinite(top)
+    left, right, top = left[known], right[known], np.minimum(top[known], panel.top)
+    corners = np.stack([_pairs(left, 0), _pairs(left, top), _pairs(right, top), _pairs(right, 0)], axis=1)
+    return svg.path(map(panel.place, corners), class_, closed=True)
+
+
+def between(panel: Panel, x: np.ndarray, low: np.ndarray, high: np.ndarray, class_: str) -> str:
+    """The area between two curves over x, all (n,), shaded."""
+    known = np.isfinite(low + high)
+    outline = np.concatenate([_pairs(x[known], low[known]), _pairs(x[known], high[known])[::-1]])
+    return svg.polygon(panel.place(outline), f"wash {class_}") if known.sum() > 1 else ""
+
+
+def logarithmic(low: float, high: float) -> list[tuple[float, str]]:
+    """Ticks of an axis that holds log10 of what it names: 1, 2 and 5 times powers of ten, fewer where these crowd."""
+    powers = 10.0 ** np.arange(np.floor(low), np.ceil(high) + 1)
+    factors = (1, 2, 5) if high - low < 2.2 else (1,)
+    values = np.sort(np.outer(powers, factors).ravel())
+    values = values[(np.log10(values) >= low - 1e-9) & (np.log10(values) <= high + 1e-9)]
+    return [(float(np.log10(value)), f"{value:g}") for value in values]
 
 
 def band(panel: Panel, x0: float, x1: float, class_: str) -> str:
@@ -78,8 +109,13 @@ def ticks(low: float, high: float, count: float) -> np.ndarray:
     return step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
 
 
-def _ticks(low: float, high: float, length: float) -> np.ndarray:
-    return ticks(low, high, length / 50)
+def _found(low: float, high: float, length: float) -> Ticks:
+    values = ticks(low, high, length / 50)
+    return list(zip(values.tolist(), _written(values), strict=True))
+
+
+def _places(ticks: Ticks) -> list[float]:
+    return [place for place, _ in ticks]
 
 
 def _written(values: np.ndarray) -> list[str]:

@@ -5,6 +5,7 @@ NaN interrupts a line and hides a mark, as everywhere in camviz: "no such point"
 
 from collections.abc import Iterable
 from html import escape
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,14 @@ def text(point: ArrayLike, words: str, class_: str = "label", **attributes: Any)
     if not np.isfinite([x, y]).all():
         return ""
     return element("text", escape(words, quote=False), x=x, y=y, class_=class_, **attributes)
+
+
+def paragraph(point: ArrayLike, words: str, width: float, class_: str = "note", line: float = 17) -> str:
+    """Words from a point (2,) on, broken into lines that fit `width` as nearly as letters of unknown width can tell."""
+    x, y = np.asarray(point, dtype=float)
+    letters = max(8, int(width / (6.3 if "note" in class_ else 7.1)))
+    lines = [part for given in words.splitlines() for part in wrap(given, letters) or [""]]
+    return "".join(text((x, y + line * i), part, class_) for i, part in enumerate(lines))
 
 
 def rectangle(x: float, y: float, width: float, height: float, class_: str, **attributes: Any) -> str:

@@ -68,6 +68,10 @@ class View:
         """The view's controls by field name, in the order of declaration."""
         return {f.name: _labelled(f) for f in fields(cls) if "control" in f.metadata}
 
+    def offered(self) -> dict[str, Control]:
+        """The controls as this state offers them; a subclass changes those whose range depends on what it shows."""
+        return self.controls()
+
     def figure(self, *, draft: bool = False) -> Picture:
         """The picture of this state; with `draft`, a coarser one fit for dragging."""
         raise NotImplementedError(f"{type(self).__name__} draws nothing yet")

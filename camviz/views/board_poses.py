@@ -16,11 +16,12 @@ from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Label, Line, Sheet, axes_triad, camera_body, draw_space, space_panel
-from camviz.files.calibration import Board
+from camviz.files.calibration import Board, Calibration
 from camviz.lenses.base import Array
-from camviz.views.base import View, choice, slider
+from camviz.views.base import Control, View, choice, slider
 
 _NINE_BY_SIX = Board(9, 6, 0.025)
+_MOST_NUMBERED = 40  # boards that still leave room for each other's numbers
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,22 @@ class BoardPosesView(View):
             got = len(self.photographs)
             raise ValueError(f"photographs must be as many as the {len(self.cam_from_board)} poses, got {got}")
 
+    @classmethod
+    def of(cls, calibration: Calibration, camera: str = "") -> BoardPosesView:
+        """The boards of a calibration before its camera, the first unless named. Raises ValueError without poses."""
+        name = camera or next(iter(calibration.cameras))
+        if calibration.board is None or name not in calibration.cam_from_board:
+            raise ValueError(f"The file does not hold where the board was in the views of {name}.")
+        standing = calibration.cameras[name].at(RigidTransform.identity())
+        poses = calibration.cam_from_board[name]
+        view = cls(standing, poses, calibration.board, "camera")
+        away = float(np.median(np.linalg.norm(poses.translation, axis=-1)))
+        return view.but(eye=replace(view.eye, distance=2.2 * away))
+
+    def offered(self) -> dict[str, Control]:
+        controls = self.controls()
+        return {**controls, "picture": replace(controls["picture"], high=len(self.cam_from_board))}
+
     # The numbers -----------------------------------------------------------------------------------------------------
 
     @property
@@ -67,8 +84,7 @@ class BoardPosesView(View):
 
     def corners(self) -> Array:
         """The inner corners (rows * columns, 3) in the board's frame, in metres."""
-        column, row = np.meshgrid(np.arange(self.board.columns, dtype=float), np.arange(self.board.rows, dtype=float))
-        return self.board.square_size * np.stack([column, row, 0 * row], axis=-1).reshape(-1, 3)
+        return self.board.corners
 
     def pixels(self) -> Array:
         """Where the chosen picture has the corners, (rows * columns, 2), by pose, lens and camera matrix."""
@@ -97,14 +113,14 @@ class BoardPosesView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        space, attached = self._space(draft)
+        space, attached = self.space(space_panel("poses", 20, 34, 540, 452), draft)
         body = svg.rectangle(0, 0, 960, 500, "paper") + space + self._image() + self._equation()
         if self.photographs:
             attached = attached | {"photograph": jpeg(self.photographs[self.index])}
         return Picture(body, 960, 500, "Camera and board", self.description(), attached)
 
-    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = space_panel("poses", 20, 34, 540, 452)
+    def space(self, panel: Panel, draft: bool) -> tuple[str, dict[str, bytes]]:
+        """The panel with the poses in space, a handle called "eye", and the photographs it needs."""
         before_board = self.still == "board"
         target = (self._middle + self.centres.mean(0)) / 2 if before_board else transform(self.chosen, self._middle) / 2
         eye = replace(self.eye, target=tuple(target.tolist()))
@@ -117,7 +133,7 @@ class BoardPosesView(View):
     def _cameras(self) -> list[Item]:
         """The board, and every picture's camera around it."""
         still = RigidTransform.identity()
-        items = [*self._board(still, True), *axes_triad(still, 3 * self.board.square_size)]
+        items = [*self.board_items(still, True), *axes_triad(still, 3 * self.board.square_size)]
         for i, board_from_cam in enumerate(self.cam_from_board.inv()):
             items += self._body(board_from_cam, str(i + 1)) if i == self.index else self._pyramid(board_from_cam, i + 1)
         return items
@@ -127,9 +143,10 @@ class BoardPosesView(View):
         still = RigidTransform.identity()
         items = [*self._body(still, "C"), *axes_triad(still, 2 * self.board.square_size)]
         for i, cam_from_board in enumerate(self.cam_from_board):
-            items += self._board(cam_from_board, i == self.index)
-            where = transform(cam_from_board, self._outline()[0])
-            items.append(Label(where, str(i + 1), "label orange" if i == self.index else "note"))
+            items += self.board_items(cam_from_board, i == self.index)
+            if i == self.index or len(self.cam_from_board) <= _MOST_NUMBERED:
+                where = transform(cam_from_board, self.outline()[0])
+                items.append(Label(where, str(i + 1), "label orange" if i == self.index else "note"))
         return items
 
     def _body(self, pose: RigidTransform, name: str) -> list[Item]:
@@ -151,19 +168,21 @@ class BoardPosesView(View):
             * self.camera.lens.unproject(self.camera.intrinsics.from_pixels(self.camera.intrinsics.border(1)))
         )
 
-    def _board(self, frame_from_board: RigidTransform, chosen: bool) -> list[Item]:
-        outline = transform(frame_from_board, self._outline())
+    def board_items(self, frame_from_board: RigidTransform, chosen: bool) -> list[Item]:
+        """The board's rim, and if it is picked out its squares, standing in a frame."""
+        outline = transform(frame_from_board, self.outline())
         rim = Line(np.vstack([outline, outline[:1]]), "orange" if chosen else "muted", 1.8 if chosen else 1)
         if not chosen:
             return [rim]
-        return [rim, Sheet.over(outline[[0, 1, 3, 2]].reshape(2, 2, 3), self._checkers(), 0.9)]
+        return [rim, Sheet.over(outline[[0, 1, 3, 2]].reshape(2, 2, 3), self.checkers(), 0.9)]
 
-    def _outline(self) -> Array:
+    def outline(self) -> Array:
         """The four corners (4, 3) of the board's squares, one square beyond the inner corners."""
         right, below = self.board.columns, self.board.rows
         return self.board.square_size * np.array([[-1, -1, 0], [right, -1, 0], [right, below, 0], [-1, below, 0]])
 
-    def _checkers(self) -> NDArray[np.uint8]:
+    def checkers(self) -> NDArray[np.uint8]:
+        """The board's squares as a picture, one square beyond the inner corners."""
         column, row = np.meshgrid(np.arange(self.board.columns + 1), np.arange(self.board.rows + 1))
         squares = np.where((column + row) % 2, 245, 40).astype(np.uint8)
         return np.repeat(np.kron(squares, np.ones((12, 12), np.uint8))[..., None], 3, axis=-1)

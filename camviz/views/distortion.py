@@ -140,7 +140,7 @@ class DistortionView(View):
                 svg.rectangle(0, 0, 960, 602, "paper"),
                 self._picture_panel(),
                 self._field_panel(),
-                self._curve_panel(),
+                self.curve_panel(70, 370, 420, 180),
                 lens_panel,
                 self._numbers_column(),
             ]
@@ -240,10 +240,11 @@ class DistortionView(View):
 
     # The radial curve ------------------------------------------------------------------------------------------------
 
-    def _curve_panel(self) -> str:
+    def curve_panel(self, x: float, y: float, width: float, height: float, *, equation: bool = True) -> str:
+        """The radial curve g(r), where it folds and where the picture ends; `x` and `y` are its plot's corner."""
         corner = distortion.image_corner_radius(self.intrinsics) or 1.0  # a single pixel on the axis has none
         top = 1.5 * corner
-        panel = plot.plot_panel("curve", 70, 370, 420, 180, (0, top), (0, 1.2 * corner))
+        panel = plot.plot_panel("curve", x, y, width, height, (0, top), (0, 1.2 * corner))
         r = np.linspace(0, top, 241)
         fold = self._fold
         curve, beyond = self._radial(np.where(r <= fold, r, np.nan)), self._radial(np.where(r >= fold, r, np.nan))
@@ -260,7 +261,7 @@ class DistortionView(View):
             + self._fold_mark(panel, fold)
             + svg.text(panel.place((corner, 0)) + (-6, -8), "image corner", "green end halo"),
             title="The radial curve",
-            note=self.equation(),
+            note=self.equation() if equation else "",
         )
 
     def _radial(self, r: np.ndarray) -> np.ndarray:

@@ -52,6 +52,29 @@ def on_photograph(lines: ArrayLike, class_: str) -> str:
     return svg.path(lines, "paper-line") + svg.path(lines, class_)
 
 
+def arrows(starts: ArrayLike, ends: ArrayLike, class_: str, head: float = 6) -> str:
+    """Arrows between places (n, 2) in the panel, with an edge in the colour of the paper and a head of their size."""
+    starts, ends = (np.asarray(places, dtype=float).reshape(-1, 2) for places in (starts, ends))
+    along = ends - starts
+    length = np.linalg.norm(along, axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        back = -along / length * np.minimum(head, 0.6 * length)
+    side = 0.45 * np.stack([-back[:, 1], back[:, 0]], axis=-1)
+    barbs = np.stack([ends + back + side, ends, ends + back - side], axis=1)
+    shafts = np.stack([starts, ends], axis=1)
+    known = np.isfinite(barbs).all(axis=(1, 2))
+    data = np.concatenate([shafts[known], barbs[known][:, :2], barbs[known][:, 1:]])
+    return "".join(svg.segments(data[:, 0], data[:, 1], c) for c in ("paper-line", class_))
+
+
+def cross(at: ArrayLike, class_: str, radius: float = 5) -> str:
+    """Slanting crosses at places (n, 2) in the panel."""
+    at = np.asarray(at, dtype=float).reshape(-1, 2)
+    arm = radius * np.array([1, 1]), radius * np.array([1, -1])
+    starts, ends = np.concatenate([at - a for a in arm]), np.concatenate([at + a for a in arm])
+    return svg.segments(starts, ends, "paper-line") + svg.segments(starts, ends, class_)
+
+
 def ring(at: Array, class_: str, radius: float) -> str:
     """A circle around a place (2,) in the panel."""
     turn = np.linspace(0, 2 * np.pi, 33)

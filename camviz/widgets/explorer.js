@@ -135,7 +135,7 @@ function hands(picture, ask) {
     const handle = event.target.closest("[data-drag]")?.dataset.drag;
     if (!handle || event.button) return;
     const [x, y] = at(event);
-    held = { handle, x, y };
+    held = { handle, x, y, moved: false };
     picture.setPointerCapture(event.pointerId);
     picture.querySelector(`[data-drag="${CSS.escape(handle)}"]`).focus({ preventScroll: true });
     event.preventDefault();
@@ -144,9 +144,12 @@ function hands(picture, ask) {
     if (!held) return;
     const [x, y] = at(event);
     ask({ drags: [[held.handle, x, y, x - held.x, y - held.y]] }, true);
-    Object.assign(held, { x, y });
+    Object.assign(held, { x, y, moved: true });
   };
-  const up = () => { held = null; };
+  const up = () => {      // a click is a drag of no length
+    if (held && !held.moved) ask({ drags: [[held.handle, held.x, held.y, 0, 0]] }, false);
+    held = null;
+  };
   const key = (event) => {
     const handle = event.target.closest?.("[data-drag]")?.dataset.drag;
     if (!handle || !/^(Arrow(Left|Right|Up|Down)|[+=-])$/.test(event.key)) return;

@@ -85,7 +85,7 @@ def explore(view: View, *names: str, **ranges: Any) -> Explorer:
     `ranges` narrows or widens: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words for a choice.
     Raises ValueError naming the fields there are when one is unknown.
     """
-    declared = type(view).controls()
+    declared = view.offered()
     for name in (*names, *ranges):
         if name not in declared:
             raise ValueError(f"{type(view).__name__} has no control {name!r}; it has {', '.join(declared)}")

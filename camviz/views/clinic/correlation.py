@@ -1,0 +1,153 @@
+"""Which parameters a calibration cannot tell apart: the correlation matrix of its solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from camviz.draw import svg
+from camviz.draw.heat import Shades, bar
+from camviz.draw.panel import Panel
+from camviz.draw.picture import Picture, png
+from camviz.lenses.base import Array
+from camviz.views.base import View, choice
+from camviz.views.clinic.observations import Missing
+from camviz.views.clinic.uncertainty import adjusted, determined
+
+_FIGURES = 18  # parameters up to which the cells have room for their numbers
+_STRONG = 0.95
+
+
+@dataclass(frozen=True)
+class CorrelationView(View):
+    """The correlations (n, n) of a solution's parameters, from their covariance, with each one's standard deviation.
+
+    Two that hang together by almost ±1 can be traded for one another: the corners cannot tell which of them it is.
+    """
+
+    title: ClassVar[str] = "What the solution cannot tell apart"
+
+    names: tuple[str, ...]
+    covariance: Array = field(compare=False, repr=False)
+    values: Array | None = field(default=None, compare=False, repr=False)
+    show: str = choice("correlation", "size only", label="show", help="with its sign, or how strong it is")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        n = len(self.names)
+        if self.covariance.shape != (n, n):
+            raise ValueError(f"covariance must have shape {(n, n)} as there are {n} names, got {self.covariance.shape}")
+
+    @classmethod
+    def of(cls, calibration: Any, camera: str = "") -> CorrelationView:
+        """The view of a calibration: from its corners, or from the covariance that its file holds. Raises Missing."""
+        name = camera or next(iter(calibration.cameras))
+        try:
+            return cls.about(adjusted(calibration, *([name] if len(calibration.cameras) > 1 else [])))
+        except Missing as missing:
+            if name not in calibration.intrinsics_covariance or name not in calibration.estimated:
+                raise missing
+        return cls(calibration.estimated[name], calibration.intrinsics_covariance[name])
+
+    @classmethod
+    def about(cls, adjustment: Any) -> CorrelationView:
+        """The view of an adjustment's shared parameters; a lone camera's without its name. Raises Missing."""
+        names = determined(adjustment).parameters
+        alone = len(adjustment.cameras) == 1
+        shown = tuple(name.split(".", 1)[1] if alone else name for name in names)
+        return cls(shown, adjustment.covariance)
+
+    @cached_property
+    def correlations(self) -> Array:
+        """The matrix (n, n), -1 … 1; NaN for a parameter without a variance."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.clip(self.covariance / np.outer(deviation, deviation), -1, 1)
+
+    def strongest(self) -> list[tuple[str, str, float]]:
+        """The pairs of different parameters by the size of their correlation, the strongest first."""
+        i, j = np.triu_indices(len(self.names), 1)
+        order = np.argsort(-np.abs(np.nan_to_num(self.correlations[i, j])))
+        return [(self.names[i[k]], self.names[j[k]], float(self.correlations[i[k], j[k]])) for k in order]
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        told = "; ".join(f"{a} with {b} {_signed(r)}" for a, b, r in self.strongest()[:6])
+        deviations = "; ".join(
+            f"{name} ±{d:.3g}" for name, d in zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True)
+        )
+        return (
+            f"Correlations of {len(self.names)} parameters. The strongest: {told}. Standard deviations: {deviations}."
+        )
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        n = len(self.names)
+        side = 460.0
+        cell = side / max(n, 1)
+        panel = Panel("correlation", 130, 34, side, side, 0, n, 0, n)
+        shown = np.abs(self.correlations) if self.show == "size only" else self.correlations
+        shades = Shades(0, 1) if self.show == "size only" else Shades(-1, 1, diverging=True)
+        content = svg.image("matrix", 0, 0, side, side, style="image-rendering:pixelated")
+        if n <= _FIGURES:
+            places = panel.place(np.stack(np.meshgrid(np.arange(n) + 0.5, np.arange(n) + 0.5), -1)).reshape(-1, 2)
+            size = min(12.0, 0.36 * cell)
+            content += "".join(
+                svg.text(
+                    place + (0, 0.35 * size),
+                    f"{r:.2f}" if self.show == "size only" else _signed(r),
+                    "label halo middle",
+                    style=f"font-size:{size:.1f}px",
+                )
+                for place, r in zip(places, shown.ravel(), strict=True)
+                if np.isfinite(r)
+            )
+        legend, bar_picture = bar(panel.x + side + 14, 64, side - 60, "matrix-bar", shades, "r")
+        body = (
+            svg.rectangle(0, 0, 960, 590, "paper")
+            + panel.show(content, title="Correlations")
+            + legend
+            + self._names(panel, cell)
+        )
+        return Picture(
+            body + self._words(680),
+            960,
+            590,
+            self.title,
+            self.description(),
+            {"matrix": png(shades.rgba(shown)), **bar_picture},
+        )
+
+    def _names(self, panel: Panel, cell: float) -> str:
+        size = f"font-size:{min(12.0, max(5.0, 0.8 * cell)):.1f}px"
+        parts = []
+        for i, name in enumerate(self.names):
+            parts.append(svg.text((panel.x - 8, panel.y + (i + 0.5) * cell + 4), name, "tick end", style=size))
+            x, y = panel.x + (i + 0.5) * cell, panel.y + panel.height + 12
+            parts.append(svg.text((x, y), name, "tick end", style=size, transform=f"rotate(-55 {x:g} {y:g})"))
+        return "".join(parts)
+
+    def _words(self, x: float) -> str:
+        words = svg.text((x, 48), "The strongest pairs", "title")
+        for i, (a, b, r) in enumerate(self.strongest()[:9]):
+            words += svg.text((x, 72 + 20 * i), f"{_signed(r)}", "number" + (" red" if abs(r) > _STRONG else ""))
+            words += svg.text((x + 50, 72 + 20 * i), f"{a} – {b}", "label")
+        words += svg.text((x, 280), "One standard deviation", "title")
+        rows = list(zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True))
+        for i, (name, deviation) in enumerate(rows[:12]):
+            words += svg.text((x, 302 + 17 * i), name, "note") + svg.text(
+                (x + 140, 302 + 17 * i), f"±{deviation:.3g}", "number"
+            )
+        if len(rows) > 12:
+            words += svg.text((x, 302 + 17 * 12), f"and {len(rows) - 12} more", "note")
+        advice = (
+            "Close to ±1: the boards cannot tell the two apart. Neighbouring terms of a polynomial (k1, k2, k3) "
+            "and fx with fy always hang together."
+        )
+        return words + svg.paragraph((x, 520), advice, 270)
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.2f}".replace("-", "−")

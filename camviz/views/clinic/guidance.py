@@ -1,0 +1,194 @@
+"""Where to hold the board next: the pose that would take most off the uncertainty, as a board to imitate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.guidance import Candidate, next_board_poses
+from camviz.cameras import transform
+from camviz.draw import svg
+from camviz.draw.items import Face, Item, Line
+from camviz.draw.panel import image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
+from camviz.lenses.base import Array
+from camviz.views.base import View, slider
+from camviz.views.board_poses import BoardPosesView
+from camviz.views.clinic.observations import Missing
+from camviz.views.clinic.uncertainty import adjusted, determined
+
+_OFFERED, _APART = 8, 0.35  # candidates shown, and how unlike each other: corner distance in widths of the picture
+_SIDE = 16  # points along the edge of a square, so that it bends with the lens
+
+
+@dataclass(frozen=True)
+class GuidanceView(View):
+    """The boards of a calibration in space with a ghost among them, and the picture that the ghost would give.
+
+    Candidate 1 lessens the mean uncertainty of projection most; the next ones are the best that look different.
+    """
+
+    title: ClassVar[str] = "Where to hold the board next"
+
+    adjustment: Adjustment = field(compare=False, repr=False)
+    candidates: tuple[Candidate, ...] = field(compare=False, repr=False)
+    camera: str = "camera"
+    choice: int = slider(1, 1, _OFFERED, 1, label="candidate", help="1 lessens the uncertainty most")
+    backdrop: NDArray[np.uint8] | None = field(default=None, compare=False, repr=False)
+    eye: Eye = Eye(yaw_deg=-50, pitch_deg=20)
+
+    @classmethod
+    def of(cls, calibration: Any, camera: str = "") -> GuidanceView:
+        """The view of a calibration. Raises Missing where it does not hold what its solution was made from."""
+        name = camera or next(iter(calibration.cameras))
+        return cls.about(adjusted(calibration, name), name)
+
+    @classmethod
+    def about(cls, adjustment: Adjustment, camera: str = "") -> GuidanceView:
+        """The view of an adjustment; the candidates are tried here."""
+        name = camera or next(iter(adjustment.cameras))
+        determined(adjustment)
+        try:
+            ranked = next_board_poses(adjustment, camera=name)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise Missing(f"No pose can be proposed: {error}.") from error
+        return cls(adjustment, unlike(ranked, adjustment, name), name)
+
+    @property
+    def chosen(self) -> Candidate:
+        """The candidate shown."""
+        return self.candidates[min(max(round(self.choice), 1), len(self.candidates)) - 1]
+
+    def sentences(self) -> list[str]:
+        """What to do, in words."""
+        c, k = self.chosen, self.adjustment.cameras[self.camera].intrinsics
+        middle = self._uv.mean(axis=0)
+        across = ("on the left", "in the middle", "on the right")[int(np.clip(3 * (middle[0] + 0.5) / k.width, 0, 2))]
+        down = ("at the top", "half way down", "at the bottom")[int(np.clip(3 * (middle[1] + 0.5) / k.height, 0, 2))]
+        points = transform(c.cam_from_board, self.adjustment.board.corners)
+        away = float(np.linalg.norm(points.mean(axis=0)))
+        gain = 100 * (1 - c.after / c.before)
+        return [
+            f"Hold the board {across}, {down}, {away:.2g} m away, tilted by {c.tilt_deg:.0f}°, as in the picture "
+            "on the right.",
+            f"One such view would lessen the mean uncertainty from {c.before:.3g} px to {c.after:.3g} px, by "
+            f"{gain:.0f} %.",
+        ]
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        return f"{self.camera}, candidate {round(self.choice)} of {len(self.candidates)}. {' '.join(self.sentences())}"
+
+    @cached_property
+    def _uv(self) -> Array:
+        camera = self.adjustment.cameras[self.camera].at(RigidTransform.identity())
+        return camera.project(transform(self.chosen.cam_from_board, self.adjustment.board.corners))
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        space, attached = self._space(draft)
+        shown, pictures = self._imitate()
+        body = svg.rectangle(0, 0, 960, 432, "paper") + space + shown
+        for i, sentence in enumerate(self.sentences()):
+            body += svg.text((20, 402 + 20 * i), sentence, "label")
+        return Picture(body, 960, 432, self.title, self.description(), attached | pictures)
+
+    @cached_property
+    def _cam_from_board(self) -> RigidTransform:
+        a = self.adjustment
+        return a.cameras[self.camera].cam_from_world * a.first_from_board[a.posed]
+
+    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+        a, standing = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
+        boards = BoardPosesView(standing, self._cam_from_board, a.board, "camera")
+        size = a.board.square_size
+        items: list[Item] = [
+            *camera_body(standing, 2 * size, colour="blue"),
+            *axes_triad(RigidTransform.identity(), 2 * size),
+        ]
+        for pose in self._cam_from_board[: 60 if len(self._cam_from_board) > 60 else None]:
+            items += boards.board_items(pose, False)
+        ghost = transform(self.chosen.cam_from_board, boards.outline())
+        items += [Face(ghost, "orange", 0.25), Line(np.vstack([ghost, ghost[:1]]), "orange dashed", 2.2)]
+        items += [
+            Line(transform(self.chosen.cam_from_board, line), "orange", 1.0)
+            for line in _squares(a.board.columns, a.board.rows, size)
+        ]
+        middle = ghost.mean(axis=0)
+        target = tuple((middle / 2).tolist())
+        farthest = max(
+            float(np.linalg.norm(middle)), float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
+        )
+        eye = replace(self.eye, target=target, distance=1.6 * farthest * self.eye.distance / Eye().distance)
+        panel = space_panel("guidance", 20, 34, 450, 340)
+        content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
+        label = "The boards in space; drag or press the arrow keys to walk around them"
+        return panel.show(
+            content, title="Imitate the orange board", hint="drag to turn", drag="eye", label=label
+        ), attached
+
+    def _imitate(self) -> tuple[str, dict[str, bytes]]:
+        """The picture that the ghost would give, its squares bent as the lens bends them."""
+        a, camera = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
+        k, board = camera.intrinsics, a.board
+        panel = image_panel("imitate", 490, 34, 450, k.width, k.height, tallest=340)
+        content, attached = "", {}
+        if self.backdrop is not None:
+            content, attached = (
+                photograph(panel, "backdrop", k.width, k.height, class_="faint"),
+                {"backdrop": jpeg(self.backdrop)},
+            )
+        along = np.linspace(0, 1, _SIDE, endpoint=False)[:, None]
+        corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+        ring = np.concatenate([p + along * (q - p) for p, q in zip(corners, np.roll(corners, -1, 0), strict=True)])
+
+        def projected(points: Array) -> Array:
+            points = board.square_size * np.column_stack([points, np.zeros(len(points))])
+            return panel.place(camera.project(transform(self.chosen.cam_from_board, points)))
+
+        whole = projected(ring * (board.columns + 1, board.rows + 1) - 1)
+        content += svg.polygon(whole, "fill-orange", style="fill-opacity:.18;stroke:none")
+        dark = [
+            projected(ring + (i - 1, j - 1))
+            for i in range(board.columns + 1)
+            for j in range(board.rows + 1)
+            if (i + j) % 2 == 0
+        ]
+        content += svg.path([d for d in dark if np.isfinite(d).all()], "fill-orange", closed=True)
+        content += svg.line(np.vstack([whole, whole[:1]]), "orange thick")
+        return panel.show(content, title="The picture it would give"), attached
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        return self.but(eye=self.eye.orbited(dx, dy))
+
+    def pressed(self, handle: str, key: str) -> Self:
+        return self.but(eye=self.eye.key(key))
+
+
+def unlike(ranked: tuple[Candidate, ...], adjustment: Adjustment, name: str) -> tuple[Candidate, ...]:
+    """The best candidates that differ from each other in the picture, the best first."""
+    camera = adjustment.cameras[name].at(RigidTransform.identity())
+    corners = adjustment.board.corners
+    kept: list[Candidate] = []
+    seen: list[Array] = []
+    for candidate in ranked:
+        uv = camera.project(transform(candidate.cam_from_board, corners)) / camera.intrinsics.width
+        if all(np.linalg.norm(uv - other, axis=-1).max() > _APART for other in seen):
+            kept.append(candidate)
+            seen.append(uv)
+        if len(kept) == _OFFERED:
+            break
+    return tuple(kept)
+
+
+def _squares(columns: int, rows: int, size: float) -> list[Array]:
+    """The lines of a board's inner corners, in its own frame."""
+    x, y = size * np.arange(columns), size * np.arange(rows)
+    lines = [np.array([(x[0], b, 0), (x[-1], b, 0)]) for b in y]
+    return lines + [np.array([(a, y[0], 0), (a, y[-1], 0)]) for a in x]

@@ -1,0 +1,210 @@
+"""The clinic's report: every finding leads to its view, everything is inside one file, and pictures are linked."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import cv2
+import numpy as np
+import pytest
+from calibrations import bare, pair, sick, single
+
+from camviz.clinic import inspect, inspect_file
+from camviz.clinic.findings import Inspection, kinds
+from camviz.clinic.live import LiveInspection
+from camviz.clinic.report import MOST_VIEWS, report, write_report
+from camviz.clinic.views import ALIASES, VIEWS
+
+VOID = {"meta", "br", "img", "link", "input", "hr"}
+
+
+class Strict(HTMLParser):
+    """Complains about tags that are not closed in their order; gathers ids and links."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open, self.ids, self.links = [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [values[key] for key in ("href", "src") if key in values]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        values = dict(attributes)
+        self.links += [values[key] for key in ("href", "src") if key in values]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def parsed(text: str) -> Strict:
+    page = Strict()
+    page.feed(text)
+    page.close()
+    assert page.open == []
+    return page
+
+
+@pytest.fixture(scope="module", params=["healthy", "sick", "pair", "bare"])
+def page(request):
+    calibration = {"healthy": single, "sick": sick, "pair": pair, "bare": bare}[request.param]()
+    inspection = inspect(calibration)
+    text = report(inspection)
+    return inspection, text, parsed(text)
+
+
+def test_every_link_inside_the_page_leads_somewhere(page):
+    _, _, parts = page
+    inside = {link[1:] for link in parts.links if link.startswith("#")}
+    assert inside <= set(parts.ids)
+    assert len(parts.ids) == len(set(parts.ids))
+
+
+def test_every_view_of_a_finding_has_its_anchor_whatever_was_found(page):
+    _, _, parts = page
+    assert {f"view-{kind.view}" for kind in kinds().values()} <= set(parts.ids)
+    assert {f"view-{name}" for name in (*VIEWS, *ALIASES)} <= set(parts.ids)
+
+
+def test_the_page_needs_nothing_from_elsewhere(page):
+    _, text, parts = page
+    assert [link for link in parts.links if not link.startswith(("#", "data:"))] == []
+    assert re.sub(r"http://www\.w3\.org/\S+", "", text).count("http") == 0
+    assert "attached:" not in text
+    assert "@import" not in text
+
+
+def test_findings_come_first_with_their_words(page):
+    inspection, text, _ = page
+    assert text.index('id="findings"') < text.index('id="view-')
+    for finding in inspection.findings:
+        assert finding.id in text
+    if not inspection.findings:
+        assert "Nothing found" in text
+
+
+def test_the_bars_pictures_and_boards_of_a_view_share_its_number():
+    text = report(inspect(sick()))
+    bars = set(re.findall(r'<a href="#of-camera-\d+" data-choose="(\d+)" aria-label', text))
+    boards = set(re.findall(r'data-choose="(\d+)" class="board"', text))
+    figures = set(re.findall(r'<figure id="of-camera-\d+" data-view="(\d+)"', text))
+    assert bars == boards == figures == {str(i + 1) for i in range(10)}
+    assert 'data-worst="4"' in text
+
+
+def test_photographs_are_embedded_small(tmp_path):
+    noise = np.random.default_rng(0).integers(0, 255, (480, 640), np.uint8)
+    calibration = single()
+    for name in calibration.pictures["camera"]:
+        cv2.imwrite(str(tmp_path / name), cv2.GaussianBlur(noise, (0, 0), 3))
+    text = report(inspect(calibration), images=tmp_path)
+    assert len(text) < 5e6
+    assert "the picture is not at hand" not in text
+    assert text.count("data:image/jpeg") >= 10
+
+
+def test_of_many_views_the_worst_are_shown_and_the_page_says_so():
+    """Five hundred views, the tenth of which is bad."""
+    few = single(views=10)
+    uv = np.tile(few.detections["camera"], (50, 1, 1))
+    uv[9] += np.random.default_rng(0).normal(0, 3, uv[9].shape)
+    poses = type(few.cam_from_board["camera"]).concatenate([few.cam_from_board["camera"]] * 50)
+    many = replace(few, detections={"camera": uv}, cam_from_board={"camera": poses}, pictures={}, per_view_errors={})
+    text = report(Inspection(many, (), ()))
+    assert f"Of the 500 views the {MOST_VIEWS} worst are shown." in text
+    assert text.count("<figure id=") == MOST_VIEWS
+    assert 'id="of-camera-10"' in text
+    assert len(text) < 5e6
+    parsed(text)
+
+
+def test_a_file_that_cannot_be_read_gets_its_finding_and_no_views(tmp_path):
+    path = tmp_path / "bad.yml"
+    path.write_text(
+        "%YAML:1.0\nimage_width: 640\nimage_height: 480\n"
+        "camera_matrix: [[500, 0, 320], [0, 500, 240], [0, 0, 0]]\ndistortion_coefficients: [0.1, 0, 0, 0, 0]\n"
+    )
+    inspection = inspect_file(path)
+    text = report(replace(inspection, calibration=None))
+    assert parsed(text).ids.count("findings") == 1
+    assert "could not be read" in text
+    for finding in inspection.findings:
+        assert f'id="view-{finding.view}"' in text
+
+
+def test_names_from_a_file_are_words_and_not_html():
+    healthy = single()
+    hostile = "<img src=x onerror=alert(1)>'\""
+    calibration = replace(
+        healthy,
+        cameras={hostile: healthy.cameras["camera"]},
+        detections={hostile: healthy.detections["camera"]},
+        cam_from_board={hostile: healthy.cam_from_board["camera"]},
+        pictures={hostile: (hostile,) * 10},
+        per_view_errors={},
+        estimated={},
+        notes=(hostile,),
+    )
+    text = report(inspect(calibration))
+    assert "<img" not in text
+    parsed(text)
+
+
+def test_the_report_is_written_as_it_is_made(tmp_path):
+    inspection = inspect(bare())
+    write_report(inspection, tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == report(inspection)
+
+
+# In a notebook -------------------------------------------------------------------------------------------------------
+
+
+def test_the_notebook_shows_the_view_of_the_worst_finding_first_and_any_other_on_demand():
+    inspection = inspect(sick())
+    live = LiveInspection(inspection)
+    first = inspection.findings[0].view
+    assert type(live.view) is type(VIEWS[ALIASES.get(first, first)].view(live.case))
+    for name in VIEWS:
+        assert live.show(name).explorer.frame["error"] == ""
+    with pytest.raises(ValueError, match="name must be one of numbers, residual-vectors"):
+        live.show("nonsense")
+
+
+def test_the_notebook_chooses_between_cameras():
+    live = LiveInspection(inspect(pair())).show("residual-histogram", "right")
+    assert live.view.observations.name == "right"
+    with pytest.raises(ValueError, match="camera must be one of left, right, got 'top'"):
+        live.show("coverage", "top")
+
+
+@pytest.fixture
+def displayed(monkeypatch):
+    shown = []
+    monkeypatch.setattr("camviz.clinic.live.display", lambda what, **_: shown.append(what))
+    return shown
+
+
+def test_a_saved_notebook_keeps_the_findings_and_a_still(displayed, monkeypatch):
+    monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
+    inspection = inspect(sick())
+    inspection._ipython_display_()
+    words, still, widget = displayed
+    assert inspection.findings[0].id in words["text/html"]
+    assert inspection.findings[0].sentence in words["text/plain"]
+    assert "<img" in still["text/html"]
+    explorer = widget.children[1]
+    assert re.search(r'data-camviz-still="(\w+)"', still["text/html"])[1] in explorer.still_hidden
+
+
+def test_whatever_view_is_chosen_later_hides_the_one_still(displayed):
+    live = LiveInspection(inspect(sick()))
+    live._ipython_display_()
+    assert live.still_id in live.show("coverage").explorer.still_hidden
+
+
+def test_a_file_that_cannot_be_read_has_words_alone(displayed):
+    LiveInspection(replace(inspect(bare()), calibration=None))._ipython_display_()
+    assert len(displayed) == 1
