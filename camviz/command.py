@@ -6,11 +6,10 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 
 import camviz
-from camviz.commands import board, calibrate, convert, doctor, lab, show, teacher
-from camviz.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal
+from camviz.commands import board, calibrate, convert, doctor, inspect, lab, show, teacher
+from camviz.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, say
 
 DESCRIPTION = """\
 camviz is one virtual camera, taken apart piece by piece: lessons to do in JupyterLab,
@@ -23,6 +22,7 @@ examples:
   camviz board -o board.pdf                  make a board to print
   camviz calibrate left*.jpg --board 9x6 --square-mm 25
                                              calibrate a camera from pictures of it, into camera.yaml
+  camviz inspect camera.yml                  say what is wrong with a calibration, and what to do
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
   camviz convert cam.yml model --to colmap   write the same camera for another program
@@ -30,7 +30,8 @@ examples:
 
 exit status:
   0    done
-  1    something is missing on this machine (camviz doctor says what, and how to mend it)
+  1    something is missing on this machine (camviz doctor says what, and how to mend it); or, of camviz inspect,
+       something was found
   2    the command or the file it names cannot be used; one sentence on stderr says why
   130  interrupted
 """
@@ -62,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
     )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
     commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    for subcommand in (lab, doctor, board, calibrate, show, convert, teacher):
+    for subcommand in (lab, doctor, board, calibrate, inspect, show, convert, teacher):
         subcommand.add(commands)
     return everything
 
@@ -75,7 +76,5 @@ def _split(words: list[str]) -> tuple[list[str], list[str]]:
 
 def _say(sentence: str, status: int) -> int:
     """One line on stderr, whatever a file name or a key may hold."""
-    printable = "".join(c if c.isprintable() else " " for c in sentence)
-    with suppress(OSError):
-        print(f"camviz: {' '.join(printable.split())}", file=sys.stderr)
+    say(sentence)
     return status

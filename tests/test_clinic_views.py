@@ -438,6 +438,29 @@ def test_every_view_draws_every_calibration_or_says_what_is_missing(name, case):
 
 
 @pytest.mark.parametrize("name", VIEWS)
+def test_a_view_that_only_the_other_camera_saw_is_drawn_by_none(name):
+    """Its pose in this camera's list means nothing: here it is the identity, the board in the camera's own place."""
+    both = pair()
+    uv = both.detections["left"].copy()
+    uv[2] = np.nan
+    placed = both.cam_from_board["left"].as_matrix().copy()
+    placed[2] = np.eye(4)
+    calibration = replace(
+        both,
+        detections={**both.detections, "left": uv},
+        cam_from_board={**both.cam_from_board, "left": RigidTransform.from_matrix(placed)},
+    )
+    view = VIEWS[name].view(Case(calibration))
+    assert not isinstance(view, MissingView) or name == "difference"
+    for chosen in (1, 3):
+        picture = (view.but(view=chosen) if "view" in view.offered() else view).figure()
+        assert not re.search(r"\bnan\b", re.sub(r"aria-label=\"[^\"]*\"", "", picture.body))
+    seen = Observations.of(calibration)
+    assert np.isnan(seen.distances[2])
+    assert np.isfinite(np.delete(seen.distances, 2)).all()
+
+
+@pytest.mark.parametrize("name", VIEWS)
 def test_both_ends_of_every_control_draw_different_pictures(name):
     view = VIEWS[name].view(Case(pair(), single()))
     if name == "distortion":

@@ -72,7 +72,7 @@ def baseline_scale(evidence: Evidence) -> Outcome:
     stereo = [] if own_unit else [pair for pair in evidence.pairs if _length(pair) > 0]
     if board is None and not stereo:
         return Lacking("the file holds neither a board nor a stereo pair in metres")
-    findings = [*_square(board)] if board is not None else []
+    findings = [*_square(board, evidence.board)] if board is not None else []
     for pair in stereo:
         finding = _baseline(evidence, pair)
         findings += [finding] if finding else []
@@ -83,7 +83,15 @@ def _length(pair: Pair) -> float:
     return float(np.linalg.norm(pair.right_from_left.translation))
 
 
-def _square(board: Board) -> Iterator[Finding]:
+def _square(board: Board, known: Board | None) -> Iterator[Finding]:
+    if known is not None and abs(np.log(board.square_size / known.square_size)) > SAME_LENGTH:
+        ratio = board.square_size / known.square_size
+        sentence = (
+            f"The file takes the side of a square for {board.square_size:.4g} m, it is {known.square_size:.4g} m: all "
+            f"lengths are {ratio:.4g} times what they should be."
+        )
+        yield found("baseline-scale", sentence, ratio, "times")
+        return
     if not SQUARES[0] <= board.square_size <= SQUARES[1]:
         likely = board.square_size / 1000 if board.square_size > 1 else board.square_size * 1000
         sentence = (

@@ -27,11 +27,12 @@ PANORAMAS = (Cylindrical, Equirectangular)
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A calibration and what goes with it. `sizes` are (width, height) of pictures by their names."""
+    """A calibration, another one, (width, height) of pictures by their names, and the board as it was measured."""
 
     calibration: Calibration
     compare: Calibration | None = None
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    board: Board | None = None
 
     @cached_property
     def cameras(self) -> dict[str, Camera]:

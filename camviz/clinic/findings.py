@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -16,7 +16,7 @@ from camviz.clinic import checks_file, checks_lens, checks_model, checks_rig, ch
 from camviz.clinic.catalogue import SEVERITIES, Check, Finding, Kind, Lacking, found, kinds
 from camviz.clinic.evidence import Evidence
 from camviz.files import CalibrationError, load
-from camviz.files.calibration import Calibration
+from camviz.files.calibration import Board, Calibration
 
 if TYPE_CHECKING:
     from camviz.clinic.live import LiveInspection
@@ -131,13 +131,14 @@ def inspect(
     *,
     compare: Calibration | None = None,
     pictures: Mapping[str, tuple[int, int]] | None = None,
+    board: Board | None = None,
 ) -> Inspection:
     """What is wrong with a calibration.
 
     `compare` is another calibration of the same cameras. `pictures` are the sizes (width, height) of pictures by
-    their names that the calibration is meant for.
+    their names that the calibration is meant for. `board` is the board as it was measured, where that is known.
     """
-    evidence = Evidence(calibration, compare, pictures or {})
+    evidence = Evidence(calibration, compare, pictures or {}, board)
     findings: list[Finding] = []
     checked, skipped = [], []
     for id, check in CHECKS.items():
@@ -157,10 +158,13 @@ def inspect_file(
     size: tuple[int, int] | None = None,
     compare: Calibration | None = None,
     pictures: Mapping[str, tuple[int, int]] | None = None,
+    board: Board | None = None,
+    prepare: Callable[[Calibration], Calibration] | None = None,
 ) -> Inspection:
     """What is wrong with a calibration file, also with one that every other command refuses.
 
-    Raises CalibrationError where the file is not a calibration at all.
+    `prepare` may add to what was read, such as the corners in pictures; the rest is as of `inspect`. Raises
+    CalibrationError where the file is not a calibration at all.
     """
     try:
         calibration = load(path, size=size, mend=True)
@@ -170,7 +174,8 @@ def inspect_file(
         finding = found(error.id, f"{str(error).removeprefix(f'{Path(path)}: ')}.", error.value)
         why = "the file could not be read beyond the fault above"
         return Inspection(None, (finding,), (error.id,), tuple((id, why) for id in CHECKS if id != error.id))
-    return inspect(calibration, compare=compare, pictures=pictures)
+    calibration = prepare(calibration) if prepare else calibration
+    return inspect(calibration, compare=compare, pictures=pictures, board=board)
 
 
 def _said(finding: Finding) -> Sequence[str]:

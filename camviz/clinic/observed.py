@@ -109,7 +109,7 @@ def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> 
 
 
 def unexplained(adjustment: Adjustment, name: str, *also: Array) -> tuple[Array, Array, Mask]:
-    """The residuals (v, corners, 2) without what columns `also` explain; ∂pixel/∂pose (v, corners, 2, 6); which count."""
+    """Residuals (v, corners, 2) without what `also` explains, ∂pixel/∂pose (v, corners, 2, 6), and which count."""
     used = adjustment.used[name][adjustment.posed]
     residuals = np.zeros((*used.shape, 2))
     residuals[used] = _projected(adjustment, name, also[-1], also)[0].reshape(-1, 2)

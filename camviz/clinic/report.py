@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MOST_VIEWS = 24  # pictures of views that a page holds: the worst of them
 MOST_CAMERAS = 4
-MOST_BOARDS = 60
+MOST_BOARDS = 20  # of views whose pictures are not on the page
 
 _MARKS = {"fault": "✗ fault", "warning": "! warning", "note": "· note"}
 
@@ -196,13 +196,8 @@ def _linked(case: Case, name: str, headed: bool) -> str:
         svg.rectangle(0, 0, 960, 206, "paper") + view.bars_panel(panel, links=links), 960, 206,
         f"Error of every view of {name}", view.description().split(" Shown:")[0],
     )  # fmt: skip
-    few = f" Of the {len(seen)} views the {len(shown)} worst are shown." if len(shown) < len(seen) else ""
-    words = (
-        f'<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.{few}</p>'
-        if few or shown
-        else ""
-    )
-    words = words if not few else f"<p>{few.strip()}</p>{words}"
+    few = f"<p>Of the {len(seen)} views the {len(shown)} worst are shown.</p>" if len(shown) < seen.shown.sum() else ""
+    words = f'{few}<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.</p>'
     figures = "".join(_view_figure(view.but(view=i + 1), name, i) for i in shown)
     heading = f"<h3>{escape(name)}</h3>" if headed else ""
     return (
@@ -215,7 +210,8 @@ def _linked(case: Case, name: str, headed: bool) -> str:
 def worst_views(seen: Observations) -> list[int]:
     """The views (from 0) whose pictures a page holds, in their order: all of them, or the worst."""
     errors = np.nan_to_num(seen.rms_seen, nan=-1)
-    return sorted(np.argsort(-errors, kind="stable")[:MOST_VIEWS].tolist())
+    worst = [i for i in np.argsort(-errors, kind="stable").tolist() if seen.shown[i]]
+    return sorted(worst[:MOST_VIEWS])
 
 
 def _view_figure(view: ResidualsView, name: str, i: int) -> str:
@@ -249,9 +245,9 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
     panel = space_panel("boards", 10, 34, 470, 470)
     away = float(np.nanmedian(seen.distances))
     middle = np.nanmedian(seen.corners_cam.mean(axis=1), axis=0)
-    eye = Eye(tuple((0.55 * middle).tolist()), 1.5 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
+    eye = Eye(tuple((0.62 * middle).tolist()), 1.5 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
     items: list[Item] = [*camera_body(standing, 2 * size, colour="blue"), *axes_triad(_STILL, 2 * size)]
-    others = [i for i in range(len(seen)) if i not in links][:MOST_BOARDS]
+    others = [i for i in range(len(seen)) if i not in links and seen.shown[i]][:MOST_BOARDS]
     items += [item for i in others for item in drawn.board_items(seen.cam_from_board[i], False)]
     content, _ = draw_space(panel, items, eye, renderer="wire")
     for i, link in links.items():
@@ -273,8 +269,8 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
         )
     body = svg.rectangle(0, 0, 490, 514, "paper") + panel.show(content, title="Where the boards were held")
     told = (
-        f"The boards of {len(seen)} views of {name}, {seen.distances.min():.2g} m to {seen.distances.max():.2g} m "
-        "before the camera."
+        f"The boards of {len(seen)} views of {name}, {np.nanmin(seen.distances):.2g} m to "
+        f"{np.nanmax(seen.distances):.2g} m before the camera."
     )
     return Picture(body, 490, 514, "Boards in space", told)
 

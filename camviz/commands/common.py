@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -22,6 +24,13 @@ class Refusal(Exception):  # noqa: N818 - said to a person, not raised at a prog
     def __init__(self, sentence: str, status: int = REFUSED) -> None:
         super().__init__(sentence)
         self.status = status
+
+
+def say(sentence: str) -> None:
+    """One line on stderr, whatever a file name or a key may hold."""
+    printable = "".join(c if c.isprintable() else " " for c in sentence)
+    with suppress(OSError):
+        print(f"camviz: {' '.join(printable.split())}", file=sys.stderr)
 
 
 class Parser(argparse.ArgumentParser):
@@ -99,15 +108,15 @@ def millimetres(text: str) -> float:
     return length
 
 
-def add_board(command: argparse.ArgumentParser, required: bool = True) -> None:
-    """The options that say which board it is; one of 9x6 and 25 mm where they are not required."""
-    corners, side = ("", "") if required else (" (default: 9x6)", " (default: 25)")
+def add_board(command: argparse.ArgumentParser, required: bool = True, default: bool = True) -> None:
+    """The options that say which board it is; one of 9x6 and 25 mm, or none, where they are not required."""
+    corners, side = (" (default: 9x6)", " (default: 25)") if default and not required else ("", "")
     command.add_argument(
         "--board",
         metavar="9x6",
         type=numbers,
         required=required,
-        default=(9, 6),
+        default=(9, 6) if default else None,
         help="inner corners, where four squares meet, by columns and rows" + corners,
     )
     command.add_argument(
@@ -115,7 +124,7 @@ def add_board(command: argparse.ArgumentParser, required: bool = True) -> None:
         metavar="MM",
         type=millimetres,
         required=required,
-        default=25.0,
+        default=25.0 if default else None,
         help="the side of a square" + side,
     )
     command.add_argument(

@@ -20,6 +20,7 @@ from camviz.draw.panel import Panel
 from camviz.draw.picture import png
 from camviz.lenses.base import Array
 
+_SPECK = 24  # picture units, below which a closed contour is a speck between two values
 _BLUE, _GREY, _ORANGE = (33, 92, 168), (238, 238, 236), (179, 88, 6)
 
 
@@ -105,6 +106,7 @@ def contours(panel: Panel, values: Array, shades: Shades, unit: str = "", strong
     drawn, names = "", ""
     for i, (level, cut) in enumerate(zip(levels, cuts, strict=True)):
         lines = [panel.place(line) for line in generator.lines(cut)]
+        lines = [line for line in lines if np.ptp(line, axis=0).max() > _SPECK]
         thick = strong is not None and np.isclose(level, strong)
         drawn += svg.path(lines, "paper-line") + svg.path(lines, "ink thick" if thick else "ink thin")
         names += _named(panel, lines, f"{level:g}{unit}", i)

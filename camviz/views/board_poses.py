@@ -30,7 +30,7 @@ class BoardPosesView(View):
 
     `cam_from_board` holds one pose per picture. The board's frame has its origin at the first inner corner, x along the
     rows of corners, y along the columns and z away from the camera. `photographs`, uint8 RGB, are the pictures
-    themselves where they are at hand.
+    themselves where they are at hand; `hidden` are the indices of poses that are not drawn.
     """
 
     camera: Camera = field(compare=False)
@@ -40,6 +40,7 @@ class BoardPosesView(View):
     picture: int = slider(1, 1, 13, 1, label="picture", help="which of the pictures is picked out, in orange")
     photographs: Sequence[NDArray[np.uint8]] = field(default=(), compare=False, repr=False)
     eye: Eye = Eye(distance=0.9, yaw_deg=-50, pitch_deg=20)
+    hidden: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -57,7 +58,10 @@ class BoardPosesView(View):
             raise ValueError(f"The file does not hold where the board was in the views of {name}.")
         standing = calibration.cameras[name].at(RigidTransform.identity())
         poses = calibration.cam_from_board[name]
-        view = cls(standing, poses, calibration.board, "camera")
+        unseen = frozenset[int]()  # a view of a rig may be another camera's alone
+        if name in calibration.detections:
+            unseen = frozenset(np.flatnonzero(~np.isfinite(calibration.detections[name]).any(axis=(1, 2))).tolist())
+        view = cls(standing, poses, calibration.board, "camera", hidden=unseen)
         away = float(np.median(np.linalg.norm(poses.translation, axis=-1)))
         return view.but(eye=replace(view.eye, distance=2.2 * away))
 
@@ -135,6 +139,8 @@ class BoardPosesView(View):
         still = RigidTransform.identity()
         items = [*self.board_items(still, True), *axes_triad(still, 3 * self.board.square_size)]
         for i, board_from_cam in enumerate(self.cam_from_board.inv()):
+            if i in self.hidden:
+                continue
             items += self._body(board_from_cam, str(i + 1)) if i == self.index else self._pyramid(board_from_cam, i + 1)
         return items
 
@@ -143,6 +149,8 @@ class BoardPosesView(View):
         still = RigidTransform.identity()
         items = [*self._body(still, "C"), *axes_triad(still, 2 * self.board.square_size)]
         for i, cam_from_board in enumerate(self.cam_from_board):
+            if i in self.hidden:
+                continue
             items += self.board_items(cam_from_board, i == self.index)
             if i == self.index or len(self.cam_from_board) <= _MOST_NUMBERED:
                 where = transform(cam_from_board, self.outline()[0])

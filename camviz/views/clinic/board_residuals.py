@@ -77,7 +77,9 @@ class BoardResidualsView(View):
         R, t = seen.cam_from_board.rotation.as_matrix(), seen.cam_from_board.translation
         centres = -np.einsum("vij,vi->vj", R, t)[:, None]
         rays = seen.corners_board - centres
-        slope = -rays[..., :2] / rays[..., 2:]
+        with np.errstate(invalid="ignore", divide="ignore"):  # of a view that shows no corner
+            slope = -rays[..., :2] / rays[..., 2:]
+        slope = np.where(seen.used[..., None], slope, 0)
         weight = np.where(
             seen.used[..., None], 1 / np.maximum(np.linalg.norm(rays, axis=-1, keepdims=True), 1e-12) ** 2, 0
         )
@@ -147,12 +149,12 @@ class BoardResidualsView(View):
         panel, attached = self._means_panel()
         space, sheets = self._bent(draft)
         body = (
-            svg.rectangle(0, 0, 960, 420, "paper")
+            svg.rectangle(0, 0, 960, 440, "paper")
             + panel
             + space
             + svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
         )
-        return Picture(body, 960, 420, self.title, self.description(), attached | sheets)
+        return Picture(body, 960, 440, self.title, self.description(), attached | sheets)
 
     def _means_panel(self) -> tuple[str, dict[str, bytes]]:
         seen, board = self.observations, self.observations.board

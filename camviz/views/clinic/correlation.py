@@ -94,14 +94,16 @@ class CorrelationView(View):
         if n <= _FIGURES:
             places = panel.place(np.stack(np.meshgrid(np.arange(n) + 0.5, np.arange(n) + 0.5), -1)).reshape(-1, 2)
             size = min(12.0, 0.36 * cell)
+            # The cells' colours are the same in both themes, and so are the words on them.
+            lightness = shades.rgba(shown)[..., :3].astype(float).reshape(-1, 3) @ (0.299, 0.587, 0.114)
             content += "".join(
                 svg.text(
                     place + (0, 0.35 * size),
                     f"{r:.2f}" if self.show == "size only" else _signed(r),
-                    "label halo middle",
-                    style=f"font-size:{size:.1f}px",
+                    "label middle",
+                    style=f"font-size:{size:.1f}px;fill:{'#14181f' if light > 140 else '#ffffff'}",
                 )
-                for place, r in zip(places, shown.ravel(), strict=True)
+                for place, r, light in zip(places, shown.ravel(), lightness, strict=True)
                 if np.isfinite(r)
             )
         legend, bar_picture = bar(panel.x + side + 14, 64, side - 60, "matrix-bar", shades, "r")

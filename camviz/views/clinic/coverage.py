@@ -82,8 +82,8 @@ class CoverageView(View):
             f"{seen.used.sum()} corners in {len(seen)} views of {seen.name} touch {100 * n['share']:.0f} % of the "
             "picture's "
             f"{self.cells} cells and reach {100 * n['reach']:.0f} % of the way to the corner. The board was tilted by "
-            f"{n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {seen.distances.min():.2g} m to "
-            f"{seen.distances.max():.2g} m away."
+            f"{n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {np.nanmin(seen.distances):.2g} m to "
+            f"{np.nanmax(seen.distances):.2g} m away."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,6 +20,8 @@ from camviz.views.clinic.observations import Missing
 from camviz.views.clinic.uncertainty import adjusted, determined
 
 _GRID = (30, 20)
+_PARTS = ("earlier and later", "every other")
+_BY_CHANCE = 1e-6  # below this probability noise is not the reason
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,17 @@ class CrossValidationView(View):
 
     title: ClassVar[str] = "Cross-validation"
 
-    halves: Halves = field(compare=False, repr=False)
+    adjustment: Adjustment = field(compare=False, repr=False)
     held: HeldOut = field(compare=False, repr=False)
     fitted: tuple[float, ...] = field(compare=False, repr=False)
     camera: str = "camera"
     pictures: tuple[str, ...] = field(default=(), repr=False)
+    parts: str = choice(
+        "earlier and later",
+        "every other",
+        label="halves",
+        help="the first half of the views against the second, or by turns",
+    )
     show: str = choice("difference", "expected from noise", "ratio", label="map", help="what is shown over the picture")
 
     @classmethod
@@ -46,20 +54,23 @@ class CrossValidationView(View):
 
     @classmethod
     def about(cls, adjustment: Adjustment, camera: str = "", pictures: tuple[str, ...] = ()) -> CrossValidationView:
-        """The view of an adjustment; the two solutions are made here. Raises Missing where they cannot be."""
+        """The view of an adjustment, of those halves that agree less. Raises Missing where there can be none."""
         name = camera or next(iter(adjustment.cameras))
         determined(adjustment)
         try:
-            # Every other view, so that both halves see the same course of events.
-            mask = np.arange(adjustment.views) % 2 == 0
-            parted = halves(adjustment, mask, camera=name, grid=_GRID)
+            parts = min(_PARTS, key=lambda parts: _halves(adjustment, name, parts).probability)
             held = held_out(adjustment, camera=name)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise Missing(f"There can be no cross-validation: {error}.") from error
         squares = np.where(adjustment.used[name], np.sum(adjustment.residuals[name] ** 2, axis=-1), np.nan)
         with np.errstate(invalid="ignore"):
             fitted = np.sqrt(np.nansum(squares, axis=1) / np.maximum(np.isfinite(squares).sum(axis=1), 1))
-        return cls(parted, held, tuple(fitted.tolist()), name, pictures)
+        return cls(adjustment, held, tuple(fitted.tolist()), name, pictures, parts)
+
+    @property
+    def halves(self) -> Halves:
+        """The two solutions and their difference."""
+        return _halves(self.adjustment, self.camera, self.parts)
 
     def numbers(self) -> dict[str, float]:
         """The halves' median difference over what is expected, its probability, and the held-out RMS and its ratio."""
@@ -74,10 +85,13 @@ class CrossValidationView(View):
     def sentences(self) -> list[str]:
         """What the numbers mean, in words."""
         n = self.numbers()
-        agree = n["ratio"] < 2 or n["probability"] > 1e-3
+        agree = n["probability"] > _BY_CHANCE
+        which = (
+            "The earlier and the later views" if self.parts == "earlier and later" else "Every other view and the rest"
+        )
         return [
-            f"The difference of the two halves is {n['ratio']:.1f} times what noise lets expect (probability "
-            f"{n['probability']:.2g}): " + ("they agree." if agree else "something besides noise is at work."),
+            f"{which} give cameras that differ by {n['ratio']:.1f} times what noise lets expect (probability "
+            f"{n['probability']:.2g}): " + ("noise may do that." if agree else "something besides noise is at work."),
             f"Corners held out of their view's pose are off by {n['held_out']:.3g} px RMS, "
             f"{n['held_out_ratio']:.1f} times what noise alone would give.",
         ]
@@ -143,3 +157,11 @@ class CrossValidationView(View):
 
     def _name(self, view: int) -> str:
         return Path(self.pictures[view]).name if view < len(self.pictures) else f"view {view + 1}"
+
+
+@lru_cache(maxsize=8)
+def _halves(adjustment: Adjustment, camera: str, parts: str) -> Halves:
+    """The views that have a say, parted in time or by turns, and the two solved anew."""
+    place = np.cumsum(adjustment.posed)
+    first = place <= place[-1] // 2 if parts == "earlier and later" else place % 2 == 0
+    return halves(adjustment, first, camera=camera, grid=_GRID)

@@ -66,6 +66,8 @@ class Observations:
             raise Missing(f"The file does not hold {what}, so there is nothing to compare the calibration with.")
         if name not in calibration.cam_from_board:
             raise Missing(f"The file does not hold where the board was in the views of {name}.")
+        if not np.isfinite(calibration.detections[name]).any():
+            raise Missing(f"{name} saw no corner of the board in any view.")
         return cls(
             calibration.cameras[name].at(RigidTransform.identity()),
             calibration.board,
@@ -82,15 +84,21 @@ class Observations:
         return len(self.detections)
 
     @cached_property
+    def shown(self) -> NDArray[np.bool_]:
+        """Which views (views,) show any corner; another camera of a rig may have seen the others."""
+        return np.asarray(np.any(np.isfinite(self.detections).all(axis=-1), axis=1))
+
+    @cached_property
     def corners_board(self) -> Array:
         """The board's corners (corners, 3) in its own frame, in metres, bent where the board is."""
         return self.board.corners if self.board_warp is None else self.board.warped(self.board_warp)
 
     @cached_property
     def corners_cam(self) -> Array:
-        """The board's corners (views, corners, 3) in the camera's frame."""
+        """The board's corners (views, corners, 3) in the camera's frame; NaN in a view that shows none of them."""
         R, t = self.cam_from_board.rotation.as_matrix(), self.cam_from_board.translation
-        return np.einsum("vij,cj->vci", R, self.corners_board) + t[:, None]
+        points = np.einsum("vij,cj->vci", R, self.corners_board) + t[:, None]
+        return np.where(self.shown[:, None, None], points, np.nan)
 
     @cached_property
     def projected(self) -> Array:

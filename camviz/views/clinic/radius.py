@@ -134,7 +134,9 @@ class RadiusView(View):
         )
         dots = np.stack([radius, np.where(np.abs(values) <= 1.1 * reach, values, np.nan)], axis=-1)
         dots = dots[:: max(1, len(dots) // _MOST_DOTS)]
-        content = plot.grid(panel) + svg.dots(panel.place(dots), "muted faint", 3)
+        ticks = plot.ticks(panel.bottom, panel.top, 4) + 0.0
+        yticks = [(y, f"{y:.3g}".replace("-", "−")) for y in ticks.tolist()]
+        content = plot.grid(panel, yticks=yticks) + svg.dots(panel.place(dots), "muted faint", 3)
         low, high = (panel.place(np.stack([middle, mean + sign * 2 * error], -1)) for sign in (-1, 1))
         content += svg.segments(low, high, "orange half", style="stroke-width:7px;stroke-linecap:butt")
         known = np.isfinite(mean)
@@ -144,7 +146,7 @@ class RadiusView(View):
         label = "from the principal point [px]" if part == 2 else ""
         return panel.show(
             content, title=title, note="mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive"
-        ) + plot.axes(panel, label, "[px]")
+        ) + plot.axes(panel, label, "[px]", yticks=yticks)
 
     def _picture(self) -> str:
         k = self.observations.camera.intrinsics

@@ -72,7 +72,8 @@ class ResidualsView(View):
             worst = int(np.nanargmax(lengths))
             row, column = divmod(worst, seen.board.columns)
             figures["worst corner"] = f"{_pixels(lengths[worst])}, row {row + 1}, column {column + 1}"
-        figures["board"] = f"{seen.distances[i]:.3g} m away, tilted {seen.tilts_deg[i]:.0f}°"
+        if seen.shown[i]:
+            figures["board"] = f"{seen.distances[i]:.3g} m away, tilted {seen.tilts_deg[i]:.0f}°"
         return figures
 
     def description(self) -> str:
@@ -227,7 +228,10 @@ class ResidualsView(View):
         eye = replace(
             self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / Eye().distance
         )
-        return BoardPosesView(seen.camera, seen.cam_from_board, seen.board, "camera", self.index + 1, eye=eye)
+        hidden = frozenset(np.flatnonzero(~seen.shown).tolist())
+        return BoardPosesView(
+            seen.camera, seen.cam_from_board, seen.board, "camera", self.index + 1, eye=eye, hidden=hidden
+        )
 
     def _numbers_block(self) -> str:
         rows = [svg.text((490, 602), f"{self.observations.picture(self.index)}", "title")]

@@ -52,7 +52,11 @@ class RigView(View):
         if not np.linalg.norm(np.ptp(centres, axis=0)) > 0:
             raise Missing("The file does not say how one camera stands to the other.")
         name = next((name for name in calibration.cameras if name in calibration.cam_from_board), None)
-        boards = None if name is None else calibration.cameras[name].world_from_cam * calibration.cam_from_board[name]
+        if name is None:
+            return cls(calibration.cameras)
+        boards = calibration.cameras[name].world_from_cam * calibration.cam_from_board[name]
+        if name in calibration.detections:
+            boards = boards[np.isfinite(calibration.detections[name]).any(axis=(1, 2))]
         return cls(calibration.cameras, calibration.board, boards)
 
     @cached_property

@@ -1,0 +1,187 @@
+"""`camviz inspect`: what is wrong with a calibration, in plain words, as JSON or as a page."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from camviz.commands.calibrate import PICTURES, Bar, pictures
+from camviz.commands.common import (
+    OK,
+    REFUSED,
+    Refusal,
+    add_board,
+    add_command,
+    board_of,
+    loaded,
+    refuse_output,
+    say,
+    size,
+    write_whole,
+)
+
+if TYPE_CHECKING:
+    from camviz.clinic import Inspection
+    from camviz.files import Board, Calibration
+
+FOUND = 1
+
+INSPECT = """\
+Says what is wrong with a calibration: each finding in a plain sentence with the number that shows it, its likely causes
+and what to do; then what was checked, and what could not be and why. Reads every format that `camviz show` reads, and
+names the fault in files that other commands refuse. A folder of pictures, or pictures, are calibrated first. The more a
+file holds (corners, poses of the board: `camviz calibrate` writes them), the more can be checked.
+
+docs/clinic.md says what every finding means, what it is judged by, and how often it is wrong.
+"""
+EPILOG = """\
+examples:
+  camviz inspect camera.yml
+  camviz inspect stereo.yml --size 640x480 --compare factory.yml
+  camviz inspect camera.yml --images shots/ --board 9x6 --square-mm 25 --report report.html
+  camviz inspect shots/ --board 9x6 --square-mm 25 --json
+
+exit status:
+  0  nothing worse than a note was found
+  1  something was found
+  2  a file cannot be read, or the command cannot be used; one sentence on stderr says why
+"""
+
+
+def add(commands: Any) -> None:
+    command = add_command(commands, "inspect", inspect, "say what is wrong with a calibration", INSPECT)
+    command.epilog = EPILOG
+    command.add_argument("files", metavar="FILE", nargs="+", help="calibrations, a folder of pictures, or pictures")
+    command.add_argument("--images", metavar="IMAGES", nargs="+", help="pictures that the calibration is for")
+    add_board(command, required=False, default=False)
+    command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
+    command.add_argument("--compare", metavar="OTHER", type=Path, help="another calibration of the same cameras")
+    command.add_argument("--json", action="store_true", help="the same for programs")
+    command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with pictures as well")
+
+
+def inspect(options: argparse.Namespace) -> int:
+    """Inspect every file; an unreadable one is named and does not keep the others from being inspected."""
+    named = list(_named(options.files))
+    if options.report:
+        if len(named) > 1:
+            raise Refusal("--report writes a page about one calibration: give one FILE.")
+        refuse_output(options.report, "page", *(Path(word) for word in options.files))
+    board = _board(options)
+    compare = loaded(options.compare, options.size) if options.compare else None
+    inspections: dict[str, Inspection] = {}
+    unreadable = False
+    for name, paths in named:
+        try:
+            inspections[name] = _inspected(paths, board, compare, options)
+        except Refusal as refusal:
+            if len(named) == 1:
+                raise
+            say(str(refusal))
+            unreadable = True
+    _print(inspections, len(named) > 1, options.json)
+    if options.report:
+        _report(next(iter(inspections.values())), options)
+    if unreadable:
+        return REFUSED
+    return OK if all(inspection.healthy for inspection in inspections.values()) else FOUND
+
+
+def _named(words: list[str]) -> Iterator[tuple[str, list[Path]]]:
+    """The calibrations by their names, and all pictures together under the name of the first."""
+    shown: list[Path] = []
+    for word in words:
+        path = Path(word)
+        if PICTURES.fullmatch(path.suffix) or ("\0" not in word and path.is_dir() and not _is_model(path)):
+            shown += pictures([word])
+        else:
+            yield word, [path]
+    if shown:
+        yield str(shown[0].parent), shown
+
+
+def _is_model(folder: Path) -> bool:
+    from camviz.files import colmap
+
+    return colmap.model_of(folder) is not None
+
+
+def _board(options: argparse.Namespace) -> Board | None:
+    given = [options.board is not None, options.square_mm is not None]
+    if any(given) != all(given):
+        raise Refusal("a board has both: --board COLUMNSxROWS (inner corners) and --square-mm MM.")
+    return board_of(options) if all(given) else None
+
+
+def _inspected(
+    paths: list[Path], board: Board | None, compare: Calibration | None, options: argparse.Namespace
+) -> Inspection:
+    from camviz.clinic import inspect, inspect_file
+    from camviz.clinic.pictures import sizes_of
+    from camviz.files import CalibrationError
+
+    images = pictures(options.images) if options.images else []
+    if PICTURES.fullmatch(paths[0].suffix):
+        return inspect(_calibrated(paths, board), compare=compare, pictures=sizes_of(images), board=board)
+    add = None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
+    try:
+        return inspect_file(
+            paths[0], size=options.size, compare=compare, pictures=sizes_of(images), board=board, prepare=add
+        )
+    except CalibrationError as error:
+        raise Refusal(str(error)) from error
+
+
+def _calibrated(paths: list[Path], board: Board | None) -> Calibration:
+    """The calibration of a folder of pictures."""
+    if board is None:
+        raise Refusal(
+            f"{paths[0].parent}: these are pictures, which are calibrated first: say which board they show, such as "
+            "--board 9x6 --square-mm 25."
+        )
+    from camviz.calibration import CannotCalibrate, calibrate, detect
+
+    try:
+        with Bar() as bar:
+            detections = detect(paths, board, progress=bar)
+        return replace(calibrate(detections, board), source=paths[0].parent)
+    except CannotCalibrate as error:
+        raise Refusal(f"{error}.") from error
+
+
+def _with_corners(calibration: Calibration, images: list[Path], board: Board) -> Calibration:
+    """The calibration with the corners of the board in the pictures, if it is one camera's and has none."""
+    from camviz.calibration import CannotCalibrate, detect
+    from camviz.clinic.pictures import with_detections
+
+    if len(calibration.cameras) != 1 or calibration.detections:
+        return calibration
+    try:
+        with Bar() as bar:
+            return with_detections(calibration, detect(images, board, progress=bar), board)
+    except CannotCalibrate as error:
+        raise Refusal(f"{error}.") from error
+
+
+def _print(inspections: dict[str, Inspection], several: bool, as_json: bool) -> None:
+    if as_json:
+        trees = [({"file": name} if several else {}) | each.as_tree() for name, each in inspections.items()]
+        print(json.dumps(trees if several else trees[0], indent=2, ensure_ascii=False))
+        return
+    for name, inspection in inspections.items():
+        print(f"{name}\n" * several + inspection.as_text() + "\n" * several)
+
+
+def _report(inspection: Inspection, options: argparse.Namespace) -> None:
+    from camviz.clinic.report import write_report
+
+    first = Path((options.images or options.files)[0])
+    folder = first if first.is_dir() else first.parent
+    held = folder if options.images or PICTURES.fullmatch(first.suffix) or first.is_dir() else None
+    write_whole(options.report, lambda path: write_report(inspection, path, images=held))
+    if not options.json:
+        print(f"{options.report}: open it in a browser.")
