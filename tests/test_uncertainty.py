@@ -150,15 +150,33 @@ def test_covariance_is_mrcals_all_over_the_image(corners, mrcals, distance) -> N
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("distance", [inf, 1.0])
 def test_difference_is_mrcals(mrcals, distance, weighted) -> None:
-    """Within 2 %, or 0.005 px where there is next to none, at 99 of 100 pixels."""
+    """Within 2 %, or 0.005 px where there is next to none, at 99 of 100 pixels.
+
+    The cost, of fourth powers, is so flat that mrcal now and then stops before the bottom: then ours is lower.
+    """
     models = [(values[:4], values[4:]) for values in mrcals["intrinsics"]]
     first, second = (Camera(Intrinsics(640, 480, *p), BrownConrady.from_coefficients(d)) for p, d in models)
-    theirs, _, uncertainties = mrcals["difference"][f"{'0' if distance == inf else distance} {weighted}"]
+    theirs, motion, uncertainties = mrcals["difference"][f"{'0' if distance == inf else distance} {weighted}"]
     given = (np.array(uncertainties[0]), np.array(uncertainties[1])) if weighted else None
     ours = difference(first, second, distance, (60, 45), uncertainties=given)
-    length = np.linalg.norm(theirs, axis=-1)
-    close = np.abs(ours.length - length) <= np.maximum(0.02 * length, 0.005)
-    assert close[np.isfinite(length)].mean() > 0.99
+    motion = RigidTransform.from_components(motion[3], Rotation.from_matrix(motion[:3]))
+    costs = [misfit(first, second, it, distance, given) for it in (ours.second_from_first, motion)]
+    assert costs[0] < 1.0001 * costs[1]
+    if costs[1] < 1.01 * costs[0]:
+        length = np.linalg.norm(theirs, axis=-1)
+        close = np.abs(ours.length - length) <= np.maximum(0.02 * length, 0.005)
+        assert close[np.isfinite(length)].mean() > 0.99
+
+
+def misfit(first, second, second_from_first, distance, uncertainties):
+    """The sum of the fourth powers of the angles between rays, weighted or in the middle of the picture."""
+    uv = pixel_grid(first.intrinsics, (60, 45))
+    rays = [camera.lens.unproject(camera.intrinsics.from_pixels(uv)) for camera in (first, second)]
+    points = transform(second_from_first, rays[0] * (1 if distance == inf else distance))
+    angle = np.arccos(np.clip((unit(points) * rays[1]).sum(axis=-1), -1, 1))
+    if uncertainties is None:
+        return float(np.sum(angle[np.linalg.norm(uv - (319.5, 239.5), axis=-1) < 80] ** 4))
+    return float(np.nansum((angle / (uncertainties[0] * uncertainties[1])) ** 4))
 
 
 def test_difference_of_a_camera_with_itself_is_nothing() -> None:

@@ -76,6 +76,9 @@ def _stereo_note(section: Section, key: str) -> list[str]:
     if P[0, 0] <= 0:
         raise CalibrationError(f"{section.where(key)}[0, 0]: expected a positive focal length, got {P[0, 0]:g}")
     baseline = -P[0, 3] / P[0, 0]  # P[0, 3] = -fx B
+    if baseline < 0 and section.mended is not None:  # read by all the same, and never refused
+        text = f"{section.where(key)}[0, 3]: expected -fx B, which is negative in the right camera, got {P[0, 3]:g}"
+        section.mended.append(CalibrationError(text, "baseline-sign", baseline))
     return [
         f"This is one camera of a rectified pair, {baseline:.4g} m to the right of the other (P[0, 3] = -fx B); "
         "the other one is in a file of its own, so this one stands at the origin."

@@ -1,0 +1,142 @@
+"""An inspection names every fault of the symptom table at the strength it promises, and nothing in healthy ones."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform
+
+from camviz.clinic import inspect, kinds
+from camviz.clinic.catalogue import SEVERITIES
+from camviz.clinic.faults import FAULTS
+from camviz.clinic.injections import healthy, parallel_boards
+from camviz.clinic.statistics import PAGE, TABLES, alarms, healthy_pair_case, healthy_single_case, page
+from camviz.clinic.virtual import MARGIN, pair, single
+
+SEED = 20_003
+
+
+def found(name: str, strength: float, seed: int = SEED):
+    """The findings that a fault must lead to."""
+    inspection = FAULTS[name].inject(np.random.default_rng(seed), strength).inspected()
+    return [finding for finding in inspection.findings if finding.id == FAULTS[name].finding]
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_named_at_the_strength_that_is_promised(name):
+    fault = FAULTS[name]
+    assert found(name, fault.promised)
+    assert fault.promised in fault.strengths
+
+
+def test_every_finding_has_a_fault_that_leads_to_it():
+    assert {fault.finding for fault in FAULTS.values()} == set(kinds())
+
+
+@pytest.mark.parametrize("seed", range(20_100, 20_106))
+def test_nothing_is_found_in_a_healthy_camera(seed):
+    assert alarms(healthy_single_case(np.random.default_rng(seed))) == []
+
+
+@pytest.mark.parametrize("seed", [20_100, 20_101])
+def test_nothing_is_found_in_a_healthy_pair(seed):
+    assert alarms(healthy_pair_case(np.random.default_rng(seed))) == []
+
+
+def test_a_set_up_is_the_same_whatever_the_strength():
+    """Two injections with one seed differ by the fault alone: the parallel boards are at the same places."""
+    first, second = (parallel_boards(np.random.default_rng(3), strength).calibration for strength in (2.0, 2.5))
+    middles = [each.board.corners.mean(axis=0) for each in (first, second)]
+    places = [
+        np.stack([pose.apply(middle) for pose in each.cam_from_board["camera"]])
+        for each, middle in zip((first, second), middles, strict=True)
+    ]
+    directions = [place / np.linalg.norm(place, axis=1, keepdims=True) for place in places]
+    assert np.abs(directions[0] - directions[1]).max() < 0.02
+
+
+@pytest.mark.parametrize("make", [single, pair])
+def test_all_boards_of_a_set_up_are_seen_whole(make):
+    set_up = make(np.random.default_rng(11))
+    for camera, corners in zip(set_up.cameras, set_up.corners, strict=True):
+        edge = [camera.intrinsics.width - 1 - MARGIN, camera.intrinsics.height - 1 - MARGIN]
+        assert (corners > MARGIN).all()
+        assert (corners < edge).all()
+
+
+# The number that a finding carries is the fault's own ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "strength", "value", "tolerance"),
+    [
+        ("outlier corner", 30, 30, 1),
+        ("half pixel", 0.5, 0.5, 0.05),
+        ("half pixel between two", 1, 1, 1e-9),
+        ("autofocus drift", 3, 3, 0.5),
+        ("resized K", 1.5, 1.5, 1e-9),
+        ("resized K", 0.5, 0.5, 1e-9),
+        ("resized pictures", 1.25, 1.25, 1e-3),
+        ("uneven resize", 1.33, 1.33, 0.01),
+        ("near-pole rational model", 0.05, 0.05, 0.04),
+        ("square in millimetres", 1000, 25, 6),
+        ("wrong square", 20, 1.2, 0.01),
+        ("edited rotation", 0.3, 0.3, 0.3),
+        ("transposed K", 2, 2, 1e-12),
+        ("mislabelled coefficients", 8, 8, 0),
+        ("order flipped", 1, 180, 15),
+        ("zeroed distortion", 1, -0.2, 0.05),
+    ],
+)
+def test_the_number_that_shows_a_fault_is_its_strength(name, strength, value, tolerance):
+    finding, *_ = found(name, strength)
+    assert finding.value == pytest.approx(value, abs=tolerance)
+
+
+def test_the_bend_of_a_board_is_found_within_a_tenth():
+    """2 % of the longer side, along the rows."""
+    case = FAULTS["warped board"].inject(np.random.default_rng(SEED), 2)
+    board = case.calibration.board
+    (finding,) = [each for each in case.inspected().findings if each.id == "board-warp"]
+    side = (max(board.columns, board.rows) - 1) * board.square_size
+    assert finding.value == pytest.approx(0.02 * side * 1000, rel=0.1)
+
+
+def test_a_turn_of_the_whole_world_changes_nothing():
+    """Findings are about cameras, not about where the file puts its origin."""
+    _, calibration = healthy(np.random.default_rng(SEED))
+    camera = calibration.cameras["camera"]
+    moved = RigidTransform.from_components([1, 2, 3], camera.world_from_cam.rotation)
+    turned = type(calibration)(
+        {"camera": camera.at(moved)},
+        Path("virtual"),
+        calibration.format,
+        calibration.board,
+        calibration.detections,
+        calibration.cam_from_board,
+        estimated=calibration.estimated,
+    )
+    assert inspect(turned).findings == inspect(calibration).findings
+
+
+# Words ---------------------------------------------------------------------------------------------------------------
+
+VIEWS = {  # those that the report has
+    *("residual-vectors", "per-view-errors", "residual-histogram", "residual-radius", "coverage", "uncertainty"),
+    *("uncertainty-range", "difference", "distortion", "fold-map", "undistorted", "boards", "epipolar-pairs"),
+    *("rectified", "depth-error", "cross-validation", "correlation", "board-residuals", "numbers"),
+}
+
+
+def test_every_finding_has_a_view_of_the_report_a_cause_and_a_remedy():
+    for kind in kinds().values():
+        assert kind.view in VIEWS
+        assert kind.severity in SEVERITIES
+        assert kind.causes
+        assert kind.remedy.endswith(".")
+
+
+def test_the_page_says_what_the_table_of_findings_says():
+    """docs/clinic.md, but for the counted tables. To renew it: python -m camviz.clinic.statistics --page"""
+    text = PAGE.read_text(encoding="utf-8")
+    assert text == page(text.split(TABLES)[1].lstrip())

@@ -1,0 +1,395 @@
+"""An inspection names what is wrong with a calibration, with the number that shows it, and nothing else."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from test_files import sample, write
+
+import camviz
+from camviz.calibration import Detections, calibrate, calibrate_pair, detect
+from camviz.calibration.adjustment import Adjustment
+from camviz.clinic import Inspection, inspect, inspect_file, kinds
+from camviz.clinic.checks_views import coverage, held_out_ratio
+from camviz.clinic.evidence import Evidence
+from camviz.clinic.fields import smooth_field, warp_columns
+from camviz.clinic.findings import CHECKS
+from camviz.clinic.observed import explained, parameter_columns
+from camviz.clinic.virtual import single
+from camviz.command import main
+from camviz.files import Board, CalibrationError
+from camviz.lenses import BrownConrady
+
+DATA = Path(__file__).parent / "data"
+BOARD = Board(9, 6, 0.025)
+SIZES = {"kitti_calib.txt": (1242, 375)}
+
+
+def ids(inspection: Inspection) -> set[str]:
+    return {finding.id for finding in inspection.findings}
+
+
+def one(inspection: Inspection, id: str, camera=None):
+    """The one finding of this id (of this camera)."""
+    (finding,) = [each for each in inspection.findings if each.id == id and camera in (None, each.camera)]
+    return finding
+
+
+def photographs(finder):
+    paths = sorted(sample("left01.jpg").parent.glob("left*.jpg"))
+    return detect(paths, BOARD, finder=finder)
+
+
+@pytest.fixture(scope="module")
+def left_corners():
+    """The corners in them by the better finder."""
+    return photographs("auto")
+
+
+@pytest.fixture(scope="module")
+def left_classic():
+    """OpenCV's thirteen photographs of the left camera, by its classic finder, with nothing set aside."""
+    return calibrate(photographs("classic"), BOARD, robust=False)
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    """A virtual camera, solved."""
+    rng = np.random.default_rng(5)
+    set_up = single(rng, views=14)
+    return set_up, set_up.solved(set_up.observed(rng))
+
+
+# The published files -------------------------------------------------------------------------------------------------
+
+
+def test_both_published_cameras_fold_inside_their_image():
+    """g(r) = r + k1 r³ + k2 r⁵ turns back where 1 + 3 k1 r² + 5 k2 r⁴ = 0; what matters is g there, not r.
+
+    Camera 2 turns back at r = 0.9785, beyond the corner's 0.772, but its image reaches only 0.719: the corner pixels
+    have no ray.
+    """
+    inspection = inspect_file(sample("intrinsics.yml"), size=(640, 480))
+    for name, k1, k2 in (
+        ("left", 0.29589439552724328, -1.0354662043042675),
+        ("right", -0.16916358306948096, -0.11214173641213163),
+    ):
+        r = math.sqrt((-3 * k1 - math.sqrt(9 * k1**2 - 20 * k2)) / (10 * k2))
+        finding = one(inspection, "fold", name)
+        assert finding.value == pytest.approx(r, abs=1e-12)
+        assert finding.severity == "fault"
+        camera = inspection.calibration.cameras[name]
+        reach = r + k1 * r**3 + k2 * r**5
+        corners = camera.intrinsics.from_pixels([[0, 0], [639, 0], [0, 479], [639, 479]])
+        assert np.linalg.norm(corners, axis=1).max() > reach
+        assert np.isnan(camera.unproject([[0, 0]])).all()
+    assert one(inspection, "fold", "left").value == pytest.approx(0.7304, abs=5e-5)
+    assert one(inspection, "fold", "right").value == pytest.approx(0.9785, abs=5e-5)
+
+
+def test_the_published_left_camera_has_one_bad_view_and_no_fold():
+    inspection = inspect_file(sample("left_intrinsics.yml"))
+    finding = one(inspection, "outlier-view")
+    assert ids(inspection) == {"outlier-view"}
+    assert (finding.value, finding.pictures) == (pytest.approx(1.1820482, abs=1e-7), (1,))
+    assert "view 2" in finding.sentence
+    assert "fold" in inspection.checked
+
+
+def test_the_classic_finder_loses_a_column_of_left02(left_classic):
+    inspection = inspect(left_classic)
+    line = one(inspection, "outlier-line")
+    assert line.sentence.startswith("left02.jpg: column 1 ")
+    assert line.value > 3
+    assert {finding.pictures for finding in inspection.findings if finding.id == "outlier-view"} >= {(1,)}
+
+
+def test_the_same_photographs_by_the_better_finder_are_healthy(left_corners):
+    assert inspect(calibrate(left_corners, BOARD)).healthy
+
+
+def test_a_shifted_principal_point_hides_from_the_error_but_not_from_held_out_corners(left_classic):
+    """50 px: the error grows from 0.41 to 0.71 only, and corners that had no part in the pose are five times off."""
+    camera = left_classic.cameras["camera"]
+    shifted = replace(camera, intrinsics=replace(camera.intrinsics, cx=camera.intrinsics.cx + 50))
+    wrong = replace(left_classic, cameras={"camera": shifted})
+    poses = Adjustment.of(wrong).refined(only_poses=True)
+    assert poses.rms == pytest.approx(0.71, abs=0.02)
+    wrong = replace(wrong, cam_from_board={"camera": poses.first_from_board})
+    assert held_out_ratio(Evidence(left_classic).observed["camera"]) < 2
+    assert one(inspect(wrong), "pose-absorbs-error").value > 4
+
+
+# The statistics underneath -------------------------------------------------------------------------------------------
+
+
+def test_what_columns_explain_is_what_dense_least_squares_says(healthy):
+    """The same sums of squares from one matrix of all parameters, poses and columns."""
+    _, calibration = healthy
+    best = Evidence(calibration).observed["camera"].best
+    by_shared, by_pose = best.slopes("camera")
+    views, corners = best.used["camera"].shape
+    poses = np.zeros((views, corners, 2, 6 * views))
+    for view in range(views):
+        poses[view, ..., 6 * view : 6 * view + 6] = by_pose[view]
+    field, warp = smooth_field(best, "camera")[..., -4:], warp_columns(best, "camera")
+    used, residuals = best.used["camera"], best.residuals["camera"][best.used["camera"]].ravel()
+
+    def left(*groups):
+        J = np.concatenate([group[used].reshape(len(residuals), -1) for group in groups], axis=1)
+        J = J / np.linalg.norm(J, axis=0)
+        solution, _, rank, _ = np.linalg.lstsq(J, residuals, rcond=1e-7)
+        return float(np.sum((residuals - J @ solution) ** 2)), rank
+
+    without, rank = left(by_shared, poses, field)
+    bent, more = left(by_shared, poses, field, warp)
+    F = (without - bent) / 2 / (bent / (len(residuals) - more))
+    result = explained(best, "camera", warp, field)
+    assert (result.count, more - rank) == (2, 2)
+    assert pytest.approx(F, rel=1e-6) == result.F
+
+
+def test_an_added_parameter_is_found_with_its_value_and_deviation():
+    """With k1 left out of the lens of the solution, one step finds the true one within four deviations."""
+    rng = np.random.default_rng(8)
+    set_up = single(rng)
+    set_up = replace(set_up, cameras=(replace(set_up.camera, lens=BrownConrady(k1=-0.01)),))
+    solved = set_up.solved(set_up.observed(rng), fixed=("k1", "k2", "p1", "p2", "k3"))
+    best = Adjustment.of(replace(solved, estimated={"camera": ("fx", "fy", "cx", "cy")})).refined()
+    k1 = explained(best, "camera", parameter_columns(best, "camera", ["k1"]))
+    assert abs(k1.values[0] + 0.01) < 4 * k1.sigmas[0]
+    assert k1.sigmas[0] < 0.002
+
+
+def test_noise_alone_explains_as_f_says():
+    """Over 30 sets of nothing but noise the chances of the F-test are spread evenly (Kolmogorov's distance)."""
+    chances = []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        set_up = single(rng, views=8)
+        best = Evidence(set_up.solved(set_up.observed(rng))).observed["camera"].best
+        chances.append(explained(best, "camera", warp_columns(best, "camera")).chance)
+    distance = np.abs(np.sort(chances) - (np.arange(30) + 0.5) / 60).max()
+    assert distance < 1.63 / math.sqrt(30)  # 1 in 100
+
+
+SQUARE = np.array([[0.0, 0], [639, 0], [639, 479], [0, 479]])
+
+
+@pytest.mark.parametrize(("corners", "share"), [(SQUARE, 1), (SQUARE * [0.5, 1], 0.5)])
+def test_coverage_is_the_area_inside_the_outline(corners, share):
+    assert coverage(corners[None], 640, 480) == pytest.approx(share, abs=0.03)
+
+
+# What an inspection is -----------------------------------------------------------------------------------------------
+
+
+def test_every_id_has_a_check_and_words_and_is_either_checked_or_skipped_with_a_reason(healthy):
+    assert set(CHECKS) == set(kinds())
+    for source in [*DATA.glob("*.*"), DATA / "colmap"]:
+        inspection = inspect_file(source, size=SIZES.get(source.name))
+        assert sorted([*inspection.checked, *(id for id, _ in inspection.skipped)]) == sorted(kinds())
+        assert all(why for _, why in inspection.skipped)
+        assert ids(inspection) <= set(inspection.checked)
+    _, calibration = healthy
+    assert {id for id, _ in inspect(calibration).skipped} == {
+        "near-pole", "baseline-sign", "rectified-black", "inverted-transform", "corner-order",
+    }  # fmt: skip
+
+
+def test_the_json_has_the_form_that_the_documentation_gives(left_classic):
+    tree = json.loads(inspect(left_classic).as_json())
+    assert list(tree) == ["cameras", "findings", "checked", "skipped"]
+    assert list(tree["cameras"][0]) == ["name", "model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "rms"]
+    keys = ["id", "severity", "sentence", "value", "unit", "camera", "view", "causes", "remedy"]
+    assert all(list(finding) == keys for finding in tree["findings"])
+    assert all(list(each) == ["id", "why"] for each in tree["skipped"])
+    assert tree["cameras"][0]["rms"] == pytest.approx(0.4087, abs=1e-3)
+    assert tree["cameras"][0]["distortion"]["k1"] == left_classic.cameras["camera"].lens.k1
+
+
+def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(healthy):
+    _, calibration = healthy
+    assert inspect(calibration).as_text().startswith("Nothing found.\n\nChecked: not-a-rotation, bad-k")
+    K = calibration.cameras["camera"]
+    wide = replace(K, intrinsics=replace(K.intrinsics, fx=2 * K.intrinsics.fx), lens=BrownConrady(k1=-0.3, k2=-0.5))
+    severities = [finding.severity for finding in inspect(replace(calibration, cameras={"camera": wide})).findings]
+    assert severities == sorted(severities, key=["fault", "warning", "note"].index)
+    assert severities[0] == "fault"
+
+
+def test_a_calibration_inspects_itself(healthy):
+    _, calibration = healthy
+    assert calibration.inspect().checked == inspect(calibration).checked
+
+
+# Files that other commands refuse ------------------------------------------------------------------------------------
+
+EDITS = [
+    ("kalibr_chain.yaml", "[1.0, 0.0, 0.0, -0.11]", "[-1.0, 0.0, 0.0, -0.11]", "not-a-rotation", -1),
+    ("kalibr_chain.yaml", "[1.0, 0.0, 0.0, -0.11]", "[1.1, 0.0, 0.0, -0.11]", "not-a-rotation", 0.21),
+    ("kalibr_chain.yaml", "- [0.0, 0.0, 0.0, 1.0]", "- [0.0, 0.0, 0.0, 2.0]", "not-a-rotation", 1),
+    ("euroc_sensor.yaml", "[0.0, -1.0,", "[0.0, 1.0,", "not-a-rotation", -1),
+    ("basalt.json", '"qw": 0.7071067811865476', '"qw": 0.8', "not-a-rotation", 1.0677),
+    ("colmap/images.txt", "2 1 0 0 0 ", "2 1.5 0 0 0 ", "not-a-rotation", 1.5),
+    ("transforms.json", "[0.0, 0.0, -1.0, 2.0]", "[0.0, 0.0, -1.2, 2.0]", "not-a-rotation", 0.44),
+    ("metashape_cameras.xml", "1 0 0 10 0 -1 0 20", "1 0 0 10 0 1 0 20", "not-a-rotation", -1),
+    ("kitti_cam_to_cam.txt", "R_00: 1.000000e+00", "R_00: 1.100000e+00", "not-a-rotation", 0.21),
+    ("ros_file.yaml", "0.999989", "0.9", "not-a-rotation", 0.19),
+    ("opencv_stereo.xml", "0. 641.5 0. 906.5 352.75 0. 0. 1.", "0. 0. 0. 906.5 0. 641.5 352.75 1.", "bad-k", 641.5),
+    ("opencv_stereo.xml", "906.5 352.75 0. 0. 1.", "906.5 352.75 0. 0. 2.", "bad-k", 2),
+    ("matlab_parameters.json", "[0.25,712.5,0],[321.5,241.25,1]", "[0.25,712.5,0],[321.5,241.25,2]", "bad-k", 2),
+    ("kitti_calib.txt", "1.000000e+00 0.000000e+00\nP1", "4.000000e+00 0.000000e+00\nP1", "bad-k", 4),
+    ("kalibr_chain.yaml", "1.76187114e-05]", "1.76187114e-05, 0.01]", "coefficient-count", 5),
+    ("euroc_sensor.yaml", "1.76187114e-05]", "1.76187114e-05, 0.01]", "coefficient-count", 5),
+    ("matlab_parameters.json", "[-0.31,0.12]", "[-0.31,0.12,0.1,0.2]", "coefficient-count", 4),
+    ("kitti_cam_to_cam.txt", "D_00: -3.728755e-01", "D_00:", "coefficient-count", 4),
+    ("ros_file.yaml", "plumb_bob", "rational_polynomial", "coefficient-count", 5),
+    ("ros2_message.yaml", "rational_polynomial", "plumb_bob", "coefficient-count", 8),
+    ("mrcal.cameramodel", "LENSMODEL_OPENCV8", "LENSMODEL_OPENCV5", "coefficient-count", 12),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "id", "value"), EDITS)
+def test_a_file_that_is_refused_is_inspected_and_says_why(tmp_path, name, old, new, id, value):
+    for path in (DATA / name).parent.iterdir():  # COLMAP's files stand beside each other
+        if path.is_file() and "/" in name:
+            (tmp_path / path.name).write_bytes(path.read_bytes())
+    path = tmp_path / Path(name).name
+    text = (DATA / name).read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(CalibrationError) as refused:
+        camviz.load(path, size=SIZES.get(path.name))
+    assert refused.value.id == id
+    inspection = inspect_file(path, size=SIZES.get(path.name))
+    finding = one(inspection, id)
+    assert finding.severity == "fault"
+    assert finding.value == pytest.approx(value, abs=5e-4)
+    assert not inspection.healthy
+
+
+def test_a_transposed_k_is_read_on_as_the_camera_that_was_meant(tmp_path):
+    K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+    for name, matrix in (("transposed", K.T), ("scaled", 4 * K)):
+        path = write(tmp_path / f"{name}.yml", image_width=640, image_height=480, K=matrix, D=np.full((1, 5), 1e-3))
+        inspection = inspect_file(path)
+        assert ids(inspection) == {"bad-k"}
+        np.testing.assert_allclose(inspection.calibration.cameras["camera"].intrinsics.K, K)
+
+
+def test_a_negative_focal_length_in_k_leaves_nothing_to_look_at(tmp_path):
+    K = np.array([[-500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+    inspection = inspect_file(write(tmp_path / "k.yml", image_width=640, image_height=480, K=K, D=np.zeros((1, 5))))
+    assert (inspection.calibration, ids(inspection), len(inspection.skipped)) == (None, {"bad-k"}, len(kinds()) - 1)
+
+
+def test_a_rotation_that_is_mended_is_the_nearest_one(tmp_path):
+    """UVᵀ of the singular value decomposition (Golub & Van Loan, 12.4.1): a scaled rotation gives the rotation back."""
+    tree = yaml.safe_load((DATA / "kalibr_chain.yaml").read_text())
+    R = np.array(camviz.load(DATA / "kalibr_chain.yaml").cameras["cam1"].cam_from_world.rotation.as_matrix())
+    tree["cam1"]["T_cn_cnm1"] = np.vstack([np.column_stack([1.2 * R, [0.1, 0, 0]]), [0, 0, 0, 1]]).tolist()
+    path = tmp_path / "chain.yaml"
+    path.write_text(yaml.safe_dump(tree))
+    mended = inspect_file(path).calibration.cameras["cam1"].cam_from_world
+    np.testing.assert_allclose(mended.rotation.as_matrix(), R, atol=1e-12)
+
+
+def test_a_positive_p03_of_ros_is_a_baseline_of_the_wrong_sign(tmp_path):
+    """P[0, 3] = -fx B."""
+    text = (DATA / "ros_file.yaml").read_text()
+    assert "-26.507895" in text
+    (tmp_path / "ros.yaml").write_text(text.replace("-26.507895", "26.507895"))
+    assert one(inspect_file(tmp_path / "ros.yaml"), "baseline-sign").value == pytest.approx(-26.507895 / 295.53402)
+
+
+# Beside other evidence -----------------------------------------------------------------------------------------------
+
+
+def test_the_pictures_size_is_held_against_the_camera():
+    calibration = camviz.load(DATA / "ros_file.yaml")
+    assert "wrong-size" not in ids(inspect(calibration, pictures={"a.png": (640, 480)}))
+    finding = one(inspect(calibration, pictures={"a.png": (1280, 960)}), "wrong-size")
+    assert finding.value == 2
+
+
+def test_a_focal_length_in_millimetres_is_no_focal_length(tmp_path):
+    K = np.array([[3.6, 0, 320], [0, 3.6, 240], [0, 0, 1]])
+    path = write(tmp_path / "k.yml", image_width=640, image_height=480, K=K, D=np.array([[-0.1, 0, 0, 0, 0]]))
+    assert "millimetres" in one(inspect_file(path), "wrong-size").sentence
+
+
+def test_the_measured_board_is_held_against_the_files():
+    calibration = camviz.load(sample("left_intrinsics.yml"))
+    finding = one(inspect(calibration, board=Board(9, 6, 0.03)), "baseline-scale")
+    assert finding.value == pytest.approx(25 / 30)
+
+
+def test_the_photographed_pair_is_healthy_but_for_one_corner(left_corners):
+    """|T| = 0.0836 m; left13's corner is 1.5 px off by any solution."""
+    folder = sample("left01.jpg").parent
+    right = detect(sorted(folder.glob("right*.jpg")), BOARD)
+    calibration = calibrate_pair(left_corners, right, BOARD)
+    found = [finding for finding in inspect(calibration).findings if finding.severity != "note"]
+    assert [(finding.id, finding.pictures) for finding in found] == [("outlier-view", (11,))]
+
+
+def test_a_view_without_corners_is_no_reason_to_stop(healthy):
+    set_up, _ = healthy
+    (corners,) = set_up.observed(np.random.default_rng(1))
+    corners[3, 2 * set_up.board.columns :] = np.nan
+    grid = set_up.camera.intrinsics
+    names = tuple(f"{view}.png" for view in range(len(corners)))
+    solved = calibrate(Detections(names, corners, grid.width, grid.height), set_up.board)
+    solved.detections["camera"][3] = np.nan
+    inspect(solved)
+
+
+# The command ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_exit_status_is_a_gate(capsys, tmp_path):
+    assert main(["inspect", str(DATA / "ros_file.yaml")]) == 0
+    assert capsys.readouterr().out.startswith("Nothing found.")
+    assert main(["inspect", str(DATA / "opencv_fisheye.yml")]) == 0  # a note
+    assert "note fold" in capsys.readouterr().out
+    bad = tmp_path / "bad.yaml"
+    bad.write_text((DATA / "ros_file.yaml").read_text().replace("plumb_bob", "rational_polynomial"))
+    assert main(["inspect", str(bad)]) == 1
+    assert "coefficient-count" in capsys.readouterr().out
+    bad.write_text("nothing")
+    assert main(["inspect", str(bad)]) == 2
+    assert "plain text" in capsys.readouterr().err
+
+
+def test_several_files_are_inspected_each_and_an_unreadable_one_is_named(capsys, tmp_path):
+    (tmp_path / "no.yml").write_text("nothing")
+    words = [str(DATA / "ros_file.yaml"), str(tmp_path / "no.yml"), str(DATA / "colmap")]
+    assert main(["inspect", "--json", *words]) == 2
+    captured = capsys.readouterr()
+    assert [each["file"] for each in json.loads(captured.out)] == [words[0], words[2]]
+    assert "no.yml" in captured.err
+
+
+def test_pictures_are_calibrated_first_and_the_board_is_asked_for(capsys):
+    folder = sample("left01.jpg").parent
+    some = [str(folder / f"left{number:02}.jpg") for number in (1, 3, 4, 5, 6, 7)]
+    assert main(["inspect", *some]) == 2
+    assert "--board 9x6 --square-mm 25" in capsys.readouterr().err
+    status = main(["inspect", *some, "--board", "9x6", "--square-mm", "25", "--json"])
+    tree = json.loads(capsys.readouterr().out)
+    assert tree["cameras"][0]["fx"] == pytest.approx(535, abs=5)
+    assert status == (1 if any(each["severity"] != "note" for each in tree["findings"]) else 0)
+
+
+def test_corners_in_pictures_are_found_for_a_file_without_them(capsys):
+    """The published K, judged by the better finder's corners: healthy."""
+    folder = sample("left01.jpg").parent
+    words = ["inspect", str(sample("left_intrinsics.yml")), "--images", str(folder / "left*.jpg")]
+    assert main([*words, "--board", "9x6", "--square-mm", "25", "--json"]) == 0
+    tree = json.loads(capsys.readouterr().out)
+    assert "pose-absorbs-error" in tree["checked"]
