@@ -6,6 +6,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
+from camviz.views.fault_lab import FaultLabView
 from camviz.views.frustum import FrustumView
 from camviz.views.intrinsics import IntrinsicsView
 from camviz.views.pinhole import PinholeView
@@ -22,6 +23,7 @@ PICTURES = {
     "distortion": DistortionView(k1=-0.28, k2=0.07),
     "fold": DistortionView.of(PUBLISHED),
     "epipolar": EpipolarView(),
+    "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 
 if __name__ == "__main__":

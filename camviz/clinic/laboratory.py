@@ -158,7 +158,7 @@ def experiment(fault: str, strength: float, noise: float, seed: int) -> Experime
     elif fault == "boards in the middle":
         window = amount = 1 - 0.75 * strength
     set_up = _set_up(seed, tilts, window)
-    estimated = ESTIMATED
+    estimated: tuple[str, ...] = ESTIMATED
     if fault == "warped board":
         side = (BOARD.columns - 1) * BOARD.square_size
         set_up = replace(set_up, warp=(amount / 100 * side, 0.0))

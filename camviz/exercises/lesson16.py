@@ -129,6 +129,11 @@ def _transposed_grid(residuals: Array, rows: int, columns: int) -> tuple[Array, 
     return np.median(lengths, axis=0), np.median(lengths, axis=1)
 
 
+def _maybe_a_mirror(rays_first: Array, rays_second: Array) -> Array:
+    U, _, Vt = np.linalg.svd(rays_second.T @ rays_first)
+    return U @ Vt
+
+
 VIEW_RMS = Exercise(
     name="16.view_rms",
     reference=view_rms,
@@ -142,11 +147,11 @@ VIEW_RMS = Exercise(
     misconceptions=(
         Misconception(
             lambda residuals: np.sqrt(np.nanmean(residuals**2, axis=(-1, -2))),
-            "This is the RMS of one *coordinate*: too small by √2. OpenCV, and all who quote it, count one corner once.",
+            "This is the RMS of one *coordinate*: too small by √2. OpenCV, and those who quote it, count a corner once.",
         ),
         Misconception(
             lambda residuals: np.nanmean(np.linalg.norm(residuals, axis=-1), axis=-1),
-            "This is the mean length. RMS squares first, then takes the mean, then the root, and so weighs large errors.",
+            "This is the mean length. RMS squares first, then takes the mean, then the root: large errors weigh more.",
         ),
         Misconception(
             lambda residuals: np.sqrt(np.mean(np.sum(residuals**2, axis=-1), axis=-1)),
@@ -227,8 +232,8 @@ ROTATION = Exercise(
     tolerance=1e-7,
     hints=(
         "The sum of the products, `rays_second.T @ rays_first`, is a 3 × 3 matrix; its SVD has the rotation in it.",
-        "With `U, s, Vt = np.linalg.svd(rays_second.T @ rays_first)` it is U diag(1, 1, d) Vᵀ, where d = det(U Vᵀ) is 1 "
-        "or −1, so that the result is no mirror.",
+        "With `U, s, Vt = np.linalg.svd(rays_second.T @ rays_first)` it is U diag(1, 1, d) Vᵀ, where d = det(U Vᵀ) is "
+        "1 or −1, so that the result is no mirror.",
     ),
     praise="What is left after this rotation is what two calibrations really disagree about.",
     misconceptions=(
@@ -237,7 +242,7 @@ ROTATION = Exercise(
             "This is the rotation from the second to the first: the other way round.",
         ),
         Misconception(
-            lambda first, second: (lambda U, _, Vt: U @ Vt)(*np.linalg.svd(second.T @ first)),
+            _maybe_a_mirror,
             "For rays in all directions this is right. Rays in one plane may give you a *mirror*, det R = −1.",
         ),
         Misconception(

@@ -22,30 +22,37 @@ HEALTHY = "healthy"
 
 @dataclass(frozen=True)
 class Complaint:
-    """A fault that brings patients, how strong (low … high), and what the owner says, which does not give it away."""
+    """A fault that brings patients, and how strong it is then (low … high): beyond doubt."""
 
     fault: str
     strengths: tuple[float, float]
-    story: str
 
 
 COMPLAINTS = (
-    Complaint("blurred view", (3, 8), "The error of the fit is larger than that of my other cameras."),
-    Complaint("column off", (0.5, 1), "I had to take one of the pictures with the board partly in the shade."),
-    Complaint("parallel boards", (3, 8), "The error is the lowest I ever had. Yet every distance I measure is wrong."),
-    Complaint("warped board", (1.5, 2), "I printed the board on paper, and glued it to cardboard."),
-    Complaint("autofocus drift", (3, 4), "The first pictures fit, and so do the last ones. Together they do not."),
-    Complaint(
-        "absurd centre", (8, 10), "A colleague typed in the principal point of another camera and fitted the poses."
-    ),
-    Complaint("folding polynomial", (0.7, 0.9), "Undistorted pictures have something odd at their border."),
-    Complaint(
-        "resized K", (2, 2), "It came with the camera. The pictures I take look fine, and nothing projects right."
-    ),
-    Complaint("crop", (30, 38), "We cut away the left part of every picture, to save bandwidth."),
-    Complaint("boards in the middle", (0.25, 0.35), "I kept the board in the middle, where the lens is best."),
+    Complaint("blurred view", (3, 8)),
+    Complaint("column off", (0.5, 1)),
+    Complaint("parallel boards", (3, 8)),
+    Complaint("warped board", (1.5, 2)),
+    Complaint("autofocus drift", (3, 4)),
+    Complaint("absurd centre", (8, 10)),
+    Complaint("folding polynomial", (0.7, 0.9)),
+    Complaint("resized K", (2, 2)),
+    Complaint("crop", (30, 38)),
+    Complaint("boards in the middle", (0.25, 0.35)),
 )
-WELL = "Nothing is wrong, I think. I only want to be sure."
+STORIES = (  # any patient may come with any of them: what owners say does not tell what is wrong
+    "It worked last year. I changed nothing.",
+    "I followed the tutorial to the letter.",
+    "The error of the fit is what it always is.",
+    "My colleague says that it is fine.",
+    "The robot drifts to the left, and I suspect the camera.",
+    "Nothing is wrong, I think. I only want to be sure.",
+    "The distances that I measure are wrong by a few percent, or so I believe.",
+    "It came with the camera.",
+    "I calibrated three times and got three answers. Which one is this?",
+    "The pictures look odd once they are undistorted. Or is that me?",
+    "I took the pictures in a hurry.",
+)
 
 
 class Ward:
@@ -61,7 +68,8 @@ class Ward:
         self.number = number
         chosen: list[Complaint | None] = [*np.random.default_rng(number).permutation(np.array(COMPLAINTS, object))]
         chosen = [*chosen[: patients - 1], None]
-        self._complaints = [chosen[i] for i in np.random.default_rng([number, 1]).permutation(patients)]
+        order = np.random.default_rng([number, 1]).permutation(patients)
+        self._complaints = [chosen[i] for i in order]
         self._patients: dict[int, Patient] = {}
         self._tries: dict[int, int] = {}
 
@@ -126,11 +134,12 @@ class Patient:
 
 def _admitted(ward: int, patient: int, complaint: Complaint | None) -> Patient:
     rng = np.random.default_rng([ward, 2, patient])
+    story = STORIES[np.random.default_rng([ward, 3]).permutation(len(STORIES))[patient - 1]]
     name = f"Patient {patient}"
     if complaint is None:
-        return Patient(name, WELL, Case(healthy(rng)[1]), HEALTHY)
+        return Patient(name, story, Case(healthy(rng)[1]), HEALTHY)
     fault, strength = FAULTS[complaint.fault], float(rng.uniform(*complaint.strengths))
-    return Patient(name, complaint.story, fault.inject(rng, strength), fault.finding)
+    return Patient(name, story, fault.inject(rng, strength), fault.finding)
 
 
 def reply(patient: Patient, answer: Any, attempt: int) -> Verdict:

@@ -27,8 +27,8 @@ _LONGEST = 90.0  # picture units of an arrow
 class FaultLabView(View):
     """What a fault does to a calibration, and what it does not: the fit, the estimates against the truth, the findings.
 
-    Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera, boards
-    and noise. Arrows lead from a detected corner of the chosen view to its projection. Click a bar to choose a view.
+    Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
+    boards and noise. Arrows lead from a detected corner of the chosen view to its projection. Click a bar to choose a view.
     """
 
     title: ClassVar[str] = "Fault lab"
@@ -37,9 +37,7 @@ class FaultLabView(View):
     strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
     noise: float = slider(0.15, 0.02, 0.5, 0.01, unit="px", help="standard deviation of a corner's coordinates")
     seed: int = slider(1, 1, 20, 1, label="camera", help="another camera, other boards, other noise")
-    view: int = slider(
-        1, 1, VIEWS, 1, label="view", help="whose residuals are shown; a click on its bar chooses it too"
-    )
+    view: int = slider(1, 1, VIEWS, 1, label="view", help="whose residuals are shown; or click its bar")
     told: bool = switch(True, label="show the findings", help="hide them to make a diagnosis of your own")
 
     @cached_property
@@ -168,7 +166,7 @@ class FaultLabView(View):
             content += svg.dots(panel.place([(error, y)]), class_, 8)
             level = panel.y + panel.place((0, y))[1] + 4
             beside += svg.text((panel.x - 10, level), name, "label end")
-            words = f"{'+' if error > 0 else '−'}{figures(abs(error))} ± {figures(sigma)} px"
+            words = f"{_signed(error, sigma)} px"
             beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
         shown = panel.show(content, title="Estimate ± 2σ, less the truth")
         ticks = [(float(t), f"{t:g}".replace("-", "−")) for t in plot.ticks(-reach, reach, 5)]
@@ -227,6 +225,10 @@ def grouped(findings: tuple[Finding, ...]) -> list[tuple[Finding, int]]:
 def figures(value: float) -> str:
     """A length in two figures, and never in powers of ten."""
     return f"{value:.0f}" if value >= 10 else f"{value:.2g}" if value >= 0.01 else "0"
+
+
+def _signed(error: float, sigma: float) -> str:
+    return f"{'+' if error > 0 else '−'}{figures(abs(error))} ± {figures(sigma)}"
 
 
 def _short(sentence: str, letters: int = 176) -> str:
