@@ -4,7 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+from camviz.calibration.difference import difference
+from camviz.cameras import Camera, Intrinsics
+from camviz.checks import judge
 from camviz.clinic.laboratory import ILLNESSES, VIEWS, experiment
+from camviz.exercises import exercises, lesson16
 from camviz.exercises.ward import COMPLAINTS, HEALTHY, Ward
 from camviz.views.fault_lab import FaultLabView, grouped
 
@@ -49,7 +53,7 @@ def test_strength_moves_the_fault_alone():
 
 
 def test_a_moved_principal_point_is_absorbed_by_turning_every_board():
-    """Δcx = 51.2 px turns the boards by atan(Δcx/f) or, off the axis, less; and the error of the fit stays below a pixel."""
+    """Δcx = 51.2 px turns the boards by atan(Δcx/f) or, off the axis, less; the fit stays below a pixel."""
     well, ill = (experiment("moved centre", strength, 0.15, 5) for strength in (0, 1))
     turns = (ill.solved.first_from_board * well.solved.first_from_board.inv()).rotation.magnitude()
     expected = np.arctan(0.08 * 640 / well.camera.intrinsics.fx)
@@ -161,3 +165,45 @@ def test_a_consequence_is_told_from_a_cause():
 def test_a_patient_who_is_not_there_is_named(ward, bad):
     with pytest.raises(ValueError, match="patient must be a number from 1 to 8"):
         ward[bad]
+
+
+# The exercises -------------------------------------------------------------------------------------------------------
+
+MISTAKES = [
+    pytest.param(one, known, id=f"{one.name}-{number}")
+    for one in exercises("16").values()
+    for number, known in enumerate(one.misconceptions)
+]
+
+
+@pytest.mark.parametrize(("exercise", "known"), MISTAKES)
+@pytest.mark.parametrize("seed", range(4))
+def test_every_known_mistake_is_answered_by_its_own_explanation(exercise, known, seed):
+    verdict = judge(exercise, known.reference, np.random.default_rng(seed))
+    assert verdict.status == "wrong"
+    assert verdict.message == known.explanation
+
+
+@pytest.mark.parametrize("exercise", exercises("16").values(), ids=lambda one: one.name)
+def test_the_reference_is_correct_and_a_constant_is_not(exercise):
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        assert judge(exercise, exercise.reference, rng).correct
+        assert not judge(exercise, lambda *given: 1.0, rng)
+        assert not judge(exercise, lambda *given: None, rng)
+
+
+def test_the_robust_sigma_is_that_of_a_rayleigh_distribution():
+    residuals = np.random.default_rng(0).normal(0, 0.3, (200_000, 2))
+    assert lesson16.robust_sigma(residuals) == pytest.approx(0.3, rel=0.01)
+
+
+def test_the_implied_rotation_is_that_of_the_difference_map():
+    """Two cameras whose cx is 12 px apart: the turn is that which camviz takes out, near enough atan(12/f)."""
+    grid = Intrinsics(640, 480, 600, 600, 319.5, 239.5)
+    cameras = [Camera(Intrinsics(640, 480, 600, 600, cx, 239.5)) for cx in (319.5, 331.5)]
+    map_ = difference(*cameras, within=1000)
+    rays = [camera.unproject(map_.uv).reshape(-1, 3) for camera in cameras]
+    R = lesson16.implied_rotation(*rays)
+    np.testing.assert_allclose(R, map_.second_from_first.rotation.as_matrix(), atol=1e-3)
+    assert np.degrees(np.arccos((np.trace(R) - 1) / 2)) == pytest.approx(np.degrees(np.arctan(12 / grid.fx)), rel=0.15)

@@ -28,7 +28,8 @@ class FaultLabView(View):
     """What a fault does to a calibration, and what it does not: the fit, the estimates against the truth, the findings.
 
     Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
-    boards and noise. Arrows lead from a detected corner of the chosen view to its projection. Click a bar to choose a view.
+    boards and noise. Arrows lead from a detected corner of the chosen view to its projection. A click on a bar
+    chooses its view.
     """
 
     title: ClassVar[str] = "Fault lab"
@@ -83,7 +84,7 @@ class FaultLabView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         body = "".join(
             [
-                svg.rectangle(0, 0, 960, 672, "paper"),
+                svg.rectangle(0, 0, 960, 684, "paper"),
                 self._headline(),
                 self._bars_panel(),
                 self._image_panel(),
@@ -92,7 +93,7 @@ class FaultLabView(View):
             ]
         )
         words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
-        return Picture(body, 960, 672, self.title, words)
+        return Picture(body, 960, 684, self.title, words)
 
     def _headline(self) -> str:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
@@ -178,7 +179,7 @@ class FaultLabView(View):
         return shown + beside + below + svg.text((490, panel.y + panel.height + 36), note, "note")
 
     def _findings(self, draft: bool) -> str:
-        x, y = 490.0, 352.0
+        x, y = 490.0, 346.0
         head = svg.text((x, y), "What the clinic finds", "title")
         if not self.told:
             return head + svg.paragraph((x, y + 30), "Hidden. Make your diagnosis, then switch them on.", 450, "label")
@@ -198,7 +199,7 @@ class FaultLabView(View):
             body += svg.text((x + 14, y), f"{finding.id}{times}", colour, style="font-size:17px;font-weight:600")
             body += svg.text((x + 448, y), finding.severity, f"note end {colour}")
             body += svg.paragraph((x + 14, y + 18), _short(finding.sentence), 436, "label", line=16)
-            y += 74
+            y += 78
         if len(listed) > _MOST:
             body += svg.text((x, y), f"and {len(listed) - _MOST} more", "note")
         return head + body
