@@ -1,4 +1,5 @@
-"""Sample data: the 26 chessboard photographs of OpenCV's samples and their published calibrations (Apache-2.0).
+"""Sample data: the 26 chessboard photographs of OpenCV's samples and their published calibrations (Apache-2.0), and a
+stereo pair with its true disparities from scikit-image.
 
 A file is looked for in the folder that CAMVIZ_SAMPLES names, then among those fetched before, then on the network; its
 sha256 is checked wherever it comes from. Where there is none, the virtual camera pictures a chessboard instead.
@@ -10,6 +11,7 @@ import hashlib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any, overload
 
@@ -188,3 +190,63 @@ def _pose(view: int, offset: float) -> RigidTransform:
     aim = centre + 0.15 * (np.cos(2 * view) * right + np.sin(3 * view) * down)
     pose = look_at(eye, aim, down + roll * right)
     return pose * RigidTransform.from_translation([offset * BASELINE, 0, 0])
+
+
+# A published stereo pair with its truth ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class StereoSample:
+    """A pair of pictures (height, width, 3), uint8 sRGB, in rectified rows, and what is known of it.
+
+    `disparity` (height, width) are the true u_left − u_right in pixels, NaN where unknown; `focal_length` and
+    `doffs` = cx_right − cx_left are in pixels, `baseline` in metres. `real` and `sentence` as in `Pictures`.
+    """
+
+    left: NDArray[np.uint8]
+    right: NDArray[np.uint8]
+    disparity: NDArray[np.float32]
+    focal_length: float
+    baseline: float
+    doffs: float
+    real: bool
+    sentence: str
+
+
+def motorcycle(width: int = 741) -> StereoSample:
+    """The motorcycle of the Middlebury stereo data of 2014 (Scharstein et al.), from scikit-image, `width` pixels wide.
+
+    The files are read from scikit-image's data folder without importing it. Where the installed one lacks them, the
+    virtual camera's garden takes their place.
+    """
+    import cv2
+
+    folder = files("skimage") / "data"
+    names = ("motorcycle_left.png", "motorcycle_right.png", "motorcycle_disp.npz")
+    if not all((folder / name).is_file() for name in names):
+        missing = "The installed scikit-image has no motorcycle pair; the virtual camera's garden takes its place."
+        return _garden_pair(width, missing)
+    held = [np.frombuffer((folder / name).read_bytes(), np.uint8) for name in names[:2]]
+    pictures = [cv2.cvtColor(cv2.imdecode(one, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB) for one in held]
+    with as_file(folder / names[2]) as path, np.load(path) as arrays:
+        disparity = arrays["arr_0"].astype(np.float32)
+    scale = width / pictures[0].shape[1]
+    size = (width, round(scale * pictures[0].shape[0]))
+    left, right = (cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in pictures)
+    true = cv2.resize(disparity, size, interpolation=cv2.INTER_NEAREST)
+    true = np.where(np.isfinite(true), np.float32(scale) * true, np.float32(np.nan))
+    credit = "The motorcycle of the Middlebury stereo data (Scharstein et al. 2014), from scikit-image's data folder."
+    return StereoSample(left, right, true, scale * 994.978, 0.193001, scale * 31.086, True, credit)
+
+
+def _garden_pair(width: int, sentence: str) -> StereoSample:
+    from camviz.cameras import Camera, Intrinsics
+    from camviz.scenes import snapshot, textured_scene
+
+    left = Camera(Intrinsics.from_fov(width, round(0.675 * width), 60))
+    right = left.at(RigidTransform.from_translation([0.193001, 0, 0]))
+    scene, rays = textured_scene(), left.rays()
+    _, distance = scene.trace(left.centre, rays)
+    f = left.intrinsics.fx
+    true = (f * 0.193001 / (distance * rays[..., 2])).astype(np.float32)
+    return StereoSample(snapshot(scene, left), snapshot(scene, right), true, f, 0.193001, 0.0, False, sentence)

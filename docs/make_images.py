@@ -10,6 +10,7 @@ from camviz.views.fault_lab import FaultLabView
 from camviz.views.frustum import FrustumView
 from camviz.views.intrinsics import IntrinsicsView
 from camviz.views.pinhole import PinholeView
+from camviz.views.rectification import RectificationView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(
@@ -23,7 +24,11 @@ PICTURES = {
     "distortion": DistortionView(k1=-0.28, k2=0.07),
     "fold": DistortionView.of(PUBLISHED),
     "epipolar": EpipolarView(),
+<<<<<<< HEAD
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
+=======
+    "rectification": RectificationView(),
+>>>>>>> findings
 }
 
 if __name__ == "__main__":

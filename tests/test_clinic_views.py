@@ -437,6 +437,19 @@ def test_every_view_draws_every_calibration_or_says_what_is_missing(name, case):
         assert case != "pair" or name == "difference"
 
 
+def test_errors_without_corners_are_bars_alone():
+    errors = np.array([0.2, 1.2, 0.3])
+    known = replace(bare(), per_view_errors={"camera": errors})
+    view = VIEWS["residual-vectors"].view(Case(known))
+    body = view.figure().body
+    height = float(re.search(r'height="([\d.]+)" viewBox="[^"]*" data-panel="bars"', body)[1])
+    outlines = re.search(r'<path d="([^"]*)" class="fill-blue"', body)[1].strip("MZ").split("ZM")
+    tops = [min(float(point.split(",")[1]) for point in outline.split()) for outline in outlines]
+    np.testing.assert_allclose((height - np.array(tops)) / height * 1.2 * 1.2, errors, atol=0.002)
+    assert "view 2 has the largest error, 1.2 px" in view.description()
+    assert "does not hold the corners" in view.description()
+
+
 @pytest.mark.parametrize("name", VIEWS)
 def test_a_view_that_only_the_other_camera_saw_is_drawn_by_none(name):
     """Its pose in this camera's list means nothing: here it is the identity, the board in the camera's own place."""

@@ -70,7 +70,7 @@ def test_all_boards_of_a_set_up_are_seen_whole(make):
 @pytest.mark.parametrize(
     ("name", "strength", "value", "tolerance"),
     [
-        ("outlier corner", 30, 30, 1),
+        ("blurred view", 10, 10 * np.sqrt(2), 2),
         ("half pixel", 0.5, 0.5, 0.05),
         ("half pixel between two", 1, 1, 1e-9),
         ("autofocus drift", 3, 3, 0.5),

@@ -173,7 +173,7 @@ def test_noise_alone_explains_as_f_says():
         set_up = single(rng, views=8)
         best = Evidence(set_up.solved(set_up.observed(rng))).observed["camera"].best
         chances.append(explained(best, "camera", warp_columns(best, "camera")).chance)
-    distance = np.abs(np.sort(chances) - (np.arange(30) + 0.5) / 60).max()
+    distance = np.abs(np.sort(chances) - (np.arange(30) + 0.5) / 30).max()
     assert distance < 1.63 / math.sqrt(30)  # 1 in 100
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import PANORAMAS, Evidence
-from camviz.clinic.observed import explained, parameter_columns
 from camviz.lenses import BrownConrady, KannalaBrandt, Perspective
 
 SQUARE = 0.02  # how far fx/fy may be from 1: sensors have square pixels to a few thousandths
@@ -53,11 +52,11 @@ def _zero(evidence: Evidence, name: str) -> Iterator[Finding]:
     if observed is None:
         yield found("zero-distortion", f"{sentence}.", 0, "", name)
         return
-    bare = replace(observed.adjustment, estimated={name: ("fx", "fy", "cx", "cy")}).refined()
-    k1 = explained(bare, name, parameter_columns(bare, name, ["k1"]))
-    if k1.count and abs(k1.values[0]) > STANDARD_ERRORS * k1.sigmas[0]:
-        sentence += f", and the corners ask for k1 = {k1.values[0]:.3g} ± {k1.sigmas[0]:.1g}."
-        yield found("zero-distortion", sentence, k1.values[0], "", name)
+    bent = replace(observed.adjustment, estimated={name: ("fx", "fy", "cx", "cy", "k1")}).refined()
+    k1, sigma = bent.intrinsics(name)[-1], float(np.sqrt(bent.intrinsics_covariance(name)[-1, -1]))
+    if abs(k1) > STANDARD_ERRORS * sigma:
+        sentence += f", and the corners ask for k1 = {k1:.3g} ± {sigma:.1g}."
+        yield found("zero-distortion", sentence, k1, "", name)
 
 
 def aspect(evidence: Evidence) -> Outcome:

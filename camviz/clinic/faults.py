@@ -110,11 +110,11 @@ FAULTS: Mapping[str, Fault] = {
         "the focal length grows from the first view to the last",
         "%",
         (0.2, 1, 3, 10),
-        3,
+        10,
         autofocus_drift,
     ),
     "rolling shutter": Fault(
-        "pose-absorbs-error", "the board moves while the image is read out", "px", (1, 3, 10, 30), 10, rolling_shutter
+        "pose-absorbs-error", "the board moves while the image is read out", "px", (1, 3, 10, 30), 30, rolling_shutter
     ),
     "absurd centre": Fault(
         "pose-absorbs-error",

@@ -23,7 +23,7 @@ from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_pa
 from camviz.page import document, figure, numbers_table
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.missing import MissingView
-from camviz.views.clinic.observations import Missing, Observations
+from camviz.views.clinic.observations import Observations
 from camviz.views.clinic.residuals import ResidualsView, bars_panel
 
 if TYPE_CHECKING:
@@ -138,14 +138,10 @@ def _section(case: Case, entry: Entry) -> tuple[str, str]:
     cameras = ("",) if entry.of_all else case.names[:MOST_CAMERAS]
     shown, why = "", ""
     for name in cameras:
-        if entry.name == "residual-vectors":
-            try:
-                shown += _linked(case, name, len(cameras) > 1)
-            except Missing as missing:
-                why = str(missing)
-            continue
         view = entry.view(case, name)
-        if isinstance(view, MissingView):
+        if isinstance(view, ResidualsView):
+            shown += _linked(case, name, len(cameras) > 1)
+        elif isinstance(view, MissingView):
             why = view.sentence
         else:
             shown += figure(name if len(cameras) > 1 else "", view.figure())

@@ -165,7 +165,7 @@ every F- and χ²-test (`model-too-simple`, `board-warp`, `split-disagreement`, 
 `pose-absorbs-error`), one in ten thousand for a whole set of views with few corners (`outlier-view`). It holds for
 independent Gaussian noise. Because real corners are neither, and because in a large set every small error of a real
 lens is beyond chance, there is a least effect beside each: it decides in practice. Rules about the numbers of a file
-have no chance in them.
+have no chance in them. No alarm in 120 means a rate below 2.5 % with 95 % confidence (1 - 0.05^(1/120)).
 """
 
 

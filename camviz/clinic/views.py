@@ -22,6 +22,7 @@ from camviz.views.clinic.coverage import CoverageView
 from camviz.views.clinic.cross_validation import CrossValidationView
 from camviz.views.clinic.depth import DepthErrorView
 from camviz.views.clinic.difference import DifferenceView
+from camviz.views.clinic.errors import ErrorsView
 from camviz.views.clinic.fold_map import FoldView
 from camviz.views.clinic.guidance import GuidanceView
 from camviz.views.clinic.histogram import HistogramView
@@ -130,6 +131,15 @@ def _boards(case: Case, name: str) -> View:
     return BoardPosesView.of(case.calibration, name)
 
 
+def _residuals(case: Case, name: str) -> View:
+    try:
+        return ResidualsView.about(case.observations(name))
+    except Missing as missing:
+        if name not in case.calibration.per_view_errors:
+            raise missing
+    return ErrorsView.of(case.calibration, name)
+
+
 def _outliers(case: Case, name: str) -> View:
     return OutliersView(Observations.of(case.calibration, name, case.photographs(name, full=True)))
 
@@ -180,7 +190,7 @@ _ENTRIES = (
         "residual-vectors",
         "Residuals, view by view",
         "Where each picture disagrees with the calibration: choose a bar, see its picture and its board.",
-        lambda case, name: ResidualsView.about(case.observations(name)),
+        _residuals,
     ),
     Entry(
         "outliers",

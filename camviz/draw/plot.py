@@ -111,14 +111,15 @@ def ticks(low: float, high: float, count: float) -> np.ndarray:
 
 def _found(low: float, high: float, length: float) -> Ticks:
     values = ticks(low, high, length / 50)
-    return list(zip(values.tolist(), _written(values), strict=True))
+    return list(zip(values.tolist(), written(values), strict=True))
 
 
 def _places(ticks: Ticks) -> list[float]:
     return [place for place, _ in ticks]
 
 
-def _written(values: np.ndarray) -> list[str]:
+def written(values: np.ndarray) -> list[str]:
+    """Evenly spaced values as text, with as many decimals as tell them apart."""
     step = float(np.min(np.diff(values))) if len(values) > 1 else 1.0
     decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
     return [f"{value:.{decimals}f}".replace("-", "−") if abs(value) > step / 1e6 else "0" for value in values]

@@ -30,6 +30,7 @@ from camviz.twoview.estimate import (
     ransac_fundamental,
     recover_pose,
 )
+from camviz.twoview.matching import METHODS, MatchingScore, disparity, left_right_check, matching_score
 from camviz.twoview.rectify import (
     RectifiedPair,
     depth_error,
@@ -41,6 +42,8 @@ from camviz.twoview.rectify import (
 from camviz.twoview.triangulate import ray_distances, refine_points, triangulate, triangulate_linear
 
 __all__ = [
+    "METHODS",
+    "MatchingScore",
     "RectifiedPair",
     "clip_lines",
     "cross_matrix",
@@ -48,6 +51,7 @@ __all__ = [
     "depth_error",
     "depth_from_disparity",
     "depth_interval",
+    "disparity",
     "disparity_from_depth",
     "eight_point",
     "epipolar_curve",
@@ -57,8 +61,10 @@ __all__ = [
     "essential_from_fundamental",
     "from_homogeneous",
     "fundamental",
+    "left_right_check",
     "line_distance",
     "linear_fundamental",
+    "matching_score",
     "nearest_essential",
     "nearest_rank_two",
     "normalising_transform",

@@ -116,7 +116,7 @@ class FaultLabView(View):
     @property
     def _bars(self) -> Panel:
         tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
-        return plot.plot_panel("bars", 66, 116, 394, 104, (0.5, VIEWS + 0.5), (0, tallest))
+        return plot.plot_panel("bars", 66, 116, 394, 152, (0.5, VIEWS + 0.5), (0, tallest))
 
     def _bars_panel(self) -> str:
         panel, errors = self._bars, self.experiment.errors
@@ -134,7 +134,7 @@ class FaultLabView(View):
     def _image_panel(self) -> str:
         made, i = self.experiment, self.index
         k = made.camera.intrinsics
-        panel = image_panel("picture", 20, 274, 440, k.width, k.height, tallest=378)
+        panel = image_panel("picture", 20, 322, 440, k.width, k.height, tallest=340)
         seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
         starts = panel.place(seen)
         along = panel.place(seen - scale * residuals) - starts

@@ -6,6 +6,7 @@ from functools import cache, lru_cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
@@ -26,6 +27,11 @@ Pose = tuple[float, ...]
 def taken(camera: Camera, side: int) -> tuple[np.ndarray, bytes]:
     """The picture that a camera takes of the garden, `side` pixels on its longer side, uint8 RGB, and it as JPEG."""
     return _taken(camera.intrinsics.within(side), camera.lens, _pose(camera))
+
+
+def distances(camera: Camera, side: int) -> NDArray[np.float32]:
+    """How far (height, width) in metres along its ray every pixel of such a picture sees; NaN in the sky."""
+    return _distances(camera.intrinsics.within(side), camera.lens, _pose(camera))
 
 
 def glimpse(camera: Camera) -> np.ndarray:
@@ -56,6 +62,14 @@ def _taken(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> tuple[np.ndarray, 
     image = snapshot(textured_scene(), Camera(intrinsics, lens, _placed(pose)))
     image.flags.writeable = False
     return image, jpeg(image)
+
+
+@lru_cache(maxsize=4)
+def _distances(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> NDArray[np.float32]:
+    camera = Camera(intrinsics, lens, _placed(pose))
+    _, distance = textured_scene().trace(camera.centre, camera.rays())
+    distance.flags.writeable = False
+    return distance
 
 
 @lru_cache(maxsize=4)

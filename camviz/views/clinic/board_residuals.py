@@ -11,10 +11,10 @@ import numpy as np
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.board_warp import WarpTest, warp_test
 from camviz.draw import svg
-from camviz.draw.heat import Shades, bar
 from camviz.draw.items import Item, Label, Line, Sheet
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
+from camviz.draw.shades import Shades, bar
 from camviz.draw.space import Eye, draw_space, space_panel
 from camviz.lenses.base import Array
 from camviz.views.base import View, slider

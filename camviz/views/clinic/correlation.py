@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import svg
-from camviz.draw.heat import Shades, bar
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, png
+from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Missing

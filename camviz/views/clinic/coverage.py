@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.draw import plot, svg
-from camviz.draw.heat import Shades, bar
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, png
+from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Observations

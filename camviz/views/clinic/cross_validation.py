@@ -12,9 +12,9 @@ import numpy as np
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.cross_validation import Halves, HeldOut, halves, held_out
 from camviz.draw import plot, svg
-from camviz.draw.heat import Shades, bar, contours, heat
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Missing
 from camviz.views.clinic.uncertainty import adjusted, determined

@@ -11,9 +11,9 @@ import numpy as np
 from camviz.calibration.difference import Difference, difference
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.heat import Shades, bar, contours, heat
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import View, choice, slider
 from camviz.views.clinic.observations import Missing
 from camviz.views.clinic.residuals import nice

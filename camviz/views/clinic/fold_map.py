@@ -13,9 +13,9 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
-from camviz.draw.heat import Shades, bar, contours, heat
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.lenses.base import Array
 from camviz.views.base import View, slider
 from camviz.views.distortion import DistortionView

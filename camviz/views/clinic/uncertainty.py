@@ -13,9 +13,9 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.uncertainty import projection_covariance, worst_deviation
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
-from camviz.draw.heat import Shades, bar, contours, heat
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Missing

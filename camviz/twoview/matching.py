@@ -1,0 +1,144 @@
+"""Stereo matching: the disparity of every pixel of a rectified pair, by OpenCV's matchers, held against the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from camviz.lenses.base import Array
+
+METHODS = ("SGM", "BM", "SGM + WLS")
+_UNIQUE = 5  # per cent by which the best match must beat the second best
+_SPECKLE = (100, 2)  # patches of fewer pixels, of disparities that differ by no more than this, are taken out
+_SMOOTHNESS, _EDGES = 800.0, 1.0  # of the filter: λ, and the grey levels over 255 that count as an edge, times 100
+
+
+def disparity(
+    left: NDArray[np.uint8],
+    right: NDArray[np.uint8],
+    method: str = "SGM",
+    *,
+    disparities: int = 64,
+    block_size: int = 5,
+) -> NDArray[np.float32]:
+    """d = u_left − u_right (height, width) in pixels of the left picture's pixels; NaN where no match was found.
+
+    `left` and `right` are a rectified pair, uint8 RGB (height, width, 3) or grey (height, width). d is sought from 0 to
+    `disparities` − 1, so that the first `disparities` columns have none. Methods: "BM", block matching by the sum of
+    absolute differences (Konolige 1998); "SGM", semi-global matching (Hirschmüller 2008); "SGM + WLS", the same in both
+    directions, filtered along the left picture's edges by weighted least squares (Min et al. 2014), which fills holes.
+    Raises ValueError for pictures of different sizes, and for what OpenCV does not take.
+    """
+    if left.shape[:2] != right.shape[:2] or left.dtype != np.uint8 or right.dtype != np.uint8:
+        raise ValueError(
+            f"left and right must be uint8 pictures of one size, got {left.dtype} {left.shape} "
+            f"and {right.dtype} {right.shape}"
+        )
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    if disparities < 16 or disparities % 16 or disparities >= left.shape[1]:
+        raise ValueError(
+            f"disparities must be a multiple of 16, from 16 to less than the picture's width, got {disparities}"
+        )
+    least = 5 if method == "BM" else 1
+    if block_size < least or block_size % 2 == 0 or block_size > min(left.shape[:2]):
+        raise ValueError(f"block_size must be an odd number from {least} to the picture's height, got {block_size}")
+    match = {"BM": _block_matching, "SGM": _semi_global, "SGM + WLS": _filtered}[method]
+    sixteenths = match(_grey(left), _grey(right), int(disparities), int(block_size), left)
+    found = sixteenths.astype(np.float32) / np.float32(16)
+    found[sixteenths < 0] = np.nan
+    return found
+
+
+@dataclass(frozen=True)
+class MatchingScore:
+    """How disparities compare with the true ones, over the `compared` pixels whose truth is known.
+
+    `missing` is the share without a disparity, `bad` the share that has none or one that is off by more than the
+    threshold, and `mean_error` the mean |d − d_true| in pixels of those that have one.
+    """
+
+    compared: int
+    missing: float
+    bad: float
+    mean_error: float
+
+
+def matching_score(disparity: ArrayLike, truth: ArrayLike, threshold: float = 1.0) -> MatchingScore:
+    """The score of disparities (...) against true ones (...) in pixels, NaN = none and not known.
+
+    The bad-pixel rate is that of Scharstein & Szeliski (2002, eq. 2), with missing pixels counted as bad. Its shares
+    are NaN where nothing can be compared.
+    """
+    found, true = np.asarray(disparity, dtype=float), np.asarray(truth, dtype=float)
+    if found.shape != true.shape:
+        raise ValueError(f"truth must have the disparities' shape {found.shape}, got {true.shape}")
+    error = np.abs(found - true)[np.isfinite(true)]
+    exists = error[np.isfinite(error)]
+    if not error.size:
+        return MatchingScore(0, np.nan, np.nan, np.nan)
+    return MatchingScore(
+        compared=error.size,
+        missing=1 - exists.size / error.size,
+        bad=1 - float(np.mean(error <= threshold)),
+        mean_error=float(exists.mean()) if exists.size else np.nan,
+    )
+
+
+def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tolerance: float = 1.0) -> Array:
+    """The left disparities (height, width), NaN where the right picture's disagree by more than `tolerance` pixels.
+
+    Pixel u of the left row says that its partner is u − d; the partner's own disparity must lead back. It does not for
+    what only one camera sees, nor for most mistakes. Both are positive for points in front of the cameras.
+    """
+    found, back = np.asarray(disparity_left, dtype=float), np.asarray(disparity_right, dtype=float)
+    u = np.arange(found.shape[-1]) - found
+    inside = (u > -0.5) & (u < found.shape[-1] - 0.5)
+    partner = np.take_along_axis(back, np.where(inside, np.rint(u), 0).astype(int), axis=-1)
+    return np.where(inside & (np.abs(partner - found) <= tolerance), found, np.nan)
+
+
+# OpenCV's matchers, which count in sixteenths of a pixel and say −16 for none ----------------------------------------
+
+
+def _block_matching(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:
+    matcher = cv2.StereoBM.create(numDisparities=disparities, blockSize=block_size)
+    matcher.setUniquenessRatio(_UNIQUE)
+    matcher.setDisp12MaxDiff(1)
+    matcher.setSpeckleWindowSize(_SPECKLE[0])
+    matcher.setSpeckleRange(_SPECKLE[1])
+    return matcher.compute(left, right)
+
+
+def _semi_global(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:
+    matcher = _semi_global_matcher(disparities, block_size)
+    matcher.setUniquenessRatio(_UNIQUE)
+    matcher.setDisp12MaxDiff(1)
+    matcher.setSpeckleWindowSize(_SPECKLE[0])
+    matcher.setSpeckleRange(_SPECKLE[1])
+    return matcher.compute(left, right)
+
+
+def _filtered(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:
+    matcher = _semi_global_matcher(disparities, block_size)
+    backwards = cv2.ximgproc.createRightMatcher(matcher)
+    wls = cv2.ximgproc.createDisparityWLSFilter(matcher)
+    wls.setLambda(_SMOOTHNESS)
+    wls.setSigmaColor(_EDGES)
+    return wls.filter(matcher.compute(left, right), picture, disparity_map_right=backwards.compute(right, left))
+
+
+def _semi_global_matcher(disparities: int, block_size: int) -> Any:
+    """Penalties as OpenCV's documentation advises: P1 = 8 and P2 = 32 for each pixel of the block."""
+    return cv2.StereoSGBM.create(
+        numDisparities=disparities, blockSize=block_size, P1=8 * block_size**2, P2=32 * block_size**2,
+        preFilterCap=63, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )  # fmt: skip
+
+
+def _grey(picture: NDArray[np.uint8]) -> Any:
+    return cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY) if picture.ndim == 3 else picture

@@ -1,0 +1,61 @@
+"""The error of every view as the file tells it, where the file does not hold the corners themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from camviz.draw import plot, svg
+from camviz.draw.picture import Picture
+from camviz.lenses.base import Array
+from camviz.views.base import View
+from camviz.views.clinic.observations import Missing
+
+_NAMED = 16  # views whose bars have room for their figures
+
+
+@dataclass(frozen=True)
+class ErrorsView(View):
+    """A bar for the RMS (views,) in pixels of every view; where in its picture it is, only corners could tell."""
+
+    title: ClassVar[str] = "Error of every view"
+
+    errors: Array = field(compare=False, repr=False)
+    name: str = "camera"
+
+    @classmethod
+    def of(cls, calibration: Any, camera: str = "") -> ErrorsView:
+        """The errors of a calibration's camera. Raises Missing where the file does not hold them."""
+        name = camera or next(iter(calibration.cameras))
+        errors = np.asarray(calibration.per_view_errors.get(name, ()), dtype=float)
+        if not np.isfinite(errors).any():
+            raise Missing(f"The file holds neither the corners that {name} saw nor the error of its views.")
+        return cls(errors, name)
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        worst = int(np.nanargmax(self.errors))
+        return (
+            f"{len(self.errors)} views of {self.name}: view {worst + 1} has the largest error, "
+            f"{self.errors[worst]:.3g} px; the median is {np.nanmedian(self.errors):.3g} px. The file does not hold "
+            "the corners, so where in the picture the error is cannot be shown."
+        )
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        errors, x = self.errors, np.arange(1, len(self.errors) + 1)
+        median, gap = float(np.nanmedian(errors)), 0.12 if len(errors) <= 60 else 0.0
+        limits = (0.5, len(errors) + 0.5), (0.0, 1.2 * float(max(np.nanmax(errors), 1e-9)))
+        panel = plot.plot_panel("bars", 70, 34, 870, 140, *limits)
+        content = plot.grid(panel, xticks=[]) + plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, errors, "fill-blue")
+        content += svg.line(panel.place([(panel.left, median), (panel.right, median)]), "ink dashed")
+        if len(errors) <= _NAMED:
+            places = zip(x, errors, strict=True)
+            content += "".join(svg.text(panel.place(p) + (0, -4), f"{p[1]:.2f}", "tick middle halo") for p in places)
+        ticks = [(t, f"{t:g}") for t in (x.tolist() if len(x) <= _NAMED else plot.ticks(1, len(x), 16).tolist())]
+        shown = panel.show(content, title=f"Error of every view, {self.name}", note=f"dashed: median, {median:.3g} px")
+        body = svg.rectangle(0, 0, 960, 250, "paper") + shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
+        return Picture(
+            body + svg.paragraph((20, 220), self.description(), 920), 960, 250, self.title, self.description()
+        )

@@ -1,0 +1,65 @@
+"""The plan of a rectified pair: the depths between which an error of the disparity leaves a point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camviz import twoview
+from camviz.draw import plot, svg
+from camviz.draw.panel import Panel
+from camviz.lenses.base import Array
+
+
+def wedge_panel(
+    place: tuple[float, float, float, float],
+    pair: twoview.RectifiedPair,
+    disparity: float,
+    plus_minus: float,
+    farthest: float,
+    notes: tuple[str, str],
+) -> str:
+    """The panel at `place` (x, y, width, height), along the left camera's ray of the point, out to `farthest` metres.
+
+    The right camera's pixel is a wedge, `plus_minus` pixels to either side, that meets the left ray between the
+    nearest and the farthest depth. The comb has a tooth for each whole disparity. `notes` are a line each.
+    """
+    B, f, Z = pair.baseline, pair.focal_length, float(pair.depth(disparity))
+    near, far = (float(depth) for depth in twoview.depth_interval(Z, f, B, plus_minus))
+    right = max(1.15 * farthest, min(1.1 * far, 3 * Z))
+    panel = plot.plot_panel("wedge", *place, (0, right), (-0.5 * B, 1.85 * B))
+    # The ray of the disparity's lower end runs from the right camera at (0, B) by (d - e) / f across for each metre.
+    end = min(far, 2 * right)
+    edge = (end, B - end * (disparity - plus_minus) / f)
+    content = (
+        plot.grid(panel)
+        + svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange")
+        + svg.line(panel.place([(0, 0), (right, 0)]), "blue")
+        + svg.path([panel.place([(0, B), tip]) for tip in ((near, 0), edge)], "orange thin")
+        + svg.line(panel.place([(0, B), (Z, 0)]), "orange")
+        + _comb(panel, f * B, right, B)
+        + svg.line(panel.place([(near, 0), (min(far, right), 0)]), "red thick")
+        + svg.dots(panel.place([(Z, 0)]), "red", 8)
+        + svg.dots(panel.place([(0, 0), (0, B)]), "ink", 9)
+        + svg.text(panel.place((0, B)) + (9, -6), "right camera", "orange halo")
+        + svg.text((panel.width - 8, panel.place((0, 0))[1] - 7), "the left camera’s ray", "blue halo end")
+        + svg.text((panel.width - 8, 16), notes[0], "note end halo")
+        + svg.text((panel.width - 8, 33), notes[1], "red end halo")
+        + svg.text((panel.width - 8, panel.height - 6), "a tooth for each pixel of disparity", "note end halo")
+    )
+    return plot.axes(panel, "Z in metres", "x in metres") + panel.show(content, title="What a disparity is worth")
+
+
+def _comb(panel: Panel, focal_baseline: float, right: float, B: float) -> str:
+    """Teeth at the depths of the whole disparities, as long as they stand two picture units apart."""
+    last = int((focal_baseline / 2 * panel.scale[0]) ** 0.5)  # Z² / (f B) is the gap
+    depths: Array = focal_baseline / np.arange(1, 2 + last)
+    depths = depths[depths <= right]
+    teeth = np.stack([depths, np.full_like(depths, -0.08 * B)], axis=-1)
+    return svg.segments(panel.place(teeth), panel.place(teeth - (0, 0.12 * B)), "muted thin")
+
+
+def metres(depth: float) -> str:
+    """A length in words, with about three digits that count; none behind the cameras."""
+    if not np.isfinite(depth):
+        return "∞" if depth > 0 else "none"
+    return f"{depth:.3f} m" if depth < 10 else f"{depth:.2f} m" if depth < 100 else f"{depth:.0f} m"

@@ -1,0 +1,378 @@
+"""The rectification visualizer: two pictures turned until matching points share a row, and the depth that follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar, Self
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz import twoview
+from camviz.cameras import Camera, Intrinsics
+from camviz.draw import svg
+from camviz.draw.heat import heat_key, heat_map, heat_panel
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.lenses.base import Array
+from camviz.views import stereo_pair
+from camviz.views.base import View, choice, slider
+from camviz.views.depth_wedge import metres, wedge_panel
+from camviz.views.marks import clipped, on_photograph, ring
+from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
+
+_WIDTH, _TALLEST = 385, 289
+_MAP_WIDTH, _MAP_TALLEST = 236, 177
+_ROWS = 12  # epipolar lines in a picture's height
+_GARDEN_CAMERA = Camera(Intrinsics.from_fov(480, 360, 62))
+_GARDEN = Source(
+    _GARDEN_CAMERA.at(RigidTransform.from_components([-0.3, 0, 0.3], Rotation.from_euler("YXZ", [3, -3, -2], True))),
+    _GARDEN_CAMERA.at(
+        RigidTransform.from_components([-0.3 + 0.25, 0.012, 0.31], Rotation.from_euler("YXZ", [-3, -1, 4], True))
+    ),
+)
+
+
+@dataclass(frozen=True)
+class RectificationView(View):
+    """A pair from as it was taken (`rectify` 0) to rectified (1), its disparities, its depths, and what they are worth.
+
+    (column, row) is a pixel of the *rectified* left picture and `disparity` a shift from there to the right one; both
+    marks stay on their rays while the cameras turn. Matching runs along the rows of the pictures as they are at that
+    moment. `source` is the garden, or a pair of photographs.
+    """
+
+    title: ClassVar[str] = "Rectification, disparity and depth"
+
+    rectify: float = slider(1.0, 0, 1, 0.01, help="0: the pictures as taken; 1: both turned into rows")
+    row: float = slider(168.0, 0, 359, 1, unit="px", help="of the mark in the rectified left picture")
+    column: float = slider(294.0, 0, 479, 1, unit="px", help="of the mark in the rectified left picture")
+    disparity: float = slider(16.0, 1, 128, 0.25, unit="px", help="from the left mark to the right one")
+    plus_minus: float = slider(0.5, 0.05, 2, 0.05, label="± error", unit="px", help="how well a match is found")
+    method: str = choice("SGM", "BM", "SGM + WLS", help="how disparities are found along the rows")
+    block_size: int = slider(7, 5, 25, 2, unit="px", help="side of the squares that are compared")
+    disparities: int = slider(64, 16, 128, 16, label="number of disparities", help="how far along the row to look")
+    baseline: float = slider(0.25, 0.05, 0.6, 0.01, unit="m", help="distance between the cameras")
+    show: str = choice("depth", "true depth", "error", label="second map", help="what the second map shows")
+    source: Source = _GARDEN
+
+    @classmethod
+    def of(
+        cls,
+        left: Camera,
+        right: Camera,
+        photographs: tuple[np.ndarray, np.ndarray] | None = None,
+        depth: np.ndarray | None = None,
+        **state: Any,
+    ) -> Self:
+        """The view of a calibrated pair, in the garden or with what it saw; further fields by name.
+
+        `depth` (height, width) is the true Z in metres of the left photograph's pixels, NaN where unknown. Raises
+        ValueError for cameras that cannot be rectified and for photographs of another size than theirs.
+        """
+        size = (left.intrinsics.height, left.intrinsics.width)
+        arrays = {"left photograph": photographs and photographs[0], "right photograph": photographs and photographs[1]}
+        for name, array in {**arrays, "depth": depth}.items():
+            if array is not None and array.shape[:2] != size:
+                raise ValueError(f"{name} must have the left camera's {size} rows and columns, got {array.shape[:2]}")
+        if (right.intrinsics.height, right.intrinsics.width) != size:
+            raise ValueError("both cameras must have pictures of one size")
+        distances = None
+        if depth is not None:
+            along = left.lens.unproject(left.intrinsics.from_pixels(left.intrinsics.grid()))[..., 2]
+            distances = np.asarray(depth / along, np.float32)
+        pair = twoview.rectify(left, right)
+        middle: dict[str, Any] = {"row": size[0] // 2, "column": size[1] // 2, "baseline": pair.baseline}
+        return cls(**{**middle, **state}, source=Source(left, right, photographs, distances))
+
+    # The state's geometry --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def stage(self) -> Stage:
+        """The cameras at this moment."""
+        return stereo_pair.stage(self.source, float(self.baseline), float(self.rectify))
+
+    @cached_property
+    def uv_left(self) -> Array:
+        """The left mark (2,) in the left picture of this moment."""
+        pair = self.stage.pair
+        return seen_from_there(self.stage.left, pair.left, [self.column, self.row])
+
+    @cached_property
+    def uv_right(self) -> Array:
+        """The right mark (2,) in the right picture of this moment."""
+        pair = self.stage.pair
+        return seen_from_there(self.stage.right, pair.right, [self.column - self.disparity, self.row])
+
+    def depth(self) -> float:
+        """Z = f B / d of the two marks, in metres."""
+        return float(self.stage.pair.depth(self.disparity))
+
+    def depth_interval(self) -> tuple[float, float]:
+        """The nearest and farthest depths within the error of the disparity, in metres; the farthest may be inf."""
+        pair = self.stage.pair
+        near, far = twoview.depth_interval(self.depth(), pair.focal_length, pair.baseline, self.plus_minus)
+        return float(near), float(far)
+
+    def rows_apart(self) -> float:
+        """By how many pixels rows differ, on average over the picture, between partners at the marks' disparity."""
+        pair = self.stage.pair
+        size = pair.left.intrinsics
+        grid = np.stack(np.meshgrid(np.linspace(0, size.width, 9), np.linspace(0, size.height, 7)), axis=-1)
+        left = seen_from_there(self.stage.left, pair.left, grid)
+        right = seen_from_there(self.stage.right, pair.right, grid - (self.disparity, 0))
+        seen = size.contains(left) & size.contains(right)
+        return float(np.abs(left - right)[seen][:, 1].mean()) if seen.any() else float("nan")
+
+    # Disparities -----------------------------------------------------------------------------------------------------
+
+    def disparity_map(self, *, draft: bool = False) -> np.ndarray:
+        """What the matcher finds (rows, columns), in pixels of the full picture however coarse; NaN = none."""
+        return stereo_pair.disparities(*self._matching(draft))
+
+    def true_disparity_map(self, *, draft: bool = False) -> np.ndarray:
+        """The truth on the same grid; NaN where it is unknown, and where the right picture does not show the point."""
+        return stereo_pair.true_disparities(*self._key(draft))
+
+    def score(self, *, draft: bool = False) -> twoview.MatchingScore:
+        """The matcher's disparities against the truth: wrong is off by more than a pixel."""
+        return stereo_pair.score(*self._matching(draft))
+
+    def _key(self, draft: bool) -> tuple[Source, float, float, int]:
+        """What the pictures depend on."""
+        size = self.source.left.intrinsics
+        side = min(COARSE if draft else FINE, max(size.width, size.height))
+        return self.source, float(self.baseline), float(self.rectify), side
+
+    def _matching(self, draft: bool) -> tuple[Source, float, float, int, str, int, int]:
+        """What the disparities depend on."""
+        return *self._key(draft), self.method, int(self.block_size), int(self.disparities)
+
+    def _at_mark(self, values: np.ndarray) -> float:
+        """The number of a map at the left mark; NaN outside."""
+        size = self.stage.left.intrinsics
+        if not size.contains(self.uv_left):
+            return float("nan")
+        height, width = values.shape
+        u, v = np.rint((self.uv_left + 0.5) * (width / size.width, height / size.height) - 0.5).astype(int)
+        return float(values[min(max(v, 0), height - 1), min(max(u, 0), width - 1)])
+
+    # Words -----------------------------------------------------------------------------------------------------------
+
+    def numbers(self, *, draft: bool = False) -> dict[str, str]:
+        """The state's key figures, as text."""
+        now, found, score = self.stage, self.disparity_map(draft=draft), self.score(draft=draft)
+        f = now.left.intrinsics.fx
+        shifted = abs(now.doffs) > 0.05
+        second = f"{now.doffs:.1f} px".replace("-", "−") if shifted else f"{now.pair.baseline:.3f} m"
+        figures = {
+            "f, doffs" if shifted else "f, B": f"{f:.0f} px, {second}",
+            "rows differ by": f"{self.rows_apart():.1f} px",
+            "chosen, rectified": self._in_words(self.disparity, self.depth()),
+            "measured at the mark": self._with_depth(self._at_mark(found)),
+        }
+        if not score.compared:
+            return {**figures, "no disparity": f"{100 * np.isnan(found).mean():.0f} % of the pixels"}
+        return {
+            **figures,
+            "true at the mark": self._with_depth(self._at_mark(self.true_disparity_map(draft=draft))),
+            "no disparity": f"{100 * score.missing:.0f} % of the pixels",
+            f"off by more than {WRONG:g} px": f"{100 * (score.bad - score.missing):.1f} %",
+            "mean error": f"{score.mean_error:.2f} px" if np.isfinite(score.mean_error) else "none found",
+        }
+
+    def _with_depth(self, disparity: float) -> str:
+        """A disparity of this moment's pictures in words, with what Z = f B / (d + doffs) makes of it."""
+        return self._in_words(disparity, float(self.stage.depth(disparity))) if np.isfinite(disparity) else "none"
+
+    @staticmethod
+    def _in_words(disparity: float, depth: float) -> str:
+        return f"{disparity:.1f} px: {metres(depth)}".replace("-", "−")
+
+    def equation(self) -> str:
+        """Z = f B / d with this state's numbers."""
+        pair = self.stage.pair
+        return f"Z = {pair.focal_length:.0f} · {pair.baseline:.3f} / {self.disparity:.2f} = {metres(self.depth())}"
+
+    def interval(self) -> str:
+        """What the error of the disparity leaves of that depth."""
+        near, far = self.depth_interval()
+        return f"±{self.plus_minus:g} px: {metres(near)} … {metres(far)}"
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        return self._described(self.numbers())
+
+    def _described(self, numbers: dict[str, str]) -> str:
+        way = "rectified" if self.rectify == 1 else f"{100 * self.rectify:.0f} % of the way to rectified"
+        way = way if self.rectify else "as taken"
+        figures = "; ".join(f"{name} {value}" for name, value in numbers.items())
+        matched = f"{self.method}, blocks of {self.block_size:g} px, {self.disparities:g} disparities"
+        return f"The pair {way}. {figures}. Matched by {matched}. {self.equation()}; {self.interval()}."
+
+    # Hands -----------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> RectificationView:
+        panel = {"left": self._left_panel, "right": self._right_panel}.get(handle)
+        if panel is None:
+            return self
+        pair = self.stage.pair
+        here, now, rectified = (
+            (self.uv_left, self.stage.left, pair.left)
+            if handle == "left"
+            else (self.uv_right, self.stage.right, pair.right)
+        )
+        at = panel.place(here) + (panel.x + dx, panel.y + dy) if np.isnan(x) else np.array([x, y])
+        uv = seen_from_there(rectified, now, panel.data(at - (panel.x, panel.y)))
+        if not np.isfinite(uv).all():
+            return self
+        size = rectified.intrinsics
+        if handle == "left":
+            column, row = np.clip(uv, 0, (size.width - 1, size.height - 1)).tolist()
+            return self.but(column=column, row=row)
+        return self.but(disparity=float(np.clip(self.column - uv[0], 0.25, size.width)))
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        numbers = self.numbers(draft=draft)
+        left, right = _photographs(*self._key(draft))
+        disparity_png, second_png = _maps(*self._matching(draft), self.show)
+        attached = {
+            "left": left, "right": right, "disparity": disparity_png, "second": second_png,
+            "disparity key": heat_key("disparity"), "second key": heat_key(self._second[0]),
+        }  # fmt: skip
+        panels = [self._picture_panel(self._left_panel), self._picture_panel(self._right_panel)]
+        body = "".join([
+            svg.rectangle(0, 0, 960, 590, "paper"), *panels, self._maps_block(), self._wedge_panel(), _column(numbers),
+        ])  # fmt: skip
+        return Picture(body, 960, 590, self.title, self._described(numbers), attached)
+
+    # The two pictures ------------------------------------------------------------------------------------------------
+
+    @property
+    def _left_panel(self) -> Panel:
+        size = self.stage.left.intrinsics
+        return image_panel("left", 20, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
+
+    @property
+    def _right_panel(self) -> Panel:
+        size = self.stage.right.intrinsics
+        return image_panel("right", 420, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
+
+    def _picture_panel(self, panel: Panel) -> str:
+        now = self.stage.left if panel.name == "left" else self.stage.right
+        size = now.intrinsics
+        content = "".join([
+            photograph(panel, panel.name, size.width, size.height),
+            self._pencil(panel, now),
+            self._same_row(panel),
+            on_photograph(self._epipolar(panel, now, np.array([self.row])), "green"),
+            self._mark(panel),
+        ])  # fmt: skip
+        action = "move the mark" if panel.name == "left" else "change the disparity"
+        label = f"The {panel.name} picture; drag or press the arrow keys to {action}"
+        return panel.show(content, title=f"The {panel.name} picture", hint="drag", drag=panel.name, label=label)
+
+    def _epipolar(self, panel: Panel, now: Camera, rows: Array) -> Array:
+        """The epipolar lines (m, 2, 2) that the rectified pair has in `rows`, where this camera now sees them."""
+        size = self.stage.pair.left.intrinsics
+        u = np.linspace(-size.width, 2 * size.width, 40)
+        uv = np.stack(np.broadcast_arrays(u, rows[:, None]), axis=-1)
+        return clipped(panel, panel.place(seen_from_there(now, self.stage.pair.left, uv)))
+
+    def _pencil(self, panel: Panel, now: Camera) -> str:
+        height = self.stage.pair.left.intrinsics.height
+        lines = self._epipolar(panel, now, np.linspace(-0.5, 1.5, 2 * _ROWS + 1) * height)
+        return svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
+
+    def _same_row(self, panel: Panel) -> str:
+        """The left mark's row in both pictures: where a matcher looks, whether the partner is there or not."""
+        v = panel.place(self.uv_left)[1]
+        return on_photograph([[(0, v), (panel.width, v)]], "orange dashed")
+
+    def _mark(self, panel: Panel) -> str:
+        at = panel.place(self.uv_left if panel.name == "left" else self.uv_right)
+        return ring(at, "red", 8) + svg.dots([at], "red", 5)
+
+    # The maps --------------------------------------------------------------------------------------------------------
+
+    @property
+    def _second(self) -> tuple[str, str, float, float, str]:
+        """Colours, title, limits and unit of the second map."""
+        if self.show == "error":
+            return "error", "Error", 0.0, 4.0, "px"
+        low, high = stereo_pair.depth_limits(self.source)
+        return "depth", "Depth" if self.show == "depth" else "True depth", low, high, "m"
+
+    def _maps_block(self) -> str:
+        size = self.stage.left.intrinsics
+        left, right = (
+            image_panel(name, x, 374, _MAP_WIDTH, size.width, size.height, tallest=_MAP_TALLEST)
+            for name, x in (("disparity", 20), ("second", 325))
+        )
+        _, title, low, high, unit = self._second
+        note = "" if self.source.photographs is None or self.source.distances is not None else "truth unknown"
+        formula = "Z = fB / (d + doffs)" if abs(self.stage.doffs) > 0.05 else "Z = fB / d"
+        marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
+        return "".join([
+            heat_panel(left, size.width, size.height, 0, self.disparities, "px", marks[0],
+                       title="Disparity", note=self.method),
+            heat_panel(right, size.width, size.height, low, high, unit, marks[1],
+                       title=title, note=formula if self.show == "depth" else note),
+            svg.text((20, left.y + left.height + 18), "hatched: no disparity", "note"),
+        ])  # fmt: skip
+
+    def _wedge_panel(self) -> str:
+        farthest = stereo_pair.depth_limits(self.source)[1]
+        notes = (self.equation(), self.interval())
+        place = (672, 374, 270, 177)
+        return wedge_panel(place, self.stage.pair, self.disparity, self.plus_minus, farthest, notes)
+
+
+def _column(numbers: dict[str, str]) -> str:
+    rows = []
+    for i, (name, value) in enumerate(numbers.items()):
+        rows.append(svg.text((820, 42 + 37 * i), name, "note"))
+        rows.append(svg.text((820, 58 + 37 * i), value, "label"))
+    return "".join(rows)
+
+
+# What is kept once made ----------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=4)
+def _photographs(source: Source, baseline: float, rectify: float, side: int) -> tuple[bytes, bytes]:
+    seen = stereo_pair.pictures(source, baseline, rectify, side)
+    return jpeg(seen.left), jpeg(seen.right)
+
+
+@lru_cache(maxsize=4)
+def _maps(
+    source: Source,
+    baseline: float,
+    rectify: float,
+    side: int,
+    method: str,
+    block: int,
+    count: int,
+    show: str,
+) -> tuple[bytes, bytes]:
+    """The disparities and the second map, as PNG."""
+    found = stereo_pair.disparities(source, baseline, rectify, side, method, block, count)
+    now = stereo_pair.stage(source, baseline, rectify)
+    first = heat_map(_small(found), 0, count, "disparity")
+    if show == "depth":
+        return first, heat_map(_small(now.depth(found)), *stereo_pair.depth_limits(source), "depth")
+    truth = stereo_pair.true_disparities(source, baseline, rectify, side)
+    if show == "true depth":
+        return first, heat_map(_small(now.depth(truth)), *stereo_pair.depth_limits(source), "depth")
+    return first, heat_map(_small(np.abs(found - truth)), 0, 4, "error")
+
+
+def _small(values: np.ndarray) -> np.ndarray:
+    """A map no finer than a screen shows it, which keeps a saved notebook light."""
+    scale = min(1.0, 1.5 * _MAP_WIDTH / values.shape[1])
+    return cv2.resize(values, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
