@@ -4,6 +4,7 @@ from pathlib import Path
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
+from camviz.views.calibration import CalibrationView
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.fault_lab import FaultLabView
@@ -23,12 +24,10 @@ PICTURES = {
     "frustum": FrustumView(),
     "distortion": DistortionView(k1=-0.28, k2=0.07),
     "fold": DistortionView.of(PUBLISHED),
+    "calibration": CalibrationView(tilt=2.0),
     "epipolar": EpipolarView(),
-<<<<<<< HEAD
-    "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
-=======
     "rectification": RectificationView(),
->>>>>>> findings
+    "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 
 if __name__ == "__main__":

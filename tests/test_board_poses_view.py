@@ -41,7 +41,7 @@ def test_the_camera_stood_where_minus_r_transposed_t_says(view):
 def test_the_corners_are_put_where_opencv_projects_them(view, picture):
     rvec, t = PUBLISHED[picture - 1].reshape(2, 3)
     coefficients = np.array([-0.266, -0.0386, 0.0018, -0.0003])
-    there = cv2.projectPoints(view.corners(), rvec, t, CAMERA.intrinsics.K, coefficients)[0].reshape(-1, 2)
+    there = cv2.projectPoints(view.board.corners, rvec, t, CAMERA.intrinsics.K, coefficients)[0].reshape(-1, 2)
     np.testing.assert_allclose(view.but(picture=picture).pixels(), there, atol=1e-9)
 
 

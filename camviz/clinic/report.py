@@ -22,6 +22,7 @@ from camviz.draw.picture import Picture
 from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
 from camviz.page import document, figure, numbers_table
 from camviz.views.board_poses import BoardPosesView
+from camviz.views.chessboard import outline
 from camviz.views.clinic.missing import MissingView
 from camviz.views.clinic.observations import Observations
 from camviz.views.clinic.residuals import ResidualsView, bars_panel
@@ -247,11 +248,11 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
     items += [item for i in others for item in drawn.board_items(seen.cam_from_board[i], False)]
     content, _ = draw_space(panel, items, eye, renderer="wire")
     for i, link in links.items():
-        outline = transform(seen.cam_from_board[i], drawn.outline())
+        corners = transform(seen.cam_from_board[i], outline(seen.board))
         group: list[Item] = [
-            Face(outline, "orange", 0.35),
-            Line(np.vstack([outline, outline[:1]]), "muted", 1.1),
-            Label(outline[0], str(i + 1), "note"),
+            Face(corners, "orange", 0.35),
+            Line(np.vstack([corners, corners[:1]]), "muted", 1.1),
+            Label(corners[0], str(i + 1), "note"),
         ]
         lines, _ = draw_space(panel, group, eye, renderer="wire")
         content += svg.element(

@@ -15,10 +15,11 @@ from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, Item, Label, Line, Sheet, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.space import Eye, Item, Label, Line, axes_triad, camera_body, draw_space, space_panel
 from camviz.files.calibration import Board, Calibration
 from camviz.lenses.base import Array
 from camviz.views.base import Control, View, choice, slider
+from camviz.views.chessboard import outline, rim, squares
 
 _NINE_BY_SIX = Board(9, 6, 0.025)
 _MOST_NUMBERED = 40  # boards that still leave room for each other's numbers
@@ -86,13 +87,9 @@ class BoardPosesView(View):
         """cam_from_board of the chosen picture."""
         return self.cam_from_board[self.index]
 
-    def corners(self) -> Array:
-        """The inner corners (rows * columns, 3) in the board's frame, in metres."""
-        return self.board.corners
-
     def pixels(self) -> Array:
         """Where the chosen picture has the corners, (rows * columns, 2), by pose, lens and camera matrix."""
-        return self.camera.at(self.chosen.inv()).project(self.corners())
+        return self.camera.at(self.chosen.inv()).project(self.board.corners)
 
     def numbers(self) -> dict[str, float]:
         """The camera's distance from the board's middle in metres, and its axis against the board's normal in °."""
@@ -112,7 +109,7 @@ class BoardPosesView(View):
 
     @property
     def _middle(self) -> Array:
-        return self.corners().mean(axis=0)
+        return self.board.corners.mean(axis=0)
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -153,7 +150,7 @@ class BoardPosesView(View):
                 continue
             items += self.board_items(cam_from_board, i == self.index)
             if i == self.index or len(self.cam_from_board) <= _MOST_NUMBERED:
-                where = transform(cam_from_board, self.outline()[0])
+                where = transform(cam_from_board, outline(self.board)[0])
                 items.append(Label(where, str(i + 1), "label orange" if i == self.index else "note"))
         return items
 
@@ -178,22 +175,9 @@ class BoardPosesView(View):
 
     def board_items(self, frame_from_board: RigidTransform, chosen: bool) -> list[Item]:
         """The board's rim, and if it is picked out its squares, standing in a frame."""
-        outline = transform(frame_from_board, self.outline())
-        rim = Line(np.vstack([outline, outline[:1]]), "orange" if chosen else "muted", 1.8 if chosen else 1)
-        if not chosen:
-            return [rim]
-        return [rim, Sheet.over(outline[[0, 1, 3, 2]].reshape(2, 2, 3), self.checkers(), 0.9)]
-
-    def outline(self) -> Array:
-        """The four corners (4, 3) of the board's squares, one square beyond the inner corners."""
-        right, below = self.board.columns, self.board.rows
-        return self.board.square_size * np.array([[-1, -1, 0], [right, -1, 0], [right, below, 0], [-1, below, 0]])
-
-    def checkers(self) -> NDArray[np.uint8]:
-        """The board's squares as a picture, one square beyond the inner corners."""
-        column, row = np.meshgrid(np.arange(self.board.columns + 1), np.arange(self.board.rows + 1))
-        squares = np.where((column + row) % 2, 245, 40).astype(np.uint8)
-        return np.repeat(np.kron(squares, np.ones((12, 12), np.uint8))[..., None], 3, axis=-1)
+        corners = transform(frame_from_board, outline(self.board))
+        edge = rim(corners, "orange" if chosen else "muted", 1.8 if chosen else 1)
+        return [edge, squares(corners, self.board)] if chosen else [edge]
 
     def _image(self) -> str:
         k = self.camera.intrinsics

@@ -21,6 +21,7 @@ from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_pa
 from camviz.lenses.base import Array
 from camviz.views.base import View, slider
 from camviz.views.board_poses import BoardPosesView
+from camviz.views.chessboard import outline
 from camviz.views.clinic.observations import Missing
 from camviz.views.clinic.uncertainty import adjusted, determined
 
@@ -114,7 +115,7 @@ class GuidanceView(View):
         ]
         for pose in self._cam_from_board[: 60 if len(self._cam_from_board) > 60 else None]:
             items += boards.board_items(pose, False)
-        ghost = transform(self.chosen.cam_from_board, boards.outline())
+        ghost = transform(self.chosen.cam_from_board, outline(a.board))
         items += [Face(ghost, "orange", 0.25), Line(np.vstack([ghost, ghost[:1]]), "orange dashed", 2.2)]
         items += [
             Line(transform(self.chosen.cam_from_board, line), "orange", 1.0)

@@ -1,0 +1,367 @@
+"""The calibration visualizer: boards before a camera, what is estimated from their corners, and how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from camviz.cameras import Camera, transform
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import Eye, Item, Label, camera_body, draw_space, space_panel
+from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
+from camviz.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
+from camviz.views.chessboard import outline, rim, squares
+
+_MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
+_CELLS = (16, 12)  # of the coverage map
+_STRIP = Panel("estimates", 322, 428, 290, 198, -1, 1, 0, len(INTRINSICS))
+_REACH = 300.0  # pixels at the ends of the strip
+_LOW, _HIGH = 0.05, 50.0  # pixels at the ends of the bars
+_NORMAL = 0.07  # metres, the length of the handle that tilts a board
+_PIXELS = ("fx", "fy", "cx", "cy")
+
+
+@dataclass(frozen=True)
+class CalibrationView(BoardPictures):
+    """Corners and their residuals, the boards in space, the estimate ± σ against the truth, and two kinds of error."""
+
+    title: ClassVar[str] = "Calibration"
+
+    eye: Eye = Eye(distance=1.2, yaw_deg=-58, pitch_deg=26)
+
+    # Words -----------------------------------------------------------------------------------------------------------
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        if self.adjustment is None:
+            return {"estimate": "none: no board is seen"}
+        figures = {name: self._written(name) for name in FREE[self.free]}
+        figures["RMS"] = f"{self.adjustment.rms:.3f} px"
+        if np.isfinite(self.held_out):
+            figures["on unseen boards"] = f"{self.held_out:.3g} px"
+        if self.used[self.index]:
+            figures[f"correlation of fx with the distance of board {self.index + 1}"] = _signed(self.correlation)
+        return figures
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        n = self.count
+        boards = f"{n} board{'s' if n > 1 else ''}"
+        if self.seen is None:
+            boards += f" tilted by {self.tilt:g}° about {self.distance:g} m away, corners found to {self.noise:g} px"
+        left_out = f", without board {self.index + 1}" if self.leave_out else ""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        return f"{boards}{left_out}; solved for {self.free}. {figures}."
+
+    def _written(self, name: str) -> str:
+        value, sigma = self.estimates[name]
+        true = f" (true {_number(name, self.true[name])})" if self.truth else ""
+        return f"{_number(name, value)} ± {_spread(name, sigma)}{true}"
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        view = self.but(coarse=True) if draft else self
+        space, attached = view._space(draft)
+        photographs = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
+        body = svg.rectangle(0, 0, 960, 660, "paper") + view._image() + space + view._estimates() + view._errors()
+        return Picture(body, 960, 660, self.title, view.description(), attached | photographs)
+
+    # What the camera saw ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _image_panel(self) -> Panel:
+        return image_panel("image", 20, 34, 450, self.width, self.height, tallest=338)
+
+    def _image(self) -> str:
+        panel = self._image_panel
+        others = np.delete(self.corners, self.index, axis=0)
+        marks = svg.dots(panel.place(others), "muted", 2.6) + self._vectors(panel) + self._handle(panel)
+        if self.photographs:
+            content = photograph(panel, "photograph", self.width, self.height) + self._outlined(panel) + marks
+        else:
+            content = self._coverage(panel) + self._outlined(panel) + marks
+        note = f"errors drawn {self.magnified:g}×" if self.adjustment else ""
+        words = "What the camera saw: drag a board, or move it with the arrow keys, plus and minus"
+        drag = {"drag": "board", "label": words} if self.seen is None else {}
+        title = f"Picture {self.index + 1} of {self.count}" if self.photographs else "What the camera saw"
+        return panel.show(content, title=title, note=note, **drag)
+
+    def _coverage(self, panel: Panel) -> str:
+        """Cells in which corners were seen, the darker the more."""
+        uv = self.corners[self.used].reshape(-1, 2)
+        uv = uv[np.isfinite(uv).all(axis=1)]
+        cell = np.array([self.width, self.height]) / _CELLS
+        inside = np.clip(((uv + 0.5) / cell).astype(int), 0, np.array(_CELLS) - 1)
+        places, count = np.unique(inside, axis=0, return_counts=True)
+        starts = panel.place(places * cell - 0.5)
+        squared = starts[:, None] + np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (cell * panel.scale)
+        level = np.minimum(np.ceil(count / 4), 3)
+        return "".join(
+            svg.path(squared[level == i], "fill-blue", closed=True, style=f"fill-opacity:{0.09 * i:g};stroke:none")
+            for i in (1, 2, 3)
+        )
+
+    def _outlined(self, panel: Panel) -> str:
+        """The picked board: its rows and columns of corners, in the order in which they are found."""
+        uv = panel.place(self.corners[self.index]).reshape(self.board.rows, self.board.columns, 2)
+        strength = " thin half" if self.photographs else "" if self.used[self.index] else " dashed"
+        return svg.path([*uv, *uv.swapaxes(0, 1)], f"orange{strength}")
+
+    @property
+    def magnified(self) -> float:
+        """How many times longer than they are the errors are drawn."""
+        typical = self.adjustment.rms if self.adjustment else 1.0
+        return float(_MAGNIFIED[np.abs(np.log(_MAGNIFIED * max(typical, 1e-3) / 9)).argmin()])
+
+    def _vectors(self, panel: Panel) -> str:
+        """The residuals, magnified, from where the estimated camera would see a corner towards where it was found."""
+        if self.adjustment is None:
+            return ""
+        residuals, found = self.residuals, self.corners
+        starts, ends = panel.place(found), panel.place(found + self.magnified * residuals)
+        others = np.arange(self.count) != self.index
+        faint = "" if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
+        here = svg.dots(starts[self.index], "orange", 4) + svg.segments(starts[self.index], ends[self.index], "red")
+        return faint + here
+
+    @property
+    def _grips(self) -> Array:
+        """Pixels (2, 2): the middle of the picked board, and the tip of the handle that stands on it."""
+        pose, middle = self.cam_from_board[self.index], middle_of(self.board)
+        return self._true_camera.project(transform(pose, [middle, middle - (0, 0, _NORMAL)]))
+
+    def _handle(self, panel: Panel) -> str:
+        if self.seen is not None:
+            return ""
+        middle, tip = panel.place(self._grips)
+        tip = np.clip(np.where(np.isfinite(tip), tip, middle), 10, np.array([panel.width, panel.height]) - 10)
+        words = "A stick upright on the board: drag it, or press the arrow keys, to tilt the board"
+        hand = svg.element("circle", cx=tip[0], cy=tip[1], r=16, fill_opacity=0, class_="card")
+        knob = hand + svg.dots([tip], "paper-dot", 15) + svg.dots([tip], "orange", 11)
+        grip = svg.group(knob, data_drag="tilt", tabindex=0, role="group", aria_label=words)
+        return svg.line([middle, tip], "orange thick") + svg.dots([middle], "orange", 6) + grip
+
+    # The boards in space ---------------------------------------------------------------------------------------------
+
+    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("space", 490, 34, 450, 338)
+        far = float(self._poses_shown.translation[:, 2].max())
+        eye = replace(self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.6)
+        content, attached = draw_space(panel, self._items(), eye, draft=draft, renderer="wire")
+        label = "The boards in space; drag or press the arrow keys to walk around, plus and minus to go nearer"
+        note = "dashed: where the estimate has them" if self.truth else ""
+        return panel.show(content, title="The boards in space", note=note, drag="eye", label=label), attached
+
+    @property
+    def _poses_shown(self) -> RigidTransform:
+        return self.cam_from_board if self.truth else self.estimated_poses
+
+    def _items(self) -> list[Item]:
+        camera = self.truth or self.camera or self._true_camera
+        items: list[Item] = [*camera_body(camera, 0.09, colour="blue", name="")]
+        shown = transform_each(self._poses_shown, outline(self.board))
+        items += [rim(corners, "muted", 1.2) for corners in np.delete(shown, self.index, axis=0)]
+        if self.truth and self.adjustment:
+            estimated = transform_each(self.adjustment.first_from_board, outline(self.board))
+            items += [rim(corners, "red dashed", 1.4) for corners in estimated]
+        picked = shown[self.index]
+        items += [rim(picked, "orange", 2.2), squares(picked, self.board)]
+        items.append(Label(picked[0], str(self.index + 1), "label orange"))
+        return items
+
+    # The estimate ----------------------------------------------------------------------------------------------------
+
+    def _estimates(self) -> str:
+        x = (20, 128, 218, 300)
+        heads = ("", "true" if self.truth else "", "estimate", "± σ")
+        parts = [svg.text((20, 402), "The estimate" + (", against the truth" if self.truth else ""), "title")]
+        parts += [svg.text((at, 420), words, "note end") for at, words in zip(x, heads, strict=True)]
+        for row, name in enumerate(INTRINSICS):
+            y = _STRIP.y + 22 * row + 15
+            free = name in FREE[self.free]
+            value, sigma = self.estimates.get(name, (np.nan, np.nan))
+            class_ = "number" if free else "number faint"
+            parts.append(svg.text((x[0], y), name, class_))
+            words = (
+                _number(name, self.true[name]) if self.truth else "",
+                _number(name, value) if np.isfinite(value) else "",
+                _spread(name, sigma) if free else "held",
+            )
+            parts += [svg.text((at, y), one, f"{class_} end") for at, one in zip(x[1:], words, strict=True)]
+        return "".join(parts) + self._strip()
+
+    def _strip(self) -> str:
+        """Every estimate's distance from the truth with ± σ and ± 2σ, in pixels on a scale that is linear near 0."""
+        marks = np.array([-100, -10, -1, 0, 1, 10, 100])
+        xs = _STRIP.place(np.stack([_squeezed(marks), 0 * marks], axis=-1))[:, 0]
+        content = "".join(
+            svg.line([(x, 0), (x, _STRIP.height)], "axis" if not m else "grid") for x, m in zip(xs, marks, strict=True)
+        )
+        for row, name in enumerate(INTRINSICS):
+            content += self._dot(name, row)
+        ticks = "".join(
+            svg.text(
+                (_STRIP.x + x, _STRIP.y + _STRIP.height + 15), f"{m:+d}".replace("-", "−") if m else "0", "tick middle"
+            )
+            for x, m in zip(xs, marks, strict=True)
+        )
+        where = "from the truth" if self.truth else "σ"
+        words = f"{where}, px; k and p: at the image’s corner"
+        return (
+            _STRIP.show(content)
+            + ticks
+            + svg.text((_STRIP.x + 145, _STRIP.y + _STRIP.height + 31), words, "note middle")
+        )
+
+    def _dot(self, name: str, row: int) -> str:
+        value, sigma = self.estimates.get(name, (np.nan, np.nan))
+        unit = self._pixels_per[name]
+        error = (value - self.true[name]) * unit if self.truth else 0.0
+        free = name in FREE[self.free]
+        if not np.isfinite(error) or (not free and not self.truth):
+            return ""
+        reach = _squeezed(error + np.array([-2, 2, -1, 1, 0]) * sigma * unit)
+        (a, y), (b, _), (c, _), (d, _), at = _STRIP.place(np.stack([reach, np.full(5, row + 0.5)], axis=-1))
+        if not free:
+            return svg.dots([at], "muted", 6)
+        spread = svg.line([(a, y), (b, y)], "blue thin") + svg.line([(c, y), (d, y)], "blue thick")
+        if 0 < at[0] < _STRIP.width:
+            return spread + svg.dots([at], "blue", 9)
+        edge, inward = (_STRIP.width - 2, -11) if at[0] > 0 else (2, 11)
+        return spread + svg.polygon([(edge, y), (edge + inward, y - 6), (edge + inward, y + 6)], "fill-blue")
+
+    @cached_property
+    def _pixels_per(self) -> dict[str, float]:
+        """How far, in pixels, the image's corner moves when a coefficient changes by 1; 1 for fx, fy, cx and cy."""
+        camera = self.truth or self.camera or self._true_camera
+        at = camera.intrinsics.from_pixels((-0.5, -0.5))
+        ray = camera.lens.unproject(at)
+        ideal = ray[:2] / ray[2] if np.isfinite(ray).all() else at  # the corner may lie beyond a fold
+        moved = {name: BrownConrady(**{name: 1.0}).distort(ideal) - ideal for name in INTRINSICS if name not in _PIXELS}
+        scaled = {name: float(camera.intrinsics.fx * np.linalg.norm(shift)) for name, shift in moved.items()}
+        return dict.fromkeys(_PIXELS, 1.0) | scaled
+
+    # The errors ------------------------------------------------------------------------------------------------------
+
+    def _errors(self) -> str:
+        if self.adjustment is None:
+            return svg.text((650, 402), "No board is seen: nothing to estimate from", "title")
+        bars = [("on the boards it was fitted to", self.adjustment.rms, "fill-blue")]
+        bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
+        parts = [svg.text((650, 402), "Two kinds of error", "title")]
+        for i, (words, value, class_) in enumerate(bars):
+            y = 416 + 44 * i
+            parts.append(svg.text((650, y + 10), words, "note halo"))
+            parts.append(svg.rectangle(650, y + 16, 230 * _share(value), 14, class_, rx=2))
+            parts.append(svg.text((656 + 230 * _share(value), y + 28), f"{_digits(value)} px", "number halo"))
+        return self._noise_mark() + "".join(parts) + self._per_board() + self._facts()
+
+    def _noise_mark(self) -> str:
+        """What the noise alone would leave: √2 times its standard deviation in u and v."""
+        if self.seen is not None or self.noise < _LOW:
+            return ""
+        x = 650 + 230 * _share(np.sqrt(2) * self.noise)
+        return svg.segments([(x, 430), (x, 474)], [(x, 448), (x, 492)], "ink") + svg.text(
+            (x, 507), "noise alone", "tick middle"
+        )
+
+    def _per_board(self) -> str:
+        errors = self.per_board
+        top = max(np.nanmax(errors, initial=0), 1e-9)
+        step = min(26.0, 280 / len(errors))
+        parts = [svg.text((650, 528), "RMS of each board", "note")]
+        for i, error in enumerate(errors):
+            x, picked = 650 + step * i, i == self.index
+            if np.isfinite(error):
+                height = 44 * error / top
+                class_ = "fill-orange" if picked else "fill-blue" if self.used[i] else "fill-muted"
+                parts.append(svg.rectangle(x, 582 - height, 0.72 * step, height, class_))
+            parts.append(
+                svg.text((x + 0.36 * step, 596), str(i + 1), "tick middle orange" if picked else "tick middle")
+            )
+        chosen = errors[self.index]
+        if np.isfinite(chosen):
+            parts.append(svg.text((940, 528), f"board {self.index + 1}: {_digits(chosen)} px", "note end"))
+        return "".join(parts)
+
+    def levers(self) -> list[str]:
+        """fx over the picked board's distance Z, which is all that a board held flat shows: true and estimated."""
+        rows = [("true", self.truth, self.cam_from_board)] if self.truth else []
+        rows += [("found", self.camera, self.estimated_poses)] if self.camera else []
+        return [f"{name:6}{self._lever(camera, poses)}" for name, camera, poses in rows]
+
+    def _lever(self, camera: Camera, poses: RigidTransform) -> str:
+        f, z = camera.intrinsics.fx, transform(poses[self.index], middle_of(self.board))[2]
+        return f"fx/Z = {_number('fx', f)}/{z:.3f} m = {f / z:.0f} px/m"
+
+    def _facts(self) -> str:
+        lines = [svg.text((650, 622 + 17 * i), words, "number") for i, words in enumerate(self.levers())]
+        words = f"correlation of fx with Z of board {self.index + 1}: {_signed(self.correlation)}"
+        return "".join(lines) + svg.text((650, 656), words if self.used[self.index] else "", "note")
+
+    # Touch -----------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        if handle == "eye":
+            return self.but(eye=self.eye.orbited(dx, dy))
+        if handle == "tilt":
+            return self.moved(self.index, turn=np.radians(0.5) * np.array([dy, -dx, 0]))
+        view = self if np.isnan(x) else self._with_board_at(x - dx, y - dy)
+        centre = transform(view.cam_from_board[view.index], middle_of(self.board))
+        du, dv = np.array([dx, dy]) / self._image_panel.scale
+        pixels = self._true_camera.intrinsics
+        return view.moved(view.index, shift=centre[2] * np.array([du / pixels.fx, dv / pixels.fy, 0]))
+
+    def pressed(self, handle: str, key: str) -> Self:
+        if handle == "eye":
+            return self.but(eye=self.eye.key(key))
+        steps = {"+": -1, "=": -1, "-": 1}.get(key, 0)
+        if handle == "board" and steps:
+            centre = transform(self.cam_from_board[self.index], middle_of(self.board))
+            return self.moved(self.index, shift=0.05 * steps * centre)
+        return super().pressed(handle, key)
+
+    def _with_board_at(self, x: float, y: float) -> Self:
+        """With the board picked that is under the pointer; the one already picked has precedence."""
+        panel = self._image_panel
+        uv = panel.data(np.array([x, y]) - (panel.x, panel.y))
+        middles = self._true_camera.project(transform_each(self.cam_from_board, middle_of(self.board)[None])[:, 0])
+        away = np.linalg.norm(middles - uv, axis=1)
+        reach = np.nanmax(np.linalg.norm(self.corners[self.index] - middles[self.index], axis=1), initial=20.0)
+        return self if away[self.index] < reach else self.but(picked=int(np.nanargmin(away)) + 1)
+
+
+def _squeezed(pixels: np.ndarray | float) -> np.ndarray:
+    """-1 … 1 for pixels from -_REACH to _REACH: linear below a pixel, logarithmic above."""
+    return np.clip(np.arcsinh(2 * np.asarray(pixels)) / np.arcsinh(2 * _REACH), -1.1, 1.1)
+
+
+def _share(pixels: float) -> float:
+    """0 … 1 for pixels from _LOW to _HIGH, on a logarithmic scale."""
+    return float(np.clip(np.log(max(pixels, 1e-9) / _LOW) / np.log(_HIGH / _LOW), 0.01, 1))
+
+
+def _number(name: str, value: float) -> str:
+    return (f"{value:.1f}" if name in _PIXELS else f"{value:.4f}").replace("-", "−")
+
+
+def _spread(name: str, sigma: float) -> str:
+    if name in _PIXELS:
+        return f"{sigma:.2g}" if sigma < 10 else f"{sigma:.0f}" if sigma < 1e4 else "unknown"
+    return f"{sigma:.4f}" if sigma < 1 else f"{sigma:.3g}" if sigma < 1e3 else "unknown"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.4f}".replace("-", "−")
+
+
+def _digits(value: float) -> str:
+    return f"{value:.3f}" if value < 1 else f"{value:.3g}"
