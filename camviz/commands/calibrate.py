@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, refuse_output
+from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, refuse_output, write_whole
 
 if TYPE_CHECKING:
     from camviz.files import Board, Calibration
@@ -36,7 +36,7 @@ models:
   omni        xi k1 k2 p1 p2 of the unified sphere, as cv2.omnidir has it
 
 examples:
-  camviz calibrate left*.jpg --board 9x6 --square-mm 25
+  camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
 """
@@ -59,6 +59,7 @@ def add(commands: Any) -> None:
     command.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
     )
+    command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
 
 
 def calibrate(options: argparse.Namespace) -> int:
@@ -71,6 +72,8 @@ def calibrate(options: argparse.Namespace) -> int:
     left = pictures(options.images)
     right = pictures(options.right) if options.right else []
     refuse_output(options.output, "calibration", *left, *right)
+    if options.report:
+        refuse_output(options.report, "page", options.output, *left, *right)
     try:
         calibration = _pair(left, right, board, options) if right else _single(left, board, options)
         write(calibration, options.output, "opencv")
@@ -83,7 +86,19 @@ def calibrate(options: argparse.Namespace) -> int:
     for sentence in report(calibration):
         print(sentence)
     print(f"{options.output}: written.")
+    if options.report:
+        _inspect(calibration, left[0].parent, options.report)
     return OK
+
+
+def _inspect(calibration: Calibration, folder: Path, page: Path) -> None:
+    """Say what an inspection finds, and write its page."""
+    from camviz.clinic import inspect
+    from camviz.clinic.report import write_report
+
+    inspection = inspect(calibration)
+    write_whole(page, lambda path: write_report(inspection, path, images=folder))
+    print(f"\n{inspection.as_text()}\n{page}: open it in a browser.")
 
 
 def pictures(words: Sequence[str]) -> list[Path]:

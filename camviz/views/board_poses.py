@@ -126,7 +126,7 @@ class BoardPosesView(View):
         target = (self._middle + self.centres.mean(0)) / 2 if before_board else transform(self.chosen, self._middle) / 2
         eye = replace(self.eye, target=tuple(target.tolist()))
         items = self._cameras() if before_board else self._boards()
-        content, attached = draw_space(panel, items, eye, draft=draft)
+        content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
         title = "Where the camera stood" if before_board else "Where the board was held"
         label = "The poses in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
         return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), attached
