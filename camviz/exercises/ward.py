@@ -70,6 +70,7 @@ class Ward:
         chosen = [*chosen[: patients - 1], None]
         order = np.random.default_rng([number, 1]).permutation(patients)
         self._complaints = [chosen[i] for i in order]
+        self._stories = [STORIES[i] for i in np.random.default_rng([number, 3]).permutation(len(STORIES))]
         self._patients: dict[int, Patient] = {}
         self._tries: dict[int, int] = {}
 
@@ -81,7 +82,9 @@ class Ward:
         if not isinstance(patient, int) or not 1 <= patient <= len(self):
             raise ValueError(f"patient must be a number from 1 to {len(self)}, got {patient!r}")
         if patient not in self._patients:
-            self._patients[patient] = _admitted(self.number, patient, self._complaints[patient - 1])
+            self._patients[patient] = _admitted(
+                self.number, patient, self._complaints[patient - 1], self._stories[patient - 1]
+            )
         return self._patients[patient]
 
     def diagnose(self, patient: int, finding: str = "") -> Verdict:
@@ -132,9 +135,8 @@ class Patient:
         display(live.widget)
 
 
-def _admitted(ward: int, patient: int, complaint: Complaint | None) -> Patient:
+def _admitted(ward: int, patient: int, complaint: Complaint | None, story: str) -> Patient:
     rng = np.random.default_rng([ward, 2, patient])
-    story = STORIES[np.random.default_rng([ward, 3]).permutation(len(STORIES))[patient - 1]]
     name = f"Patient {patient}"
     if complaint is None:
         return Patient(name, story, Case(healthy(rng)[1]), HEALTHY)
