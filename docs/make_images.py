@@ -7,6 +7,7 @@ from camviz.lenses import BrownConrady
 from camviz.views.calibration import CalibrationView
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
+from camviz.views.fault_lab import FaultLabView
 from camviz.views.frustum import FrustumView
 from camviz.views.intrinsics import IntrinsicsView
 from camviz.views.pinhole import PinholeView
@@ -26,6 +27,7 @@ PICTURES = {
     "calibration": CalibrationView(tilt=2.0),
     "epipolar": EpipolarView(),
     "rectification": RectificationView(),
+    "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 
 if __name__ == "__main__":

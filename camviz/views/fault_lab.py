@@ -1,0 +1,237 @@
+"""The fault lab: one virtual camera, one fault of any strength, and everything that moves when it is solved again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+
+from camviz.clinic.catalogue import Finding
+from camviz.clinic.laboratory import BOARD, ILLNESSES, VIEWS, Experiment, experiment
+from camviz.draw import plot, svg
+from camviz.draw.panel import Panel, image_panel
+from camviz.draw.picture import Picture
+from camviz.lenses.base import Array
+from camviz.views.base import View, choice, slider, switch
+from camviz.views.marks import arrows
+
+_COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
+_MOST = 4  # findings that have room
+_FAR = 4.0  # standard deviations
+_LONGEST = 90.0  # picture units of an arrow
+
+
+@dataclass(frozen=True)
+class FaultLabView(View):
+    """What a fault does to a calibration, and what it does not: the fit, the estimates against the truth, the findings.
+
+    Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
+    boards and noise. Arrows lead from a detected corner of the chosen view to its projection. A click on a bar
+    chooses its view.
+    """
+
+    title: ClassVar[str] = "Fault lab"
+
+    fault: str = choice(next(iter(ILLNESSES)), *list(ILLNESSES)[1:], help="what is wrong")
+    strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
+    noise: float = slider(0.15, 0.02, 0.5, 0.01, unit="px", help="standard deviation of a corner's coordinates")
+    seed: int = slider(1, 1, 20, 1, label="camera", help="another camera, other boards, other noise")
+    view: int = slider(1, 1, VIEWS, 1, label="view", help="whose residuals are shown; or click its bar")
+    told: bool = switch(True, label="show the findings", help="hide them to make a diagnosis of your own")
+
+    @cached_property
+    def experiment(self) -> Experiment:
+        """The calibration shown, and its truth."""
+        return experiment(self.fault, float(self.strength), float(self.noise), round(self.seed))
+
+    @property
+    def index(self) -> int:
+        """The place of the chosen view in the list, from 0."""
+        return min(max(round(self.view), 1), VIEWS) - 1
+
+    def worst(self) -> Self:
+        """The same, with the view of the largest error chosen."""
+        return self.but(view=int(np.nanargmax(self.experiment.errors)) + 1)
+
+    def numbers(self) -> dict[str, str]:
+        """How well it fits, how far off it takes itself to be, and how far off it is."""
+        made = self.experiment
+        return {
+            "error of the fit": f"{made.solved.rms:.2f} px",
+            "believes to be off by": f"{figures(float(np.nanmedian(made.believed)))} px",
+            "is off by": f"{figures(float(np.nanmedian(made.off.length)))} px",
+        }
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        told = self._diagnosis() if self.told else "Findings hidden."
+        cause = f"{self.fault}, strength {self.strength:g}: {self.experiment.words}; " if self.told else ""
+        numbers = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        estimates = "; ".join(
+            f"{k} {'+' if e > 0 else '−'}{figures(abs(e))} ± {figures(s)} px"
+            for k, (e, s) in self.experiment.estimates.items()
+        )
+        return f"{cause}{numbers}. Estimated less true: {estimates}. {told}"
+
+    def _diagnosis(self) -> str:
+        findings = self.experiment.inspection.findings
+        return " ".join(f"{one.severity} {one.id}: {one.sentence}" for one in findings) or "Nothing found."
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        body = "".join(
+            [
+                svg.rectangle(0, 0, 960, 684, "paper"),
+                self._headline(),
+                self._bars_panel(),
+                self._image_panel(),
+                self._estimates_panel(),
+                self._findings(draft),
+            ]
+        )
+        words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
+        return Picture(body, 960, 684, self.title, words)
+
+    def _headline(self) -> str:
+        told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
+                "is off by": "against the true camera"}  # fmt: skip
+        parts = []
+        for i, (name, value) in enumerate(self.numbers().items()):
+            x = 20 + 316 * i
+            parts.append(svg.text((x, 22), name, "title"))
+            parts.append(svg.text((x, 52), value, f"label{' red' if i == 2 and self._astray else ''}",
+                                  style="font-size:26px;font-weight:600"))  # fmt: skip
+            parts.append(svg.text((x + 8 + 8 * len(name), 22), told[name], "note"))
+        words = f"In this calibration, {self.experiment.words}." if self.strength else "A healthy calibration."
+        return "".join(parts) + svg.text((20, 78), words if self.told else "What is wrong here?", "label")
+
+    @property
+    def _astray(self) -> bool:
+        made = self.experiment
+        return bool(np.nanmedian(made.off.length) > 3 * np.nanmedian(made.believed))
+
+    @property
+    def _bars(self) -> Panel:
+        tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
+        return plot.plot_panel("bars", 66, 116, 394, 152, (0.5, VIEWS + 0.5), (0, tallest))
+
+    def _bars_panel(self) -> str:
+        panel, errors = self._bars, self.experiment.errors
+        x = np.arange(1, VIEWS + 1)
+        content = plot.grid(panel, xticks=[])
+        for mask, class_ in ((x != self.index + 1, "fill-blue"), (x == self.index + 1, "fill-orange")):
+            content += plot.bars(panel, x - 0.38, x + 0.38, np.where(mask, errors, np.nan), class_)
+        median = float(np.nanmedian(errors))
+        content += svg.line(panel.place([(panel.left, median), (panel.right, median)]), "ink dashed")
+        label = "One bar per view; click, drag or press the arrow keys to choose a view"
+        shown = panel.show(content, title="Error of every view", hint="click a bar", drag="bars", label=label)
+        names = [(float(i), f"{i}") for i in x.tolist()]
+        return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
+
+    def _image_panel(self) -> str:
+        made, i = self.experiment, self.index
+        k = made.camera.intrinsics
+        panel = image_panel("picture", 20, 322, 440, k.width, k.height, tallest=340)
+        seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
+        starts = panel.place(seen)
+        along = panel.place(seen - scale * residuals) - starts
+        length = np.linalg.norm(along, axis=-1)
+        cut = length > _LONGEST
+        ends = starts + along * np.where(cut, _LONGEST / np.maximum(length, 1e-9), 1)[:, None]
+        grid = panel.place(seen - residuals).reshape(BOARD.rows, BOARD.columns, 2)
+        content = svg.path([*grid, *grid.swapaxes(0, 1)], "muted thin")
+        content += arrows(starts[~cut], ends[~cut], "orange") + arrows(starts[cut], ends[cut], "red")
+        content += svg.dots(starts, "green", 3.5)
+        note = "red: longer than drawn" if cut.any() else "from detected to projected"
+        return panel.show(content, title=f"View {i + 1}: residuals × {scale:g}", note=note)
+
+    @property
+    def arrow_scale(self) -> float:
+        """How much longer arrows are than residuals: by the noise alone, so that a fault makes them grow."""
+        return float(max(1, round(1.8 / self.noise) * 5))
+
+    def _estimates_panel(self) -> str:
+        estimates = self.experiment.estimates
+        values = np.array(list(estimates.values()))
+        reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + 2 * values[:, 1])), 3.0)
+        panel = Panel("estimates", 530, 116, 250, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
+        content = svg.line(panel.place([(0, 0), (0, panel.bottom)]), "ink")
+        beside = ""
+        for i, (name, (error, sigma)) in enumerate(estimates.items()):
+            y, far = i + 0.6, abs(error) > _FAR * sigma
+            class_ = "red" if far else "green"
+            content += svg.line(panel.place([(error - 2 * sigma, y), (error + 2 * sigma, y)]), f"{class_} thick")
+            content += svg.dots(panel.place([(error, y)]), class_, 8)
+            level = panel.y + panel.place((0, y))[1] + 4
+            beside += svg.text((panel.x - 10, level), name, "label end")
+            words = f"{_signed(error, sigma)} px"
+            beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
+        shown = panel.show(content, title="Estimate ± 2σ, less the truth")
+        ticks = [(float(t), f"{t:g}".replace("-", "−")) for t in plot.ticks(-reach, reach, 5)]
+        below = "".join(
+            svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
+            for px, (_, words) in zip(panel.place([(t, 0) for t, _ in ticks])[:, 0], ticks, strict=True)
+        )
+        note = "in pixels (k1, k2: at the image’s corner); red: more than 4σ off"
+        return shown + beside + below + svg.text((490, panel.y + panel.height + 36), note, "note")
+
+    def _findings(self, draft: bool) -> str:
+        x, y = 490.0, 346.0
+        head = svg.text((x, y), "What the clinic finds", "title")
+        if not self.told:
+            return head + svg.paragraph((x, y + 30), "Hidden. Make your diagnosis, then switch them on.", 450, "label")
+        if draft:
+            return head + svg.text((x, y + 34), "measuring …", "label", style="font-size:20px")
+        inspection = self.experiment.inspection
+        if not inspection.findings:
+            words = f"{len(inspection.checked)} checks were made: {', '.join(inspection.checked)}."
+            return (head + svg.text((x, y + 36), "Nothing found.", "green", style="font-size:22px;font-weight:600")
+                    + svg.paragraph((x, y + 62), words, 450))  # fmt: skip
+        body, y = "", y + 26
+        listed = grouped(inspection.findings)
+        for finding, count in listed[:_MOST]:
+            times = f" × {count}" if count > 1 else ""
+            colour = _COLOURS[finding.severity]
+            body += svg.rectangle(x, y - 14, 4, 58, f"fill-{colour}")
+            body += svg.text((x + 14, y), f"{finding.id}{times}", colour, style="font-size:17px;font-weight:600")
+            body += svg.text((x + 448, y), finding.severity, f"note end {colour}")
+            body += svg.paragraph((x + 14, y + 18), _short(finding.sentence), 436, "label", line=16)
+            y += 78
+        if len(listed) > _MOST:
+            body += svg.text((x, y), f"and {len(listed) - _MOST} more", "note")
+        return head + body
+
+    # Touch -----------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        if handle != "bars" or not np.isfinite(x):
+            return self
+        place: Array = self._bars.data((x - self._bars.x, 0))
+        return self.but(view=int(np.clip(round(float(place[0])), 1, VIEWS)))
+
+    def pressed(self, handle: str, key: str) -> Self:
+        step = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
+        return self.but(view=min(max(self.index + 1 + step, 1), VIEWS))
+
+
+def grouped(findings: tuple[Finding, ...]) -> list[tuple[Finding, int]]:
+    """The first finding of every id, and how many there are of it."""
+    ids = [finding.id for finding in findings]
+    return [(finding, ids.count(finding.id)) for i, finding in enumerate(findings) if finding.id not in ids[:i]]
+
+
+def figures(value: float) -> str:
+    """A length in two figures, and never in powers of ten."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}" if value >= 0.01 else "0"
+
+
+def _signed(error: float, sigma: float) -> str:
+    return f"{'+' if error > 0 else '−'}{figures(abs(error))} ± {figures(sigma)}"
+
+
+def _short(sentence: str, letters: int = 176) -> str:
+    """A sentence that fits three lines, cut between words where it does not."""
+    return sentence if len(sentence) <= letters else sentence[:letters].rsplit(" ", 1)[0] + " …"

@@ -1,0 +1,209 @@
+"""The fault lab and the ward: what is shown of a fault is true, and a diagnosis is answered by what is the case."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.calibration.difference import difference
+from camviz.cameras import Camera, Intrinsics
+from camviz.checks import judge
+from camviz.clinic.laboratory import ILLNESSES, VIEWS, experiment
+from camviz.exercises import exercises, lesson16
+from camviz.exercises.ward import COMPLAINTS, HEALTHY, Ward
+from camviz.views.fault_lab import FaultLabView, grouped
+
+
+def names(made):
+    return {finding.id for finding in made.inspection.findings}
+
+
+@pytest.mark.parametrize("fault", ILLNESSES)
+def test_every_fault_at_full_strength_is_named_by_the_inspection(fault):
+    for seed in (1, 2):
+        assert ILLNESSES[fault].finding in names(experiment(fault, 1.0, 0.15, seed))
+
+
+@pytest.mark.parametrize("seed", [1, 5, 9])
+def test_a_healthy_camera_has_no_finding_and_is_as_far_off_as_it_believes(seed):
+    made = experiment("outlier corner", 0.0, 0.15, seed)
+    assert not made.inspection.findings
+    ratio = np.nanmedian(made.off.length) / np.nanmedian(made.believed)
+    assert 0.1 < ratio < 3
+
+
+def test_the_camera_is_the_one_that_opencv_solves_for():
+    """Least squares of the same corners, from the truth here and from nothing there: the same to 0.01 px."""
+    made = experiment("column off", 0.3, 0.15, 3)
+    board, corners = made.solved.board.corners.astype(np.float32), made.solved.detections["camera"].astype(np.float32)
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 200, 1e-14)
+    rms, K, *_ = cv2.calibrateCamera(
+        [board] * VIEWS, list(corners), (640, 480), None, None, flags=cv2.CALIB_FIX_K3, criteria=criteria
+    )
+    assert made.solved.rms == pytest.approx(rms, abs=1e-4)
+    np.testing.assert_allclose(made.camera.intrinsics.K, K, atol=0.01)
+
+
+def test_strength_moves_the_fault_alone():
+    """Corners that the fault does not touch are the same to the last digit whatever its strength."""
+    weak, strong = (experiment("column off", strength, 0.15, 3).solved.detections["camera"] for strength in (0, 1))
+    moved = np.linalg.norm(weak - strong, axis=-1) > 0
+    assert sorted(moved.sum(axis=1))[-2:] == [0, 6]
+    grid = moved[moved.any(axis=1)][0].reshape(6, 9)
+    assert grid.all(axis=0).sum() == 1
+
+
+def test_a_moved_principal_point_is_absorbed_by_turning_every_board():
+    """Δcx = 51.2 px turns the boards by atan(Δcx/f) or, off the axis, less; the fit stays below a pixel."""
+    well, ill = (experiment("moved centre", strength, 0.15, 5) for strength in (0, 1))
+    turns = (ill.solved.first_from_board * well.solved.first_from_board.inv()).rotation.magnitude()
+    expected = np.arctan(0.08 * 640 / well.camera.intrinsics.fx)
+    np.testing.assert_allclose(turns, expected, rtol=0.25)
+    assert ill.solved.rms < 1
+
+
+@pytest.mark.parametrize("name", FaultLabView.controls())
+def test_every_control_changes_the_picture(name):
+    control = FaultLabView.controls()[name]
+    base = FaultLabView(fault="warped board", strength=0.5)
+    ends = control.choices or ((control.low, control.high) if control.low is not None else (True, False))
+    assert len({base.but(**{name: end}).figure(draft=True).svg() for end in ends}) == len(ends)
+
+
+def test_a_draft_measures_and_the_fine_picture_names_the_finding():
+    view = FaultLabView(fault="warped board", strength=1.0)
+    assert "measuring" in view.figure(draft=True).body
+    fine = view.figure()
+    assert "measuring" not in fine.body
+    assert "board-warp" in fine.body
+    assert "board-warp" in fine.description
+
+
+def test_hidden_findings_are_nowhere_in_the_picture():
+    picture = FaultLabView(fault="warped board", strength=1.0, told=False).figure()
+    for words in ("board-warp", "bent", "warped"):
+        assert words not in picture.svg()
+
+
+def test_clicking_a_bar_chooses_its_view():
+    view = FaultLabView()
+    panel = view._bars
+    for wanted in (1, 7, VIEWS):
+        x = panel.x + panel.place((wanted, 0))[0]
+        assert view.dragged("bars", x, panel.y + 5, 0, 0).view == wanted
+    assert view.pressed("bars", "ArrowLeft").view == 1
+    assert view.but(view=3).pressed("bars", "ArrowRight").view == 4
+
+
+def test_findings_of_one_kind_are_counted():
+    made = FaultLabView(fault="blurred view", strength=1.0).experiment
+    listed = grouped(made.inspection.findings)
+    assert sum(count for _, count in listed) == len(made.inspection.findings)
+    assert len({finding.id for finding, _ in listed}) == len(listed)
+
+
+def test_an_unknown_fault_is_refused_with_those_there_are():
+    with pytest.raises(ValueError, match="warped board"):
+        experiment("flat tyre", 0.5, 0.15, 1)
+
+
+@pytest.fixture(scope="module")
+def ward():
+    return Ward(16)
+
+
+def test_a_ward_has_one_healthy_patient_and_each_fault_once(ward):
+    findings = [ward[i].finding for i in range(1, len(ward) + 1)]
+    assert findings.count(HEALTHY) == 1
+    assert len(set(findings)) == len(ward) == 8
+
+
+def test_the_clinic_finds_what_every_patient_has(ward):
+    for patient in (ward[i] for i in range(1, len(ward) + 1)):
+        found = {finding.id for finding in patient.inspected().findings}
+        assert patient.finding in found or (patient.finding == HEALTHY and not found)
+
+
+def test_another_ward_has_its_patients_in_another_order_and_the_same_one_is_the_same(ward):
+    orders = {tuple(each.fault if each else HEALTHY for each in Ward(number)._complaints) for number in range(12)}
+    assert len(orders) == 12
+    again = Ward(16)
+    assert [again[i].finding for i in (1, 2)] == [ward[i].finding for i in (1, 2)]
+
+
+def test_the_story_does_not_give_the_fault_away():
+    """Over many wards every story comes with several faults."""
+    told = {}
+    for number in range(40):
+        ward = Ward(number)
+        for story, complaint in zip(ward._stories, ward._complaints, strict=False):
+            told.setdefault(story, set()).add(complaint.fault if complaint else HEALTHY)
+    assert min(map(len, told.values())) >= len(COMPLAINTS) / 2
+
+
+def test_a_diagnosis_is_answered_by_what_is_the_case():
+    ward = Ward(16)
+    ill = next(i for i in range(1, 9) if ward[i].finding == "wrong-size")
+    well = next(i for i in range(1, 9) if ward[i].finding == HEALTHY)
+    assert ward.diagnose(ill).status == "unsolved"
+    assert ward.diagnose(ill, "wrong-size").correct
+    assert "`numbers`" in ward.diagnose(ill, "fold").hint
+    assert "clean factor" in ward.diagnose(ill, HEALTHY).hint  # the second hint says what is seen
+    assert "no finding" in ward.diagnose(ill, "flu").message
+    assert ward.diagnose(well, HEALTHY).correct
+    assert ward.diagnose(well, "board-warp").status == "wrong"
+
+
+def test_a_consequence_is_told_from_a_cause():
+    ward = Ward(16)
+    patient = next(i for i in range(1, 9) if ward[i].finding == "outlier-line")
+    verdict = ward.diagnose(patient, "outlier-view")
+    assert verdict.status == "wrong"
+    assert "follows from something else" in verdict.message
+
+
+@pytest.mark.parametrize("bad", [0, 9, "1"])
+def test_a_patient_who_is_not_there_is_named(ward, bad):
+    with pytest.raises(ValueError, match="patient must be a number from 1 to 8"):
+        ward[bad]
+
+
+# The exercises -------------------------------------------------------------------------------------------------------
+
+MISTAKES = [
+    pytest.param(one, known, id=f"{one.name}-{number}")
+    for one in exercises("16").values()
+    for number, known in enumerate(one.misconceptions)
+]
+
+
+@pytest.mark.parametrize(("exercise", "known"), MISTAKES)
+@pytest.mark.parametrize("seed", range(4))
+def test_every_known_mistake_is_answered_by_its_own_explanation(exercise, known, seed):
+    verdict = judge(exercise, known.reference, np.random.default_rng(seed))
+    assert verdict.status == "wrong"
+    assert verdict.message == known.explanation
+
+
+@pytest.mark.parametrize("exercise", exercises("16").values(), ids=lambda one: one.name)
+def test_the_reference_is_correct_and_a_constant_is_not(exercise):
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        assert judge(exercise, exercise.reference, rng).correct
+        assert not judge(exercise, lambda *given: 1.0, rng)
+        assert not judge(exercise, lambda *given: None, rng)
+
+
+def test_the_robust_sigma_is_that_of_a_rayleigh_distribution():
+    residuals = np.random.default_rng(0).normal(0, 0.3, (200_000, 2))
+    assert lesson16.robust_sigma(residuals) == pytest.approx(0.3, rel=0.01)
+
+
+def test_the_implied_rotation_is_that_of_the_difference_map():
+    """Two cameras whose cx is 12 px apart: the turn is that which camviz takes out, near enough atan(12/f)."""
+    grid = Intrinsics(640, 480, 600, 600, 319.5, 239.5)
+    cameras = [Camera(Intrinsics(640, 480, 600, 600, cx, 239.5)) for cx in (319.5, 331.5)]
+    map_ = difference(*cameras, within=1000)
+    rays = [camera.unproject(map_.uv).reshape(-1, 3) for camera in cameras]
+    R = lesson16.implied_rotation(*rays)
+    np.testing.assert_allclose(R, map_.second_from_first.rotation.as_matrix(), atol=1e-3)
+    assert np.degrees(np.arccos((np.trace(R) - 1) / 2)) == pytest.approx(np.degrees(np.arctan(12 / grid.fx)), rel=0.15)
