@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.lenses.base import Array
@@ -59,4 +59,4 @@ def warp_test(adjustment: Adjustment) -> WarpTest:
     if spare < 1:
         raise ValueError(f"more than {bent.unknowns} measurements are needed, got {bent.measurements}")
     statistic = (flat.sum_of_squares - bent.sum_of_squares) / 2 / (bent.sum_of_squares / spare)
-    return WarpTest(flat, bent, statistic, float(f_distribution.sf(statistic, 2, spare)))
+    return WarpTest(flat, bent, statistic, float(fdtrc(2, spare, max(statistic, 0.0))))

@@ -7,7 +7,7 @@ from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from camviz.calibration.adjustment import Adjustment, Mask
 from camviz.calibration.difference import Difference, difference, pixel_grid
@@ -71,7 +71,7 @@ def halves(
 def _probability(one: Adjustment, other: Adjustment, name: str) -> float:
     delta = one.intrinsics(name) - other.intrinsics(name)
     covariance = one.intrinsics_covariance(name) + other.intrinsics_covariance(name)
-    return float(chi2.sf(delta @ np.linalg.solve(covariance, delta), len(delta)))
+    return float(chdtrc(len(delta), delta @ np.linalg.solve(covariance, delta)))
 
 
 @dataclass(frozen=True, eq=False)

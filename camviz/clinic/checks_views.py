@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from scipy import stats
+from scipy.special import chdtri, fdtrc
 
 from camviz.calibration.cross_validation import held_out
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
@@ -55,8 +55,8 @@ def _bad_views(evidence: Evidence, name: str, errors: Array, counts: Array) -> I
     """A view's squared error times (2n - 6)/σ² is χ² with 2n - 6 degrees of freedom, its pose being fitted."""
     with np.errstate(invalid="ignore"):
         freedom = np.maximum(2 * counts - 6, 1)
-        typical = np.sqrt(stats.chi2.ppf(0.5, freedom))
-        limit = np.maximum(MANY_TIMES, np.sqrt(stats.chi2.isf(ONCE_IN / len(errors), freedom)) / typical)
+        typical = np.sqrt(chdtri(freedom, 0.5))
+        limit = np.maximum(MANY_TIMES, np.sqrt(chdtri(freedom, ONCE_IN / len(errors))) / typical)
         median = float(np.nanmedian(errors))
         bad = np.flatnonzero(errors > limit * median)
     for view in map(int, bad):
@@ -254,7 +254,7 @@ def moving_boards(observed: Observed) -> tuple[float, float]:
         return 1.0, 0.0
     variance = max(float(np.sum(left[used] ** 2)) - fallen, np.finfo(float).tiny) / freedom
     part = np.sqrt(max(fallen - count * variance, 0) / best.measurements / variance)
-    return float(stats.f.sf(fallen / count / variance, count, freedom)), float(part)
+    return float(fdtrc(count, freedom, max(fallen / count / variance, 0.0))), float(part)
 
 
 def held_out_ratio(observed: Observed) -> float:

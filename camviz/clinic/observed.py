@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import fdtrc
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.slopes import pixel_slopes
@@ -105,7 +105,7 @@ def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> 
     F = fallen / count / variance
     part = float(np.sqrt(max(fallen - count * variance, 0) / adjustment.measurements / variance))
     sigmas = np.sqrt(variance) * np.linalg.norm(into, axis=1) / scale
-    return Explained(count, F, float(stats.f.sf(F, count, freedom)), into @ along / scale, sigmas, part)
+    return Explained(count, F, float(fdtrc(count, freedom, max(F, 0.0))), into @ along / scale, sigmas, part)
 
 
 def unexplained(adjustment: Adjustment, name: str, *also: Array) -> tuple[Array, Array, Mask]:
