@@ -10,7 +10,7 @@ import traitlets
 
 from camviz.draw.picture import style
 from camviz.views.base import Control, View
-from camviz.widgets.memory import give_back, give_back_after_cells
+from camviz.widgets.memory import give_back_after_cells
 from camviz.widgets.still import StillWidget
 
 _HERE = files("camviz.widgets")
@@ -52,8 +52,6 @@ class Explorer(StillWidget):
         with self.hold_sync():
             self.view = view
             self.values, self.frame = shown["values"], shown["frame"]
-        if not draft:
-            give_back()
 
     def _receive(self, _widget: object, message: dict[str, Any], _buffers: object) -> None:
         try:
