@@ -97,7 +97,7 @@ def _disagreement(observed: Observed) -> Iterator[Finding]:
         said = max(certain, key=lambda each: apart[each])
         sentence = (
             f"{observed.name}: solved from {said}, the camera differs by {apart[said]:.2g} px over the image "
-            f"(median), {results[said].ratio:.1f} times what their uncertainties allow."
+            f"(median); noise alone parts them so far less than once in {1 / BY_CHANCE:,.0f} times."
         )
         yield found("split-disagreement", sentence, apart[said], "px", observed.name)
 
