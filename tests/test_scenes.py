@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
 
 import camviz.lenses
 from camviz.cameras import Camera, Intrinsics, look_at
@@ -486,7 +487,8 @@ def test_outlines_are_where_the_tracer_meets_the_surface():
 def test_a_meshs_vertices_lie_on_the_surface_it_stands_for(surface):
     """Rays to the vertices that face the camera, drawn in by a thousandth, end on them."""
     vertices = surface.mesh().vertices
-    inner = surface.ball()[0] + 0.999 * (vertices - surface.ball()[0])
+    middle = np.mean([centre for centre, _, _ in surface.balls()], axis=0)
+    inner = middle + 0.999 * (vertices - middle)
     distance = np.linalg.norm(inner, axis=-1)
     _, depth = Scene([surface]).trace(np.zeros(3), unit(inner))
     assert np.isfinite(depth).all()
@@ -550,5 +552,21 @@ def test_pixels_without_a_ray_are_not_traced():
     directions = np.full((2 * RUN, 3), np.nan)
     directions[RUN:] = (0, 0, 1)
     runs = Runs.gather(np.zeros((1, 3)), directions)
-    ahead = Bounds.around([(np.array([0.0, 0, 5]), 1.0, np.zeros(3))])
+    ahead = Bounds.around([[(np.array([0.0, 0, 5]), 1.0, np.zeros(3))]])
     assert runs.may_meet(ahead).tolist() == [[False, True]]
+
+
+@pytest.mark.parametrize(("yaw", "x"), [(12, -0.6), (140, 1.0), (-60, 3.0)])
+def test_surfaces_that_are_alike_look_together_as_they_do_one_by_one(yaw, x):
+    """The garden's lamps and walls are traced together; a scene for each surface tells which of them is nearest."""
+    garden = textured_scene()
+    pose = RigidTransform.from_components([x, -0.4, 0.2], Rotation.from_euler("y", yaw, degrees=True))
+    camera = Camera(Intrinsics.from_fov(160, 120, 90), world_from_cam=pose)
+    light, depth = garden.trace(camera.centre, camera.rays(), spread=0.005)
+    alone = [Scene([surface], garden.sky).trace(camera.centre, camera.rays(), 0.005) for surface in garden.surfaces]
+    distances = np.nan_to_num([distance for _, distance in alone], nan=np.inf)
+    nearest = distances.argmin(axis=0)
+    np.testing.assert_allclose(np.nan_to_num(depth, nan=np.inf), distances.min(axis=0), rtol=2e-5)
+    expected = np.take_along_axis(np.array([seen for seen, _ in alone]), nearest[None, ..., None], axis=0)[0]
+    same = np.abs(light - expected).max(axis=-1) < 1e-3
+    assert same.mean() > 0.999  # where two walls join, either may be the nearer by a rounding

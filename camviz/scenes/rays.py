@@ -13,23 +13,29 @@ from camviz.lenses.base import Array
 
 Floats = NDArray[np.float32]
 RUN = 32
+Ball = tuple[Array, float, Array]  # centre, radius, normal
 _ROUNDING = np.float32(1e-5)
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Balls around surfaces, `centre` (n, 3) and `radius` (n,), and a unit `normal` (n, 3): 0 where it is not flat."""
+    """Balls around surfaces, `centre` (n, 3) and `radius` (n,), and a unit `normal` (n, 3): 0 where it is not flat.
+
+    Each surface has those from its `first` (surfaces,) on.
+    """
 
     centre: Floats
     radius: Floats
     normal: Floats
+    first: NDArray[np.intp]
 
     @classmethod
-    def around(cls, balls: Sequence[tuple[Array, float, Array]]) -> Bounds:
-        """From a centre, a radius and a normal for each surface."""
-        rows = np.array([[*centre, radius, *normal] for centre, radius, normal in balls], dtype=np.float32)
-        rows = rows.reshape(-1, 7)
-        return cls(rows[:, :3], rows[:, 3], rows[:, 4:])
+    def around(cls, surfaces: Sequence[Sequence[Ball]]) -> Bounds:
+        """From the balls of each surface."""
+        rows = [[*centre, radius, *normal] for balls in surfaces for centre, radius, normal in balls]
+        table = np.array(rows, dtype=np.float32).reshape(-1, 7)
+        counts = np.array([len(balls) for balls in surfaces], dtype=np.intp)
+        return cls(table[:, :3], table[:, 3], table[:, 4:], np.cumsum(counts) - counts)
 
 
 @dataclass(frozen=True)
@@ -86,9 +92,9 @@ class Runs:
         )
 
     def pick(self, runs: NDArray[np.intp]) -> tuple[Array, Floats]:
-        """Origins (3, 1) or (3, n) and directions (3, n) of the rays in some runs."""
+        """Origins (3, 1, 1) or (3, p, RUN) and directions (3, p, RUN) of p runs."""
         origins = self.origins.take(runs, axis=1) if self.origins.shape[1] > 1 else self.origins
-        return origins.reshape(3, -1), self.directions.take(runs, axis=1).reshape(3, -1)
+        return origins, self.directions.take(runs, axis=1)
 
     def may_meet(self, bounds: Bounds) -> NDArray[np.bool_]:
         """False (surfaces, runs) where no ray of the run can meet the surface.
@@ -107,7 +113,7 @@ class Runs:
         height = bounds.normal[:, :1] * -x + bounds.normal[:, 1:2] * -y + bounds.normal[:, 2:] * -z
         towards = -np.sign(height) * (bounds.normal @ self.axis)
         plane = (np.abs(height) <= self.slack) | (towards >= -self.sine - _ROUNDING)
-        return (self.cosine <= 0) | (ball & plane)
+        return (self.cosine <= 0) | np.logical_or.reduceat(ball & plane, bounds.first, axis=0)
 
 
 def _in_runs(vectors: Array) -> Floats:

@@ -14,9 +14,11 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens
 from camviz.lenses.base import Array, as_points
 from camviz.scenes.light import to_display
+from camviz.scenes.meeting import Meeting
 from camviz.scenes.rays import RUN, Bounds, Floats, Runs
-from camviz.scenes.surfaces import Meeting, Mesh, Surface, on_sphere
+from camviz.scenes.surfaces import Mesh, Surface, on_sphere
 from camviz.scenes.texture import Texture
+from camviz.scenes.together import Indices, Traced, together
 from camviz.scenes.wireframe import Wireframe
 
 BLOCK = 1 << 15  # rays traced together: few enough to stay in the processor's cache
@@ -59,31 +61,38 @@ class Scene:
 
     @cached_property
     def _bounds(self) -> Bounds:
-        return Bounds.around([surface.ball() for surface in self.surfaces])
+        return Bounds.around([surface.balls() for surface in self.surfaces])
+
+    @cached_property
+    def _traced(self) -> list[tuple[Traced, list[int]]]:
+        return together(self.surfaces)
 
     def follow(self, runs: Runs, spread: float, count: int) -> tuple[Floats, Floats]:
         """As `trace` does, light (count, 3) and distance (count,) of the first `count` of the rays in `runs`."""
         depth = np.full(runs.count, np.inf, dtype=np.float32)
         light = np.empty((depth.size, 3), dtype=np.float32)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            for surface, may_meet in zip(self.surfaces, runs.may_meet(self._bounds), strict=True):
-                near = np.flatnonzero(may_meet)
-                if near.size:
-                    self._meet(surface, runs, near, depth, light, spread)
+            may_meet = runs.may_meet(self._bounds)
+            for surfaces, members in self._traced:
+                member, run = np.nonzero(may_meet[members])
+                if run.size:
+                    self._meet(surfaces, member, run, runs, depth, light, spread)
             self._paint_sky(runs, depth, light, spread)
         return light[:count], depth[:count]
 
     def _meet(
-        self, surface: Surface, runs: Runs, near: NDArray[np.intp], depth: Floats, light: Floats, spread: float
+        self, surfaces: Traced, member: Indices, run: Indices, runs: Runs, depth: Floats, light: Floats, spread: float
     ) -> None:
-        """Let the rays of the runs `near` meet one surface, and where it is the nearest so far, see it."""
-        at = surface.meet(*runs.pick(near))
-        hit = np.flatnonzero(at.depth < depth.reshape(-1, RUN).take(near, axis=0).ravel())
-        if hit.size:
-            rays = near[hit // RUN] * RUN + hit % RUN
+        """Let each `run` (p,) of rays meet one surface, and where that is the nearest so far, see it."""
+        at = surfaces.meet(*runs.pick(run), member)
+        hit = np.flatnonzero(at.depth < depth.reshape(-1, RUN).take(run, axis=0).ravel())
+        ray = run[hit // RUN] * RUN + hit % RUN
+        np.minimum.at(depth, ray, at.depth[hit])
+        nearest = np.flatnonzero(at.depth[hit] == depth[ray])
+        if nearest.size:
+            hit, ray = hit[nearest], ray[nearest]
             seen = Meeting(at.depth[hit], at.place.take(hit, axis=1))
-            depth[rays] = seen.depth
-            light[rays] = surface.radiance(seen, spread)
+            light[ray] = surfaces.radiance(seen, spread, member[hit // RUN])
 
     def _paint_sky(self, runs: Runs, depth: Floats, light: Floats, spread: float) -> None:
         missed = np.flatnonzero(depth == np.inf)

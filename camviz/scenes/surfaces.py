@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.lenses.base import Array, unit
 from camviz.scenes.light import sunlight, to_display, to_linear
-from camviz.scenes.rays import Floats
+from camviz.scenes.meeting import FAR, HALF, Meeting, meet_circle, meet_plane, meet_square, texels
+from camviz.scenes.rays import Ball, Floats
 from camviz.scenes.texture import Texture
-
-_FAR, _HALF = np.float32(np.inf), np.float32(0.5)
 
 
 @dataclass(frozen=True)
@@ -44,13 +43,6 @@ class Mesh:
         return red, green, blue
 
 
-class Meeting(NamedTuple):
-    """Where n rays meet a surface: the distance (n,) along each, inf on a miss, and `place` (3, n) in its own frame."""
-
-    depth: Floats
-    place: Floats
-
-
 class Surface(Protocol):
     """What a scene is made of."""
 
@@ -59,8 +51,8 @@ class Surface(Protocol):
         """What it belongs to, in drawings."""
         ...
 
-    def ball(self) -> tuple[Array, float, Array]:
-        """Centre (3,) and radius of a ball around it, and its unit normal (3,) if it is flat, otherwise 0."""
+    def balls(self) -> tuple[Ball, ...]:
+        """Balls that it lies in: centre (3,), radius, and its unit normal (3,) if it is flat, otherwise 0."""
         ...
 
     def meet(self, origins: Array, directions: Floats) -> Meeting:
@@ -113,25 +105,29 @@ class Rectangle:
         return self.corner + np.array([0 * self.across, self.across, self.across + self.down, self.down])
 
     @cached_property
-    def _local_from_world(self) -> Array:
+    def local_from_world(self) -> Array:
+        """Turns world directions (3,) into s, r and metres along the normal."""
         return np.linalg.inv(np.stack([self.across, self.down, self.normal], axis=1))
 
-    def ball(self) -> tuple[Array, float, Array]:
+    @cached_property
+    def texels_per_metre(self) -> float:
+        """Along the edge where they are closer together."""
+        columns, rows = self.repeats
+        wide = self.texture.width * columns / np.linalg.norm(self.across)
+        return float(max(wide, self.texture.height * rows / np.linalg.norm(self.down)))
+
+    def balls(self) -> tuple[Ball, ...]:
         centre = self.corners.mean(axis=0)
-        return centre, float(np.linalg.norm(self.corners - centre, axis=1).max()), self.normal
+        return ((centre, float(np.linalg.norm(self.corners - centre, axis=1).max()), self.normal),)
 
     def meet(self, origins: Array, directions: Floats) -> Meeting:
-        at = _meet_plane(self._local_from_world, self.corner, origins, directions)
-        s, r, _ = at.place
-        inside = (np.abs(s - _HALF) <= _HALF) & (np.abs(r - _HALF) <= _HALF) & (at.depth > 0)
-        return at._replace(depth=np.where(inside, at.depth, _FAR))
+        return meet_square(*_in_frame(self.local_from_world, self.corner, origins, directions))
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
         columns, rows = (np.float32(n) for n in self.repeats)
-        wide = self.texture.width * columns / np.linalg.norm(self.across)
-        high = self.texture.height * rows / np.linalg.norm(self.down)
         s, r, cosine = at.place
-        light = self.texture.sample(s * columns, r * rows, _texels(at.depth, cosine, spread * max(wide, high)))
+        apart = texels(at.depth, cosine, spread * self.texels_per_metre) if spread > 0 else 0.0
+        light = self.texture.sample(s * columns, r * rows, apart)
         return light if self.shade == 1 else light * np.float32(self.shade)
 
     def outline(self) -> tuple[Array, ...]:
@@ -170,16 +166,17 @@ class Ground:
     def _local_from_world(self) -> Array:
         return np.array([[1 / self.tile, 0, 0], [0, 0, -1 / self.tile], [0, -1, 0]])
 
-    def ball(self) -> tuple[Array, float, Array]:
-        return self._point, np.inf, np.array([0.0, -1.0, 0.0])
+    def balls(self) -> tuple[Ball, ...]:
+        return ((self._point, np.inf, np.array([0.0, -1.0, 0.0])),)
 
     def meet(self, origins: Array, directions: Floats) -> Meeting:
-        at = _meet_plane(self._local_from_world, self._point, origins, directions)
-        return at._replace(depth=np.where(at.depth > 0, at.depth, _FAR))
+        at = meet_plane(*_in_frame(self._local_from_world, self._point, origins, directions))
+        return at._replace(depth=np.where(at.depth > 0, at.depth, FAR))
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
         s, r, cosine = at.place
-        light = self.texture.sample(s, r, _texels(at.depth, cosine, spread * self.texture.width / self.tile))
+        apart = texels(at.depth, cosine, spread * self.texture.width / self.tile) if spread > 0 else 0.0
+        light = self.texture.sample(s, r, apart)
         clear = np.exp(at.depth * np.float32(-1 / self.sight))[:, None]
         haze = np.asarray(self.haze, dtype=np.float32)
         return haze + (light - haze) * clear
@@ -211,15 +208,15 @@ class Sphere:
         if not self.radius > 0:
             raise ValueError(f"radius must be a positive length in metres, got {self.radius}")
 
-    def ball(self) -> tuple[Array, float, Array]:
-        return self.centre, self.radius, np.zeros(3)
+    def balls(self) -> tuple[Ball, ...]:
+        return ((self.centre, self.radius, np.zeros(3)),)
 
     def meet(self, origins: Array, directions: Floats) -> Meeting:
         start = ((origins - self.centre[:, None]) / self.radius).astype(np.float32)
         step = directions / np.float32(self.radius)
-        first, second = _meet_circle(start, step)
+        first, second = meet_circle(start, step)
         depth = np.where(first > 0, first, second)
-        return Meeting(np.where(depth > 0, depth, _FAR), start + depth * step)
+        return Meeting(np.where(depth > 0, depth, FAR), start + depth * step)
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
         density = self.texture.height / (np.pi * self.radius)
@@ -261,18 +258,22 @@ class Column:
     def _top(self) -> Array:
         return self.foot - [0, self.height, 0]
 
-    def ball(self) -> tuple[Array, float, Array]:
-        return (self.foot + self._top) / 2, float(np.hypot(self.height / 2, self.radius)), np.zeros(3)
+    def balls(self) -> tuple[Ball, ...]:
+        """One above the other, at most four: a single one would be far wider than a thin column."""
+        count = int(np.clip(self.height / (2 * self.radius), 1, 4))
+        radius = float(np.hypot(self.height / (2 * count), self.radius))
+        at = (np.arange(count) + 0.5) / count
+        return tuple((self.foot + share * (self._top - self.foot), radius, np.zeros(3)) for share in at)
 
     def meet(self, origins: Array, directions: Floats) -> Meeting:
         scale = np.array([[self.radius], [self.height], [self.radius]])
         start = ((origins - self._top[:, None]) / scale).astype(np.float32)
         step = np.divide(directions, scale, dtype=np.float32)
-        first, second = _meet_circle(start[::2], step[::2])
-        outside = (first > 0) & (np.abs(start[1] + first * step[1] - _HALF) <= _HALF)
+        first, second = meet_circle(start[::2], step[::2])
+        outside = (first > 0) & (np.abs(start[1] + first * step[1] - HALF) <= HALF)
         depth = np.where(outside, first, second)
         place = start + depth * step
-        return Meeting(np.where((depth > 0) & (np.abs(place[1] - _HALF) <= _HALF), depth, _FAR), place)
+        return Meeting(np.where((depth > 0) & (np.abs(place[1] - HALF) <= HALF), depth, FAR), place)
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
         x, r, z = at.place
@@ -329,7 +330,7 @@ def _vector(values: ArrayLike, name: str) -> Array:
 
 def around(x: Floats, z: Floats) -> Floats:
     """How far round (n,) a direction points, 0…1: 0.5 along +z, more to the right."""
-    return np.arctan2(x, z) * np.float32(0.5 / np.pi) + _HALF
+    return np.arctan2(x, z) * np.float32(0.5 / np.pi) + HALF
 
 
 def on_sphere(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
@@ -337,37 +338,10 @@ def on_sphere(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
     return around(x, -z), np.arccos(np.clip(-y, -1, 1)) * np.float32(1 / np.pi)
 
 
-def _meet_plane(local_from_world: Array, point: Array, origins: Array, directions: Floats) -> Meeting:
-    """Where rays meet the plane z = 0 of a frame at `point` whose third axis is a unit normal: t = -z₀ / ż.
-
-    The third row of `place` is not z, which is 0, but the cosine of the angle between ray and normal.
-    """
+def _in_frame(local_from_world: Array, point: Array, origins: Array, directions: Floats) -> tuple[Floats, Floats]:
+    """Origins and directions of rays in a frame at `point`."""
     start = (local_from_world @ (origins - point[:, None])).astype(np.float32)
-    place = local_from_world.astype(np.float32) @ directions
-    depth = -start[2] / place[2]
-    place[:2] *= depth
-    place[:2] += start[:2]
-    np.abs(place[2], out=place[2])
-    return Meeting(depth, place)
-
-
-def _meet_circle(start: Floats, step: Floats) -> tuple[Floats, Floats]:
-    """Both distances (n,) to the unit circle or sphere about 0, near one first; NaN where a ray passes it by.
-
-    From the point m of the ray that is nearest to the centre it is sqrt(1 - m²) either way; taking m first keeps the
-    digits that the textbook's b² - 4ac would lose.
-    """
-    squared = (step * step).sum(axis=0)
-    middle = -(start * step).sum(axis=0) / squared
-    nearest = start + middle * step
-    half = np.sqrt((1 - (nearest * nearest).sum(axis=0)) / squared)
-    return middle - half, middle + half
-
-
-def _texels(depth: Floats, cosine: Floats, density: float) -> Floats | float:
-    """Texels between neighbouring rays; a slanted look stretches them by 1 / cos, of which the square root is taken as
-    a compromise between too sharp along the slope and too soft across it."""
-    return np.multiply(depth / np.sqrt(cosine), density, dtype=np.float32) if density > 0 else 0.0
+    return start, local_from_world.astype(np.float32) @ directions
 
 
 def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.intp]]:
