@@ -4,7 +4,9 @@ NaN interrupts a line and hides a mark, as everywhere in camviz: "no such point"
 """
 
 from collections.abc import Iterable
+from functools import cache
 from html import escape
+from math import isfinite
 from textwrap import wrap
 from typing import Any
 
@@ -15,9 +17,7 @@ from numpy.typing import ArrayLike
 def element(tag: str, content: str = "", **attributes: Any) -> str:
     """`<tag attributes>content</tag>`. Underscores in attribute names become dashes; a trailing one is dropped."""
     written = "".join(
-        f' {name.rstrip("_").replace("_", "-")}="{escape(_number(value))}"'
-        for name, value in attributes.items()
-        if value is not None
+        [f' {_dashed(name)}="{_written(value)}"' for name, value in attributes.items() if value is not None]
     )
     return f"<{tag}{written}>{content}</{tag}>" if content else f"<{tag}{written}/>"
 
@@ -87,14 +87,19 @@ def image(name: str, x: float, y: float, width: float, height: float, **attribut
     )
 
 
-def _number(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+@cache
+def _dashed(name: str) -> str:
+    return name.rstrip("_").replace("_", "-")
+
+
+def _written(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else escape(str(value))
 
 
 def _pieces(points: np.ndarray, closed: bool) -> str:
-    exists = np.isfinite(points).all(axis=-1)
-    if exists.all():
+    if isfinite(points.sum()):
         return _piece(points, closed)
+    exists = np.isfinite(points).all(axis=-1)
     cuts = np.flatnonzero(np.diff(exists.astype(np.int8))) + 1
     runs = zip(np.split(points, cuts), np.split(exists, cuts), strict=True)
     return "".join(_piece(run, False) for run, here in runs if here.size and here[0])
@@ -103,4 +108,4 @@ def _pieces(points: np.ndarray, closed: bool) -> str:
 def _piece(points: np.ndarray, closed: bool) -> str:
     if len(points) < 2:
         return ""
-    return "M" + " ".join(map("%.1f,%.1f".__mod__, map(tuple, points.tolist()))) + ("Z" if closed else "")
+    return "M" + " ".join([f"{x:.1f},{y:.1f}" for x, y in points.tolist()]) + ("Z" if closed else "")

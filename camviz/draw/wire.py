@@ -223,18 +223,20 @@ def _path_data(pieces: Pieces, key: np.ndarray) -> Iterator[tuple[int, str]]:
 
 def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
     """Arrow heads, shorter where the arrow points towards the eye or away from it."""
-    for line in lines:
-        if line.head:
-            tail, tip = sight.place(sight.points_cam(line.points[-2:]))
-            along = tip - tail
-            length = float(np.hypot(*along))
-            if np.isfinite(length) and length > 1:
-                along *= min(4.2 * line.width, length) / length
-                across = 0.38 * np.array([-along[1], along[0]])
-                colour = line.class_.split()[0]
-                yield svg.polygon(
-                    [tip + 0.3 * along, tip - 0.7 * along + across, tip - 0.7 * along - across], f"fill-{colour}"
-                )
+    arrows = [line for line in lines if line.head]
+    if not arrows:
+        return
+    ends = sight.place(sight.points_cam(np.array([line.points[-2:] for line in arrows])))
+    for line, (tail, tip) in zip(arrows, ends, strict=True):
+        along = tip - tail
+        length = float(np.hypot(*along))
+        if np.isfinite(length) and length > 1:
+            along *= min(4.2 * line.width, length) / length
+            across = 0.38 * np.array([-along[1], along[0]])
+            colour = line.class_.split()[0]
+            yield svg.polygon(
+                [tip + 0.3 * along, tip - 0.7 * along + across, tip - 0.7 * along - across], f"fill-{colour}"
+            )
 
 
 def _fills(sight: Sight, items: Sequence[Item], name: str, scale: float) -> Iterator[Fill]:

@@ -48,7 +48,7 @@ def _kind(surface: Surface) -> Hashable:
         return Sphere, surface.texture, surface.radius
     if isinstance(surface, Column):
         return Column, surface.texture, surface.radius, surface.height
-    return surface
+    return id(surface)
 
 
 def _one(alike: list[Surface]) -> Traced:
