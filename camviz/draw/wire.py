@@ -70,9 +70,9 @@ def draw_wire(
 ) -> tuple[str, dict[str, bytes]]:
     """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …
 
-    What is seen of the `scenery`, lines and faces that do not change, is kept while the onlooker stands still.
+    What is seen of the `scenery`, things that do not change, is kept while the onlooker stands still.
     """
-    stage, kept = _scenery(sight, scenery)
+    stage, kept = _scenery(sight, scenery, scale)
     fills = sorted([*kept, *_fills(sight, items, name, scale)], key=lambda fill: -fill[0])
     depths = np.array([depth for depth, _, _ in fills])
     behind, lines = _lines(scenery), _lines(items)
@@ -82,7 +82,7 @@ def draw_wire(
     for i, (_, fragment, _) in enumerate(fills):
         layers += [fragment, strokes.get(i + 1, "")]
     photographs = {key: data for _, _, attached in fills for key, data in attached.items()}
-    return "".join(layers) + draw_marks(sight, items), photographs
+    return "".join(layers) + draw_marks(sight, [*scenery, *items]), photographs
 
 
 def draw_lines(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
@@ -93,8 +93,8 @@ def draw_lines(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hid
 
 
 @lru_cache(maxsize=4)
-def _scenery(sight: Sight, items: tuple[Item, ...]) -> tuple[Pieces, list[Fill]]:
-    return cut(sight, _lines(items), nothing_hides, fine=False), list(_fills(sight, items, "scenery", 1))
+def _scenery(sight: Sight, items: tuple[Item, ...], scale: float) -> tuple[Pieces, list[Fill]]:
+    return cut(sight, _lines(items), nothing_hides, fine=False), list(_fills(sight, items, "scenery", scale))
 
 
 def _lines(items: Sequence[Item]) -> list[Line]:

@@ -242,7 +242,8 @@ class EpipolarView(TwoCameras):
     def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("space", 20, 409, 500, 200)
         scenery = () if self.photographs else scene_items(textured_scene(), "wire")
-        items, eye = self._space_items(images), self._onlooker
+        scenery += self._bodies(images, draft)
+        items, eye = self._space_items(), self._onlooker
         content, sheets = draw_space(panel, items, eye, draft=draft, renderer="wire", scenery=scenery)
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
         shown = panel.show(content, title="The epipolar plane", hint="drag to turn", drag="orbit", label=label)
@@ -260,12 +261,19 @@ class EpipolarView(TwoCameras):
         target = tuple((left + s * (np.array(self.eye.target) - left)).tolist())
         return replace(self.eye, target=target, distance=s * self.eye.distance)
 
-    def _space_items(self, images: dict[str, np.ndarray]) -> list[Item]:
+    def _bodies(self, images: dict[str, np.ndarray], draft: bool) -> tuple[Item, ...]:
+        """The two cameras; the same objects again until one of them moves."""
+        if draft not in self._drawn:
+            s = self._nearness
+            left = camera_body(self.left, 0.6 * s, image=images["left"], colour="blue")
+            right = camera_body(self.right, 0.6 * s, image=images["right"], colour="orange")
+            self._drawn[draft] = (*left, *right)
+        return self._drawn[draft]
+
+    def _space_items(self) -> list[Item]:
         left, right, point, s = self.left.centre, self.right.centre, self.point, self._nearness
         ray = np.array([left, left + max(8.0 * s, self.depth) * self.left.unproject([self.u, self.v])])
         return [
-            *camera_body(self.left, 0.6 * s, image=images["left"], colour="blue"),
-            *camera_body(self.right, 0.6 * s, image=images["right"], colour="orange"),
             Label(left + (0, 0.22 * s, 0), "left", "label blue"),
             Label(right + (0, 0.22 * s, 0), "right", "label orange"),
             Face(np.array([left, right, point]), "green", 0.3),

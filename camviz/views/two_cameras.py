@@ -12,6 +12,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import bends
+from camviz.draw.items import Item
 from camviz.lenses import BrownConrady, Equidistant, Perspective
 from camviz.lenses.base import Array, unit
 from camviz.scenes import textured_scene
@@ -19,6 +20,7 @@ from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
 
 _TURN: dict[str, Any] = {"low": -40.0, "high": 40.0, "step": 0.5, "unit": "°"}
+_OF_THE_POINT = {"u", "v", "depth", "noise", "matches", "normalised", "truth", "eye"}  # the cameras stand still
 _STAND = RigidTransform.from_translation([-0.4, 0.0, 0.0])  # of the left camera in the garden
 _CAMERAS = {
     "perspective": Camera(Intrinsics.from_fov(640, 480, 65), Perspective()),
@@ -74,6 +76,19 @@ class TwoCameras(View):
         middle: dict[str, Any] = {"u": (left.intrinsics.width - 1) / 2, "v": (left.intrinsics.height - 1) / 2}
         placed: dict[str, Any] = {"right_x": x, "right_y": y, "right_z": z, "yaw": yaw, "pitch": pitch, "roll": roll}
         return cls(pair=(left, right), photographs=photographs, **placed, **middle)
+
+    def but(self, **changes: Any) -> Self:
+        """The same view with some fields changed; cameras that nobody moves are kept, and what was drawn of them."""
+        changed = super().but(**changes)
+        if not changes.keys() - _OF_THE_POINT:
+            kept = {name: made for name, made in vars(self).items() if name in ("left", "right", "baseline", "_drawn")}
+            vars(changed).update(kept)
+        return changed
+
+    @cached_property
+    def _drawn(self) -> dict[bool, tuple[Item, ...]]:
+        """The cameras' bodies, as drawn in drafts and in fine pictures."""
+        return {}
 
     # The geometry ----------------------------------------------------------------------------------------------------
 
