@@ -2,7 +2,6 @@
 
 import os
 import re
-import time
 from pathlib import Path
 
 import numpy as np
@@ -43,11 +42,9 @@ ROS = (DATA / "ros_file.yaml").read_text()
 
 
 def complaint(path, **options):
-    """The sentence that `load` refuses a file with, soon, on one line and naming the file."""
-    start = time.perf_counter()
+    """The sentence that `load` refuses a file with, on one line and naming the file."""
     with pytest.raises(CalibrationError) as caught:
         camviz.load(path, **options)
-    assert time.perf_counter() - start < 10
     sentence = str(caught.value)
     assert "\n" not in sentence
     assert Path(path).name in sentence or repr(path) in sentence
@@ -86,13 +83,12 @@ def test_a_pipe_is_not_waited_for(tmp_path):
     assert "not a regular file" in complaint(tmp_path / "pipe")
 
 
-def test_a_gigabyte_is_refused_unread(tmp_path):
+def test_a_gigabyte_is_refused_unread(tmp_path, monkeypatch):
     path = tmp_path / "large.yml"
     with path.open("wb") as file:
         file.truncate(2**30)
-    start = time.perf_counter()
+    monkeypatch.setattr(Path, "open", lambda *_: pytest.fail("the file was opened"))
     assert "1024 MB" in complaint(path)
-    assert time.perf_counter() - start < 0.1
 
 
 @pytest.mark.parametrize("content", [b"", b" \n\n\t", b"\xef\xbb\xbf"])
@@ -339,7 +335,8 @@ def test_deep_nesting_stays_shallow(tmp_path, text):
     ids=["list", "xml words", "xml elements", "word", "plain text", "number", "comment", "open string"]
     + ["literal", "open literal", "comments", "colmap line", "colmap lines", "kitti line", "kitti lines", "attributes"],
 )
-def test_the_largest_allowed_file_is_refused_in_seconds(tmp_path, text):
+def test_the_largest_allowed_file_is_refused(tmp_path, text):
+    """Seconds each; work that grew with the square of the size would take hours."""
     refusal(tmp_path, text)
 
 
@@ -353,7 +350,7 @@ def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):
         ("cameras.bin", b"\xff" * 8, "announces 18,446,744,073,709,551,615"),
         ("cameras.bin", b"\1" + b"\0" * 7, "ends before all"),
         ("cameras.bin", b"\0" * 8, "at least one camera"),
-        ("cameras.bin", b"\1" + b"\0" * 11 + b"\x0a\0\0\0" + b"\0" * 16, "THIN_PRISM_FISHEYE"),
+        ("cameras.bin", b"\1" + b"\0" * 11 + b"\x0b\0\0\0" + b"\0" * 16, "RAD_TAN_THIN_PRISM_FISHEYE"),
         ("images.bin", b"\xff" * 8, "announces 18,446,744,073,709,551,615"),
         ("images.bin", b"\1" + b"\0" * 7 + b"\0" * 64 + b"x" * 2000, "name of an image"),
         ("images.bin", b"\1" + b"\0" * 7 + b"\0" * 64 + b"a\0" + b"\xff" * 8, "ends before all"),

@@ -1,17 +1,22 @@
 """Each format's conventions, held against the definition its own program gives, or against that program itself."""
 
+import io
 import json
 from math import tan
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import camviz
 from camviz.cameras import transform
-from camviz.files import CalibrationError
+from camviz.files import CalibrationError, matlab_binary
 from camviz.files.colmap import MODELS
+from camviz.files.models import same_camera
 from camviz.lenses import KannalaBrandt, Stereographic
 
 DATA = Path(__file__).parent / "data"
@@ -19,7 +24,33 @@ POINTS = np.random.default_rng(7).uniform([-0.3, -0.25, 0.9], [0.3, 0.25, 3.0], 
 PARAMETERS = {
     "f": 500.0, "fx": 500.0, "fy": 490.0, "cx": 321.0, "cy": 239.5, "omega": 0.9, "alpha": 0.6, "beta": 1.1,
     "k1": -0.1, "k2": 0.02, "p1": 1e-3, "p2": -2e-3, "k3": 3e-3, "k4": 4e-3, "k5": 5e-3, "k6": 6e-3,
+    "sx1": 1e-3, "sy1": -2e-3,
 }  # fmt: skip
+
+
+def mat_of(variables, **options):
+    file = io.BytesIO()
+    scipy.io.savemat(file, variables, **options)
+    return file.getvalue()
+
+
+ONE_BY_ONE = b"\1\0\0\0\1\0\0\0"  # the size of a variable
+FIELDS = st.text("abcXYZ_", min_size=1, max_size=20).filter(lambda name: not name.startswith("_"))
+NUMBERS = st.floats(allow_nan=False) | st.integers(-(2**31), 2**31) | st.booleans()
+ROWS = st.lists(st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=2), min_size=2, max_size=4)
+WORDS = st.text("abc äθ", min_size=1, max_size=9).filter(lambda words: words == words.strip())
+TREES = st.recursive(
+    NUMBERS | ROWS | WORDS,
+    lambda inner: st.dictionaries(FIELDS, inner, min_size=1, max_size=4),
+    max_leaves=8,
+)
+
+
+def _saved(tree):
+    """A tree as scipy.io.savemat takes it."""
+    if isinstance(tree, dict):
+        return {name: _saved(value) for name, value in tree.items()}
+    return np.array(tree) if isinstance(tree, list) else tree
 
 
 def camera_of(name, **options):
@@ -242,7 +273,7 @@ def test_metashapes_cameras_stand_where_their_transforms_put_them():
 @pytest.mark.parametrize(
     ("name", "old", "new", "what"),
     [
-        ("colmap/cameras.txt", "PINHOLE 640 480", "THIN_PRISM_FISHEYE 640 480", "camera model THIN_PRISM_FISHEYE"),
+        ("colmap/cameras.txt", "PINHOLE 640 480", "SIMPLE_DIVISION 640 480", "camera model SIMPLE_DIVISION"),
         ("colmap/cameras.txt", "7 PINHOLE 640 480 500 510 320 240", "7 PINHOLE 640 480 5", r"line 6.params: expected"),
         ("colmap/cameras.txt", "3 OPENCV", "1 OPENCV", "line 5: the camera 1 appears twice"),
         ("colmap/images.txt", "2 1 0 0 0 0.5", "2 1 1 0 0 0.5", "quaternion of length 1, got length 1.41"),
@@ -284,7 +315,36 @@ def test_a_kitti_file_asks_for_the_size_it_never_holds():
         camviz.load(DATA / "kitti_calib.txt")
 
 
-def test_a_matlab_file_says_what_to_do_in_matlab(tmp_path):
-    (tmp_path / "p.mat").write_bytes(b"MATLAB 5.0 MAT-file, Platform: GLNXA64")
-    with pytest.raises(CalibrationError, match="jsonencode"):
+@pytest.mark.parametrize("name", ["matlab_parameters", "matlab_intrinsics"])
+def test_a_mat_file_says_what_its_json_says(name):
+    """The .mat files were written by scipy, one of them compressed, from what the JSON files hold."""
+    assert same_camera(camera_of(f"{name}.mat"), camera_of(f"{name}.json"), 0.0)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@given(tree=TREES)
+def test_a_mat_file_is_the_tree_that_was_saved(compressed, tree):
+    """Structs, cells, words, numbers of every kind, in either order of bytes, as scipy.io writes them."""
+    file = io.BytesIO()
+    scipy.io.savemat(file, {"s": _saved(tree)}, do_compression=compressed, long_field_names=True)
+    assert matlab_binary.parse(file.getvalue())["s"] == tree
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"MATLAB 7.3 MAT-file, Platform: GLNXA64", "-v7"),
+        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64", "header is broken"),
+        (mat_of({"a": 1.0}), r"expected one struct with RadialDistortion.*toStruct"),
+        (mat_of({"a": {"K": np.eye(3), "FocalLength": 1.0}, "b": {"FocalLength": 1.0}}), r"got 2 among 'a', 'b'"),
+        (mat_of({"zeros": np.zeros(3 * 2**20)}, do_compression=True), "at most 16 MB, one unfolds to more"),
+        (mat_of({"a": {"b": 1.0}}).replace(ONE_BY_ONE, b"\xff\xff\xff\x7f" * 2), "at most 1,000,000 values"),
+    ],
+    ids=["new", "header", "others", "two", "bomb", "announced"],
+)
+def test_a_mat_file_that_holds_no_camera_is_refused_in_a_sentence(tmp_path, content, what):
+    (tmp_path / "p.mat").write_bytes(content)
+    with pytest.raises(CalibrationError, match=what) as caught:
         camviz.load(tmp_path / "p.mat")
+    assert "p.mat: " in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -23,6 +23,7 @@ from camviz.lenses import (
     Orthographic,
     Perspective,
     Stereographic,
+    ThinPrismFisheye,
     UnifiedSphere,
 )
 from camviz.lenses.base import unit
@@ -46,6 +47,8 @@ EXAMPLES = {
     "kannala_brandt": (KannalaBrandt(0.00693023, -0.0013828, -0.000272596, -0.000452646), 100),
     "kannala_brandt_folding": (KannalaBrandt(-0.1), 100),
     "kannala_brandt_none": (KannalaBrandt(), 180),
+    "thin_prism_fisheye": (ThinPrismFisheye(0.02, -0.01, 1e-3, -5e-4, 2e-3, -3e-4, 1e-3, -2e-3), 100),
+    "thin_prism_fisheye_folding": (ThinPrismFisheye(-0.1, p1=1e-3, sx1=2e-3), 100),
     "equidistant": (Equidistant(), 180),
     "equisolid": (Equisolid(), 180),
     "orthographic": (Orthographic(), 90),
@@ -213,7 +216,7 @@ def test_a_lens_is_a_value(lens, widest_deg):
 
 def test_every_lens_has_a_name_and_every_name_is_exercised():
     assert set(LENSES.values()) == {type(lens) for lens, _ in EXAMPLES.values()}
-    assert len(LENSES) == 13
+    assert len(LENSES) == 14
 
 
 @pytest.mark.parametrize("cls", [cls for cls in LENSES.values() if cls.__dataclass_fields__], ids=lambda c: c.__name__)
@@ -448,6 +451,7 @@ COLMAP = [
     ("FULL_OPENCV", EXAMPLES["brown_conrady_8"][0], [0.5, 0.1, 1e-3, -5e-4, 0.01, 0.6, 0.2, 0.02], 55),
     ("OPENCV_FISHEYE", KannalaBrandt(0.01, -0.002, 3e-4, -4e-4), [0.01, -0.002, 3e-4, -4e-4], 85),
     ("FISHEYE", Equidistant(), [], 85),
+    ("THIN_PRISM_FISHEYE", EXAMPLES["thin_prism_fisheye"][0], [0.02, -0.01, 1e-3, -5e-4, 2e-3, -3e-4, 1e-3, -2e-3], 85),
     ("FOV", FieldOfView(0.93), [0.93], 85),
     ("EUCM", ExtendedUnified(0.6, 1.1), [0.6, 1.1], 85),
 ]

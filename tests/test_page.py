@@ -1,7 +1,6 @@
 """The page of a calibration: whole, offline, with the file's own numbers, whatever the shape of its images."""
 
 import re
-import time
 from itertools import combinations
 from pathlib import Path
 
@@ -41,11 +40,8 @@ def panels(picture):
 
 
 @pytest.mark.parametrize("intrinsics", ODD.values(), ids=ODD)
-def test_an_odd_image_gets_its_page_in_time(intrinsics):
-    page(calibration(Camera(Intrinsics(640, 480, 500, 500, 320, 240))))  # what the first page of a process loads
-    start = time.perf_counter()
+def test_an_odd_image_gets_its_page(intrinsics):
     text = page(calibration(Camera(intrinsics, BrownConrady(-0.1))))
-    assert time.perf_counter() - start < 5
     assert text.count("<svg xmlns") == 3
     assert not re.search(r'[ "(,](nan|inf)\b', re.sub("base64,[^\"']*", "", text))
 

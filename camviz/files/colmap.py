@@ -17,7 +17,15 @@ from camviz.files.models import Model, expressed, model_named
 from camviz.files.section import COUNT, LARGEST, LARGEST_SIDE, ROTATION_TOLERANCE, Section
 from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_text
 from camviz.files.trees import scalar, shown
-from camviz.lenses import BrownConrady, Equidistant, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
+from camviz.lenses import (
+    BrownConrady,
+    Equidistant,
+    ExtendedUnified,
+    FieldOfView,
+    KannalaBrandt,
+    Perspective,
+    ThinPrismFisheye,
+)
 
 FIRST_PIXEL = 0.5  # "the upper left corner is (0, 0), the centre of the first pixel (0.5, 0.5)"
 MAX_IMAGES = 100_000
@@ -33,13 +41,14 @@ MODELS = {  # by COLMAP's number for it, in COLMAP's order of parameters (colmap
     7: Model("FOV", FieldOfView, "fx fy cx cy omega"),
     8: Model("SIMPLE_RADIAL_FISHEYE", KannalaBrandt, "f cx cy k1"),
     9: Model("RADIAL_FISHEYE", KannalaBrandt, "f cx cy k1 k2"),
+    10: Model("THIN_PRISM_FISHEYE", ThinPrismFisheye, "fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1"),
     14: Model("SIMPLE_FISHEYE", Equidistant, "f cx cy"),
     15: Model("FISHEYE", Equidistant, "fx fy cx cy"),
     16: Model("EUCM", ExtendedUnified, "fx fy cx cy alpha beta"),
 }
 # What every COLMAP reads; the last three, of its newest releases, are written only where nothing else will do.
 WRITTEN = [model for number, model in MODELS.items() if number < 14] + [MODELS[16]]
-UNNAMED = {10: "THIN_PRISM_FISHEYE", 11: "RAD_TAN_THIN_PRISM_FISHEYE", 12: "SIMPLE_DIVISION", 13: "DIVISION"}
+UNNAMED = {11: "RAD_TAN_THIN_PRISM_FISHEYE", 12: "SIMPLE_DIVISION", 13: "DIVISION"}
 UNNAMED |= {17: "EQUIRECTANGULAR"}
 _CAMERA_LINE = re.compile(r"(?:[ \t]*(?:#[^\r\n]*)?\r?\n)*[ \t]*\d+[ \t]+[A-Z][A-Z0-9_]{2,40}[ \t]+\d+[ \t]+\d+[ \t]")
 _FILES = ("cameras.txt", "images.txt", "cameras.bin", "images.bin")

@@ -9,11 +9,24 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from camviz.files import basalt, colmap, euroc, kalibr, kitti, matlab, metashape, mrcal, opencv, ros, transforms
+from camviz.files import (
+    basalt,
+    colmap,
+    euroc,
+    kalibr,
+    kitti,
+    matlab,
+    matlab_binary,
+    metashape,
+    mrcal,
+    opencv,
+    ros,
+    transforms,
+)
 from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.literal import parse_literal
 from camviz.files.section import LARGEST_SIDE, Section
-from camviz.files.text import read_text
+from camviz.files.text import read_bytes, text_of
 from camviz.files.trees import parse, shown
 
 Reader = Callable[[Section, Path, tuple[int, int] | None], Calibration]
@@ -46,10 +59,13 @@ def load(path: str | PathLike[str], *, size: tuple[int, int] | None = None, mend
 def _loaded(path: Path, size: tuple[int, int] | None, mended: list[CalibrationError] | None) -> Calibration:
     if "\0" not in str(path) and (cameras := colmap.model_of(path)):
         return colmap.read(cameras, path, mended)
-    text = read_text(path)
+    content = read_bytes(path)
+    text = "" if matlab_binary.is_mat(content) else text_of(content, path)
     if colmap.is_cameras(text):
         return colmap.read(path, path, mended)
     try:
+        if not text:
+            return _plausible(matlab.read_binary(content, path, size, mended))
         return _plausible(_read(text, path, size, mended))
     except CalibrationError as error:
         raise CalibrationError(f"{path}: {error}", error.id, error.value) from error.__cause__

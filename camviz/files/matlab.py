@@ -1,4 +1,4 @@
-"""MATLAB's cameraParameters or cameraIntrinsics as jsonencode(toStruct(params)) writes them."""
+"""MATLAB's cameraParameters or cameraIntrinsics: toStruct(params), saved or written by jsonencode."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Calibration
+from camviz.files import matlab_binary
+from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.output import as_json, only_camera, refuse_own_world
 from camviz.files.section import BAD_K, Section, explained
 from camviz.files.sizes import agreed_size, pair_of_sides
+from camviz.files.trees import shown
 from camviz.lenses import BrownConrady
 
 FIRST_PIXEL = 1.0
@@ -20,6 +22,22 @@ RADIAL, TANGENTIAL = "RadialDistortion", "TangentialDistortion"
 
 def is_parameters(section: Section) -> bool:
     return RADIAL in section or "IntrinsicMatrix" in section or "FocalLength" in section
+
+
+def read_binary(
+    content: bytes, path: Path, size: tuple[int, int] | None, mended: list[CalibrationError] | None
+) -> Calibration:
+    """From a .mat file: the one variable that holds parameters, or the variables that are them."""
+    variables = matlab_binary.parse(content)
+    held = [Section(each, name, mended) for name, each in variables.items() if isinstance(each, dict)]
+    found = [section for section in [Section(variables, mended=mended), *held] if is_parameters(section)]
+    if len(found) != 1:
+        names = ", ".join(shown(name) for name in list(variables)[:6]) or "nothing"
+        raise CalibrationError(
+            f"expected one struct with {RADIAL}, IntrinsicMatrix or FocalLength, got {len(found)} among {names}; "
+            f"{matlab_binary.HOW}"
+        )
+    return read(found[0], path, size)
 
 
 def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:

@@ -25,15 +25,22 @@ _SIGNATURES = {
     b"\x1f\x8b": "a gzip archive",
     b"\x93NUMPY": "a NumPy array",
     b"\x89HDF": "an HDF5 file",
-    b"MATLAB 5.0": "a MATLAB file; in MATLAB, writelines(jsonencode(toStruct(params)), 'camera.json') makes one",
+    b"MATLAB 7.3": "a MATLAB file of version 7.3; in MATLAB, save('camera.mat', 's', '-v7') makes one that is read",
 }
 
 
 def read_text(path: Path) -> str:
     """The text of a calibration file; CalibrationError for anything that cannot be one."""
+    return text_of(read_bytes(path), path)
+
+
+def read_bytes(path: Path) -> bytes:
+    """The bytes of a file that is small enough to be a calibration; CalibrationError for anything else."""
     with open_bounded(path, MAX_BYTES) as file:
         content = file.read(MAX_BYTES + 1)
-    return _decoded(content, path)
+    if len(content) > MAX_BYTES:
+        raise CalibrationError(f"{path}: {_too_large(len(content), MAX_BYTES)}")
+    return content
 
 
 @contextmanager
@@ -66,9 +73,8 @@ def _too_large(size: int, most: int) -> str:
     return f"a calibration file has at most {most // 2**20} MB, this one has {size / 2**20:.0f} MB"
 
 
-def _decoded(content: bytes, path: Path) -> str:
-    if len(content) > MAX_BYTES:
-        raise CalibrationError(f"{path}: {_too_large(len(content), MAX_BYTES)}")
+def text_of(content: bytes, path: Path) -> str:
+    """The bytes of a file as text; CalibrationError where they are something else."""
     for signature, what in _SIGNATURES.items():
         if content.startswith(signature):
             raise CalibrationError(f"{path}: expected a calibration as text (YAML, XML, JSON), this is {what}")

@@ -7,11 +7,13 @@ from camviz.lenses.kannala_brandt import KannalaBrandt
 from camviz.lenses.panoramas import Cylindrical, Equirectangular
 from camviz.lenses.perspective import Perspective
 from camviz.lenses.spheres import DoubleSphere, ExtendedUnified, UnifiedSphere
+from camviz.lenses.thin_prism_fisheye import ThinPrismFisheye
 
 LENSES: dict[str, type[Lens]] = {
     "perspective": Perspective,
     "brown_conrady": BrownConrady,
     "kannala_brandt": KannalaBrandt,
+    "thin_prism_fisheye": ThinPrismFisheye,
     "equidistant": Equidistant,
     "equisolid": Equisolid,
     "orthographic": Orthographic,
@@ -39,5 +41,6 @@ __all__ = [
     "Orthographic",
     "Perspective",
     "Stereographic",
+    "ThinPrismFisheye",
     "UnifiedSphere",
 ]

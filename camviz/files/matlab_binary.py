@@ -1,0 +1,183 @@
+"""MATLAB's .mat files (level 5, which `save` writes unless told -v7.3) as a plain tree of dicts, lists and numbers.
+
+The layout is that of "MAT-File Format", MathWorks, chapter 1. The file comes from strangers: sizes are checked against
+the bytes that are there, what is compressed unfolds into a bounded buffer, and nothing is allocated on a file's word.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from camviz.files.calibration import CalibrationError
+from camviz.files.text import MAX_BYTES
+from camviz.files.trees import MAX_DEPTH, MAX_NODES
+
+SIGNATURE = b"MATLAB 5.0 MAT-file"
+HOW = "in MATLAB, s = toStruct(params); save('camera.mat', 's', '-v7') makes one that can be read"
+_HEADER = 128
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_ENCODINGS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
+_MATRIX, _COMPRESSED = 14, 15
+_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16, 17
+_LOGICAL = 0x200
+
+
+def is_mat(content: bytes) -> bool:
+    """True for the bytes of such a file."""
+    return content.startswith(SIGNATURE)
+
+
+def parse(content: bytes) -> dict[str, Any]:
+    """The variables of a .mat file by name; CalibrationError where it stops being one."""
+    if len(content) < _HEADER or content[126:128] not in (b"IM", b"MI"):
+        raise CalibrationError("expected a .mat file of level 5, its header is broken")
+    order = "<" if content[126:128] == b"IM" else ">"
+    reader = _Reader(order)
+    variables: dict[str, Any] = {}
+    for kind, data in reader.elements(content[_HEADER:]):
+        if kind == _COMPRESSED:
+            kind, data = next(reader.elements(_inflated(data)), (0, b""))
+        if kind == _MATRIX:
+            name, value = reader.variable(data)
+            variables[name] = value
+    return variables
+
+
+def _inflated(data: bytes) -> bytes:
+    """What is compressed, up to the bound that holds for every file."""
+    try:
+        unfolding = zlib.decompressobj()
+        unfolded = unfolding.decompress(data, MAX_BYTES + 1)
+    except zlib.error as error:
+        raise CalibrationError(f"a compressed variable is broken ({error})") from None
+    if len(unfolded) > MAX_BYTES:
+        raise CalibrationError(f"expected variables of at most {MAX_BYTES >> 20} MB, one unfolds to more")
+    return unfolded
+
+
+@dataclass
+class _Reader:
+    """Reads elements in the file's byte order, and counts what it makes of them."""
+
+    order: str
+    nodes: int = 0
+
+    def elements(self, data: bytes) -> Iterator[tuple[int, bytes]]:
+        """The data elements one after another: their type and bytes."""
+        at = 0
+        while at + 8 <= len(data):
+            word, size = struct.unpack_from(f"{self.order}II", data, at)
+            if word >> 16:  # small: type and size in one word, the data in the other
+                kind, size, start, end = word & 0xFFFF, word >> 16, at + 4, at + 8
+                if size > 4:
+                    raise CalibrationError(f"a small element announces {size} bytes, it has room for 4")
+            else:
+                kind, start = word, at + 8
+                end = start + size if kind == _COMPRESSED else start + size + (-size % 8)
+                if start + size > len(data):
+                    raise CalibrationError(f"an element announces {size:,} bytes, {len(data) - start:,} are left")
+            yield kind, data[start : start + size]
+            at = end
+
+    def variable(self, data: bytes, depth: int = 0) -> tuple[str, Any]:
+        """Name and value of one matrix element."""
+        self._count(1)
+        if depth > MAX_DEPTH:
+            raise CalibrationError(f"expected at most {MAX_DEPTH} levels of nesting")
+        if not data:
+            return "", []
+        parts = self.elements(data)
+        flags = self._integers(self._part(parts, "flags"), "u4")
+        if not flags:
+            raise CalibrationError("a variable lacks its class")
+        kind, logical = flags[0] & 0xFF, bool(flags[0] & _LOGICAL)
+        if kind in (_OBJECT, _FUNCTION, _OPAQUE):
+            raise CalibrationError(f"expected numbers and structs, a variable is a MATLAB object; {HOW}")
+        sides = self._integers(self._part(parts, "dimensions"), "i4")
+        name = self._part(parts, "name")[1].decode("latin-1")
+        return name, self._value(kind, logical, sides, parts, depth)
+
+    def _value(self, kind: int, logical: bool, sides: list[int], parts: Iterator[tuple[int, bytes]], depth: int) -> Any:
+        if len(sides) < 2 or min(sides) < 0:
+            raise CalibrationError(f"expected two or more dimensions, got {sides[:4]}")
+        if kind == _STRUCT:
+            return self._struct(prod(sides), parts, depth)
+        if kind == _CELL:
+            return [self._inner(parts, depth) for _ in self._counted(prod(sides))]
+        if kind == _CHAR:
+            return self._words(self._part(parts, "text"))
+        if kind == _SPARSE or len(sides) > 2:
+            return None  # no part of a calibration that is read
+        return _listed(self._numbers(self._part(parts, "numbers"), sides), logical)
+
+    def _struct(self, count: int, parts: Iterator[tuple[int, bytes]], depth: int) -> Any:
+        (length,) = self._integers(self._part(parts, "length of names"), "i4")[:1] or [0]
+        names = self._part(parts, "names")[1]
+        if length <= 0:
+            raise CalibrationError("a struct's names have no length")
+        fields = [names[i : i + length].split(b"\0")[0].decode("latin-1") for i in range(0, len(names), length)]
+        made = [{field: self._inner(parts, depth) for field in fields} for _ in self._counted(count if fields else 0)]
+        return made[0] if count == 1 and made else made
+
+    def _inner(self, parts: Iterator[tuple[int, bytes]], depth: int) -> Any:
+        kind, data = self._part(parts, "value")
+        if kind != _MATRIX:
+            raise CalibrationError(f"expected a value, got an element of type {kind}")
+        return self.variable(data, depth + 1)[1]
+
+    def _numbers(self, part: tuple[int, bytes], sides: list[int]) -> np.ndarray:
+        values = self._array(part)
+        if values.size != prod(sides):
+            raise CalibrationError(f"expected {sides[0]} × {sides[1]} numbers, got {values.size}")
+        self._count(values.size)
+        return values.reshape(sides, order="F")
+
+    def _words(self, part: tuple[int, bytes]) -> str:
+        kind, data = part
+        if kind in _ENCODINGS:
+            encoding = _ENCODINGS[kind] + ("" if kind == 16 else "-le" if self.order == "<" else "-be")
+            return data.decode(encoding, errors="replace")
+        return "".join(chr(code) for code in self._array(part).tolist() if 0 <= code < 0x110000)
+
+    def _integers(self, part: tuple[int, bytes], expected: str) -> list[int]:
+        if _NUMBERS.get(part[0]) != expected:
+            raise CalibrationError(f"expected integers, got an element of type {part[0]}")
+        values: list[int] = self._array(part).tolist()
+        return values
+
+    def _array(self, part: tuple[int, bytes]) -> np.ndarray:
+        kind, data = part
+        if kind not in _NUMBERS:
+            raise CalibrationError(f"expected numbers, got an element of type {kind}")
+        dtype = np.dtype(self.order + _NUMBERS[kind])
+        return np.frombuffer(data[: len(data) // dtype.itemsize * dtype.itemsize], dtype)
+
+    def _part(self, parts: Iterator[tuple[int, bytes]], what: str) -> tuple[int, bytes]:
+        part = next(parts, None)
+        if part is None:
+            raise CalibrationError(f"a variable ends before its {what}")
+        return part
+
+    def _counted(self, count: int) -> range:
+        self._count(count)
+        return range(count)
+
+    def _count(self, more: int) -> None:
+        self.nodes += more
+        if self.nodes > MAX_NODES:
+            raise CalibrationError(f"expected at most {MAX_NODES:,} values")
+
+
+def _listed(values: np.ndarray, logical: bool) -> Any:
+    """As MATLAB's jsonencode writes a matrix: rows of a matrix, a flat list for a row or column, a bare scalar."""
+    listed = values.astype(bool) if logical else values
+    if values.size == 1:
+        return listed.ravel()[0].item()
+    return listed.ravel().tolist() if 1 in values.shape else listed.tolist()
