@@ -150,19 +150,24 @@ def autofocus_drift(rng: Rng, strength: float) -> Case:
 def rolling_shutter(rng: Rng, strength: float) -> Case:
     """A board that moves by so many pixels, sideways and turning, from the first row of the image to the last."""
     set_up = single(rng)
+    corners = read_by_rows(rng, set_up, strength)
+    return Case(set_up.solved((corners + rng.normal(0, set_up.noise, corners.shape),)))
+
+
+def read_by_rows(rng: Rng, set_up: SetUp, strength: float) -> Array:
+    """The corners (views, corners, 2) of such boards: each seen when its row is read, half a frame early or late."""
     camera, points = set_up.camera, set_up.board.corners
-    corners = set_up.corners[0].copy()
+    corners: Array = set_up.corners[0].copy()
     for view, pose in enumerate(set_up.cam_from_board):
         depth = pose.apply(points)[:, 2].mean()
-        drift = rng.normal(size=3) * [1, 1, 0.3]
+        drift, spin = rng.normal(size=3) * [1, 1, 0.3], rng.normal(size=3)
         drift *= strength * depth / camera.intrinsics.fx / np.linalg.norm(drift)
-        spin = rng.normal(size=3)
         spin *= strength / camera.intrinsics.fx / np.linalg.norm(spin) * 2
         for _ in range(3):
             late = corners[view, :, 1] / camera.intrinsics.height - 0.5
             there = Rotation.from_rotvec(late[:, None] * spin).apply(pose.apply(points) - pose.translation)
             corners[view] = camera.project(there + pose.translation + late[:, None] * drift)
-    return Case(set_up.solved((corners + rng.normal(0, set_up.noise, corners.shape),)))
+    return corners
 
 
 def richer_lens(rng: Rng, strength: float) -> Case:

@@ -57,6 +57,7 @@ ILLNESSES: Mapping[str, Illness] = {
     "boards in the middle": Illness("low-coverage", 1, "the boards stay inside {0:.0%} of the width and height"),
     "warped board": Illness("board-warp", 2, "the board is bent by {0:.2f} % of its length"),
     "autofocus drift": Illness("split-disagreement", 3, "the focal length grows by {0:.2f} % from first view to last"),
+    "rolling shutter": Illness("pose-absorbs-error", 30, "boards move by {0:.1f} px while a picture is read out"),
     "lens too rich": Illness(
         "model-too-simple", 30, "an r⁵ term of {0:.1f} px, at the corner, and a model with k1 only"
     ),
@@ -167,7 +168,9 @@ def experiment(fault: str, strength: float, noise: float, seed: int) -> Experime
     elif fault == "lens too rich":
         set_up, estimated = _richer(set_up, seed, amount, illness.gross), ("fx", "fy", "cx", "cy", "k1")
     rng = np.random.default_rng([seed, 1])
-    corners = set_up.corners[0] + noise * rng.normal(size=set_up.corners[0].shape)
+    moving = amount if fault == "rolling shutter" else 0.0
+    seen = injections.read_by_rows(np.random.default_rng([seed, 2]), set_up, moving) if moving else set_up.corners[0]
+    corners = seen + noise * rng.normal(size=seen.shape)
     if fault in _CHANGES:
         _CHANGES[fault](rng, corners, (BOARD.rows, BOARD.columns), amount)
     solved = _after(fault, amount, _solved(set_up, corners, estimated))
