@@ -13,12 +13,10 @@ from playwright.sync_api import Browser
 LESSONS = sorted(path.name for path in (ROOT / "lessons").glob("*.ipynb"))
 
 
-@pytest.hookimpl(tryfirst=True)  # before the groups are read
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_itemcollected(item: pytest.Item) -> None:
     """Workers share the lessons out among them, each lesson whole (`-n 2 --dist loadgroup`)."""
-    for item in items:
-        lesson = getattr(item, "callspec", None) and item.callspec.params.get("lesson")
-        item.add_marker(pytest.mark.xdist_group(lesson or item.path.stem))
+    lesson = getattr(item, "callspec", None) and item.callspec.params.get("lesson")
+    item.add_marker(pytest.mark.xdist_group(lesson or item.path.stem))
 
 
 @pytest.fixture(scope="session")
