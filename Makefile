@@ -13,7 +13,7 @@ lint:
 	$(BIN)/codespell
 
 browser:
-	$(BIN)/python -m pytest -m browser -n 2 --dist loadgroup tests/browser
+	$(BIN)/python -m pytest -m browser -n 2 tests/browser
 
 bench:
 	$(BIN)/python benchmarks/kernel.py

@@ -5,18 +5,26 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from laboratory import ROOT, Notebook, chromium, jupyterlab
 from playwright.sync_api import Browser
+from xdist.scheduler.loadscope import LoadScopeScheduling
 
 LESSONS = sorted(path.name for path in (ROOT / "lessons").glob("*.ipynb"))
 
 
-def pytest_itemcollected(item: pytest.Item) -> None:
-    """Workers share the lessons out among them, each lesson whole (`-n 2 --dist loadgroup`)."""
-    lesson = getattr(item, "callspec", None) and item.callspec.params.get("lesson")
-    item.add_marker(pytest.mark.xdist_group(lesson or item.path.stem))
+class ByLesson(LoadScopeScheduling):
+    """Workers share the lessons out among them, each lesson whole: it is opened and run once."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        lesson = re.search(r"\w+\.ipynb", nodeid)
+        return lesson[0] if lesson else super()._split_scope(nodeid)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByLesson:
+    return ByLesson(config, log)
 
 
 @pytest.fixture(scope="session")
