@@ -133,5 +133,5 @@ TELEPHOTO = Prescription(
         (-98.4, 0.0, 1.0),
     ),
 )
-"""United States patent 4,113,357, example 1 (Nikon, 600 mm f/5.6, internal focusing); its indices to three decimals, and so
-focal lengths to one per cent."""
+"""United States patent 4,113,357, example 1 (Nikon, 600 mm f/5.6, internal focusing); its indices to three decimals,
+and so focal lengths to one per cent."""
