@@ -6,18 +6,17 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import optics
-from camviz.scenes import Scene, Sphere, Texture, aperture, parallax, render, textured_scene, to_display
+from camviz.scenes import Rectangle, Scene, Texture, aperture, parallax, render, textured_scene, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera, spiral
 
 BLACK, WHITE = Texture.plain((0, 0, 0)), Texture.plain((1, 1, 1))
 PLACE = RigidTransform.from_translation([0.5, 0.5, 1.0])  # in the garden, 2.3 m from the globe
 
 
-def point_of_light(camera, depth_m, radius_px, offset=(0.0, 0.0)):
-    """A white ball that looks `radius_px` large, on a black sky."""
-    fx = camera.camera.intrinsics.fx
-    centre = np.array([*offset, depth_m])
-    return Scene([Sphere(centre, radius_px * depth_m / fx, WHITE)], BLACK)
+def point_of_light(camera, depth_m, radius_px):
+    """A white square on the axis that looks 2 `radius_px` wide, under a black sky: flat, so that it has one depth."""
+    half = radius_px * depth_m / camera.camera.intrinsics.fx
+    return Scene([Rectangle([-half, -half, depth_m], [2 * half, 0, 0], [0, 2 * half, 0], WHITE)], BLACK)
 
 
 def spread(picture):
