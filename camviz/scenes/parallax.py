@@ -160,7 +160,17 @@ def _touch(one: Surface, other: Surface) -> bool:
 
 
 def _surrounds(thing: Scene, camera: Camera) -> bool:
-    return any(np.linalg.norm(centre - camera.centre) <= r for centre, r, _ in (one.ball() for one in thing.surfaces))
+    centres, radii, _ = _extent(thing)
+    return bool((np.linalg.norm(centres - camera.centre, axis=1) <= radii).any())
+
+
+@lru_cache(maxsize=256)
+def _extent(thing: Scene) -> tuple[Array, Array, Array]:
+    """Centres (n, 3) and radii (n,) of the balls around its surfaces, and points (m, 3) a little outside its outline."""
+    balls = [(one.ball(), one) for one in thing.surfaces]
+    outside = [centre + _ROOM * (line - centre) for (centre, _, _), one in balls for line in one.outline()]
+    centres, radii = (np.array([ball[i] for ball, _ in balls]) for i in (0, 1))
+    return centres, radii, np.concatenate(outside) if outside else np.empty((0, 3))
 
 
 def _frame(camera: Camera, margin: int) -> Box:
@@ -171,8 +181,7 @@ def _frame(camera: Camera, margin: int) -> Box:
 def _box(thing: Scene, camera: Camera, frame: Box) -> Box:
     """left, top, right, bottom in whole pixels around a thing, and inside the frame."""
     left, top, right, bottom = frame
-    outlines = [(one.ball()[0], line) for one in thing.surfaces for line in one.outline()]
-    uv = camera.project(np.concatenate([centre + _ROOM * (line - centre) for centre, line in outlines]))
+    uv = camera.project(_extent(thing)[2])
     if not np.isfinite(uv).all():
         return left, top, right, bottom
     (u0, v0), (u1, v1) = np.floor(uv.min(axis=0)).astype(int) - 2, np.ceil(uv.max(axis=0)).astype(int) + 3
