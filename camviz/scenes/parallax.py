@@ -166,7 +166,7 @@ def _surrounds(thing: Scene, camera: Camera) -> bool:
 
 @lru_cache(maxsize=256)
 def _extent(thing: Scene) -> tuple[Array, Array, Array]:
-    """Centres (n, 3) and radii (n,) of the balls around its surfaces, and points (m, 3) a little outside its outline."""
+    """Centres (n, 3) and radii (n,) of balls around its surfaces, and points (m, 3) a little outside its outline."""
     balls = [(one.ball(), one) for one in thing.surfaces]
     outside = [centre + _ROOM * (line - centre) for (centre, _, _), one in balls for line in one.outline()]
     centres, radii = (np.array([ball[i] for ball, _ in balls]) for i in (0, 1))

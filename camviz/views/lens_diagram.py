@@ -67,7 +67,7 @@ def _central_ray(panel: Panel, tip: Array, image: Array) -> str:
 def _cones(panel: Panel, lens: ThinLensCamera, object_mm: float, tip: Array, image: Array) -> str:
     """All the light from the object's foot and from its tip: cones as wide as the aperture, and then to a point."""
     half, foot = lens.aperture_mm / 2, before_lens(object_mm, 0.0)
-    shade = svg.polygon(panel.place([foot, (0, half), (image[0], 0), (0, -half)]), "wash fill-blue")
+    shade = svg.polygon(panel.place(np.array([foot, (0, half), (image[0], 0), (0, -half)])), "wash fill-blue")
     edges = ""
     for start, end, class_ in ((foot, image * (1, 0), "blue thin"), (tip, image, "orange thin")):
         rims = [np.array([0.0, side * half]) for side in (1, -1)]
@@ -121,25 +121,28 @@ def _arrow(panel: Panel, foot: Array, tip: Array, class_: str) -> str:
 
 def loupe(panel: Panel, lens: ThinLensCamera, depths: list[tuple[float, str, str]]) -> str:
     """The ends of the cones from points of the axis, each (depth in mm, class, name), and the sensor that cuts them."""
-    parts = ""
-    for i, (depth, class_, name) in enumerate(depths):
-        v = float(optics.image_distance_mm(lens.focal_mm, depth))
-        ends = [[(z, side * cone_height(lens, depth, z)) for z in (panel.left, panel.right)] for side in (1, -1)]
-        parts += svg.polygon(
-            panel.place([*ends[0], *ends[1][::-1]])
-            if v < panel.left
-            else panel.place([ends[0][0], (v, 0), ends[1][0]]),
-            f"wash fill-{class_}",
-        )
-        parts += svg.path([panel.place(end) for end in ends], class_)
-        at = np.clip(panel.place((v, 0))[0], 30, panel.width - 30), (18, panel.height - 10)[i % 2]
-        parts += svg.text(at, name, f"{class_} halo middle")
-        blur = abs(cone_height(lens, depth, lens.image_mm))
-        cut = panel.place([(lens.image_mm, blur), (lens.image_mm, -blur)])
-        parts += svg.line(cut, f"{class_} thick")
     middle = panel.place([(lens.image_mm, panel.top), (lens.image_mm, panel.bottom)])
     axis = panel.place([(panel.left, 0), (panel.right, 0)])
-    return svg.line(axis, "muted dashed thin") + svg.line(middle, "red") + parts
+    cones = "".join(_cone_end(panel, lens, depth, class_) for depth, class_, _ in depths)
+    names = ""
+    for (depth, class_, name), y in zip(depths, (18, panel.height - 10), strict=True):
+        v = float(optics.image_distance_mm(lens.focal_mm, depth))
+        names += _name(panel, np.array([panel.place((v, 0))[0], y]), name, class_)
+    return svg.line(axis, "muted dashed thin") + svg.line(middle, "red") + cones + names
+
+
+def _cone_end(panel: Panel, lens: ThinLensCamera, depth_mm: float, class_: str) -> str:
+    """Where the light of a point comes together and parts again, and how wide the sensor cuts it."""
+    v = float(optics.image_distance_mm(lens.focal_mm, depth_mm))
+    (left, right), at_sensor = (
+        [cone_height(lens, depth_mm, z) for z in (panel.left, panel.right)],
+        cone_height(lens, depth_mm, lens.image_mm),
+    )
+    edges = [[(panel.left, side * left), (panel.right, side * right)] for side in (1, -1)]
+    tip = [(v, 0.0)] if v > panel.left else [edges[1][1], edges[0][1]]
+    shade = svg.polygon(panel.place([edges[0][0], edges[1][0], *tip]), f"wash fill-{class_}")
+    cut = panel.place([(lens.image_mm, at_sensor), (lens.image_mm, -at_sensor)])
+    return shade + svg.path([panel.place(edge) for edge in edges], class_) + svg.line(cut, f"{class_} thick")
 
 
 def opening(panel: Panel, aperture: Aperture, points: Array, passes: Array) -> str:
