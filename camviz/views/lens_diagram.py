@@ -61,7 +61,7 @@ def rays(panel: Panel, lens: ThinLensCamera, object_mm: float) -> str:
 
 def _central_ray(panel: Panel, tip: Array, image: Array) -> str:
     """The ray through the middle of the lens, which alone is not bent, on to the edge of the panel."""
-    return svg.line(panel.place([tip, (0.0, 0.0), image * panel.right / image[0]]), "muted")
+    return svg.line(panel.place(np.array([tip, (0.0, 0.0), image * panel.right / image[0]])), "muted")
 
 
 def _cones(panel: Panel, lens: ThinLensCamera, object_mm: float, tip: Array, image: Array) -> str:
@@ -106,13 +106,13 @@ def _name(panel: Panel, at: Array, words: str, class_: str) -> str:
 
 
 def _focal_points(panel: Panel, f: float) -> str:
-    places = panel.place([before_lens(f, 0.0), (f, 0.0)])
+    places = panel.place(np.array([before_lens(f, 0.0), (f, 0.0)]))
     names = (svg.text(p + (-9, 19), name, "green halo end") for p, name in zip(places, ("F", "F'"), strict=True))
     return svg.dots(places, "green", 8) + "".join(names)
 
 
 def _arrow(panel: Panel, foot: Array, tip: Array, class_: str) -> str:
-    a, b = panel.place([foot, tip])
+    a, b = panel.place(np.array([foot, tip]))
     head = min(7.0, abs(b[1] - a[1]) / 2)
     back = np.sign(a[1] - b[1]) * head
     barbs = [b + (-0.5 * head, back), b, b + (0.5 * head, back)]
