@@ -8,6 +8,7 @@ from camviz import optics
 from camviz.scenes import aperture, to_display
 from camviz.views import lens_diagram
 from camviz.views.depth_of_field import DRAFT, GLOBE_M, DepthOfFieldView, _garden
+from camviz.views.lens_elements import LensElementsView
 
 ENDS = [
     (name, value)
@@ -140,3 +141,23 @@ def test_dragging_moves_object_sensor_and_focus():
 def test_a_state_that_makes_no_sense_is_refused_by_name(bad, word):
     with pytest.raises(ValueError, match=word):
         DepthOfFieldView(**bad)
+
+
+@pytest.mark.parametrize("lens", ["triplet", "telephoto"])
+def test_a_lens_cut_open_sends_its_rays_where_a_thin_lens_between_its_planes_would(lens):
+    view = LensElementsView(lens=lens, image_mm=8.0)
+    end = view.prescription.length_mm + view.prescription.back_focal_mm
+    z, y = view.prescription.trace(view.heights_mm, 8.0 / view.prescription.focal_mm)
+    np.testing.assert_allclose(y[-1], 8.0)
+    assert z[-1] == pytest.approx(end)
+    for ray in np.stack([np.broadcast_to(z[:, None], y.shape), y], axis=-1).swapaxes(0, 1):
+        at_first = ray[0, 1] + 8.0 / view.prescription.focal_mm * view.prescription.front_principal_mm
+        assert view._bent(ray) == pytest.approx(at_first)
+
+
+@pytest.mark.parametrize(("name", "value"), [("lens", "telephoto"), ("opening", 0.1), ("image_mm", 15.0)])
+def test_every_control_of_the_lens_cut_open_changes_it(name, value):
+    assert LensElementsView(**{name: value}).figure().body != LensElementsView().figure().body
+    assert "50.0 mm" in LensElementsView().description()
+    with pytest.raises(ValueError, match="opening"):
+        LensElementsView(opening=0)
