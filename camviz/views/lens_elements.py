@@ -25,8 +25,8 @@ class LensElementsView(View):
     """A published lens and parallel light through it, which meets `image_mm` from the axis.
 
     `opening` is the share of the full aperture that the rays fill. They are traced by matrices, as if all angles were
-    small; the dashed lines are where one thin lens would send them, its front at the first principal plane H, its back at
-    the second one H'.
+    small; the dashed lines are where one thin lens would send them, its front at the first principal plane H and its
+    back at the second one, H'.
     """
 
     title: ClassVar[str] = "Behind the thin lens"
