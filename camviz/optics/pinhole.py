@@ -123,6 +123,6 @@ def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: Arra
     return 100 * np.asarray(exposure_s) * (16 / f_number(diameter_mm, focal_mm)) ** 2
 
 
-def field_of_view_deg(width_mm: ArrayLike, focal_mm: ArrayLike) -> Any:
-    """2 atan(width / 2f): the angle a wall of that width sees through a hole at distance f."""
-    return np.degrees(2 * np.arctan2(np.asarray(width_mm), 2 * np.asarray(focal_mm)))
+def field_of_view_deg(width_mm: ArrayLike, distance_mm: ArrayLike) -> Any:
+    """2 atan(width / 2v): the angle a wall or sensor of that width sees through a hole or thin lens at distance v."""
+    return np.degrees(2 * np.arctan2(np.asarray(width_mm), 2 * np.asarray(distance_mm)))

@@ -1,0 +1,306 @@
+"""The depth-of-field visualizer: a lens and its rays, the photograph those rays make, and how sharp it can be where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from camviz import optics
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.plot import Ticks, axes, band, curve, logarithmic, plot_panel, upright
+from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, to_display
+from camviz.scenes.aperture import Aperture, ThinLensCamera
+from camviz.views import lens_diagram
+from camviz.views.base import View, choice, slider, switch
+
+SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
+DRAFT, FINE = 64, 256  # points of the lens
+GLOBE_Z = 3.3  # of the globe in the world, towards which the camera looks along +z
+STAND = (0.58, 0.45)  # x and y of the camera
+GLOBE_M = 0.54  # the globe's diameter
+LIGHT_N = 4.0  # the f-number for which a fixed exposure is right
+_DEPTHS, _BLURS = (0.5, 40.0), (0.002, 20.0)  # the plot's range: m and mm
+_SHAPES = {"disc": ("disc", 6), "hexagon": ("polygon", 6), "ring": ("ring", 6), "heart": ("heart", 6)}
+
+
+@dataclass(frozen=True)
+class DepthOfFieldView(View):
+    """A thin lens of `focal_mm` at `f_number`, focused at `focus_m`, `distance_m` before a globe in the garden.
+
+    When the focal length changes, `hold` says what stays: the f-number, the diameter of the aperture, or the framing,
+    for which the camera steps back or forth until the globe is as large as before, and the focus with it. The picture
+    is traced through the aperture's shape, of which a half may be covered. `match_exposure` exposes for as long as the
+    f-number needs; otherwise as f/4 needs. A covered half is never made up for.
+    """
+
+    title: ClassVar[str] = "Lens and depth of field"
+
+    focal_mm: float = slider(50.0, 20.0, 100.0, 1.0, label="focal length f", unit="mm")
+    f_number: float = slider(2.0, 1.4, 22.0, 0.1, label="f-number N", help="focal length / diameter of the aperture")
+    focus_m: float = slider(2.3, 0.8, 10.0, 0.05, label="focus s", unit="m", help="the distance that is sharp")
+    distance_m: float = slider(2.3, 1.0, 6.0, 0.05, label="distance Z", unit="m", help="from the lens to the globe")
+    sensor: str = choice("full frame", *list(SENSORS)[1:], label="sensor", help="36, 23.5 or 17.3 mm wide")
+    hold: str = choice("f-number", "diameter", "framing", label="hold fixed", help="while the focal length changes")
+    aperture: str = choice("disc", "hexagon", "ring", "heart", label="aperture", help="the shape of the stop")
+    covered: str = choice("nothing", "left half", "upper half", label="cover", help="black card before the lens")
+    match_exposure: bool = switch(True, label="match exposure", help="expose as long as the f-number needs")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("focal_mm", "f_number", "focus_m", "distance_m"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        if not 1000 * min(self.focus_m, self.distance_m) > self.focal_mm:
+            raise ValueError(f"focus_m and distance_m must lie beyond the focal length, got {self.focus_m} m")
+
+    def but(self, **changes: Any) -> Self:
+        """The same view with some fields changed, and what `hold` makes of a change of focal length or sensor."""
+        changed = super().but(**changes)
+        if self.hold == "diameter" and "f_number" not in changes:
+            number = float(np.clip(changed.focal_mm / self.lens.aperture_mm, *self._range("f_number")))
+            return replace(changed, f_number=number)
+        return self._stepped(changed) if self.hold == "framing" and "distance_m" not in changes else changed
+
+    def _stepped(self, changed: Self) -> Self:
+        """m / sensor stays: m = f / (Z - f), so Z = f (1 + 1/m). The focus moves with the camera."""
+        zoom = SENSORS[changed.sensor] / SENSORS[self.sensor]
+        m = float(optics.magnification(self.focal_mm, 1000 * self.distance_m)) * zoom
+        if zoom == 1 and changed.focal_mm == self.focal_mm:
+            return changed
+        distance = float(np.clip(changed.focal_mm * (1 + 1 / m) / 1000, *self._range("distance_m")))
+        focus = changed.focus_m + distance - self.distance_m
+        return replace(changed, distance_m=distance, focus_m=float(np.clip(focus, *self._range("focus_m"))))
+
+    @classmethod
+    def _range(cls, name: str) -> tuple[float, float]:
+        control = cls.controls()[name]
+        return float(control.low or 0), float(control.high or 0)
+
+    # What is true ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def lens(self) -> ThinLensCamera:
+        """The camera that takes the picture."""
+        shape, blades = _SHAPES[self.aperture]
+        pose = RigidTransform.from_translation([*STAND, GLOBE_Z - self.distance_m])
+        stop = Aperture(shape, blades, self.covered)  # type: ignore[arg-type]
+        sensor = SENSORS[self.sensor]
+        return ThinLensCamera(320, 240, sensor, self.focal_mm, self.f_number, self.focus_m, stop, pose)
+
+    @property
+    def circle_mm(self) -> float:
+        """The largest disc that passes for a point: 1/1500 of the sensor's diagonal, 0.03 mm for full frame."""
+        return self.lens.sensor_mm * 1.25 / 1500
+
+    @property
+    def limits_m(self) -> tuple[float, float]:
+        """Nearest and farthest distance that is blurred by no more than that."""
+        args = (self.focal_mm, self.f_number, 1000 * self.focus_m, self.circle_mm)
+        return float(optics.near_limit_mm(*args)) / 1000, float(optics.far_limit_mm(*args)) / 1000
+
+    def blur_mm(self, depth_m: np.ndarray | float) -> np.ndarray:
+        """Diameter (...) of the disc that a point at depth (...) makes on the sensor."""
+        depth_mm = 1000 * np.asarray(depth_m)
+        return optics.circle_of_confusion_mm(self.focal_mm, self.f_number, 1000 * self.focus_m, depth_mm)
+
+    @cached_property
+    def open_share(self) -> float:
+        """The share of the lens's area that is open."""
+        return float(self.lens.points(4096)[1].mean())
+
+    @property
+    def brightness(self) -> float:
+        """Exposure of the sensor, 1 being correct: open area over image distance squared, ∝ share / (N (1 + m))²."""
+        m = float(optics.magnification(self.focal_mm, 1000 * self.focus_m))
+        fixed = (LIGHT_N / float(optics.working_f_number(self.f_number, m))) ** 2
+        return self.open_share * (1.0 if self.match_exposure else fixed)
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        near, far = self.limits_m
+        field_ = optics.field_of_view_deg(self.lens.sensor_mm, self.lens.image_mm)
+        m = float(optics.magnification(self.focal_mm, 1000 * self.distance_m))
+        blur = float(self.blur_mm(self.distance_m))
+        hyperfocal = float(optics.hyperfocal_mm(self.focal_mm, self.f_number, self.circle_mm)) / 1000
+        return {
+            "aperture": f"{self.focal_mm:g} mm / {self.f_number:.3g} = {self.lens.aperture_mm:.1f} mm",
+            "sensor at v": f"{self.lens.image_mm:.2f} mm behind the lens",
+            "field of view": f"{field_:.1f}° across",
+            "globe on the sensor": f"{1000 * GLOBE_M * m:.1f} mm, m = 1 : {1 / m:.0f}",
+            "blur of the globe": f"{1000 * blur:.0f} µm = {blur * 320 / self.lens.sensor_mm:.1f} px",
+            "depth of field": f"{_range_m(near, far)}",
+            "hyperfocal distance": f"{hyperfocal:.2f} m",
+            "Airy disc": f"{2 * float(optics.airy_radius_um(self.f_number)):.1f} µm across",
+            "light": f"{_percent(self.brightness)} of a correct exposure",
+        }
+
+    def equation(self) -> str:
+        """The lens equation, with this state's numbers."""
+        return f"1/{self.focal_mm:g} = 1/{1000 * self.focus_m:.0f} + 1/{self.lens.image_mm:.2f}"
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        return (
+            f"A lens of {self.focal_mm:g} mm at f/{self.f_number:.3g}, focused at {self.focus_m:.2f} m, "
+            f"{self.distance_m:.2f} m from the globe, {self.sensor} sensor, aperture {self.aperture}, "
+            f"covered: {self.covered}. {figures}."
+        )
+
+    def image(self, samples: int = FINE) -> np.ndarray:
+        """The photograph, upright, as sRGB bytes (240, 320, 3)."""
+        light = parallax.photograph(_garden(), self.lens, samples)
+        return to_display(light * np.float32(self.brightness / self.open_share))
+
+    # What it looks like ----------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        body = "".join(
+            [
+                svg.rectangle(0, 0, 960, 636, "paper"),
+                self._ray_panel(),
+                self._loupe_panel(),
+                self._aperture_panel(),
+                self._photograph_panel(),
+                self._blur_panel(),
+                self._numbers(),
+            ]
+        )
+        photographs = {"lens": jpeg(self.image(DRAFT if draft else FINE))}
+        return Picture(body, 960, 636, self.title, self.description(), photographs)
+
+    @cached_property
+    def _rays(self) -> Panel:
+        return lens_diagram.diagram_panel(20, 34, 560, 196)
+
+    def _ray_panel(self) -> str:
+        content = lens_diagram.rays(self._rays, self.lens, 1000 * self.distance_m)
+        label = "Rays through the lens; drag or press the arrow keys to move the object"
+        hint = "left edge: infinity · drag to move the object"
+        return self._rays.show(
+            content, title="Thin lens, to scale behind the lens", hint=hint, drag="object", label=label
+        )
+
+    @cached_property
+    def _loupe(self) -> Panel:
+        return lens_diagram.loupe_panel(20, 268, 386, 140, self.lens.image_mm)
+
+    def _loupe_panel(self) -> str:
+        depths = [(1000 * self.distance_m, "blue", "globe"), (np.inf, "orange", "far away")]
+        content = lens_diagram.loupe(self._loupe, self.lens, depths)
+        label = "Around the sensor, enlarged; drag or press the arrow keys to move the sensor"
+        return self._loupe.show(
+            content, title="At the sensor", note="10 mm wide, 2.5 mm tall", drag="sensor", label=label
+        )
+
+    def _aperture_panel(self) -> str:
+        panel = Panel("aperture", 440, 268, 140, 140, -1.1, 1.1, -1.1, 1.1)
+        points, passes = self.lens.points(DRAFT)
+        content = lens_diagram.opening(panel, self.lens.aperture, points, passes)
+        return panel.show(content, title="Points of the lens")
+
+    def _photograph_panel(self) -> str:
+        panel = image_panel("lens", 600, 34, 340, 320, 240)
+        note = f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
+        return panel.show(photograph(panel, "lens", 320, 240), title="The photograph, traced", note=note)
+
+    @cached_property
+    def _plot(self) -> Panel:
+        return plot_panel("blur", 74, 446, 506, 140, _logs(_DEPTHS), _logs(_BLURS))
+
+    def _blur_panel(self) -> str:
+        panel, (near, far) = self._plot, self.limits_m
+        around = 1 + np.outer((-1, 1), np.geomspace(1e-4, 0.1, 9)).ravel()  # the curve comes down steeply to the focus
+        depth = np.sort(np.concatenate([np.geomspace(*_DEPTHS, 161), self.focus_m * around]))
+        blur = np.maximum(self.blur_mm(depth), 1e-6)
+        airy = 2e-3 * float(optics.airy_radius_um(self.f_number))
+        far_x = min(np.log10(far), panel.right)
+        level = [[(panel.left, np.log10(y)), (panel.right, np.log10(y))] for y in (self.circle_mm, airy)]
+        here = panel.place(_logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), _BLURS[0]))))
+        xticks, yticks = logarithmic(*_logs(_DEPTHS)), _micrometres()
+        content = (
+            _grid(panel, xticks, yticks)
+            + band(panel, np.log10(near), far_x, "fill-green")
+            + svg.line(panel.place(level[0]), "green dashed")
+            + svg.line(panel.place(level[1]), "purple dashed thin")
+            + curve(panel, np.log10(depth), np.log10(blur), "blue thick")
+            + upright(panel, np.log10(self.focus_m), "red thin")
+            + svg.text(panel.place(level[0][0]) + (8, -5), f"allowed: c = {1000 * self.circle_mm:.0f} µm", "green halo")
+            + svg.text(panel.place(level[1][1]) + (-8, -5), "Airy disc", "purple halo end")
+            + svg.dots([here], "orange", 10)
+            + svg.text(here + (8, -8), "globe", "orange halo")
+        )
+        label = "Blur against distance; drag or press the arrow keys to change the focus"
+        shown = panel.show(content, title="Blur against distance", hint="drag to focus", drag="focus", label=label)
+        return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks) + shown
+
+    def _numbers(self) -> str:
+        rows = [svg.text((606, 326), "This lens", "title")]
+        for i, (name, value) in enumerate(self.numbers().items()):
+            rows.append(svg.text((606, 352 + 23 * i), name, "note"))
+            rows.append(svg.text((736, 352 + 23 * i), value, "label"))
+        rows.append(svg.text((606, 574), "lens equation, 1/f = 1/s + 1/v, in mm:", "note"))
+        rows.append(svg.text((606, 596), self.equation(), "label"))
+        return "".join(rows)
+
+    # What it does when touched ---------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        if handle == "object":
+            place = lens_diagram.before_lens(1000 * self.distance_m, 0.0)[0] + dx / self._rays.scale[0]
+            share = float(np.clip(-place / lens_diagram.HORIZON_MM, 0.01, 0.99))
+            return self._moved("distance_m", lens_diagram.HORIZON_MM * share / (1 - share) / 1000)
+        if handle == "sensor":
+            v = max(self.lens.image_mm + dx / self._loupe.scale[0], self.focal_mm * 1.0001)
+            return self._moved("focus_m", float(optics.object_distance_mm(self.focal_mm, v)) / 1000)
+        return self._moved("focus_m", float(10 ** (np.log10(self.focus_m) + dx / self._plot.scale[0])))
+
+    def _moved(self, name: str, value: float) -> Self:
+        return self.but(**{name: float(np.clip(value, *self._range(name)))})
+
+    def pressed(self, handle: str, key: str) -> Self:
+        step = {"ArrowLeft": -1, "ArrowDown": -1, "-": -1, "ArrowRight": 1, "ArrowUp": 1, "+": 1}.get(key, 0)
+        if handle == "object":  # to the right is nearer
+            return self._moved("distance_m", self.distance_m * 1.05**-step)
+        return self._moved("focus_m", self.focus_m * 1.05 ** (-step if handle == "sensor" else step))
+
+
+@lru_cache(maxsize=1)
+def _garden() -> Scene:
+    """The garden with a garland of lamps before its wall: points of light, which show the aperture's shape."""
+    garden, glow, side = textured_scene(), Texture.plain((1.0, 0.9, 0.72)), 0.036
+    lights = [
+        Rectangle(np.array([x, y, 6.3]), np.array([side, 0, 0]), np.array([0, side, 0]), glow, shade=20, name="garland")
+        for x, y in zip(np.linspace(-1.5, 0.94, 6), [-0.62, -0.72, -0.86, -0.74, -0.7, -0.84], strict=True)
+    ]
+    return Scene([*lights, *garden.surfaces], garden.sky)
+
+
+def _logs(pair: tuple[float, float]) -> tuple[float, float]:
+    low, high = np.log10(pair)
+    return float(low), float(high)
+
+
+def _grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:
+    lines = [[(x, panel.bottom), (x, panel.top)] for x, _ in xticks]
+    lines += [[(panel.left, y), (panel.right, y)] for y, _ in yticks]
+    return svg.path([panel.place(line) for line in lines], "grid")
+
+
+def _micrometres() -> list[tuple[float, str]]:
+    return [(float(np.log10(um / 1000)), f"{um:g}") for um in (10, 100, 1000, 10_000)]
+
+
+def _range_m(near: float, far: float) -> str:
+    digits = 2 if far - near > 0.1 else 3
+    return f"{near:.{digits}f} m to " + ("infinity" if np.isinf(far) else f"{far:.{digits}f} m")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.1f} %"

@@ -1,0 +1,163 @@
+"""The depth-of-field visualizer shows what the lens does, and its controls do what they are named for."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz import optics
+from camviz.scenes import aperture, to_display
+from camviz.views import lens_diagram
+from camviz.views.depth_of_field import DRAFT, GLOBE_M, DepthOfFieldView, _garden
+from camviz.views.lens_elements import LensElementsView
+
+ENDS = [
+    (name, value)
+    for name, control in DepthOfFieldView.controls().items()
+    for value in (control.choices or ((control.low, control.high) if control.low is not None else (True, False)))
+]
+
+
+@pytest.mark.parametrize(("name", "value"), ENDS)
+def test_every_end_of_every_control_draws_and_changes_what_is_seen(name, value):
+    view = DepthOfFieldView(f_number=2.5, focus_m=3.0)
+    if name == "hold":  # changes nothing by itself: it says what a change of focal length does
+        view, value, name = view.but(hold=value), 90.0, "focal_mm"
+    if getattr(view, name) == value:
+        return
+    first, other = view.figure(draft=True), view.but(**{name: value}).figure(draft=True)
+    assert other.body != first.body or other.photographs != first.photographs
+    assert "nan" not in other.body.lower().replace("nance", "")
+
+
+def test_its_numbers_are_those_of_the_optics():
+    view = DepthOfFieldView(focal_mm=50, f_number=8, focus_m=5.23333)
+    numbers = view.numbers()
+    assert view.circle_mm == pytest.approx(0.03)
+    assert view.limits_m == pytest.approx((3.49448, 10.41667), abs=2e-5)
+    assert numbers["depth of field"].startswith("3.49 m to 10.42 m")
+    assert numbers["hyperfocal distance"] == "10.47 m"
+    assert numbers["Airy disc"] == "10.7 µm across"
+    assert DepthOfFieldView(focal_mm=50, focus_m=1.0).numbers()["sensor at v"].startswith("52.63 mm")
+    assert DepthOfFieldView(focal_mm=20, f_number=22, focus_m=10).numbers()["depth of field"].count("infinity") == 1
+
+
+def test_the_description_states_the_state():
+    words = DepthOfFieldView(focal_mm=85, f_number=2.8, focus_m=1.5, covered="left half").description()
+    for part in ("85 mm", "f/2.8", "focused at 1.50 m", "full frame", "covered: left half", "50 % of a correct"):
+        assert part in words
+
+
+def test_covering_half_the_lens_dims_the_picture_and_crops_nothing():
+    whole, half = (DepthOfFieldView(f_number=4, covered=c).image(128) for c in ("nothing", "upper half"))
+    linear = [aperture_light.astype(float) for aperture_light in (whole, half)]
+    assert half.mean() < 0.8 * whole.mean()
+    corners = np.s_[[0, 0, -1, -1], [0, -1, 0, -1]]
+    assert (linear[1][corners] > 0.5 * linear[0][corners]).all()  # sRGB bytes: half the light is 0.73 of the byte
+
+
+def test_the_globe_keeps_its_size_while_the_framing_is_held():
+    view = DepthOfFieldView(focal_mm=50, distance_m=2.3, hold="framing")
+    near, far = view.but(focal_mm=35), view.but(focal_mm=100)
+
+    def tall(one):
+        ends = [(0.68, 0.36 + side * GLOBE_M / 2, 3.3) for side in (-1, 1)]
+        return np.ptp(one.lens.camera.project(ends)[:, 1])
+
+    assert tall(near) == pytest.approx(tall(view), rel=5e-3)
+    assert tall(far) == pytest.approx(tall(view), rel=5e-3)
+    assert near.distance_m < view.distance_m < far.distance_m
+    assert far.focus_m == pytest.approx(far.distance_m)  # the focus went along
+    lamp = [[2.05, -0.7, 9.2]]
+    offsets = [
+        abs((one.lens.camera.project(lamp) - one.lens.camera.project([[0.68, 0.36, 3.3]]))[0, 0]) for one in (near, far)
+    ]
+    assert offsets[1] > 1.5 * offsets[0]  # what is behind it grew: the camera moved, and perspective with it
+    smaller = view.but(sensor="APS-C")
+    assert tall(smaller) == pytest.approx(tall(view), rel=5e-3)
+
+
+def test_with_the_camera_still_a_longer_lens_only_enlarges():
+    short, long = DepthOfFieldView(focal_mm=30), DepthOfFieldView(focal_mm=90)
+    points = np.array([[0.68, 0.36, 3.3], [1.42, 0.67, 4.7], [-0.07, -0.18, 6.47]])
+    middle = np.array([159.5, 119.5])
+    ratio = (long.lens.camera.project(points) - middle) / (short.lens.camera.project(points) - middle)
+    np.testing.assert_allclose(ratio, long.lens.image_mm / short.lens.image_mm, rtol=1e-9)
+
+
+def test_holding_the_diameter_changes_the_f_number_and_the_other_way_round():
+    view = DepthOfFieldView(focal_mm=50, f_number=2.0)
+    assert view.but(focal_mm=100).f_number == 2.0
+    held = view.but(hold="diameter").but(focal_mm=100)
+    assert held.f_number == pytest.approx(4.0)
+    assert held.lens.aperture_mm == pytest.approx(25.0)
+
+
+def test_a_fixed_exposure_dims_with_the_square_of_the_f_number():
+    fixed = DepthOfFieldView(match_exposure=False, focus_m=10.0)
+    assert fixed.but(f_number=4).brightness == pytest.approx(1, abs=0.02)
+    assert fixed.but(f_number=8).brightness / fixed.but(f_number=4).brightness == pytest.approx(0.25)
+    assert fixed.but(f_number=8, match_exposure=True).brightness == 1
+
+
+def test_the_photograph_is_the_one_that_traces_every_ray():
+    view = DepthOfFieldView(f_number=1.4, focus_m=1.5)
+    exact = to_display(aperture.photograph(_garden(), view.lens, DRAFT))
+    assert cv2.PSNR(view.image(DRAFT), exact) > 34
+
+
+def test_lines_stay_straight_where_the_drawing_runs_to_infinity():
+    """From a point 2 m away through a point 0.5 m away to the lens, in the drawing as in space."""
+    z = np.array([2000.0, 500.0, 0.0])
+    drawn = lens_diagram.before_lens(z, 300 + 0.1 * (2000 - z))
+    (a, b, c) = np.column_stack([drawn, np.ones(3)])
+    assert abs(np.linalg.det([a, b, c])) < 1e-6
+    np.testing.assert_allclose(lens_diagram.before_lens(np.inf, 7.0), [-lens_diagram.HORIZON_MM, 0])
+
+
+def test_a_cone_is_as_wide_at_the_sensor_as_the_blur():
+    view = DepthOfFieldView(focal_mm=85, f_number=2, focus_m=1.5, distance_m=3.0)
+    half = lens_diagram.cone_height(view.lens, 3000, view.lens.image_mm)
+    assert 2 * abs(half) == pytest.approx(float(view.blur_mm(3.0)))
+
+
+def test_dragging_moves_object_sensor_and_focus():
+    view = DepthOfFieldView()
+    assert view.dragged("object", 0, 0, 5, 0).distance_m < view.distance_m
+    assert view.dragged("sensor", 0, 0, 5, 0).focus_m < view.focus_m  # farther from the lens: focused nearer
+    assert view.dragged("focus", 0, 0, 30, 0).focus_m > view.focus_m
+    assert view.dragged("sensor", 0, 0, -999, 0).focus_m == 10
+    assert view.pressed("object", "ArrowRight").distance_m < view.distance_m
+    assert view.pressed("sensor", "ArrowRight").focus_m < view.focus_m
+    assert view.pressed("focus", "ArrowRight").focus_m > view.focus_m
+    v = view.lens.image_mm + 10 / view._loupe.scale[0]
+    assert view.dragged("sensor", 0, 0, 10, 0).lens.image_mm == pytest.approx(v)
+    assert optics.image_distance_mm(50, 1000 * view.dragged("sensor", 0, 0, 10, 0).focus_m) == pytest.approx(v)
+
+
+@pytest.mark.parametrize(("bad", "word"), [
+    ({"focal_mm": 0}, "focal_mm"), ({"f_number": -2}, "f_number"), ({"focus_m": 0.04}, "beyond the focal length"),
+    ({"sensor": "large"}, "sensor"), ({"aperture": "star"}, "aperture"), ({"match_exposure": 1}, "match_exposure"),
+])  # fmt: skip
+def test_a_state_that_makes_no_sense_is_refused_by_name(bad, word):
+    with pytest.raises(ValueError, match=word):
+        DepthOfFieldView(**bad)
+
+
+@pytest.mark.parametrize("lens", ["triplet", "telephoto"])
+def test_a_lens_cut_open_sends_its_rays_where_a_thin_lens_between_its_planes_would(lens):
+    view = LensElementsView(lens=lens, image_mm=8.0)
+    end = view.prescription.length_mm + view.prescription.back_focal_mm
+    z, y = view.prescription.trace(view.heights_mm, 8.0 / view.prescription.focal_mm)
+    np.testing.assert_allclose(y[-1], 8.0)
+    assert z[-1] == pytest.approx(end)
+    for ray in np.stack([np.broadcast_to(z[:, None], y.shape), y], axis=-1).swapaxes(0, 1):
+        at_first = ray[0, 1] + 8.0 / view.prescription.focal_mm * view.prescription.front_principal_mm
+        assert view._bent(ray) == pytest.approx(at_first)
+
+
+@pytest.mark.parametrize(("name", "value"), [("lens", "telephoto"), ("opening", 0.1), ("image_mm", 15.0)])
+def test_every_control_of_the_lens_cut_open_changes_it(name, value):
+    assert LensElementsView(**{name: value}).figure().body != LensElementsView().figure().body
+    assert "50.0 mm" in LensElementsView().description()
+    with pytest.raises(ValueError, match="opening"):
+        LensElementsView(opening=0)
