@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 
 import cv2
 import numpy as np
@@ -155,8 +156,8 @@ def _things(scene: Scene) -> tuple[Scene, ...]:
 
 
 def _touch(one: Surface, other: Surface) -> bool:
-    (a, r, _), (b, s, _) = one.ball(), other.ball()
-    return one.name == other.name and bool(np.linalg.norm(a - b) <= r + s)
+    pairs = product(one.balls(), other.balls()) if one.name == other.name else ()
+    return any(np.linalg.norm(a - b) <= r + s for (a, r, _), (b, s, _) in pairs)
 
 
 def _surrounds(thing: Scene, camera: Camera) -> bool:
@@ -167,9 +168,11 @@ def _surrounds(thing: Scene, camera: Camera) -> bool:
 @lru_cache(maxsize=256)
 def _extent(thing: Scene) -> tuple[Array, Array, Array]:
     """Centres (n, 3) and radii (n,) of balls around its surfaces, and points (m, 3) a little outside its outline."""
-    balls = [(one.ball(), one) for one in thing.surfaces]
-    outside = [centre + _ROOM * (line - centre) for (centre, _, _), one in balls for line in one.outline()]
-    centres, radii = (np.array([ball[i] for ball, _ in balls]) for i in (0, 1))
+    balls = [one.balls() for one in thing.surfaces]
+    middles = [np.mean([centre for centre, _, _ in those], axis=0) for those in balls]
+    lines = [(middle, line) for middle, one in zip(middles, thing.surfaces, strict=True) for line in one.outline()]
+    outside = [middle + _ROOM * (line - middle) for middle, line in lines]
+    centres, radii = (np.array([ball[i] for those in balls for ball in those]) for i in (0, 1))
     return centres, radii, np.concatenate(outside) if outside else np.empty((0, 3))
 
 
