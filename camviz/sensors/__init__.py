@@ -1,0 +1,35 @@
+"""Image sensors: what turns light into numbers, after EMVA Standard 1288, release 4.0 (linear)."""
+
+from camviz.sensors.counting import poisson
+from camviz.sensors.dark import band_gap_ev, dark_current_ratio, doubling_temperature_k
+from camviz.sensors.efficiency import EfficiencyCurve
+from camviz.sensors.fixed_pattern import FixedPattern
+from camviz.sensors.sensor import (
+    Exposure,
+    Sensor,
+    amplify,
+    convert,
+    decibel,
+    fill,
+    leak,
+    quantise,
+    read,
+)
+
+__all__ = [
+    "EfficiencyCurve",
+    "Exposure",
+    "FixedPattern",
+    "Sensor",
+    "amplify",
+    "band_gap_ev",
+    "convert",
+    "dark_current_ratio",
+    "decibel",
+    "doubling_temperature_k",
+    "fill",
+    "leak",
+    "poisson",
+    "quantise",
+    "read",
+]
