@@ -115,7 +115,7 @@ def row_times(height: int, row_s: float, exposure_s: float = 0.0) -> Array:
 
     A global shutter is the case row_s = 0.
     """
-    return exposure_s / 2 + row_s * np.arange(height)
+    return exposure_s / 2 + row_s * np.arange(height, dtype=np.float64)
 
 
 def rolling_rays(camera: Camera, poses: RigidTransform) -> tuple[Array, Array]:
