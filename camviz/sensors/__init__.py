@@ -2,6 +2,7 @@
 
 from camviz.sensors.counting import poisson
 from camviz.sensors.dark import band_gap_ev, dark_current_ratio, doubling_temperature_k
+from camviz.sensors.digital_camera import DigitalCamera, Shot
 from camviz.sensors.efficiency import EfficiencyCurve
 from camviz.sensors.fixed_pattern import FixedPattern
 from camviz.sensors.published import PUBLISHED, SHUTTERS, MeasuredShutter, PublishedSensor
@@ -32,12 +33,14 @@ __all__ = [
     "PUBLISHED",
     "SHUTTERS",
     "Brigade",
+    "DigitalCamera",
     "EfficiencyCurve",
     "Exposure",
     "FixedPattern",
     "MeasuredShutter",
     "PublishedSensor",
     "Sensor",
+    "Shot",
     "amplify",
     "band_gap_ev",
     "bloomed",
