@@ -41,6 +41,15 @@ def test_white_light_brings_the_photons_that_physics_counts():
     assert CAMERA.channels.electrons[3] == pytest.approx(0.6 * photons, rel=2e-3)
 
 
+def test_filters_let_through_their_published_response_to_photons():
+    """Of D65's photons the D5100's red lets s λ⁻¹ / max(s λ⁻¹) through: response to power, turned into one to photons."""
+    shape = colour.SpectralShape(380, 780, 5)
+    red = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"].copy().align(shape).values[:, 0] / shape.wavelengths
+    photons = colour.SDS_ILLUMINANTS["D65"].copy().align(shape).values * shape.wavelengths
+    share = photons @ (red / red.max()) / photons.sum()
+    assert CAMERA.channels.photons[RED] / CAMERA.channels.photons[3] == pytest.approx(share, rel=0.01)
+
+
 def test_illuminance_behind_the_lens_is_that_of_the_camera_equation():
     """A white wall under 1000 lx at f/4 through glass that passes 90 %: 1000 · .9 / 64 lx on the axis, cos⁴θ beside."""
     lux = CAMERA.take(grey(1.0), 1e-3, generator(0)).illuminance_lux
