@@ -42,7 +42,7 @@ def test_white_light_brings_the_photons_that_physics_counts():
 
 
 def test_filters_let_through_their_published_response_to_photons():
-    """Of D65's photons the D5100's red lets s λ⁻¹ / max(s λ⁻¹) through: response to power, turned into one to photons."""
+    """Of D65's photons the D5100's red lets s λ⁻¹ / max(s λ⁻¹) through: response to power, made one to photons."""
     shape = colour.SpectralShape(380, 780, 5)
     red = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"].copy().align(shape).values[:, 0] / shape.wavelengths
     photons = colour.SDS_ILLUMINANTS["D65"].copy().align(shape).values * shape.wavelengths
