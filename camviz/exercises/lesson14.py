@@ -1,4 +1,4 @@
-"""Lesson 14, image sensors: electrons from lux, row times from a lamp's stripes, decibels, and a leaky bucket brigade."""
+"""Lesson 14, image sensors: electrons from lux, row times from a lamp's stripes, decibels, a leaky bucket brigade."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ EXPECTED_ELECTRONS = Exercise(
             lambda lux, f_number, pitch_um, exposure_s, efficiency: (
                 4 * f_number * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency) / 4
             ),
-            "The f-number enters squared: it is the aperture's *diameter* that N divides, and light goes through its area.",
+            "The f-number enters squared: N is about the aperture's *diameter*, and light goes through its area.",
         ),
         Misconception(
             lambda lux, f_number, pitch_um, exposure_s, efficiency: (
@@ -177,7 +177,7 @@ ARRIVING = Exercise(
         ),
         Misconception(
             lambda electrons, efficiency: electrons * efficiency,
-            "Every row loses as much here. The farther one has a longer way: the share is multiplied once for each shift.",
+            "Every row loses as much here. A farther one has a longer way: multiply once for each shift.",
         ),
         Misconception(
             lambda electrons, efficiency: electrons * (1 - (1 - efficiency) * (1 + np.arange(len(electrons)))),
