@@ -4,7 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.sensors import decibel
+from camviz.cameras import Camera, Intrinsics
+from camviz.scenes import textured_scene, to_display
+from camviz.sensors import decibel, gliding, rolling_picture
 from camviz.views.image_sensor import ImageSensorView
 from camviz.views.readout import LARGE, ROWS, ReadoutView, fan
 
@@ -57,6 +59,16 @@ def test_a_train_leans_what_stands_by_the_closed_form():
     view = ReadoutView(subject="view from a train", speed=40)
     assert view.lean_px == pytest.approx(554.256 * 40 * 480 * 64e-6 / 3, rel=1e-5)
     assert "a thing at 3 m moves 227 px" in view.numbers().values()
+
+
+def test_the_train_s_picture_is_that_of_the_rolling_shutter():
+    """Against the camera that is traced row by row; the two average textures over slightly different angles."""
+    view = ReadoutView(subject="view from a train", speed=25, row_us=80)
+    camera = Camera(Intrinsics.from_fov(80, 60, 60))
+    traced = rolling_picture(textured_scene(), camera, gliding(camera, (25, 0, 0)), 480 / 60 * 80e-6)
+    apart = np.abs(view.picture(80, 60).astype(float) - to_display(traced))
+    assert apart.mean() < 1.5
+    assert np.abs(view.picture(80, 60).astype(float) - view.but(readout="CCD").picture(80, 60)).mean() > 10
 
 
 def test_the_picture_is_dark_where_it_is_not_read():

@@ -130,7 +130,7 @@ def rolling_rays(camera: Camera, poses: RigidTransform) -> tuple[Array, Array]:
             f"poses must hold one for each of the {height} rows, got {matrices.shape[:-2] or 'a single one'}"
         )
     rays = camera.lens.unproject(camera.intrinsics.from_pixels(camera.intrinsics.grid()))
-    return matrices[:, None, :3, 3], np.einsum("vij,vuj->vui", matrices[:, :3, :3], rays)
+    return matrices[:, None, :3, 3], rays @ np.swapaxes(matrices[:, :3, :3], 1, 2)
 
 
 def rolling_picture(

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
@@ -16,8 +16,8 @@ from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, grid, plot_panel, upright
 from camviz.lenses.base import Array
-from camviz.scenes import snapshot, textured_scene, to_display
-from camviz.sensors.readout import bucket_brigade, gliding, rolling_picture
+from camviz.scenes import textured_scene, to_display
+from camviz.sensors.readout import bucket_brigade, row_times
 from camviz.views.base import View, choice, slider
 
 ROWS = 480  # of the sensor: what the row time counts
@@ -86,12 +86,15 @@ class ReadoutView(View):
 
     def picture(self, width: int, height: int) -> np.ndarray:
         """The whole picture as this sensor takes it, sRGB bytes (height, width, 3)."""
-        row_s = self.frame_s / height if self.rolling else 0.0
-        return _seen(self.subject, self.speed, 0.0, row_s, width, height)
+        return self._pair(width, height)[0]
 
     def scene_now(self, width: int, height: int) -> np.ndarray:
         """The world at this moment, sRGB bytes (height, width, 3)."""
-        return _seen(self.subject, self.speed, self.now_s, 0.0, width, height)
+        return self._pair(width, height)[1]
+
+    def _pair(self, width: int, height: int) -> np.ndarray:
+        row_s = self.frame_s / height if self.rolling else 0.0
+        return _seen(self.subject, self.speed, self.now_s, row_s, width, height)
 
     @cached_property
     def lean_px(self) -> float:
@@ -129,7 +132,7 @@ class ReadoutView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         size = SMALL[self.subject] if draft else LARGE
-        whole, now = self.picture(*size), self.scene_now(*size)
+        whole, now = self._pair(*size)
         read = round(size[1] * self.time / 100)
         partial = whole.copy()
         partial[read:] = (_DIM * whole[read:]).astype(np.uint8)
@@ -246,19 +249,33 @@ def fan(u: ArrayLike, v: ArrayLike, turns: ArrayLike) -> Array:
     return light
 
 
-@lru_cache(maxsize=4)
-def _seen(subject: str, speed: float, start_s: float, row_s: float, width: int, height: int) -> np.ndarray:
-    """The scene from `start_s` on, each row `row_s` later than the one above, sRGB bytes (height, width, 3)."""
-    if subject == "fan":
-        v, u = np.mgrid[:height, :width]
-        turns = speed * (start_s + row_s * v)
-        light = fan((u - (width - 1) / 2) / (height / 2), (v - (height - 1) / 2) / (height / 2), turns)
-        return to_display(light)
+@lru_cache(maxsize=2)
+def _seen(subject: str, speed: float, now_s: float, row_s: float, width: int, height: int) -> np.ndarray:
+    """The picture whose rows are `row_s` apart, and the scene at `now_s`: sRGB bytes (2, height, width, 3)."""
+    times = np.concatenate([row_times(height, row_s), np.full(height, now_s)])
+    draw = _fan_rows if subject == "fan" else _train_rows
+    both = to_display(draw(speed * times, width, height)).reshape(2, height, width, 3)
+    both.flags.writeable = False
+    return both
+
+
+def _fan_rows(turns: Array, width: int, height: int) -> Array:
+    """Rows (n, width, 3) of the fan's picture, over and over from its first to its last, each turned by its own."""
+    u = (np.arange(width) - (width - 1) / 2) / (height / 2)
+    v = (np.arange(len(turns)) % height - (height - 1) / 2) / (height / 2)
+    return fan(u, v[:, None], turns[:, None])
+
+
+def _train_rows(way_m: Array, width: int, height: int) -> NDArray[np.float32]:
+    """Rows (n, width, 3) of the view from a train, over and over, each from its own place on the way to the right.
+
+    One call of the tracer for all: what it costs is mostly the same for few rays and for many.
+    """
     camera = Camera(Intrinsics.from_fov(width, height, _FOV_DEG))
-    motion = gliding(camera, (speed, 0, 0))
-    if row_s == 0:
-        return snapshot(textured_scene(), camera.at(motion(np.array([start_s]))[0]))
-    return to_display(rolling_picture(textured_scene(), camera, lambda times: motion(times + start_s), row_s))
+    rays = np.tile(camera.rays(), (len(way_m) // height, 1, 1))
+    origins = np.zeros_like(rays)
+    origins[..., 0] = way_m[:, None]
+    return textured_scene().trace(origins, rays, spread=1 / camera.intrinsics.fx)[0]
 
 
 def _squares(panel: Panel, charge: Array, left: float, top: float) -> str:
