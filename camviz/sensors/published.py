@@ -87,7 +87,7 @@ KAF_3200ME = PublishedSensor(
         measured_at_nm=656.3,
     ),
     float("nan"),
-    "measured by Christian Buil, astrosurf.com/buil/cameras",  # codespell:ignore buil
+    'measured for the page "Parameters of CCD and CMOS cameras", astrosurf.com',
     ("offset_dn", "dsnu_e", "prnu"),
 )  # fmt: skip
 
