@@ -183,6 +183,6 @@ class ImageSensorView(View):
 @lru_cache(maxsize=2)
 def _light(width: int) -> np.ndarray:
     """The garden's linear light (height, width, 3)."""
-    light = render(textured_scene(), Camera(Intrinsics.from_fov(width, width * 3 // 4, 60)), supersample=2)
+    light = render(textured_scene(), Camera(Intrinsics.from_fov(width, width * 3 // 4, 60)))
     light.flags.writeable = False
     return light
