@@ -1,0 +1,51 @@
+"""Colour filter arrays: patterns and mosaics, demosaicing, and measures of what it gets wrong."""
+
+from camviz.mosaics.demosaicing import (
+    ALGORITHMS,
+    ANY_PATTERN,
+    bilinear,
+    demosaic,
+    edge_aware,
+    malvar,
+    menon,
+    nearest,
+    opencv,
+)
+from camviz.mosaics.patterns import (
+    BAYER,
+    BLUE,
+    GREEN,
+    MONOCHROME,
+    PATTERNS,
+    RED,
+    RGBW,
+    WHITE,
+    XTRANS,
+    Pattern,
+    in_colour,
+    mosaic,
+)
+
+__all__ = [
+    "ALGORITHMS",
+    "ANY_PATTERN",
+    "BAYER",
+    "BLUE",
+    "GREEN",
+    "MONOCHROME",
+    "PATTERNS",
+    "RED",
+    "RGBW",
+    "WHITE",
+    "XTRANS",
+    "Pattern",
+    "bilinear",
+    "demosaic",
+    "edge_aware",
+    "in_colour",
+    "malvar",
+    "menon",
+    "mosaic",
+    "nearest",
+    "opencv",
+]

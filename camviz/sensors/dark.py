@@ -1,0 +1,45 @@
+"""Dark current: electrons that heat, not light, sets free, and how they multiply as silicon warms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+BOLTZMANN_EV_PER_K = 8.617333262e-5
+ZERO_CELSIUS_K = 273.15
+
+
+def band_gap_ev(temperature_c: ArrayLike) -> Any:
+    """Silicon's band gap E_g = 1.1557 - 7.021e-4 T² / (1108 + T), T in kelvin (Varshni 1967)."""
+    T = _kelvin(temperature_c)
+    return 1.1557 - 7.021e-4 * T**2 / (1108 + T)
+
+
+def dark_current_ratio(temperature_c: ArrayLike, reference_c: ArrayLike) -> Any:
+    """How many times the dark current at `reference_c` flows at `temperature_c`.
+
+    Electrons climb by way of traps in the middle of the gap: D ∝ T^1.5 exp(-E_g / 2kT) (Janesick 2001, chapter 7).
+    """
+    T, reference = _kelvin(temperature_c), _kelvin(reference_c)
+    halves = band_gap_ev(reference_c) / reference - band_gap_ev(temperature_c) / T
+    return (T / reference) ** 1.5 * np.exp(halves / (2 * BOLTZMANN_EV_PER_K))
+
+
+def doubling_temperature_k(temperature_c: ArrayLike) -> Any:
+    """By how many kelvin silicon must warm for its dark current to double, at the slope it has at `temperature_c`.
+
+    ln 2 / (d ln D / dT) = ln 2 · T / (3/2 + (E_g - T E_g') / 2kT): it grows with the temperature.
+    """
+    T = _kelvin(temperature_c)
+    gap_slope = -7.021e-4 * T * (T + 2 * 1108) / (1108 + T) ** 2  # E_g'
+    activation = (band_gap_ev(temperature_c) - T * gap_slope) / 2
+    return np.log(2) * T / (1.5 + activation / (BOLTZMANN_EV_PER_K * T))
+
+
+def _kelvin(temperature_c: ArrayLike) -> Any:
+    T = np.asarray(temperature_c, dtype=float) + ZERO_CELSIUS_K
+    if not np.all(T > 0):
+        raise ValueError(f"temperature_c must lie above absolute zero, -273.15 °C, got {T.min() - ZERO_CELSIUS_K:g}")
+    return T

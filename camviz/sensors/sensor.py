@@ -1,0 +1,240 @@
+"""An image sensor after EMVA 1288: from photons to digital numbers, each step a function with units.
+
+The linear model of EMVA Standard 1288, release 4.0:
+
+    photons → (quantum efficiency) → electrons → (+ dark) → full well → (+ offsets, read noise) → (gain) → ADC → dn
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from camviz.sensors.counting import Floats, poisson, poisson_alike
+from camviz.sensors.dark import dark_current_ratio
+from camviz.sensors.efficiency import EfficiencyCurve
+from camviz.sensors.fixed_pattern import FixedPattern, Spread, fixed_pattern
+
+Words = NDArray[np.uint16]
+
+
+def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator) -> Floats:
+    """Electrons that light sets free, where `photons` arrive on average and each frees one with chance `efficiency`.
+
+    A random number of photons, thinned at random, is again Poisson: e ~ Poisson(η μ_p).
+    """
+    return poisson(np.multiply(photons, efficiency, dtype=np.float32), rng)
+
+
+def leak(shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: float, rng: np.random.Generator) -> Floats:
+    """Electrons that heat sets free during the exposure, of the given shape: Poisson(dark current · t)."""
+    return poisson_alike(dark_current_e_per_s * exposure_s, shape, rng)
+
+
+def fill(electrons: ArrayLike, full_well_e: float) -> Floats:
+    """What the wells hold of these electrons: no more than the full well."""
+    return np.minimum(electrons, full_well_e, dtype=np.float32)
+
+
+def read(charge_e: ArrayLike, offset_e: ArrayLike, read_noise_e: float, rng: np.random.Generator) -> Floats:
+    """The signal in electrons as the amplifier reports it: with each pixel's own offset, and fresh noise each time."""
+    charge = np.asarray(charge_e, dtype=np.float32)
+    signal: Floats = rng.standard_normal(charge.shape, dtype=np.float32)
+    signal *= np.float32(read_noise_e)
+    signal += charge
+    signal += np.asarray(offset_e, dtype=np.float32)
+    return signal
+
+
+def amplify(signal_e: ArrayLike, gain_dn_per_e: float, offset_dn: float) -> Floats:
+    """The voltage before the converter, counted in its steps: K e + offset, in DN, not yet whole."""
+    return np.multiply(signal_e, gain_dn_per_e, dtype=np.float32) + np.float32(offset_dn)
+
+
+def quantise(voltage_dn: ArrayLike, bits: int) -> Words:
+    """Whole digital numbers 0 … 2^bits - 1, the nearest to each voltage; what lies beyond is cut off."""
+    nearest = np.rint(voltage_dn)
+    return np.clip(nearest, 0, 2**bits - 1, out=nearest).astype(np.uint16)
+
+
+@dataclass(frozen=True, eq=False)
+class Exposure:
+    """One frame, step by step; all arrays of one shape.
+
+    Photons expected, electrons freed by light and by heat, the charge that the well holds, the signal as read (in
+    electrons, with offsets and read noise), the voltage in steps of the converter, and the digital numbers.
+    """
+
+    photons: Floats
+    photoelectrons: Floats
+    dark_electrons: Floats
+    charge_e: Floats
+    signal_e: Floats
+    voltage_dn: Floats
+    dn: Words
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """An EMVA 1288 sensor. Noise figures are standard deviations in electrons; `prnu` is a fraction of the signal.
+
+    `quantum_efficiency` is that at `measured_at_nm`, or a curve over wavelength. EMVA 1288 counts photons on the whole
+    pixel, so its efficiency includes the fill factor: leave `fill_factor` at 1. A datasheet that gives the efficiency
+    of the light-sensitive area alone has it multiplied by `fill_factor`.
+
+    Of the variance of a fixed pattern, `..._column_share` is the same down each column and `..._row_share` along each
+    row. `specimen` is the serial number of this piece of silicon: another number, another pattern. PRNU acts on the
+    light, DSNU on what is read; the read noise is what is left in an exposure too short for dark current.
+    """
+
+    quantum_efficiency: float | EfficiencyCurve = 0.6
+    full_well_e: float = 10_000.0
+    read_noise_e: float = 5.0
+    gain_dn_per_e: float = 0.38
+    offset_dn: float = 64.0
+    bits: int = 12
+    dark_current_e_per_s: float = 0.0
+    reference_temperature_c: float = 20.0
+    dsnu_e: float = 0.0
+    dsnu_column_share: float = 0.0
+    dsnu_row_share: float = 0.0
+    prnu: float = 0.0
+    prnu_column_share: float = 0.0
+    prnu_row_share: float = 0.0
+    measured_at_nm: float = 525.0
+    fill_factor: float = 1.0
+    specimen: int = 0
+
+    def __post_init__(self) -> None:
+        efficiency = self.quantum_efficiency
+        if not isinstance(efficiency, EfficiencyCurve) and not 0 <= efficiency <= 1:
+            raise ValueError(f"quantum_efficiency must lie between 0 and 1, or be a curve, got {efficiency}")
+        if not 0 < self.fill_factor <= 1:
+            raise ValueError(f"fill_factor must lie above 0 and be at most 1, got {self.fill_factor}")
+        if not (isinstance(self.bits, int) and 1 <= self.bits <= 16):
+            raise ValueError(f"bits must be a whole number from 1 to 16, got {self.bits}")
+        for name in ("full_well_e", "gain_dn_per_e", "measured_at_nm"):
+            _require(isfinite(getattr(self, name)) and getattr(self, name) > 0, self, name, "positive and finite")
+        for name in ("read_noise_e", "dark_current_e_per_s", "dsnu_e", "prnu"):
+            _require(isfinite(getattr(self, name)) and getattr(self, name) >= 0, self, name, "zero or more, and finite")
+        for name in ("offset_dn", "reference_temperature_c"):
+            _require(isfinite(getattr(self, name)), self, name, "a finite number")
+        for kind in ("dsnu", "prnu"):
+            shares = [getattr(self, f"{kind}_{which}_share") for which in ("column", "row")]
+            if min(shares) < 0 or sum(shares) > 1:
+                raise ValueError(f"{kind}_column_share and {kind}_row_share must be shares of one whole, got {shares}")
+
+    def efficiency(self, wavelength_nm: ArrayLike | None = None) -> Any:
+        """Electrons per photon that arrives on the pixel, at `measured_at_nm` if no wavelength (...) is given.
+
+        A sensor with a single figure has that figure at every wavelength.
+        """
+        if isinstance(self.quantum_efficiency, EfficiencyCurve):
+            wavelength = self.measured_at_nm if wavelength_nm is None else wavelength_nm
+            return self.quantum_efficiency.at(wavelength) * self.fill_factor
+        one = self.quantum_efficiency * self.fill_factor
+        return one if wavelength_nm is None else np.full(np.shape(wavelength_nm), one)[()]
+
+    def dark_current(self, temperature_c: float) -> float:
+        """Dark current in electrons per second and pixel at `temperature_c`, from that at the reference temperature."""
+        return self.dark_current_e_per_s * float(dark_current_ratio(temperature_c, self.reference_temperature_c))
+
+    def pattern(self, height: int, width: int) -> FixedPattern:
+        """This specimen's fixed pattern: the same at every call, so that it can be measured and taken out."""
+        gain = Spread(self.prnu, self.prnu_column_share, self.prnu_row_share)
+        offset = Spread(self.dsnu_e, self.dsnu_column_share, self.dsnu_row_share)
+        return fixed_pattern(gain, offset, self.specimen, height, width)
+
+    def expose(self, photons: ArrayLike, exposure_s: float, temperature_c: float, rng: np.random.Generator) -> Exposure:
+        """One frame of `photons` (height, width): the number expected on each pixel during the whole exposure.
+
+        Monochromatic light at `measured_at_nm`. For light of many colours give the electrons expected, `collect`.
+        """
+        photons = _picture(photons, "photons")
+        return self.collect(photons * np.float32(self.efficiency()), exposure_s, temperature_c, rng, photons)
+
+    def collect(
+        self,
+        electrons: ArrayLike,
+        exposure_s: float,
+        temperature_c: float,
+        rng: np.random.Generator,
+        photons: ArrayLike | None = None,
+    ) -> Exposure:
+        """One frame, from the photoelectrons expected on each pixel (height, width); `photons` are only reported."""
+        expected = _picture(electrons, "electrons")
+        if not (isfinite(exposure_s) and exposure_s >= 0):
+            raise ValueError(f"exposure_s must be zero seconds or more, got {exposure_s}")
+        height, width = expected.shape
+        pattern = self.pattern(height, width)
+        freed = convert(expected, pattern.gain, rng)
+        dark = leak(expected.shape, self.dark_current(temperature_c), exposure_s, rng)
+        charge = fill(freed + dark, self.full_well_e)
+        arrived = expected / np.float32(self.efficiency()) if photons is None else _picture(photons, "photons")
+        return Exposure(arrived, freed, dark, *self._digitise(charge, pattern, rng))
+
+    def _digitise(
+        self, charge: Floats, pattern: FixedPattern, rng: np.random.Generator
+    ) -> tuple[Floats, Floats, Floats, Words]:
+        signal = read(charge, pattern.offset_e, self.read_noise_e, rng)
+        voltage = amplify(signal, self.gain_dn_per_e, self.offset_dn)
+        return charge, signal, voltage, quantise(voltage, self.bits)
+
+    # What the model foretells -----------------------------------------------------------------------------------------
+
+    @property
+    def saturation_e(self) -> float:
+        """The most electrons that a digital number can tell apart: the full well, or what the converter reaches."""
+        return min(self.full_well_e, (2**self.bits - 1 - self.offset_dn) / self.gain_dn_per_e)
+
+    def dark_noise_e(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
+        """sqrt(σ_read² + D t): read noise and the dark current's own, in electrons, without quantisation."""
+        current = self.dark_current(self.reference_temperature_c if temperature_c is None else temperature_c)
+        return float(np.sqrt(self.read_noise_e**2 + current * exposure_s))
+
+    def snr(self, photons: ArrayLike, exposure_s: float = 0.0, temperature_c: float | None = None) -> Any:
+        """The signal-to-noise ratio of one pixel over time (...) at `photons` (...), below saturation.
+
+        η μ_p / sqrt(σ_d² + σ_q²/K² + η μ_p) with σ_q² = 1/12 (EMVA 1288, release 4.0 linear).
+        """
+        signal = np.multiply(photons, self.efficiency())
+        return signal / np.sqrt(self._floor_e(exposure_s, temperature_c) ** 2 + signal)
+
+    def threshold_photons(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
+        """The absolute sensitivity threshold: how many photons give SNR = 1.
+
+        From η μ = sqrt(σ² + η μ): η μ = ½ + sqrt(σ² + ¼), which EMVA 1288 rounds to σ + ½.
+        """
+        return (self._floor_e(exposure_s, temperature_c) + 0.5) / float(self.efficiency())
+
+    def dynamic_range(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
+        """Saturation over absolute sensitivity threshold, a plain ratio; 20 log10 of it is in dB, log2 in stops."""
+        saturation = self.saturation_e / float(self.efficiency())
+        return saturation / self.threshold_photons(exposure_s, temperature_c)
+
+    def _floor_e(self, exposure_s: float, temperature_c: float | None) -> float:
+        """Dark noise with that of quantisation, 1/12 DN², in electrons."""
+        return float(np.hypot(self.dark_noise_e(exposure_s, temperature_c), (1 / 12) ** 0.5 / self.gain_dn_per_e))
+
+
+def decibel(ratio: ArrayLike) -> Any:
+    """20 log10: how EMVA 1288 writes ratios of signals."""
+    return 20 * np.log10(ratio)
+
+
+def _require(holds: bool, sensor: Sensor, name: str, what: str) -> None:
+    if not holds:
+        raise ValueError(f"{name} must be {what}, got {getattr(sensor, name)}")
+
+
+def _picture(values: ArrayLike, name: str) -> Floats:
+    picture = np.asarray(values, dtype=np.float32)
+    if picture.ndim != 2:
+        raise ValueError(f"{name} must be one number for each pixel, (height, width), got shape {picture.shape}")
+    if not picture.min(initial=0) >= 0 or not picture.max(initial=0) < np.inf:
+        raise ValueError(f"{name} must be finite and not negative, got {picture.min()} … {picture.max()}")
+    return picture

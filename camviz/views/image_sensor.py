@@ -1,0 +1,188 @@
+"""The image sensor visualizer: which photons become electrons, how many a pixel holds, and what becomes of a shot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.plot import axes, bars, between, curve, grid, legend, logarithmic, plot_panel
+from camviz.lenses.base import Array
+from camviz.scenes import render, textured_scene
+from camviz.sensors import DigitalCamera, Sensor, decibel
+from camviz.sensors.digital_camera import Shot
+from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
+from camviz.views.base import View, choice, slider
+
+SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
+SCENE_LUX = 1000.0
+CHANNELS = (("red", "red"), ("green", "green"), ("blue", "blue"))
+_MODELS: dict[str, PublishedSensor] = {
+    "IMX174: 77 % at 525 nm": IMX174,
+    "KAF-0400: a curve": KAF_0400,
+    "CMV4000: 60 % at 550 nm": CMV4000,
+}
+_MOST_E = 100_000.0
+
+
+@dataclass(frozen=True)
+class ImageSensorView(View):
+    """A sensor behind the filters of a Nikon D5100 photographs the garden, a white wall under 1000 lux, at f/4.
+
+    The quantum efficiency is a published one. Where only one figure was published, it is drawn dashed at all
+    wavelengths, for want of others. `fill_factor` is the share of the pixel that catches light, beyond what the
+    published figure includes. Pitch and read noise are the published sensor's too; the gain fills the converter.
+    """
+
+    title: ClassVar[str] = "Image sensor"
+
+    model: str = choice(*_MODELS, label="efficiency", help="a published quantum efficiency, pitch and read noise")
+    light: str = choice("D65", *(one for one in ILLUMINANTS if one != "D65"), help="a CIE illuminant")
+    exposure_ms: float = slider(10.0, 0.1, 100.0, 0.1, label="exposure", unit="ms", help="how long light is gathered")
+    fill_factor: float = slider(
+        1.0, 0.1, 1.0, 0.01, label="fill factor", help="the share of the pixel that catches light"
+    )
+    full_well: float = slider(
+        30_000.0, 300.0, _MOST_E, 100.0, label="full well", unit="e⁻", help="what a pixel can hold"
+    )
+    bits: float = slider(12.0, 2.0, 16.0, 1.0, unit="bits", help="of the converter")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.exposure_ms > 0:
+            raise ValueError(f"exposure_ms must be positive, got {self.exposure_ms}")
+
+    # What is true ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def sensor(self) -> Sensor:
+        """The sensor of this state."""
+        bits = round(self.bits)
+        return replace(
+            _MODELS[self.model].sensor, fill_factor=self.fill_factor, full_well_e=self.full_well, bits=bits,
+            gain_dn_per_e=(2**bits - 1) / self.full_well, offset_dn=0.0, dsnu_e=0.0, prnu=0.0,
+        )  # fmt: skip
+
+    def camera(self, width: int) -> DigitalCamera:
+        """The camera of this state, its picture `width` pixels wide."""
+        camera = Camera(Intrinsics.from_fov(width, width * 3 // 4, 60))
+        pitch_um = _MODELS[self.model].pitch_um
+        return DigitalCamera(camera, self.sensor, pitch_um, illuminant=self.light, scene_lux=SCENE_LUX)
+
+    def shot(self, width: int) -> Shot:
+        """The photograph of the garden, every step of it."""
+        camera = self.camera(width)
+        return camera.take(_light(width), self.exposure_ms / 1000, np.random.Generator(np.random.SFC64(4)))
+
+    @cached_property
+    def white_e(self) -> Array:
+        """Electrons (4,) that a white wall frees in red, green, blue and unfiltered pixels on the axis."""
+        camera = self.camera(4)
+        lux = camera.scene_lux * camera.transmittance / (4 * camera.f_number**2)
+        return camera.channels.electrons * lux * camera.pitch_um**2 * self.exposure_ms / 1000
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        sensor, ratio = self.sensor, self.sensor.dynamic_range()
+        red, green, blue, _ = self.white_e
+        return {
+            "efficiency with fill factor": f"{100 * float(sensor.efficiency()):.1f} % at {sensor.measured_at_nm:g} nm",
+            "electrons of a white wall": f"R {red:,.0f}, G {green:,.0f}, B {blue:,.0f}",
+            "full well": f"{self.full_well:,.0f} e⁻",
+            "threshold, SNR = 1": f"{sensor.threshold_photons():.1f} photons",
+            "dynamic range": f"{float(decibel(ratio)):.1f} dB = {np.log2(ratio):.1f} stops",
+            "converter": f"{round(self.bits)} bits, {1 / sensor.gain_dn_per_e:.3g} e⁻ a step",
+            "greatest SNR": f"{float(decibel(self.full_well**0.5)):.1f} dB",
+        }
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        full = " and ".join(name for (name, _), e in zip(CHANNELS, self.white_e, strict=False) if e > self.full_well)
+        return (
+            f"{_MODELS[self.model].name} under {self.light}, {self.exposure_ms:g} ms, fill factor "
+            f"{self.fill_factor:g}: {figures}. A white wall overfills {full or 'no'} pixels."
+        )
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        width = SMALL if draft else LARGE
+        picture = self.shot(width).picture
+        panel = image_panel("picture", 590, 34, 350, width, width * 3 // 4)
+        shown = panel.show(photograph(panel, "picture", width, width * 3 // 4), title="What becomes of it")
+        body = svg.rectangle(0, 0, 960, 590, "paper") + self._spectra() + self._electrons() + shown + self._numbers()
+        return Picture(body, 960, 590, self.title, self.description(), {"picture": jpeg(picture, 92)})
+
+    def _spectra(self) -> str:
+        panel = plot_panel("efficiency", 70, 34, 480, 210, (380, 780), (0, 100))
+        unfiltered = 100 * np.asarray(self.sensor.efficiency(WAVELENGTHS_NM))
+        per_photon = sensitivities("Nikon D5100") / WAVELENGTHS_NM[:, None]
+        passed = per_photon / per_photon.max(axis=0)
+        spectrum = illuminant(self.light)
+        known = "thick" if self.model == "KAF-0400: a curve" else "thick dashed"
+        content = (
+            between(panel, WAVELENGTHS_NM, np.zeros(len(spectrum)), 96 * spectrum / spectrum.max(), "fill-muted")
+            + grid(panel)
+            + curve(panel, WAVELENGTHS_NM, unfiltered, f"ink {known}")
+            + "".join(curve(panel, WAVELENGTHS_NM, unfiltered * passed[:, i], c) for i, (_, c) in enumerate(CHANNELS))
+            + svg.dots([panel.place((self.sensor.measured_at_nm, 100 * float(self.sensor.efficiency())))], "ink", 8)
+            + legend(
+                panel,
+                [("ink " + known, "without filter"), *((c, f"{name} filter") for name, c in CHANNELS)],
+                "bottom right",
+            )
+        )
+        return axes(panel, "wavelength [nm]; grey: the light's spectrum", "electrons per 100 photons") + panel.show(
+            content, title="Quantum efficiency", note=_MODELS[self.model].camera
+        )
+
+    def _electrons(self) -> str:
+        """Electrons of each channel beside the full well and the threshold, on a logarithmic scale."""
+        low, high = 0.0, float(np.log10(3 * _MOST_E))
+        panel = plot_panel("electrons", 70, 330, 480, 200, (0.4, 5.4), (low, high))
+        yticks = logarithmic(low, high)
+        xticks = [(i + 1.0, name) for i, name in enumerate(("red", "green", "blue", "no filter"))]
+        content = grid(panel, xticks=[], yticks=yticks)
+        for i, class_ in enumerate(("red", "green", "blue", "ink")):
+            top = np.log10(np.maximum(np.array([self.white_e[i], min(self.white_e[i], self.full_well)]), 1))
+            left, right = np.array([i + 0.68]), np.array([i + 1.32])
+            content += bars(panel, left, right, top[:1], f"{class_} dotted")
+            content += bars(panel, left, right, top[1:], f"wash fill-{class_}") + bars(
+                panel, left, right, top[1:], class_
+            )
+        floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
+        content += self._level(panel, self.full_well, f"full well {self.full_well:,.0f} e⁻", "orange", -6)
+        content += self._level(panel, floor_e, f"threshold {floor_e:.1f} e⁻", "purple", -6)
+        return axes(panel, "pixels of a white wall", "electrons", xticks, yticks) + panel.show(
+            content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux"
+        )
+
+    def _level(self, panel: Panel, electrons: float, words: str, class_: str, above: float) -> str:
+        y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
+        return svg.line([(0, y), (panel.width, y)], f"{class_} dashed") + svg.text(
+            (panel.width - 6, y + above), words, f"{class_} halo end"
+        )
+
+    def _numbers(self) -> str:
+        rows = [svg.text((590, 336), "This sensor", "title")]
+        for i, (name, value) in enumerate(self.numbers().items()):
+            rows.append(svg.text((590, 362 + 24 * i), name, "note"))
+            rows.append(svg.text((756, 362 + 24 * i), value, "label"))
+        rows.append(svg.paragraph((590, 548), _MODELS[self.model].source, 350))
+        return "".join(rows)
+
+
+@lru_cache(maxsize=2)
+def _light(width: int) -> np.ndarray:
+    """The garden's linear light (height, width, 3)."""
+    light = render(textured_scene(), Camera(Intrinsics.from_fov(width, width * 3 // 4, 60)))
+    light.flags.writeable = False
+    return light

@@ -1,0 +1,129 @@
+"""The sensors' visualizers show what the sensors do, and every control is seen at both of its ends."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.scenes import textured_scene, to_display
+from camviz.sensors import decibel, gliding, rolling_picture
+from camviz.views.image_sensor import ImageSensorView
+from camviz.views.readout import LARGE, ROWS, ReadoutView, fan
+
+VIEWS = (ReadoutView(), ReadoutView(subject="view from a train"), ImageSensorView())
+ENDS = [
+    (view, name, value)
+    for view in VIEWS
+    for name, control in view.controls().items()
+    for value in (control.choices or (control.low, control.high))
+    if value != getattr(view, name)
+]
+
+
+def name_of(part):
+    return type(part).__name__ if hasattr(part, "figure") else str(part)
+
+
+@pytest.mark.parametrize(("view", "name", "value"), ENDS, ids=name_of)
+def test_both_ends_of_every_control_draw_and_change_the_picture(view, name, value):
+    first, other = view.figure(draft=True), view.but(**{name: value}).figure(draft=True)
+    assert other.body != first.body or other.photographs != first.photographs
+    assert other.description != first.description
+    assert "nan" not in other.body.lower().replace("nanmedian", "")
+
+
+def photo(view, name):
+    data = np.frombuffer(view.figure().photographs[name], np.uint8)
+    return cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1].astype(float)
+
+
+def test_a_fans_rows_are_those_of_the_fan_at_their_own_times():
+    """Row by row, the rolling picture is the still fan at that row's moment."""
+    view = ReadoutView(speed=15, row_us=50, time=100)
+    picture = view.picture(*LARGE)
+    for row in (0, 77, 150, 239):
+        then = view.but(time=100 * row / LARGE[1]).scene_now(*LARGE)
+        np.testing.assert_array_equal(picture[row], then[row])
+    assert np.abs(picture.astype(float) - view.but(readout="CCD").picture(*LARGE)).mean() > 10
+
+
+@pytest.mark.parametrize("readout", ["CCD", "CMOS, global shutter"])
+def test_what_is_exposed_at_once_is_the_scene_of_the_first_moment(readout):
+    view = ReadoutView(readout=readout, time=80)
+    np.testing.assert_array_equal(view.picture(*LARGE), view.but(time=0).scene_now(*LARGE))
+    assert "moves 0 px" in view.description()
+
+
+def test_a_train_leans_what_stands_by_the_closed_form():
+    """f v t / Z: 554.3 px · 40 m/s · 30.72 ms / 3 m = 227 px, which the numbers state."""
+    view = ReadoutView(subject="view from a train", speed=40)
+    assert view.lean_px == pytest.approx(554.256 * 40 * 480 * 64e-6 / 3, rel=1e-5)
+    assert "a thing at 3 m moves 227 px" in view.numbers().values()
+
+
+def test_the_train_s_picture_is_that_of_the_rolling_shutter():
+    """Against the camera that is traced row by row; the two average textures over slightly different angles."""
+    view = ReadoutView(subject="view from a train", speed=25, row_us=80)
+    camera = Camera(Intrinsics.from_fov(80, 60, 60))
+    traced = rolling_picture(textured_scene(), camera, gliding(camera, (25, 0, 0)), 480 / 60 * 80e-6)
+    apart = np.abs(view.picture(80, 60).astype(float) - to_display(traced))
+    assert apart.mean() < 1.5
+    assert np.abs(view.picture(80, 60).astype(float) - view.but(readout="CCD").picture(80, 60)).mean() > 10
+
+
+def test_the_picture_is_dark_where_it_is_not_read():
+    view = ReadoutView(time=50)
+    picture = photo(view, "read")
+    assert picture[130:].mean() < 0.25 * picture[:110].mean()
+    assert f"{ROWS // 2} of {ROWS} rows" in view.numbers().values()
+
+
+def test_a_turn_of_the_fan_is_no_turn():
+    u, v = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 31))
+    np.testing.assert_allclose(fan(u, v, 0.3), fan(u, v, 1.3))
+    assert np.abs(fan(u, v, 0.3) - fan(u, v, 0.4)).max() > 0.1
+
+
+def test_dragging_the_clock_moves_the_time():
+    view = ReadoutView(time=50)
+    assert view.dragged("time", 0, 0, 26, 0).time > view.time
+    assert view.pressed("time", "ArrowLeft").time < view.time
+    assert view.dragged("time", 0, 0, 1e4, 0).time == 100
+
+
+def test_the_sensors_numbers_are_those_of_its_sensor():
+    view = ImageSensorView(full_well=5000, bits=8, fill_factor=0.5)
+    numbers, sensor = view.numbers(), view.sensor
+    assert sensor.efficiency() == pytest.approx(0.385)
+    assert numbers["dynamic range"].startswith(f"{float(decibel(sensor.dynamic_range())):.1f} dB")
+    assert numbers["converter"] == f"8 bits, {5000 / 255:.3g} e⁻ a step"
+    assert numbers["greatest SNR"] == f"{10 * np.log10(5000):.1f} dB"
+
+
+def test_a_white_walls_electrons_are_those_that_the_shot_counts():
+    """Mean of red pixels on the axis of a wall, to 1 %: the shot's own expectation, photons times efficiency."""
+    view = ImageSensorView()
+    camera = view.camera(64)
+    shot = camera.take(np.ones((48, 64, 3), np.float32), view.exposure_ms / 1000, np.random.default_rng(1))
+    red = camera.pattern.mask(0, 48, 64)
+    red[:20] = red[28:] = red[:, :26] = red[:, 38:] = False
+    assert shot.exposure.photoelectrons[red].mean() == pytest.approx(view.white_e[0], rel=0.02)
+
+
+def test_more_light_than_the_well_holds_is_white():
+    assert photo(ImageSensorView(full_well=1000, exposure_ms=100), "picture")[:60].min() > 240
+    assert "overfills red and green and blue" in ImageSensorView(full_well=1000, exposure_ms=100).description()
+
+
+def test_few_bits_leave_few_levels():
+    raw = ImageSensorView(bits=3).shot(64).raw
+    assert set(np.unique(raw)) <= set(range(8))
+
+
+def test_states_that_cannot_be_are_refused():
+    with pytest.raises(ValueError, match="row_us must be positive"):
+        ReadoutView(row_us=0)
+    with pytest.raises(ValueError, match="time"):
+        ReadoutView(time=101)
+    with pytest.raises(ValueError, match="exposure_ms"):
+        ImageSensorView(exposure_ms=0)
