@@ -292,8 +292,7 @@ def _grey(path: Path) -> Frame:
 
 def _pair(shot: Shot, reader: _Reader) -> Pair:
     first, second = map(reader, shot.frames)
-    saturated = np.mean(first == first.max()) > 0.5
-    if np.array_equal(first, second) and not saturated:
+    if np.array_equal(first, second) and np.mean(first == first.max()) < 0.5:  # unless it is saturated
         raise RecordingError(f"{shot.frames[1]}: is the same picture as {shot.frames[0].name}, pixel by pixel.")
     return pair(first, second)
 

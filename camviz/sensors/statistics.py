@@ -47,11 +47,11 @@ def pair(first: ArrayLike, second: ArrayLike) -> Pair:
     if a.shape != b.shape or a.size < 2:
         raise ValueError(f"a pair is two frames of one shape, got {a.shape} and {b.shape}")
     clipped = float(np.count_nonzero(a == 0) + np.count_nonzero(b == 0)) / (2 * a.size)
-    mean_a, mean_b = float(a.mean(dtype=float)), float(b.mean(dtype=float))
-    a, b = (a.astype(float) - mean_a).ravel(), (b.astype(float) - mean_b).ravel()
-    shared = float(a @ b) / a.size
-    variance = 0.5 * float(a @ a + b @ b) / a.size - shared
-    return Pair((mean_a + mean_b) / 2, variance, shared, a.size, mean_b - mean_a, clipped)
+    difference, total = np.subtract(b, a, dtype=float), np.add(b, a, dtype=float)
+    variance = float(difference.var()) / 2
+    # var (a + b) - var (a - b) = 4 cov (a, b)
+    shared = float(total.var()) / 4 - variance / 2
+    return Pair(float(total.mean()) / 2, variance, shared, a.size, float(difference.mean()), clipped)
 
 
 def frame_variance(frame: ArrayLike) -> float:
