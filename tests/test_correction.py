@@ -79,6 +79,10 @@ def test_a_flat_field_takes_both_patterns_and_the_fall_off_and_costs_what_is_for
     dark, flat = average(shoot(0.0, 16, rng)), average(shoot(8_000.0, 16, rng))
     even = flattened(shoot(4_000.0, 1, rng)[0], dark, flat)
     assert spread(even) == pytest.approx(MODEL.noise_flattened(4_000, 16, 16, 8_000), rel=0.015)
+    one, half = shoot(0.0, 1, rng)[0], average(shoot(800.0, 16, rng))
+    assert spread(flattened(shoot(400.0, 1, rng)[0], one, half)) == pytest.approx(
+        MODEL.noise_flattened(400, 1, 16, 800), rel=0.015
+    )
     shaded = flattened(shoot(4_000 * falloff, 1, rng)[0], dark, average(shoot(8_000 * falloff, 16, rng)))
     rows = shaded.reshape(10, 20, 10, 30).mean(axis=(1, 3))  # 600 pixels each: the noise is 0.1 %
     assert np.ptp(rows) / rows.mean() < 0.015

@@ -141,6 +141,28 @@ def test_a_pattern_is_split_into_rows_columns_and_pixels():
     assert seen.variance == pytest.approx(36, rel=0.01)
 
 
+def test_a_stack_of_two_frames_is_a_pair():
+    """What averaging left over is taken off: the pattern of two frames is their covariance."""
+    rng = generator(6)
+    pattern = rng.normal(100, 3, (90, 120))
+    a, b = (pattern + rng.normal(0, 10, pattern.shape) for _ in range(2))
+    two = stack([a, b])
+    assert two.pattern == pytest.approx(np.cov(a.ravel(), b.ravel())[0, 1], rel=1e-3)
+    assert two.variance == pytest.approx(np.var(a - b) / 2 + (a.mean() - b.mean()) ** 2 / 2, rel=1e-9)
+
+
+def test_the_gain_is_fitted_below_seventy_percent_of_saturation():
+    """Whatever a sensor does to its noise just before it is full must not reach K."""
+    levels = few_levels(Sensor(), np.linspace(0.05, 1, 20), 20_000)
+    bent = tuple(
+        replace(one, bright=replace(one.bright, variance=1.2 * one.bright.variance)) if one.exposure_s > 0.62 else one
+        for one in levels
+    )
+    plain, spoilt = Measurement(levels), Measurement(bent)
+    assert plain.exposures_s[plain.linear].max() == pytest.approx(0.55, abs=0.06)
+    assert spoilt.gain_dn_per_e == pytest.approx(plain.gain_dn_per_e, rel=1e-12)
+
+
 def test_the_equations_of_the_standard_split_a_pattern_alike():
     """s²_col and s²_pixel as EMVA 1288 release 4.0 writes them, section 8.2, in M rows and N columns."""
     rng = generator(5)
