@@ -138,7 +138,7 @@ class PhotonTransferView(View):
         slope = slope_through_origin(signal[used], self.frames * (noise**2 - dark**2)[used])
         return slope if slope > 0 and noise[top] > 0.5 else float("nan")
 
-    def numbers(self, pixels: int = 6000) -> dict[str, str]:
+    def numbers(self, pixels: int = 3000) -> dict[str, str]:
         """The state's key figures, as text."""
         fitted = self.fitted_gain(*self.measured(pixels))
         parts = self.parts(np.array([self.card_e]))
@@ -167,7 +167,7 @@ class PhotonTransferView(View):
         well = self.sensor.gain_dn_per_e * (FULL_WELL_E - 4 * (self.read_noise_e + self.dsnu_e)) + self.sensor.offset_dn
         return min(2**self.bits - 1.0, well)
 
-    def description(self, pixels: int = 6000) -> str:
+    def description(self, pixels: int = 3000) -> str:
         """The state in words and numbers."""
         figures = "; ".join(f"{name} {value}" for name, value in self.numbers(pixels).items())
         how = "the difference of two frames" if self.difference else "one frame"
@@ -176,7 +176,7 @@ class PhotonTransferView(View):
     # What it looks like -----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        pixels = 1500 if draft else 6000
+        pixels = 1500 if draft else 3000
         dn = self.image(draft=draft)
         body = "".join(
             [
