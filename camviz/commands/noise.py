@@ -1,0 +1,147 @@
+"""`camviz noise`: the EMVA 1288 figures of a camera, measured from its frames."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from html import escape
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from camviz.commands.common import OK, Refusal, add_command, refuse_output, write_whole
+
+if TYPE_CHECKING:
+    from camviz.sensors.measurement import Measurement
+    from camviz.sensors.recording import Recording
+
+NOISE = """\
+Measures a sensor from its frames, by EMVA Standard 1288 (release 4.0, linear): gain, read noise, quantum efficiency,
+signal to noise, dynamic range, full well, fixed patterns and dark current.
+
+FOLDER holds, for each of several exposures, two frames of the same steady, even light and two with the lens covered,
+8- or 16-bit grey PNG or TIFF straight from the sensor:
+  bright_<exposure ms>_0.png   bright_<exposure ms>_1.png   dark_<exposure ms>_0.png   dark_<exposure ms>_1.png
+The exposures should reach beyond saturation. Further frames of one exposure (_2, _3, ...), of both kinds, make a stack,
+which splits the patterns into rows, columns and pixels. FOLDER may also be, or hold, an EMVA 1288 descriptor file.
+"""
+EPILOG = """\
+examples:
+  camviz noise shots/
+  camviz noise shots/ --photons-per-ms 5200 --report noise.html
+  camviz noise EMVA1288_Data.txt --json
+
+exit status:
+  0  measured
+  2  the frames cannot be measured, or the command cannot be used; one sentence on stderr says why
+"""
+
+
+def add(commands: Any) -> None:
+    command = add_command(commands, "noise", noise, "measure a sensor from its frames", NOISE)
+    command.epilog = EPILOG
+    command.add_argument("folder", metavar="FOLDER", type=Path, help="the frames, or an EMVA 1288 descriptor file")
+    command.add_argument(
+        "--photons-per-ms", metavar="N", type=_photons, help="photons that reach a pixel in a millisecond of exposure"
+    )
+    command.add_argument("--json", action="store_true", help="the figures for programs; null if unknown")
+    command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with the curves as well")
+
+
+def noise(options: argparse.Namespace) -> int:
+    """Measure, write the page whole or not at all, and only then print."""
+    if "\0" in str(options.folder):
+        raise Refusal(f"{str(options.folder)!r} is not the name of a folder.")
+    if options.report:
+        refuse_output(options.report, "page", options.folder)
+    from camviz.sensors.recording import RecordingError, measure, read_recording
+
+    try:
+        recording = read_recording(options.folder)
+        if options.photons_per_ms is not None:
+            recording = recording.with_photons_per_ms(options.photons_per_ms)
+        found = measure(recording)
+    except RecordingError as error:
+        raise Refusal(str(error)) from error
+    if options.report:
+        _refuse_frame(options.report, recording)
+        text = page(found, recording)
+        write_whole(options.report, lambda path: path.write_text(text, encoding="utf-8"))
+    print(as_json(found) if options.json else as_text(found, recording))
+    if options.report and not options.json:
+        print(f"{options.report}: open it in a browser.")
+    return OK
+
+
+def _photons(text: str) -> float:
+    """A number of photons above zero."""
+    try:
+        photons = float(text)
+    except ValueError:
+        photons = 0.0
+    if not 0 < photons < 1e12:
+        raise argparse.ArgumentTypeError(f"expected photons per pixel and millisecond, above 0, got {text!r}")
+    return photons
+
+
+def _refuse_frame(output: Path, recording: Recording) -> None:
+    shots = [*recording.pairs, *filter(None, (recording.bright_stack, recording.dark_stack))]
+    refuse_output(output, "page", *(frame for shot in shots for frame in shot.frames))
+
+
+def as_json(found: Measurement) -> str:
+    """The figures as one JSON object; null for those that the frames cannot give."""
+    figures = {name: float(value) if isfinite(value) else None for name, value in found.figures().items()}
+    return json.dumps(figures, indent=2)
+
+
+def as_text(found: Measurement, recording: Recording) -> str:
+    """The figures in words, with the reason where one is not known."""
+    from camviz.views.measured_noise import FIGURES, written
+
+    lines = [f"{recording.source}: {len(found.levels)} levels of exposure, {found.levels[0].bright.pixels} pixels."]
+    figures = found.figures()
+    for name, (words, _, _) in FIGURES.items():
+        why = found.why(name)
+        lines.append(f"  {words:24} {written(name, figures[name])}" + (f": {why}" if why else ""))
+    return "\n".join([*lines, *remarks(found)])
+
+
+def remarks(found: Measurement) -> list[str]:
+    """What else a reader should know, one sentence each."""
+    said = []
+    smallest, largest, mean = found.linearity
+    if isfinite(mean):
+        said.append(f"Off a straight line by {mean:.2%} on average, from {smallest:+.2%} to {largest:+.2%}.")
+    for name, parts in found.pattern_split().items():
+        words, factor, unit = ("DSNU", 1.0, "e⁻") if name == "dsnu_e" else ("PRNU", 100.0, "%")
+        listed = ", ".join(f"{part}s {factor * value:.3g} {unit}" for part, value in parts.items())
+        said.append(f"{words} by its parts: {listed}.")
+    if not (found.bright and found.dark):
+        said.append("The patterns come from pairs of frames; a stack of 16 or more of one exposure tells them better.")
+    if found.flicker_counts:
+        said.append(
+            "By release 3 of the standard, as the descriptor says: flicker of the light between frames counts as noise."
+        )
+    return said
+
+
+def page(found: Measurement, recording: Recording) -> str:
+    """The measurement as one page of HTML that needs no network: the figures, then the curves."""
+    from camviz.page import document, figure
+    from camviz.views.measured_noise import FIGURES, MeasuredNoiseView, written
+
+    figures = found.figures()
+    rows = "".join(
+        f"<tr><th>{escape(words)}</th><td>{escape(written(name, figures[name]))}</td>"
+        f"<td>{escape(found.why(name))}</td></tr>"
+        for name, (words, _, _) in FIGURES.items()
+    )
+    notes = "".join(f"<p>{escape(sentence)}</p>" for sentence in remarks(found))
+    body = (
+        f"<p>{len(found.levels)} levels of exposure, {found.levels[0].bright.pixels} pixels. "
+        "EMVA Standard 1288, linear model.</p>"
+        f'<div class="scroll"><table>{rows}</table></div>{notes}'
+        + figure("", MeasuredNoiseView(measurement=found, name=recording.source.name).figure())
+    )
+    return document(recording.source.name, body)

@@ -1,0 +1,340 @@
+"""The photon-transfer visualizer: where a picture's noise comes from, and the gain that falls out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import isfinite, log10
+from typing import ClassVar
+
+import numpy as np
+
+from camviz.cameras import Camera, Intrinsics
+from camviz.draw import plot, svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.scenes import render, textured_scene, to_display
+from camviz.sensors import Sensor
+from camviz.sensors.frozen import Draw, exposed
+from camviz.sensors.statistics import slope_through_origin
+from camviz.views import garden
+from camviz.views.base import View, slider, switch
+
+FULL_WELL_E = 15_000.0
+WHITE_E_PER_S = 10_000.0  # electrons that a white surface frees in a second
+CARD = 0.4  # of white: the even grey card that the noise is measured on
+LEVELS = np.geomspace(2.0**-12, 8.0, 32)  # seconds: half a stop apart, and as many
+_WIDTH, _HEIGHT = 640, 480
+_CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
+
+
+@dataclass(frozen=True)
+class PhotonTransferView(View):
+    """A camera in the garden with a grey card, and the noise on that card at every exposure.
+
+    `exposure` is in stops: 0 is one second, each step halves or doubles. At `gain` 1 the converter reaches its end as
+    the well does, at 15 000 electrons; more gain gives more DN per electron, and less room. With `difference` the
+    noise is that of the difference of two frames over √2, else what varies over the pixels of one.
+    """
+
+    title: ClassVar[str] = "Photon transfer"
+
+    exposure: float = slider(-3.0, -10.0, 3.0, 0.25, unit="stops", help="0 is one second; −1 half of it")
+    gain: float = slider(1.0, 1.0, 16.0, 0.5, unit="×", help="more numbers for each electron, as ISO does")
+    read_noise_e: float = slider(8.0, 0.0, 40.0, 0.5, label="read noise", unit="e⁻", help="each time a pixel is read")
+    prnu: float = slider(1.5, 0.0, 6.0, 0.1, label="PRNU", unit="%", help="pixels answer light differently")
+    dsnu_e: float = slider(5.0, 0.0, 40.0, 0.5, label="DSNU", unit="e⁻", help="pixels begin from different offsets")
+    dark_current: float = slider(20.0, 0.0, 500.0, 5.0, label="dark current", unit="e⁻/s", help="at 20 °C")
+    temperature_c: float = slider(20.0, -30.0, 60.0, 1.0, label="temperature", unit="°C", help="of the sensor")
+    bits: int = slider(12, 4, 14, 1, label="bit depth", unit="bits", help="of the converter")
+    frames: int = slider(1, 1, 64, 1, label="frames averaged", help="each picture is the mean of so many")
+    photon_noise: bool = switch(True, label="photon noise", help="light comes in photons, at random")
+    difference: bool = switch(False, label="difference of two frames", help="take the fixed pattern out")
+    brighten: bool = switch(True, help="show dim pictures as bright as others")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("gain", "frames", "bits"):
+            if not getattr(self, name) >= 1:
+                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        object.__setattr__(self, "bits", int(self.bits))
+        object.__setattr__(self, "frames", int(self.frames))
+
+    # What is true -----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def sensor(self) -> Sensor:
+        """The sensor of these settings."""
+        steps = 2**self.bits - 1
+        offset = 0.03 * steps
+        return Sensor(
+            quantum_efficiency=1.0,  # everything here is told in electrons
+            full_well_e=FULL_WELL_E,
+            read_noise_e=self.read_noise_e,
+            gain_dn_per_e=self.gain * (steps - offset) / FULL_WELL_E,
+            offset_dn=offset,
+            bits=self.bits,
+            dark_current_e_per_s=self.dark_current,
+            dsnu_e=self.dsnu_e,
+            prnu=self.prnu / 100,
+        )
+
+    @property
+    def exposure_s(self) -> float:
+        return float(2.0**self.exposure)
+
+    @property
+    def card_e(self) -> float:
+        """The electrons that light frees in a pixel of the card, on average."""
+        return CARD * WHITE_E_PER_S * self.exposure_s
+
+    def parts(self, electrons: np.ndarray) -> dict[str, np.ndarray]:
+        """The deviation of each kind of noise, in DN, on a card that frees so many electrons (n,).
+
+        The fixed patterns are not in the difference of two frames.
+        """
+        K, even = self.sensor.gain_dn_per_e, np.ones_like(electrons)
+        heat = self.sensor.dark_current(self.temperature_c) * electrons / (CARD * WHITE_E_PER_S)
+        root = self.frames**-0.5
+        found = {
+            "read noise": K * self.read_noise_e * root * even,
+            "photons": K * np.sqrt(electrons) * root * self.photon_noise,
+            "dark current": K * np.sqrt(heat) * root,
+            "rounding": (1 / 12) ** 0.5 * root * even,
+        }
+        if not self.difference:
+            found |= {"PRNU": K * self.prnu / 100 * electrons, "DSNU": K * self.dsnu_e * even}
+        return found
+
+    def measured(self, pixels: int = 6000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Signal above the dark (DN), its noise and that of the dark (DN), each (n,), from frames of the card."""
+        return _measured(self, pixels)
+
+    def _frames(self, electrons: np.ndarray, pixels: int, seed: int) -> np.ndarray:
+        """Two frames of the card at each level (n, 2, pixels), in DN."""
+        draw = _draw((len(LEVELS), 2, pixels), (pixels,), seed)
+        times = LEVELS[:, None, None]
+        return self._exposed(electrons[:, None, None], times, draw)
+
+    def _exposed(self, electrons: np.ndarray, exposure_s: np.ndarray | float, draw: Draw) -> np.ndarray:
+        return exposed(
+            *(self.sensor, electrons, exposure_s, self.temperature_c, draw),
+            averaged=self.frames,
+            photon_noise=self.photon_noise,
+        )
+
+    def _noise(self, frames: np.ndarray) -> np.ndarray:
+        if self.difference:
+            return (frames[:, 0] - frames[:, 1]).std(axis=-1).astype(float) / 2**0.5
+        return frames[:, 0].std(axis=-1).astype(float)
+
+    def fitted_gain(self, signal: np.ndarray, noise: np.ndarray, dark: np.ndarray) -> float:
+        """K in DN/e⁻ as EMVA 1288 fits it, variance over signal up to 70 % of saturation; NaN if rounding hides it.
+
+        The mean of n frames has 1/n of their variance.
+        """
+        top = int(np.argmax(noise))
+        used = (signal <= 0.7 * signal[top]) & (np.arange(len(signal)) <= top)
+        slope = slope_through_origin(signal[used], self.frames * (noise**2 - dark**2)[used])
+        return slope if slope > 0 and noise[top] > 0.5 else float("nan")
+
+    def numbers(self, pixels: int = 3000) -> dict[str, str]:
+        """The state's key figures, as text."""
+        fitted = self.fitted_gain(*self.measured(pixels))
+        parts = self.parts(np.array([self.card_e]))
+        K = self.sensor.gain_dn_per_e
+        whole = float(np.sqrt(sum(part[0] ** 2 for part in parts.values()))) / K
+        full = self._saturated_share
+        return {
+            "exposure": _seconds(self.exposure_s),
+            "gain K": f"{K:.4g} DN/e⁻",
+            "K from the curve": f"{fitted:.4g} DN/e⁻, {fitted / K:.3g} × K" if isfinite(fitted) else "none",
+            "on the card": f"{self.card_e:.4g} e⁻ ± {whole:.3g}",
+            "signal / noise": f"{self.card_e / max(whole, 1e-9):.3g}" if full < 0.5 else "saturated",
+            "mostly from": max(parts, key=lambda name: float(parts[name][0])),
+            "card saturated": f"{100 * full:.0f} %",
+        }
+
+    @property
+    def _saturated_share(self) -> float:
+        """The share of the card's pixels that are full."""
+        card = self._exposed(np.full(2000, self.card_e), self.exposure_s, _draw((2000,), (2000,), 23))
+        return float(np.mean(card >= self._top_dn))
+
+    @property
+    def _top_dn(self) -> float:
+        """The largest number there is, less what a full well may vary by."""
+        well = self.sensor.gain_dn_per_e * (FULL_WELL_E - 4 * (self.read_noise_e + self.dsnu_e)) + self.sensor.offset_dn
+        return min(2**self.bits - 1.0, well)
+
+    def description(self, pixels: int = 3000) -> str:
+        """The state in words and numbers."""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers(pixels).items())
+        how = "the difference of two frames" if self.difference else "one frame"
+        return f"Noise of {how}, {self.bits} bits, {self.temperature_c:g} °C, {self.frames} averaged: {figures}."
+
+    # What it looks like -----------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        pixels = 1500 if draft else 3000
+        dn = self.image(draft=draft)
+        body = "".join(
+            [
+                svg.rectangle(0, 0, 960, 606, "paper"),
+                self._picture_panel(),
+                self._histogram_panel(dn),
+                self._transfer_panel(pixels),
+                self._numbers_column(pixels),
+            ]
+        )
+        return Picture(body, 960, 606, self.title, self.description(pixels), {"camera": jpeg(self._developed(dn))})
+
+    def image(self, *, draft: bool) -> np.ndarray:
+        """What the camera records of the garden with the card in it, DN (height, width)."""
+        light = _garden(garden.DRAFT if draft else garden.FINE)
+        draw = _draw(light.shape, light.shape, 24)
+        return self._exposed(WHITE_E_PER_S * self.exposure_s * light, self.exposure_s, draw)
+
+    def _developed(self, dn: np.ndarray) -> np.ndarray:
+        """The picture for the screen: white at the converter's end or, brightened, where white things are."""
+        white = self.sensor.gain_dn_per_e * min(WHITE_E_PER_S * self.exposure_s, FULL_WELL_E)
+        scale = white if self.brighten else 2**self.bits - 1 - self.sensor.offset_dn
+        return to_display((dn - self.sensor.offset_dn) / max(scale, 1e-9))
+
+    def _picture_panel(self) -> str:
+        panel = image_panel("picture", 20, 34, 380, _WIDTH, _HEIGHT)
+        left, top, right, bottom = (s * n for s, n in zip(_CARD, (_WIDTH, _HEIGHT) * 2, strict=True))
+        outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
+        shown = photograph(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
+        shown += svg.line(panel.place(outline), "yellow")
+        note = "brightened" if self.brighten else "as recorded"
+        return panel.show(shown, title=f"The garden in {_seconds(self.exposure_s)}", note=note)
+
+    def _histogram_panel(self, dn: np.ndarray) -> str:
+        """How many pixels have which number: the whole picture, and the card alone."""
+        top = min(2**self.bits, 2 ** int(np.ceil(np.log2(max(float(dn.max()) + 1, 16)))))
+        edges = np.linspace(-0.5, top - 0.5, min(top, 128) + 1)
+        rows, columns = _card_slices(*dn.shape)
+        panel = plot.plot_panel("histogram", 66, 376, 334, 150, (-0.02 * top, 1.02 * top), (0, 1.08))
+        shares = []
+        for values, class_ in ((dn, "fill-muted half"), (dn[rows, columns], "fill-blue half")):
+            counts = np.histogram(values, edges)[0]
+            shares.append(plot.bars(panel, edges[:-1], edges[1:], np.sqrt(counts / counts.max()), class_))
+        legend = [("muted thick", "picture"), ("blue thick", "card")]
+        yticks = [(0.0, "0"), (1.0, "most")]
+        content = plot.grid(panel, None, yticks) + "".join(shares) + plot.legend(panel, legend, "top right")
+        labels = plot.axes(panel, "digital number (DN)", "√ pixels", None, yticks)
+        return panel.show(content, title="Histogram") + labels
+
+    @cached_property
+    def _plot(self) -> Panel:
+        """Logarithmic axes that do not move with the gain: an electron at gain 1 is always in the same place."""
+        one = 0.97 * 2**self.bits / FULL_WELL_E
+        across = (log10(0.6 * one), log10(1.3 * 2**self.bits))
+        return plot.plot_panel("transfer", 490, 34, 450, 340, across, (log10(0.4 * one), log10(0.12 * 2**self.bits)))
+
+    def _transfer_panel(self, pixels: int) -> str:
+        panel = self._plot
+        ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
+        content = plot.grid(panel, *ticks) + self._curves(panel) + self._points(panel, pixels)
+        how = "the difference of two" if self.difference else "one frame"
+        label = "Noise over signal; drag or press the arrow keys to change the exposure"
+        shown = panel.show(
+            content, title=f"Noise of {how}", hint="drag to change the exposure", drag="exposure", label=label
+        )
+        return shown + plot.axes(panel, "signal above the dark (DN)", "noise, σ (DN)", *ticks)
+
+    def _curves(self, panel: Panel) -> str:
+        """Every kind of noise as a line of its own slope, and all together."""
+        K = self.sensor.gain_dn_per_e
+        signal = np.logspace(panel.left, panel.right, 40)
+        parts = self.parts(signal / K)
+        lines, legend = [], []
+        for name, (class_, slope) in _STYLES.items():
+            part = parts.get(name, np.zeros(1))
+            if part.max() > 0:
+                lines.append(plot.curve(panel, np.log10(signal), np.log10(part), class_))
+                legend.append((class_, f"{name} (slope {slope})"))
+        whole = np.sqrt(sum(part**2 for part in parts.values()))
+        lines.append(plot.curve(panel, np.log10(signal), np.log10(whole), "ink"))
+        return "".join(lines) + plot.legend(panel, [("ink", "all together"), *legend], "top left")
+
+    def _points(self, panel: Panel, pixels: int) -> str:
+        """What frames of the card say, and the exposure of the picture."""
+        signal, noise, _ = self.measured(pixels)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            points = panel.place(np.log10(np.stack([signal, noise], axis=-1)))
+            whole = np.sqrt(sum(part[0] ** 2 for part in self.parts(np.array([self.card_e])).values()))
+        points[~np.isfinite(points).all(axis=-1)] = np.nan
+        at = log10(self.sensor.gain_dn_per_e * self.card_e)
+        here = svg.dots([panel.place((at, log10(max(whole, 1e-9))))], "yellow", 13)
+        return plot.upright(panel, at, "yellow dashed") + here + svg.dots(points, "blue", 6)
+
+    def _numbers_column(self, pixels: int) -> str:
+        rows = [svg.text((490, 448), "On the card", "title")]
+        for i, (name, value) in enumerate(self.numbers(pixels).items()):
+            rows.append(svg.text((490, 472 + 20 * i), name, "note"))
+            rows.append(svg.text((620, 472 + 20 * i), value, "label"))
+        return "".join(rows)
+
+    # The exposure is dragged along the curve --------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> PhotonTransferView:
+        if handle != "exposure":
+            return self
+        stops = self.exposure + dx / self._plot.scale[0] / log10(2)
+        return self.but(exposure=float(np.clip(stops, *_limits("exposure"))))
+
+    def pressed(self, handle: str, key: str) -> PhotonTransferView:
+        steps = {"ArrowLeft": -0.5, "ArrowDown": -0.5, "-": -0.5, "ArrowRight": 0.5, "ArrowUp": 0.5, "+": 0.5}
+        return self.but(exposure=float(np.clip(self.exposure + steps.get(key, 0), *_limits("exposure"))))
+
+
+_STYLES = {
+    "read noise": ("green dashed", "0"),
+    "DSNU": ("sky dashed", "0"),
+    "rounding": ("muted dotted", "0"),
+    "photons": ("orange dashed", "½"),
+    "dark current": ("red dotted", "½"),
+    "PRNU": ("purple dashed", "1"),
+}
+
+
+def _limits(name: str) -> tuple[float, float]:
+    control = PhotonTransferView.controls()[name]
+    assert control.low is not None
+    assert control.high is not None
+    return control.low, control.high
+
+
+@lru_cache(maxsize=2)
+def _measured(view: PhotonTransferView, pixels: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `view.measured` gives, kept for the curve, the numbers and the description of one state."""
+    lit, unlit = (view._frames(e * LEVELS, pixels, seed) for e, seed in ((CARD * WHITE_E_PER_S, 21), (0.0, 22)))
+    signal = (lit.mean(axis=(1, 2)) - unlit.mean(axis=(1, 2))).astype(float)
+    return signal, view._noise(lit), view._noise(unlit)
+
+
+@lru_cache(maxsize=12)
+def _draw(frames: tuple[int, ...], pattern: tuple[int, ...], seed: int) -> Draw:
+    return Draw.of(frames, pattern, seed)
+
+
+@lru_cache(maxsize=2)
+def _garden(side: int) -> np.ndarray:
+    """The light (height, width) of the garden with the card in it; 1 is white."""
+    camera = Camera(Intrinsics.from_fov(_WIDTH, _HEIGHT, 70).within(side))
+    light = render(textured_scene(), camera).mean(axis=-1)
+    rows, columns = _card_slices(*light.shape)
+    light[rows, columns] = CARD
+    light.flags.writeable = False
+    return light
+
+
+def _card_slices(height: int, width: int) -> tuple[slice, slice]:
+    left, top, right, bottom = _CARD
+    return slice(round(top * height), round(bottom * height)), slice(round(left * width), round(right * width))
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:.3g} s" if seconds >= 0.3 else f"1/{1 / seconds:.0f} s"
