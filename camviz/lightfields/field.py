@@ -13,7 +13,7 @@ from camviz.lenses.base import Array
 from camviz.scenes.light import to_linear
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LightField:
     """Views (v, u, height, width, 3) from a grid of places in the plane of a lens, or of an array of cameras.
 
@@ -28,7 +28,7 @@ class LightField:
     focus: u_left − u_right, as in stereo.
     """
 
-    views: NDArray[Any] = field(compare=False, repr=False)
+    views: NDArray[Any] = field(repr=False)
     baseline: float = nan
     focal_length: float = nan
     focus_distance: float = inf
