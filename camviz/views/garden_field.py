@@ -53,13 +53,12 @@ def true_slopes(fence: bool = False) -> Floats:
 
 @lru_cache(maxsize=2)
 def measured_slopes(field: LightField, low: float, high: float) -> Floats:
-    """The disparity (height, width) as the views tell it, of a field with at least two views, low … high."""
-    if field.rows > 4 and field.columns > 4 and field.rows % 2 and field.columns % 2:
-        views = field.views[
-            field.rows // 2 % 2 :: 2, field.columns // 2 % 2 :: 2
-        ]  # every other one: a quarter of the work
-        return disparity_by_sweep(LightField(views), np.arange(2 * low, 2 * high, 2 * STEP)) * np.float32(0.5)
-    return disparity_by_sweep(field, np.arange(low, high, max(STEP, (high - low) / 60)))
+    """The disparity (height, width) between `low` and `high` as the views tell it."""
+    tried = np.arange(low - STEP, high + 2 * STEP, max(STEP, (high - low) / 60))
+    if field.rows < 5 or field.columns < 5 or field.rows % 4 != 1 or field.columns % 4 != 1:
+        return disparity_by_sweep(field, tried)
+    every_other = LightField(field.views[::2, ::2])  # with the same middle, and a quarter of the work
+    return disparity_by_sweep(every_other, 2 * tried) * np.float32(0.5)
 
 
 @lru_cache(maxsize=2)

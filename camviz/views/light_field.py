@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Self
 
@@ -29,7 +29,8 @@ class LightFieldView(View):
     """A light field as a plenoptic camera records it, and a picture made of it afterwards.
 
     The picture is sharp where points move by `slope` pixels from view to view. Mark and slice lie at (column, row) of
-    the middle view; (u, v) is one of the views, counted from 0 at the top left. `field` takes the place of the garden.
+    the middle view; (u, v) is one of the views, counted from 0 at the top left. `field` takes the place of the garden;
+    its slopes lie within `limits`.
     """
 
     title: ClassVar[str] = "Light field"
@@ -43,6 +44,7 @@ class LightFieldView(View):
     fence: bool = switch(False, label="a fence in front", help="slats two metres before the lens")
     show: str = choice("refocused", "slopes", help="the picture, or the slope measured at every pixel")
     field: LightField | None = None
+    limits: tuple[float, float] = garden_field.SLOPES
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -53,20 +55,21 @@ class LightFieldView(View):
             object.__setattr__(self, name, int(value))
 
     @classmethod
-    def of(cls, field: LightField, slopes: tuple[float, float] = (-3.0, 3.0)) -> Self:
-        """The view of a given light field, its mark in the middle, focused where the views agree."""
+    def of(cls, field: LightField, limits: tuple[float, float] = (-3.0, 3.0)) -> Self:
+        """The view of a given light field whose slopes lie within `limits`, its mark in the middle and in focus."""
         v, u, row, column = (size // 2 for size in field.views.shape[:4])
-        middle = float(np.clip(0.0, *slopes))
-        return cls(slope=middle, v=v, u=u, row=row, column=column, field=field)
+        view = cls(slope=limits[0], v=v, u=u, row=row, column=column, field=field, limits=limits)
+        return view.but(slope=float(np.clip(round(view.slope_here, 2), *limits)))
 
     def offered(self) -> dict[str, Control]:
         """The controls with the ranges of this field; a given one has no fence."""
         controls = self.controls()
         for name, size in zip(("v", "u", "row", "column"), self.views.shape, strict=False):
-            changed = controls[name]
-            controls[name] = Control(changed.label, changed.unit, 0, max(size - 1, 1), 1, (), changed.help)
-        if self.field is not None:
-            del controls["fence"]
+            controls[name] = replace(controls[name], low=0, high=size - 1)
+        controls["slope"] = replace(controls["slope"], low=self.limits[0], high=self.limits[1])
+        fixed = [name for name, control in controls.items() if control.low is not None and control.low == control.high]
+        for name in fixed + ["fence"] * (self.field is not None):
+            del controls[name]
         return controls
 
     # What is true ----------------------------------------------------------------------------------------------------
@@ -88,7 +91,7 @@ class LightFieldView(View):
     @property
     def slopes(self) -> np.ndarray:
         """The slope (height, width) measured at every pixel of the middle view."""
-        return garden_field.measured_slopes(self.light_field, _LOW - 0.15, _HIGH + 0.3)
+        return garden_field.measured_slopes(self.light_field, *self.limits)
 
     @property
     def slope_here(self) -> float:
@@ -166,10 +169,11 @@ class LightFieldView(View):
         label = "The picture; click or press the arrow keys to focus on what is there"
         heading = {"hint": "click: focus there", "drag": "focus", "label": label}
         if self.show == "slopes":
-            attached["picture"] = heat_map(self.slopes, _LOW, _HIGH, "depth")
+            attached["picture"] = heat_map(self.slopes, *self.limits, "depth")
             attached["picture key"] = heat_key("depth")
             title = "Slope measured at every pixel"
-            return heat_panel(panel, width, height, _LOW, _HIGH, "px", marks, title=title, **heading)
+            low, high = self.limits
+            return heat_panel(panel, width, height, low, high, "px", marks, title=title, **heading)
         attached["picture"] = jpeg(self.image(), quality=90)
         title = "One view" if self.aperture == "pinhole" else f"Refocused: shear by {_signed(self.slope)} px, sum"
         return panel.show(photograph(panel, "picture", width, height) + marks, title=title, **heading)
@@ -255,19 +259,17 @@ class LightFieldView(View):
 
     @cached_property
     def _plot(self) -> Panel:
-        return plot.plot_panel("depth", 556, 440, 384, 126, (_LOW, _HIGH), (1.0, 12.0))
+        return plot.plot_panel("depth", 556, 440, 384, 126, self.limits, (1.0, 12.0))
 
     def _depth_panel(self) -> str:
         panel, field = self._plot, self.light_field
-        slopes = np.linspace(_LOW, _HIGH, 139)
-        depths = field.depth(slopes)
-        marks = ""
-        if np.isfinite(field.depth(0.0)) or np.isinf(field.depth(0.0)):
-            here = panel.place((self.slope_here, min(float(field.depth(self.slope_here)), 11.6)))
-            now = panel.place((self.slope, min(float(np.nan_to_num(field.depth(self.slope), nan=11.6)), 11.6)))
-            marks = (
-                plot.curve(panel, slopes, depths, "blue thick") + ring(here, "yellow", 8) + svg.dots([now], "red", 10)
-            )
+        slopes = np.linspace(*self.limits, 139)
+        within = lambda slope: (slope, np.clip(np.nan_to_num(field.depth(slope), nan=99), 1.3, 11.6))  # noqa: E731
+        curve = plot.curve(panel, slopes, field.depth(slopes), "blue thick")
+        if np.isnan(field.baseline * field.focal_length):
+            curve = svg.text((panel.width / 2, 60), "baseline and focal length are not known", "note middle")
+        here, now = panel.place([within(self.slope_here), within(self.slope)])
+        marks = curve + ring(here, "yellow", 8) + svg.dots([now], "red", 10)
         label = "Depth against slope; drag or press the arrow keys to change the slope"
         content = plot.grid(panel) + plot.upright(panel, self.slope, "red dashed") + marks
         named = plot.axes(panel, "slope d, pixels a view", "depth, m")
@@ -278,6 +280,8 @@ class LightFieldView(View):
         field = self.light_field
         if not np.isfinite(field.baseline * field.focal_length):
             return "d = b f (1/z − 1/z_f)"
+        if np.isinf(field.focus_distance):
+            return f"d = {field.baseline * field.focal_length:.1f} px·m / z"
         return f"d = {field.baseline * field.focal_length:.1f} px·m (1/z − 1/{field.focus_distance:.4g} m)"
 
     def _numbers_block(self) -> str:
@@ -291,7 +295,7 @@ class LightFieldView(View):
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         if handle == "slope":
-            return self.but(slope=float(np.clip(self.slope + dx / self._plot.scale[0], _LOW, _HIGH)))
+            return self.but(slope=float(np.clip(self.slope + dx / self._plot.scale[0], *self.limits)))
         if handle == "viewpoint":
             return self._with_view(x, y, dx, dy)
         panel = self._image_panel
@@ -301,7 +305,7 @@ class LightFieldView(View):
         if handle == "row":
             return self.but(row=row)
         moved = self.but(row=row, column=int(np.clip(column, 0, self.views.shape[3] - 1)))
-        return moved.but(slope=float(np.clip(round(moved.slope_here, 2), _LOW, _HIGH)))
+        return moved.but(slope=float(np.clip(round(moved.slope_here, 2), *self.limits)))
 
     def _with_view(self, x: float, y: float, dx: float, dy: float) -> Self:
         panel, (rows, columns) = self._mosaic_panel, self.views.shape[:2]
