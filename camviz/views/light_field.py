@@ -108,12 +108,12 @@ class LightFieldView(View):
         rows, columns, height, width = self.views.shape[:4]
         known = {
             "focused at": metres(float(field.depth(self.slope))),
-            "α": _written(float(field.alpha(self.slope, PITCH)), "{:.3f}"),
             "slope at the mark": f"{_signed(self.slope_here)} px, {metres(float(field.depth(self.slope_here)))}",
         }
         if self.field is None:
             truth = float(garden_field.true_slopes(self.fence)[self.row, self.column])
             known["in truth"] = f"{_signed(truth)} px, {metres(float(field.depth(truth)))}"
+            known["α"] = f"{float(field.alpha(self.slope, PITCH)):.3f}"
         return known | {
             "views summed": f"{count} of {rows * columns}",
             "sensor": f"{columns * width} × {rows * height} px",
@@ -328,7 +328,3 @@ def _bytes(views: np.ndarray) -> np.ndarray:
 
 def _signed(value: float) -> str:
     return f"{value:+.2f}".replace("-", "−")
-
-
-def _written(value: float, form: str) -> str:
-    return form.format(value) if np.isfinite(value) else "unknown"
