@@ -88,7 +88,7 @@ class LightField:
         """Ng's α (...): how far behind the lens the film of a refocused picture lies, over how far the sensor does.
 
         With image distances F and αF, 1 − 1/α = F (1/z − 1/z_focus), and F = focal_length · pixel_pitch; so
-        1 − 1/α = disparity · pixel_pitch / baseline: the slope is straight in 1/α, not in α (Ng 2005, eq. 6).
+        1 − 1/α = disparity · pixel_pitch / baseline: the slope is straight in 1/α, not in α (Ng 2005).
         `pixel_pitch` is in metres. NaN where no film would do.
         """
         over = 1 - np.asarray(disparity, dtype=float) * pixel_pitch / self.baseline

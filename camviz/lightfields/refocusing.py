@@ -20,7 +20,7 @@ def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) 
     """The picture (height, width, 3), linear light, that is sharp where points move by `disparity` pixels a view.
 
     Shift and sum: R(x, y) = Σ w_vu L_vu(x − d u, y − d v) / Σ w_vu, with u and v counted from the aperture's middle
-    (Ng 2005, eq. 5). `mask` (rows, columns) are the weights w ≥ 0, by default all ones. Between pixels views are
+    (Ng 2005). `mask` (rows, columns) are the weights w ≥ 0, by default all ones. Between pixels views are
     interpolated linearly, first along y and then along x; beyond its border a view goes on as it ends.
     Raises ValueError for a mask of another shape, or with no view in it.
     """
@@ -96,7 +96,7 @@ def fourier_slice(views: ArrayLike, disparity: float) -> Array:
     """The same picture as a slice: a plane through the origin of the four-dimensional spectrum, transformed back.
 
     The picture's frequencies k = (k_x, k_y), in cycles per pixel, are found in the light field's spectrum at the
-    angular frequencies d k, in cycles per view (Ng 2005, "Fourier slice photography", section 4). Between the
+    angular frequencies d k, in cycles per view (Ng 2005, "Fourier slice photography"). Between the
     samples of the spectrum along u and v the interpolation is exact, by the kernel of a grid of so many views.
     """
     views = np.asarray(views, dtype=float)

@@ -37,7 +37,7 @@ def disparity_by_structure(field: LightField, start: ArrayLike = 0.0, window: in
 
     With L(x, u) = g(x + d u), L_u = d L_x. The structure tensor's eigenvector gives d = tan(½ atan2(2 J_xu, J_xx −
     J_uu)), where J_xx = Σ L_x², J_xu = Σ L_x L_u, J_uu = Σ L_u² over a window of `window` × `window` pixels and both
-    directions; its coherence is the trust (Wanner and Goldlücke 2014, section 3.1). Trustworthy within half a pixel of
+    directions; its coherence is the trust (Wanner and Goldlücke 2014). Trustworthy within half a pixel of
     `start`, a number: shear the field there first. It takes the three views around the middle in each direction.
     """
     grey, steps = _grey(field), [round(len(step) // 2) for step in field.steps()]
