@@ -1,0 +1,34 @@
+"""Light fields: the picture from every place of an aperture, and what can be made of them afterwards."""
+
+from camviz.lightfields.apertures import APERTURES, aperture
+from camviz.lightfields.field import LightField
+from camviz.lightfields.folders import read_folder
+from camviz.lightfields.plenoptic import (
+    epipolar_plane_image,
+    from_microlens_image,
+    from_mosaic,
+    to_microlens_image,
+    to_mosaic,
+)
+from camviz.lightfields.refocusing import fourier_slice, periodic_shift_and_sum, refocus
+from camviz.lightfields.rendering import photograph_field, true_disparity
+from camviz.lightfields.slopes import disparity_by_structure, disparity_by_sweep
+
+__all__ = [
+    "APERTURES",
+    "LightField",
+    "aperture",
+    "disparity_by_structure",
+    "disparity_by_sweep",
+    "epipolar_plane_image",
+    "fourier_slice",
+    "from_microlens_image",
+    "from_mosaic",
+    "periodic_shift_and_sum",
+    "photograph_field",
+    "read_folder",
+    "refocus",
+    "to_microlens_image",
+    "to_mosaic",
+    "true_disparity",
+]

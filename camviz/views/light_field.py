@@ -1,0 +1,330 @@
+"""The light field visualizer: rays on microlenses, all views, one slice, and a picture focused where you click."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+
+from camviz.draw import plot, svg
+from camviz.draw.heat import heat_key, heat_map, heat_panel
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg, png
+from camviz.lenses.base import Array
+from camviz.lightfields import LightField, aperture, refocus, to_microlens_image
+from camviz.scenes import to_display
+from camviz.views import garden_field, microlens_diagram
+from camviz.views.base import Control, View, choice, slider, switch
+from camviz.views.depth_wedge import metres
+from camviz.views.marks import on_photograph, ring
+
+PITCH = 0.002  # metres between microlenses, of the camera that would record the garden's field
+_LOW, _HIGH = garden_field.SLOPES
+
+
+@dataclass(frozen=True)
+class LightFieldView(View):
+    """A light field as a plenoptic camera records it, and a picture made of it afterwards.
+
+    The picture is sharp where points move by `slope` pixels from view to view. Mark and slice lie at (column, row) of
+    the middle view; (u, v) is one of the views, counted from 0 at the top left. `field` takes the place of the garden;
+    its slopes lie within `limits`.
+    """
+
+    title: ClassVar[str] = "Light field"
+
+    slope: float = slider(0.0, _LOW, _HIGH, 0.02, unit="px", help="how far a sharp point moves from view to view")
+    aperture: str = choice("full", "half", "ring", "pinhole", help="which views are summed")
+    u: int = slider(4, 0, 8, 1, label="view u", help="column of the view, from the left; the pinhole's place")
+    v: int = slider(4, 0, 8, 1, label="view v", help="row of the view, from the top; the pinhole's place")
+    column: int = slider(118, 0, 159, 1, unit="px", help="of the mark in the picture")
+    row: int = slider(48, 0, 119, 1, unit="px", help="of the mark, and of the slice")
+    fence: bool = switch(False, label="a fence in front", help="slats two metres before the lens")
+    show: str = choice("refocused", "slopes", help="the picture, or the slope measured at every pixel")
+    field: LightField | None = None
+    limits: tuple[float, float] = garden_field.SLOPES
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, size in zip(("v", "u", "row", "column"), self.views.shape, strict=False):
+            value = getattr(self, name)
+            if int(value) != value or not 0 <= value < size:
+                raise ValueError(f"{name} must be a whole number from 0 to {size - 1}, got {value}")
+            object.__setattr__(self, name, int(value))
+
+    @classmethod
+    def of(cls, field: LightField, limits: tuple[float, float] = (-3.0, 3.0)) -> Self:
+        """The view of a given light field whose slopes lie within `limits`, its mark in the middle and in focus."""
+        v, u, row, column = (size // 2 for size in field.views.shape[:4])
+        view = cls(slope=limits[0], v=v, u=u, row=row, column=column, field=field, limits=limits)
+        return view.but(slope=float(np.clip(round(view.slope_here, 2), *limits)))
+
+    def offered(self) -> dict[str, Control]:
+        """The controls with the ranges of this field; a given one has no fence."""
+        controls = self.controls()
+        for name, size in zip(("v", "u", "row", "column"), self.views.shape, strict=False):
+            controls[name] = replace(controls[name], low=0, high=size - 1)
+        controls["slope"] = replace(controls["slope"], low=self.limits[0], high=self.limits[1])
+        fixed = [name for name, control in controls.items() if control.low is not None and control.low == control.high]
+        for name in fixed + ["fence"] * (self.field is not None):
+            del controls[name]
+        return controls
+
+    # What is true ----------------------------------------------------------------------------------------------------
+
+    @property
+    def light_field(self) -> LightField:
+        """The field shown."""
+        return self.field or garden_field.garden_field(self.fence)
+
+    @property
+    def views(self) -> np.ndarray:
+        return self.light_field.views if self.field else garden_field.garden_field(False).views
+
+    @property
+    def mask(self) -> Array:
+        """The weights (rows, columns) of the views in the picture."""
+        return aperture(self.aperture, self.views.shape[0], self.views.shape[1], self.v, self.u)
+
+    @property
+    def slopes(self) -> np.ndarray:
+        """The slope (height, width) measured at every pixel of the middle view."""
+        return garden_field.measured_slopes(self.light_field, *self.limits)
+
+    @property
+    def slope_here(self) -> float:
+        """The slope measured at the mark."""
+        return float(self.slopes[self.row, self.column])
+
+    def image(self) -> np.ndarray:
+        """The picture (height, width, 3), sRGB bytes: sheared, then summed."""
+        return to_display(refocus(self.light_field, self.slope, self.mask))
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        field, count = self.light_field, int(self.mask.sum())
+        rows, columns, height, width = self.views.shape[:4]
+        known = {
+            "focused at": metres(float(field.depth(self.slope))),
+            "slope at the mark": f"{_signed(self.slope_here)} px, {metres(float(field.depth(self.slope_here)))}",
+        }
+        if self.field is None:
+            truth = float(garden_field.true_slopes(self.fence)[self.row, self.column])
+            known["in truth"] = f"{_signed(truth)} px, {metres(float(field.depth(truth)))}"
+            known["α"] = f"{float(field.alpha(self.slope, PITCH)):.3f}"
+        return known | {
+            "views summed": f"{count} of {rows * columns}",
+            "sensor": f"{columns * width} × {rows * height} px",
+            "each picture": f"{width} × {height} px",
+        }
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        shown = (
+            "the slope of every pixel" if self.show == "slopes" else f"the picture for slope {_signed(self.slope)} px"
+        )
+        fence = " behind a fence" if self.fence and self.field is None else ""
+        what = "A light field" if self.field else f"The garden{fence} as a light field"
+        return (
+            f"{what}; shown: {shown}, aperture {self.aperture}, view u = {self.u}, v = {self.v}; "
+            f"mark at column {self.column}, row {self.row}. {figures}."
+        )
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        attached = {
+            "views": garden_field.all_views(self.light_field),
+            "slice": png(_bytes(self.light_field.views[self.v, :, self._slice_row])),
+            "sensor": png(self._under_the_microlenses()),
+        }
+        picture = self._picture_panel(attached)
+        body = "".join(
+            [
+                svg.rectangle(0, 0, 960, 618, "paper"),
+                picture,
+                self._slice_panel(),
+                microlens_diagram.drawn(500, 34, self.slope_here, self.slope, self.mask[self.v], self.u),
+                self._views_panel(),
+                self._sensor_panel(),
+                self._depth_panel(),
+                self._numbers_block(),
+            ]
+        )
+        return Picture(body, 960, 618, self.title, self.description(), attached)
+
+    # The picture and its slice ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def _image_panel(self) -> Panel:
+        height, width = self.views.shape[2:4]
+        return image_panel("picture", 20, 34, 420, width, height, tallest=315)
+
+    def _picture_panel(self, attached: dict[str, bytes]) -> str:
+        panel, (height, width) = self._image_panel, self.views.shape[2:4]
+        across = panel.place([(panel.left, self.row), (panel.right, self.row)])
+        here = panel.place((self.column, self.row))
+        marks = on_photograph([across], "yellow thin") + ring(here, "yellow", 7) + self._row_handle(across[0])
+        label = "The picture; click or press the arrow keys to focus on what is there"
+        heading = {"hint": "click: focus there", "drag": "focus", "label": label}
+        if self.show == "slopes":
+            attached["picture"] = heat_map(self.slopes, *self.limits, "depth")
+            attached["picture key"] = heat_key("depth")
+            title = "Slope measured at every pixel"
+            low, high = self.limits
+            return heat_panel(panel, width, height, low, high, "px", marks, title=title, **heading)
+        attached["picture"] = jpeg(self.image(), quality=90)
+        title = "One view" if self.aperture == "pinhole" else f"Refocused: shear by {_signed(self.slope)} px, sum"
+        return panel.show(photograph(panel, "picture", width, height) + marks, title=title, **heading)
+
+    def _row_handle(self, left_end: Array) -> str:
+        grip = svg.rectangle(left_end[0], left_end[1] - 9, 16, 18, "paper half") + svg.polygon(
+            left_end + np.array([(2, 0), (13, -8), (13, 8)]), "fill-yellow"
+        )
+        label = "The slice's row; drag or press the arrow keys to move it"
+        return svg.group(grip, data_drag="row", tabindex=0, role="group", aria_label=label)
+
+    @property
+    def _slice_row(self) -> int:
+        """Where the mark's row is in the views of row v: as far up as its slope takes it."""
+        rows, height = self.views.shape[0], self.views.shape[2]
+        return int(np.clip(round(self.row - self.slope_here * (self.v - (rows - 1) / 2)), 0, height - 1))
+
+    def _slice_panel(self) -> str:
+        width, columns = self.views.shape[3], self.views.shape[1]
+        full = self._image_panel
+        panel = Panel("slice", full.x, 388, full.width, 99, -0.5, width - 0.5, -0.5, columns - 0.5)
+        seen = svg.image("slice", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
+        u = np.array([-0.5, columns - 0.5])
+        steps = u - (columns - 1) / 2
+        found, sheared = (
+            panel.place(np.stack([self.column - slope * steps, u], axis=-1)) for slope in (self.slope_here, self.slope)
+        )
+        lines = on_photograph([found], "yellow") + on_photograph([sheared], "red dashed")
+        chosen = panel.place([(-0.5, self.u), (2.5, self.u)])
+        title = f"Slice: row {self._slice_row}, v = {self.v}"
+        note = "line: the mark's; dashed: the shear"
+        return panel.show(seen + lines + svg.line(chosen, "purple thick"), title=title, note=note)
+
+    # The views -------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _mosaic_panel(self) -> Panel:
+        rows, columns, height, width = self.views.shape[:4]
+        return image_panel("views", 500, 240, 212, columns * width, rows * height, tallest=159)
+
+    def _views_panel(self) -> str:
+        panel = self._mosaic_panel
+        rows, columns = self.views.shape[:2]
+        cell = np.array([panel.width / columns, panel.height / rows])
+        closed = [
+            svg.rectangle(u * cell[0], v * cell[1], cell[0], cell[1], "fill-shade half")
+            for v, u in np.argwhere(self.mask == 0)
+        ]
+        x, y = cell * (self.u, self.v)
+        chosen = svg.line([(x, y), (x + cell[0], y), cell + (x, y), (x, y + cell[1]), (x, y)], "purple thick")
+        seen = svg.image("views", 0, 0, panel.width, panel.height)
+        label = "All views; click or press the arrow keys to choose one"
+        dark = "" if self.mask.all() else "dark: not summed"
+        return panel.show(seen + "".join(closed) + chosen, title="All views", note=dark, drag="viewpoint", label=label)
+
+    def _window(self) -> tuple[slice, slice]:
+        """The rows and columns of microlenses drawn, around the mark."""
+        height, width = self.views.shape[2:4]
+        tall, wide = min(9, height), min(12, width)
+        top, left = np.clip((self.row - tall // 2, self.column - wide // 2), 0, (height - tall, width - wide))
+        return slice(top, top + tall), slice(left, left + wide)
+
+    def _under_the_microlenses(self) -> np.ndarray:
+        down, across = self._window()
+        return to_microlens_image(_bytes(self.light_field.views[:, :, down, across]))
+
+    def _sensor_panel(self) -> str:
+        down, across = self._window()
+        panel = Panel(
+            "sensor", 728, 240, 212, 159, across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5
+        )
+        seen = svg.image("sensor", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
+        upright = [[(x - 0.5, panel.top), (x - 0.5, panel.bottom)] for x in range(across.start, across.stop)]
+        level = [[(panel.left, y - 0.5), (panel.right, y - 0.5)] for y in range(down.start, down.stop)]
+        rims = svg.path([panel.place(line) for line in upright + level], "grid")
+        x, y = self.column, self.row
+        corners = [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5), (x - 0.5, y - 0.5)]
+        return panel.show(
+            seen + rims + on_photograph([panel.place(corners)], "yellow"), title="The sensor, at the mark"
+        )
+
+    # Slope and depth -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _plot(self) -> Panel:
+        return plot.plot_panel("depth", 556, 440, 384, 126, self.limits, (1.0, 12.0))
+
+    def _depth_panel(self) -> str:
+        panel, field = self._plot, self.light_field
+        slopes = np.linspace(*self.limits, 139)
+        within = lambda slope: (slope, np.clip(np.nan_to_num(field.depth(slope), nan=99), 1.3, 11.6))  # noqa: E731
+        curve = plot.curve(panel, slopes, field.depth(slopes), "blue thick")
+        if np.isnan(field.baseline * field.focal_length):
+            curve = svg.text((panel.width / 2, 60), "baseline and focal length are not known", "note middle")
+        here, now = panel.place([within(self.slope_here), within(self.slope)])
+        marks = curve + ring(here, "yellow", 8) + svg.dots([now], "red", 10)
+        label = "Depth against slope; drag or press the arrow keys to change the slope"
+        content = plot.grid(panel) + plot.upright(panel, self.slope, "red dashed") + marks
+        named = plot.axes(panel, "slope d, pixels a view", "depth, m")
+        return named + panel.show(content, title="Slope is depth", note=self.equation(), drag="slope", label=label)
+
+    def equation(self) -> str:
+        """d = b f (1/z − 1/z_f) with this field's numbers."""
+        field = self.light_field
+        if not np.isfinite(field.baseline * field.focal_length):
+            return "d = b f (1/z − 1/z_f)"
+        if np.isinf(field.focus_distance):
+            return f"d = {field.baseline * field.focal_length:.1f} px·m / z"
+        return f"d = {field.baseline * field.focal_length:.1f} px·m (1/z − 1/{field.focus_distance:.4g} m)"
+
+    def _numbers_block(self) -> str:
+        parts = [svg.text((20, 515), "This picture", "title")]
+        for i, (name, value) in enumerate(self.numbers().items()):
+            x, y = 20 + 255 * (i // 4), 538 + 22 * (i % 4)
+            parts += [svg.text((x, y), name, "note"), svg.text((x + (112 if i < 4 else 96), y), value, "label")]
+        return "".join(parts)
+
+    # Under the pointer -----------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        if handle == "slope":
+            return self.but(slope=float(np.clip(self.slope + dx / self._plot.scale[0], *self.limits)))
+        if handle == "viewpoint":
+            return self._with_view(x, y, dx, dy)
+        panel = self._image_panel
+        at = panel.place((self.column, self.row)) + (panel.x + dx, panel.y + dy) if np.isnan(x) else np.array([x, y])
+        column, row = np.rint(panel.data(at - (panel.x, panel.y)))
+        row = int(np.clip(row, 0, self.views.shape[2] - 1))
+        if handle == "row":
+            return self.but(row=row)
+        moved = self.but(row=row, column=int(np.clip(column, 0, self.views.shape[3] - 1)))
+        return moved.but(slope=float(np.clip(round(moved.slope_here, 2), *self.limits)))
+
+    def _with_view(self, x: float, y: float, dx: float, dy: float) -> Self:
+        panel, (rows, columns) = self._mosaic_panel, self.views.shape[:2]
+        if np.isnan(x):
+            u, v = self.u + np.sign(dx), self.v + np.sign(dy)
+        else:
+            u, v = (x - panel.x) / panel.width * columns, (y - panel.y) / panel.height * rows
+        return self.but(u=int(np.clip(u, 0, columns - 1)), v=int(np.clip(v, 0, rows - 1)))
+
+    def pressed(self, handle: str, key: str) -> Self:
+        if handle == "slope":
+            step = {"ArrowLeft": -1, "ArrowDown": -1, "-": -1, "ArrowRight": 1, "ArrowUp": 1, "+": 1}.get(key, 0)
+            return self.dragged("slope", 0, 0, 5.5 * step, 0)
+        return super().pressed(handle, key)
+
+
+def _bytes(views: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(views) if views.dtype == np.uint8 else to_display(views)
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.2f}".replace("-", "−")
