@@ -1,0 +1,119 @@
+"""Spectra on one grid, 380 … 780 nm in steps of 5: lights, surfaces, the eye and cameras.
+
+Tables were published; their files name their sources. Laws (Planck's, and the CIE's daylight) are computed. A light's
+spectrum is relative power per wavelength: its scale has no meaning, 100 at 560 nm for most. Arrays are read-only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.lenses.base import Array
+
+WAVELENGTHS_NM = np.arange(380.0, 781.0, 5.0)
+WAVELENGTHS_NM.flags.writeable = False
+
+ILLUMINANTS = ("A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3")
+"""CIE illuminants in tables: a light bulb, daylights, fluorescent lamps (white, broad, three-band), a white LED."""
+
+CAMERAS = {"Nikon D5100": "nikon_5100", "Sigma SD1 Merrill": "sigma_sd_merrill", "CIE observer": "observer"}
+"""Cameras by name, and the files of their sensitivities. The last is no camera: one that sees exactly as the eye."""
+
+_SECOND_RADIATION_CONSTANT = 1.4388e-2  # c2 = h c / k in m K as the CIE takes it (ITS-90; CIE 015:2018)
+_DAYLIGHT_KELVIN = (4000.0, 25000.0)  # where the CIE's law of daylight holds
+
+
+def observer() -> Array:
+    """The colour-matching functions x̄, ȳ, z̄ (81, 3) of the CIE 1931 standard observer, 2°."""
+    return _table("observer")[1]
+
+
+def illuminant(name: str) -> Array:
+    """The relative power (81,) of one of ILLUMINANTS. ValueError for any other name."""
+    _require(name, ILLUMINANTS, "illuminant")
+    names, values = _table("illuminants")
+    return values[:, names.index(name)]
+
+
+def sensitivities(camera: str) -> Array:
+    """What each channel, red, green and blue, of one of CAMERAS makes of each wavelength (81, 3).
+
+    They are responses to power, not to photons: quantum efficiency times wavelength. A camera's channels are published
+    with a peak of 1 each, so their levels against each other are not known.
+    """
+    _require(camera, CAMERAS, "camera")
+    return _table(CAMERAS[camera])[1]
+
+
+def patch_names() -> tuple[str, ...]:
+    """The names of the chart's 24 patches, row by row, six in a row; the last row is grey, from white to black."""
+    return _table("chart")[0]
+
+
+def reflectances() -> Array:
+    """The share of light (24, 81) that each patch of the chart reflects at each wavelength."""
+    return _table("chart")[1].T
+
+
+def planckian(kelvin: float, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
+    """The relative power of a glowing black body, 100 at 560 nm (Planck's law); ValueError unless `kelvin` > 0."""
+    if not kelvin > 0:
+        raise ValueError(f"kelvin must be above 0, got {kelvin!r}")
+    nm = np.asarray(wavelengths_nm, dtype=float)
+    c2 = 1e9 * _SECOND_RADIATION_CONSTANT / kelvin
+    return 100 * (560 / nm) ** 5 * np.expm1(c2 / 560) / np.expm1(c2 / nm)
+
+
+def daylight(kelvin: float) -> Array:
+    """The relative power (81,) of daylight of a correlated colour temperature, 100 at 560 nm (CIE 015:2018, 4.1.2).
+
+    The CIE rounds the two weights to three decimals; these are not rounded. ValueError outside 4000 … 25000 K.
+    """
+    x, y = daylight_xy(kelvin)
+    share = 0.0241 + 0.2562 * x - 0.7341 * y
+    m1, m2 = (-1.3515 - 1.7703 * x + 5.9114 * y) / share, (0.0300 - 31.4424 * x + 30.0717 * y) / share
+    return _table("daylight")[1] @ (1, m1, m2)
+
+
+def daylight_xy(kelvin: float) -> tuple[float, float]:
+    """The CIE chromaticity of daylight of a correlated colour temperature. ValueError outside 4000 … 25000 K."""
+    low, high = _DAYLIGHT_KELVIN
+    if not low <= kelvin <= high:
+        raise ValueError(f"kelvin must be {low:.0f} … {high:.0f} for daylight, got {kelvin!r}")
+    t = 1e3 / kelvin
+    if kelvin <= 7000:
+        x = 0.244063 + 0.09911 * t + 2.9678 * t**2 - 4.6070 * t**3
+    else:
+        x = 0.237040 + 0.24748 * t + 1.9018 * t**2 - 2.0064 * t**3
+    return x, -3.000 * x**2 + 2.870 * x - 0.275
+
+
+def resampled(spectrum: ArrayLike, wavelengths_nm: ArrayLike) -> Array:
+    """A spectrum (81,) or (81, n) at other wavelengths: straight lines in between, 0 beyond 380 … 780 nm."""
+    values = np.asarray(spectrum, dtype=float)
+    columns = values.reshape(len(WAVELENGTHS_NM), -1).T
+    nm = np.asarray(wavelengths_nm, dtype=float)
+    sampled = np.stack([np.interp(nm, WAVELENGTHS_NM, column, left=0, right=0) for column in columns], axis=-1)
+    return sampled.reshape(nm.shape + values.shape[1:])
+
+
+@cache
+def _table(name: str) -> tuple[tuple[str, ...], Array]:
+    """The names of a table's columns, and its values (81, columns)."""
+    lines = (files("camviz.colour") / "tables" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+    names, *rows = (line.split(",") for line in lines if not line.startswith("#"))
+    values = np.array(rows, dtype=float)
+    if not np.array_equal(values[:, 0], WAVELENGTHS_NM):
+        raise ValueError(f"{name}.csv must have a row for each of 380 … 780 nm in steps of 5")
+    values.flags.writeable = False
+    return tuple(names[1:]), values[:, 1:]
+
+
+def _require(name: str, known: Collection[str], what: str) -> None:
+    if name not in known:
+        raise ValueError(f"{what} must be one of {', '.join(known)}, got {name!r}")
