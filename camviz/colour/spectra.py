@@ -60,12 +60,15 @@ def reflectances() -> Array:
     return _table("chart")[1].T
 
 
-def planckian(kelvin: float, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
-    """The relative power of a glowing black body, 100 at 560 nm (Planck's law); ValueError unless `kelvin` > 0."""
-    if not kelvin > 0:
+def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
+    """The relative power (..., wavelengths) of glowing black bodies of `kelvin` (...), 100 at 560 nm (Planck's law).
+
+    ValueError unless every `kelvin` is above 0.
+    """
+    hot, nm = np.asarray(kelvin, dtype=float)[..., None], np.asarray(wavelengths_nm, dtype=float)
+    if not (hot > 0).all():
         raise ValueError(f"kelvin must be above 0, got {kelvin!r}")
-    nm = np.asarray(wavelengths_nm, dtype=float)
-    c2 = 1e9 * _SECOND_RADIATION_CONSTANT / kelvin
+    c2 = 1e9 * _SECOND_RADIATION_CONSTANT / hot
     return 100 * (560 / nm) ** 5 * np.expm1(c2 / 560) / np.expm1(c2 / nm)
 
 
