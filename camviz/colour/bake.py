@@ -65,7 +65,12 @@ def tables() -> dict[str, Table]:
             "every 10 nm from 400 to 680; straight lines in between, beyond taken as 0.",
             _columns(dslr["Sigma SDMerill (NPL)"], ("red", "green", "blue")),
         ),
-    }  # fmt: skip
+        "primaries": Table(
+            "Reflectances that add up to a perfect white, and that in D65 look like the red, green and blue of sRGB. "
+            "I. Mallett and C. Yuksel, Spectral primary decomposition for rendering with sRGB reflectance, EGSR 2019.",
+            _columns(colour.recovery.MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019, ("red", "green", "blue")),
+        ),
+    }
 
 
 def _columns(msds: Any, names: Sequence[str]) -> dict[str, Array]:

@@ -60,6 +60,24 @@ def reflectances() -> Array:
     return _table("chart")[1].T
 
 
+def srgb_primaries() -> Array:
+    """Reflectances (3, 81) that look like sRGB's primaries in D65 and add up to white (Mallett & Yuksel 2019).
+
+    `rgb @ srgb_primaries()` is a smooth reflectance, between 0 and 1, for any linear sRGB colour (..., 3) in 0 … 1: one
+    of the many that look like it.
+    """
+    return _table("primaries")[1].T
+
+
+def gel(strength: float) -> Array:
+    """What share of each wavelength (81,) a green filter lets pass beside what it takes away elsewhere; 0 is clear.
+
+    Made up for the lessons after the "plus green" gels of film lamps: at strength 1 twice as much passes at 545 nm as
+    at the ends of the spectrum; below 0 it is a magenta filter, "minus green".
+    """
+    return 2 ** (strength * np.exp(-(((WAVELENGTHS_NM - 545) / 60) ** 2)))
+
+
 def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
     """The relative power (..., wavelengths) of glowing black bodies of `kelvin` (...), 100 at 560 nm (Planck's law).
 
