@@ -24,8 +24,11 @@ ILLUMINANTS = ("A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3")
 CAMERAS = {"Nikon D5100": "nikon_5100", "Sigma SD1 Merrill": "sigma_sd_merrill", "CIE observer": "observer"}
 """Cameras by name, and the files of their sensitivities. The last is no camera: one that sees exactly as the eye."""
 
+COLDEST_DAYLIGHT = 4000.0
+"""The correlated colour temperature, in kelvin, where the CIE's law of daylight begins."""
+
 _SECOND_RADIATION_CONSTANT = 1.4388e-2  # c2 = h c / k in m K as the CIE takes it (ITS-90; CIE 015:2018)
-_DAYLIGHT_KELVIN = (4000.0, 25000.0)  # where the CIE's law of daylight holds
+_HOTTEST_DAYLIGHT = 25000.0
 
 
 def observer() -> Array:
@@ -103,7 +106,7 @@ def daylight(kelvin: float) -> Array:
 
 def daylight_xy(kelvin: float) -> tuple[float, float]:
     """The CIE chromaticity of daylight of a correlated colour temperature. ValueError outside 4000 … 25000 K."""
-    low, high = _DAYLIGHT_KELVIN
+    low, high = COLDEST_DAYLIGHT, _HOTTEST_DAYLIGHT
     if not low <= kelvin <= high:
         raise ValueError(f"kelvin must be {low:.0f} … {high:.0f} for daylight, got {kelvin!r}")
     t = 1e3 / kelvin
