@@ -71,9 +71,9 @@ def in_daylight(camera: str) -> Shot:
 
 
 def xyz_from_raw(camera: str) -> Array:
-    """The matrix (3, 3) from raw colours as they are, unbalanced, to XYZ, fitted in D65."""
+    """The matrix (3, 3) from raw colours as they are, unbalanced, to XYZ, fitted in D65, whose white is kept."""
     shot = in_daylight(camera)
-    return fit_matrix(shot.raw_chart, shot.true_chart)
+    return fit_matrix(shot.raw_chart, shot.true_chart, (shot.white, WHITE))
 
 
 def developed(raw: ArrayLike, gains: ArrayLike, matrix: ArrayLike, *, encoded: bool = False) -> Array:
