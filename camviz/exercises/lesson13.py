@@ -21,7 +21,7 @@ def response(light: Array, reflectance: Array, sensitivity: Array) -> Array:
 def grey_world(raw: Array) -> Array:
     """The gains that make the mean of all colours grey, green's gain being 1."""
     mean = raw.reshape(-1, 3).mean(axis=0)
-    return np.asarray(mean[1] / mean, dtype=np.float64)
+    return mean[1] / mean
 
 
 def develop(raw: Array, gains: Array, matrix: Array) -> Array:
@@ -31,7 +31,7 @@ def develop(raw: Array, gains: Array, matrix: Array) -> Array:
 
 def fit_matrix(raw: Array, target: Array) -> Array:
     """The M (3, 3) with the least Σ |M raw − target|²."""
-    return np.linalg.lstsq(raw, target, rcond=None)[0].T
+    return np.asarray(np.linalg.lstsq(raw, target, rcond=None)[0].T, dtype=np.float64)
 
 
 def unseen(change: Array, sensor: Array) -> Array:
