@@ -257,25 +257,25 @@ def test_an_unknown_adaptation_is_refused_by_name():
     ("kelvin", "xy"), [(2000, (0.52668, 0.41330)), (4000, (0.38044, 0.37675)), (6500, (0.31353, 0.32363))]
 )
 def test_black_bodies_have_the_published_chromaticities(kelvin, xy):
-    np.testing.assert_allclose(temperature.locus_xy(kelvin), xy, atol=5e-5)
+    np.testing.assert_allclose(temperature.locus_xy(kelvin), xy, atol=6e-6)
 
 
 def test_d65_is_not_a_black_body_of_6500_kelvin():
     kelvin, duv = temperature.temperature(spaces.D65_XY)
-    assert kelvin == pytest.approx(6504, abs=3)
+    assert kelvin == pytest.approx(6504, abs=1)
     assert duv == pytest.approx(0.0032, abs=1e-4)
     assert np.linalg.norm(temperature.locus_xy(6500) - spaces.D65_XY) > 0.005
 
 
 def test_colour_temperature_is_that_of_colour_science():
-    """Ohno (2013) by a table and a parabola, and a search for the least distance; both from 360 nm, not 380."""
+    """Ohno (2013) by a table and a parabola, and a search for the least distance."""
     rng = np.random.default_rng(4)
-    for kelvin, duv in zip(np.geomspace(1800, 10_000, 12), rng.uniform(-0.02, 0.02, 12), strict=True):
+    for kelvin, duv in zip(np.geomspace(1800, 20_000, 12), rng.uniform(-0.02, 0.02, 12), strict=True):
         uv = temperature.uv_of_xy(temperature.xy_of_temperature(kelvin, duv))
         theirs = colour.temperature.uv_to_CCT_Ohno2013(uv)
-        assert theirs[0] == pytest.approx(kelvin, rel=2e-3)
+        assert theirs[0] == pytest.approx(kelvin, rel=5e-4)
         assert theirs[1] == pytest.approx(duv, abs=1e-4)
-        assert colour.temperature.uv_to_CCT_Planck1900(uv) == pytest.approx(kelvin, rel=2e-3)
+        assert colour.temperature.uv_to_CCT_Planck1900(uv) == pytest.approx(kelvin, rel=5e-4)
 
 
 @pytest.mark.parametrize("duv", [-0.04, -0.01, 0.0, 0.01, 0.04])

@@ -27,7 +27,7 @@ _KNEE, _SLOPE = 216 / 24389, 24389 / 27  # where L* leaves its cube root for a s
 def tristimulus(light: ArrayLike, reflectance: ArrayLike = 1.0) -> Array:
     """XYZ (..., 3) of surfaces of reflectance (..., 81) in a light of power (..., 81); Y = 1 is perfect white.
 
-    X = k Σ light · reflectance · x̄ with k = 1 / Σ light · ȳ, and so on (CIE 015:2018, 7.1).
+    X = k Σ light · reflectance · x̄ with k = 1 / Σ light · ȳ, and so on (CIE 15:2004, 7.1).
     """
     light, bars = np.asarray(light, dtype=float), observer()
     return (light * np.asarray(reflectance, dtype=float)) @ bars / (light @ bars[:, 1:2])
@@ -81,7 +81,7 @@ def from_srgb(rgb: ArrayLike) -> Array:
 
 
 def to_lab(xyz: ArrayLike, white: ArrayLike) -> Array:
-    """CIELAB (..., 3), L* a* b*, of XYZ (..., 3) beside a white (3,) of XYZ (CIE 015:2018, 8.2.1)."""
+    """CIELAB (..., 3), L* a* b*, of XYZ (..., 3) beside a white (3,) of XYZ (CIE 15:2004, 8.2.1)."""
     t = np.asarray(xyz, dtype=float) / np.asarray(white, dtype=float)
     x, y, z = np.moveaxis(np.where(t > _KNEE, np.cbrt(t), (_SLOPE * t + 16) / 116), -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)

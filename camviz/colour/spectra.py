@@ -21,7 +21,7 @@ WAVELENGTHS_NM.flags.writeable = False
 ILLUMINANTS = ("A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3")
 """CIE illuminants in tables: a light bulb, daylights, fluorescent lamps (white, broad, three-band), a white LED."""
 
-CAMERAS = {"Nikon D5100": "nikon_5100", "Sigma SD1 Merrill": "sigma_sd_merrill", "CIE observer": "observer"}
+CAMERAS = {"Nikon D5100": "nikon_5100", "Sigma SD1 Merrill": "sigma_sd_merrill", "CIE observer": ""}
 """Cameras by name, and the files of their sensitivities. The last is no camera: one that sees exactly as the eye."""
 
 COLDEST_DAYLIGHT = 4000.0
@@ -33,7 +33,15 @@ _HOTTEST_DAYLIGHT = 25000.0
 
 def observer() -> Array:
     """The colour-matching functions x̄, ȳ, z̄ (81, 3) of the CIE 1931 standard observer, 2°."""
-    return _table("observer")[1]
+    nm, bars = whole_observer()
+    return bars[(nm >= WAVELENGTHS_NM[0]) & (nm <= WAVELENGTHS_NM[-1])]
+
+
+@cache
+def whole_observer() -> tuple[Array, Array]:
+    """All wavelengths that the observer sees at all, 360 … 830 nm (95,), and x̄, ȳ, z̄ there (95, 3)."""
+    _, rows = _rows("observer")
+    return rows[:, 0], rows[:, 1:]
 
 
 def illuminant(name: str) -> Array:
@@ -50,7 +58,7 @@ def sensitivities(camera: str) -> Array:
     with a peak of 1 each, so their levels against each other are not known.
     """
     _require(camera, CAMERAS, "camera")
-    return _table(CAMERAS[camera])[1]
+    return _table(CAMERAS[camera])[1] if CAMERAS[camera] else observer()
 
 
 def patch_names() -> tuple[str, ...]:
@@ -94,7 +102,7 @@ def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> 
 
 
 def daylight(kelvin: float) -> Array:
-    """The relative power (81,) of daylight of a correlated colour temperature, 100 at 560 nm (CIE 015:2018, 4.1.2).
+    """The relative power (81,) of daylight of a correlated colour temperature, 100 at 560 nm (CIE 015:2018).
 
     The CIE rounds the two weights to three decimals; these are not rounded. ValueError outside 4000 … 25000 K.
     """
@@ -129,13 +137,19 @@ def resampled(spectrum: ArrayLike, wavelengths_nm: ArrayLike) -> Array:
 @cache
 def _table(name: str) -> tuple[tuple[str, ...], Array]:
     """The names of a table's columns, and its values (81, columns)."""
+    names, rows = _rows(name)
+    if not np.array_equal(rows[:, 0], WAVELENGTHS_NM):
+        raise ValueError(f"{name}.csv must have a row for each of 380 … 780 nm in steps of 5")
+    return names, rows[:, 1:]
+
+
+def _rows(name: str) -> tuple[tuple[str, ...], Array]:
+    """The names of a table's columns but the first, and all its numbers, wavelengths first; read-only."""
     lines = (files("camviz.colour") / "tables" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
     names, *rows = (line.split(",") for line in lines if not line.startswith("#"))
     values = np.array(rows, dtype=float)
-    if not np.array_equal(values[:, 0], WAVELENGTHS_NM):
-        raise ValueError(f"{name}.csv must have a row for each of 380 … 780 nm in steps of 5")
     values.flags.writeable = False
-    return tuple(names[1:]), values[:, 1:]
+    return tuple(names[1:]), values
 
 
 def _require(name: str, known: Collection[str], what: str) -> None:

@@ -11,25 +11,25 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.colour.spaces import chromaticity, tristimulus
-from camviz.colour.spectra import planckian
+from camviz.colour.spaces import chromaticity
+from camviz.colour.spectra import planckian, whole_observer
 from camviz.lenses.base import Array
 
 LOWEST, HIGHEST = 1000.0, 100_000.0  # kelvin
-FARTHEST = 0.05  # from the locus, in Duv: beyond, a colour temperature says nothing (CIE 015:2018, 9.5)
+FARTHEST = 0.05  # from the locus, in Duv: beyond, a colour temperature says nothing (CIE 15:2004, 9.5)
 
 
 def locus_xy(kelvin: ArrayLike) -> Array:
     """CIE (x, y) (..., 2) of black bodies at so many kelvin (...)."""
-    return chromaticity(tristimulus(planckian(kelvin)))
+    nm, bars = whole_observer()
+    return chromaticity(planckian(kelvin, nm) @ bars)
 
 
 def temperature(xy: ArrayLike) -> tuple[float, float]:
     """The correlated colour temperature in kelvin, and Duv, of CIE (x, y) (2,); NaN where there is none.
 
     The nearest point of the Planckian locus in (u, v), from a table and then by Newton's method in 1/kelvin, where the
-    locus is nearly even (the definition of CIE 015:2018, 9.5; Duv's sign as in ANSI C78.377). Spectra that begin at
-    380 nm put the locus within 3 kelvin of the published one at 6500.
+    locus is nearly even (the CIE's definition; Duv's sign as in ANSI C78.377).
     """
     uv = uv_of_xy(xy)
     kelvins, locus = _locus()

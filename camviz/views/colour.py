@@ -164,7 +164,7 @@ class ColourView(View):
         return f"{words}, gamma {self.gamma}: {figures}."
 
     def _light_in_words(self) -> str:
-        kind = self.light if self.light in LAMPS else f"{self.light} light"
+        kind = f"{self.light} light" if self.light == "Planckian" else self.light
         return f"{kind} with tint {self.tint:+.2f}".replace("-", "−") if self.tint else kind
 
     # The picture ------------------------------------------------------------------------------------------------------
