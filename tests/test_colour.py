@@ -531,6 +531,15 @@ def test_a_chart_beside_a_chessboard_is_found_in_a_photograph_of_the_garden():
     assert charts.differences(found.rgb @ m.T).mean() < 1
 
 
+def test_what_has_not_the_chart_s_colours_is_no_chart():
+    """Whatever the light and the camera, a matrix brings a chart's colours home; it does not bring others there."""
+    chart = raw_chart("Sigma SD1 Merrill", "A")[0]
+    assert charts._alike(chart)
+    assert not charts._alike(chart[::-1])
+    assert not charts._alike(np.random.default_rng(11).permutation(chart))
+    assert not charts._alike(np.random.default_rng(12).uniform(0, 1, (24, 3)))
+
+
 def test_overexposed_patches_are_named():
     found = charts.find_chart(photographed(painted_chart((1.4, 1.4, 1.4)), UPRIGHT, np.random.default_rng(2)))
     assert 18 in found.clipped

@@ -106,6 +106,8 @@ def test_the_encoded_picture_is_multiplied_after_the_curve():
     expected = to_encoded(np.clip(raw, 0, 1)) * view.gains
     image = view.image(draft=True)
     np.testing.assert_allclose(image / 255, np.clip(expected, 0, 1), atol=0.012)
+    on_chart = to_linear(np.clip(to_encoded(view.shot.raw_chart) * view.gains, 0, 1))
+    np.testing.assert_allclose(view.chart, on_chart, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,10 @@ def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarra
         parts.append(svg.text((left + 5, top + 16), f"{errors[i]:.1f}", "tick", style=f"fill:{ink}"))
     row, column = divmod(chosen, 6)
     corners = panel.place([(column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1)])
-    return "".join(parts) + svg.polygon(corners, "", style="stroke:#fff;stroke-width:3px;fill:none")
+    frame = [("#fff", 5), ("#111", 2)]  # stands out from any colour
+    return "".join(parts) + "".join(
+        svg.polygon(corners, "", style=f"stroke:{ink};stroke-width:{width}px;fill:none") for ink, width in frame
+    )
 
 
 def steps(x: float, y: float, colours: Mapping[str, np.ndarray]) -> str:
