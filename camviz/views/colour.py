@@ -279,7 +279,7 @@ def _spectrum_panel(name: str, x: float, top: float) -> Panel:
     return plot.plot_panel(name, x, 34, 244, 142, (380, 780), (0, top))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=2)  # a draft and a fine one
 def _surfaces(name: str, side: int) -> np.ndarray:
     linear = to_linear(_within(photograph(name), side))
     linear.flags.writeable = False
