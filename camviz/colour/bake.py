@@ -1,30 +1,33 @@
 """The tables of spectra, written afresh from colour-science: `python -m camviz.colour.bake`.
 
 A reader's kernel only opens the tables: colour-science takes 100 MB and more than a second to import. Everything lies
-on one grid, 380 … 780 nm in steps of 5, the finest at which the CIE publishes its illuminants for practical use.
+on one grid, 380 … 780 nm in steps of 5, at which the CIE publishes its lamps; the observer goes on to where it ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camviz.lenses.base import Array
 
-LOW, HIGH, STEP = 380, 780, 5  # nm
+GRID = np.arange(380, 781, 5)  # nm
+WIDE = np.arange(360, 831, 5)  # all that the standard observer sees
 _LICENCE = "Taken from colour-science {version}, BSD-3-Clause (see LICENSE in this folder)."
 
 
 @dataclass(frozen=True)
 class Table:
-    """One file: where its numbers were published, and its columns by name, each (81,) over the grid."""
+    """One file: where its numbers were published, its columns by name, and the wavelengths (n,) of their values."""
 
     source: str
     columns: Mapping[str, Array]
+    nm: NDArray[np.int_] = field(default_factory=lambda: GRID)
 
 
 def tables() -> dict[str, Table]:
@@ -39,7 +42,8 @@ def tables() -> dict[str, Table]:
     return {
         "observer": Table(
             "Colour-matching functions of the CIE 1931 standard colorimetric observer (2 degrees). CIE 015:2018.",
-            _columns(colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"], ("x", "y", "z")),
+            _columns(colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"], ("x", "y", "z"), WIDE),
+            WIDE,
         ),
         "illuminants": Table(
             "Relative spectral power of CIE illuminants A, D50, D65, fluorescent lamps FL2, FL7 and FL11, and the "
@@ -65,17 +69,22 @@ def tables() -> dict[str, Table]:
             "every 10 nm from 400 to 680; straight lines in between, beyond taken as 0.",
             _columns(dslr["Sigma SDMerill (NPL)"], ("red", "green", "blue")),
         ),
-    }  # fmt: skip
+        "primaries": Table(
+            "Reflectances that add up to a perfect white, and that in D65 look like the red, green and blue of sRGB. "
+            "I. Mallett and C. Yuksel, Spectral primary decomposition for rendering with sRGB reflectance, EGSR 2019.",
+            _columns(colour.recovery.MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019, ("red", "green", "blue")),
+        ),
+    }
 
 
-def _columns(msds: Any, names: Sequence[str]) -> dict[str, Array]:
+def _columns(msds: Any, names: Sequence[str], nm: NDArray[np.int_] = GRID) -> dict[str, Array]:
     """The columns of several spectra under other names."""
-    return {name: _sampled(msds.signals[label]) for name, label in zip(names, msds.labels, strict=True)}
+    return {name: _sampled(msds.signals[label], nm) for name, label in zip(names, msds.labels, strict=True)}
 
 
-def _sampled(spectrum: Any) -> Array:
-    """The values (81,) on the grid: as published where they are, straight lines in between, 0 beyond their ends."""
-    values = np.interp(np.arange(LOW, HIGH + STEP, STEP), spectrum.domain, spectrum.range, left=0, right=0)
+def _sampled(spectrum: Any, nm: NDArray[np.int_] = GRID) -> Array:
+    """The values at `nm` (n,): as published where they are, straight lines in between, 0 beyond their ends."""
+    values = np.interp(nm, spectrum.domain, spectrum.range, left=0, right=0)
     return np.round(values, 12) + 0.0  # colour-science's own interpolation leaves crumbs such as −1e-19
 
 
@@ -84,8 +93,8 @@ def text(table: Table) -> str:
     from colour import __version__
 
     comments = [table.source, _LICENCE.format(version=__version__)]
-    rows = np.stack([np.arange(LOW, HIGH + STEP, STEP), *table.columns.values()], axis=-1)
     lines = [f"# {comment}" for comment in comments] + [",".join(["nm", *table.columns])]
+    rows = np.stack([table.nm, *table.columns.values()], axis=-1)
     return "\n".join(lines + [",".join(f"{value:.7g}" for value in row) for row in rows]) + "\n"
 
 

@@ -21,16 +21,27 @@ WAVELENGTHS_NM.flags.writeable = False
 ILLUMINANTS = ("A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3")
 """CIE illuminants in tables: a light bulb, daylights, fluorescent lamps (white, broad, three-band), a white LED."""
 
-CAMERAS = {"Nikon D5100": "nikon_5100", "Sigma SD1 Merrill": "sigma_sd_merrill", "CIE observer": "observer"}
+CAMERAS = {"Nikon D5100": "nikon_5100", "Sigma SD1 Merrill": "sigma_sd_merrill", "CIE observer": ""}
 """Cameras by name, and the files of their sensitivities. The last is no camera: one that sees exactly as the eye."""
 
+COLDEST_DAYLIGHT = 4000.0
+"""The correlated colour temperature, in kelvin, where the CIE's law of daylight begins."""
+
 _SECOND_RADIATION_CONSTANT = 1.4388e-2  # c2 = h c / k in m K as the CIE takes it (ITS-90; CIE 015:2018)
-_DAYLIGHT_KELVIN = (4000.0, 25000.0)  # where the CIE's law of daylight holds
+_HOTTEST_DAYLIGHT = 25000.0
 
 
 def observer() -> Array:
     """The colour-matching functions x̄, ȳ, z̄ (81, 3) of the CIE 1931 standard observer, 2°."""
-    return _table("observer")[1]
+    nm, bars = whole_observer()
+    return bars[(nm >= WAVELENGTHS_NM[0]) & (nm <= WAVELENGTHS_NM[-1])]
+
+
+@cache
+def whole_observer() -> tuple[Array, Array]:
+    """All wavelengths that the observer sees at all, 360 … 830 nm (95,), and x̄, ȳ, z̄ there (95, 3)."""
+    _, rows = _rows("observer")
+    return rows[:, 0], rows[:, 1:]
 
 
 def illuminant(name: str) -> Array:
@@ -47,7 +58,7 @@ def sensitivities(camera: str) -> Array:
     with a peak of 1 each, so their levels against each other are not known.
     """
     _require(camera, CAMERAS, "camera")
-    return _table(CAMERAS[camera])[1]
+    return _table(CAMERAS[camera])[1] if CAMERAS[camera] else observer()
 
 
 def patch_names() -> tuple[str, ...]:
@@ -60,17 +71,38 @@ def reflectances() -> Array:
     return _table("chart")[1].T
 
 
-def planckian(kelvin: float, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
-    """The relative power of a glowing black body, 100 at 560 nm (Planck's law); ValueError unless `kelvin` > 0."""
-    if not kelvin > 0:
+def srgb_primaries() -> Array:
+    """Reflectances (3, 81) that look like sRGB's primaries in D65 and add up to white (Mallett & Yuksel 2019).
+
+    `rgb @ srgb_primaries()` is a smooth reflectance, between 0 and 1, for any linear sRGB colour (..., 3) in 0 … 1: one
+    of the many that look like it.
+    """
+    return _table("primaries")[1].T
+
+
+def gel(strength: float) -> Array:
+    """What share of each wavelength (81,) a green filter lets pass beside what it takes away elsewhere; 0 is clear.
+
+    Made up for the lessons after the "plus green" gels of film lamps: at strength 1 twice as much passes at 545 nm as
+    at the ends of the spectrum; below 0 it is a magenta filter, "minus green".
+    """
+    return 2 ** (strength * np.exp(-(((WAVELENGTHS_NM - 545) / 60) ** 2)))
+
+
+def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
+    """The relative power (..., wavelengths) of glowing black bodies of `kelvin` (...), 100 at 560 nm (Planck's law).
+
+    ValueError unless every `kelvin` is above 0.
+    """
+    hot, nm = np.asarray(kelvin, dtype=float)[..., None], np.asarray(wavelengths_nm, dtype=float)
+    if not (hot > 0).all():
         raise ValueError(f"kelvin must be above 0, got {kelvin!r}")
-    nm = np.asarray(wavelengths_nm, dtype=float)
-    c2 = 1e9 * _SECOND_RADIATION_CONSTANT / kelvin
+    c2 = 1e9 * _SECOND_RADIATION_CONSTANT / hot
     return 100 * (560 / nm) ** 5 * np.expm1(c2 / 560) / np.expm1(c2 / nm)
 
 
 def daylight(kelvin: float) -> Array:
-    """The relative power (81,) of daylight of a correlated colour temperature, 100 at 560 nm (CIE 015:2018, 4.1.2).
+    """The relative power (81,) of daylight of a correlated colour temperature, 100 at 560 nm (CIE 015:2018).
 
     The CIE rounds the two weights to three decimals; these are not rounded. ValueError outside 4000 … 25000 K.
     """
@@ -82,7 +114,7 @@ def daylight(kelvin: float) -> Array:
 
 def daylight_xy(kelvin: float) -> tuple[float, float]:
     """The CIE chromaticity of daylight of a correlated colour temperature. ValueError outside 4000 … 25000 K."""
-    low, high = _DAYLIGHT_KELVIN
+    low, high = COLDEST_DAYLIGHT, _HOTTEST_DAYLIGHT
     if not low <= kelvin <= high:
         raise ValueError(f"kelvin must be {low:.0f} … {high:.0f} for daylight, got {kelvin!r}")
     t = 1e3 / kelvin
@@ -105,13 +137,19 @@ def resampled(spectrum: ArrayLike, wavelengths_nm: ArrayLike) -> Array:
 @cache
 def _table(name: str) -> tuple[tuple[str, ...], Array]:
     """The names of a table's columns, and its values (81, columns)."""
+    names, rows = _rows(name)
+    if not np.array_equal(rows[:, 0], WAVELENGTHS_NM):
+        raise ValueError(f"{name}.csv must have a row for each of 380 … 780 nm in steps of 5")
+    return names, rows[:, 1:]
+
+
+def _rows(name: str) -> tuple[tuple[str, ...], Array]:
+    """The names of a table's columns but the first, and all its numbers, wavelengths first; read-only."""
     lines = (files("camviz.colour") / "tables" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
     names, *rows = (line.split(",") for line in lines if not line.startswith("#"))
     values = np.array(rows, dtype=float)
-    if not np.array_equal(values[:, 0], WAVELENGTHS_NM):
-        raise ValueError(f"{name}.csv must have a row for each of 380 … 780 nm in steps of 5")
     values.flags.writeable = False
-    return tuple(names[1:]), values[:, 1:]
+    return tuple(names[1:]), values
 
 
 def _require(name: str, known: Collection[str], what: str) -> None:

@@ -1,0 +1,165 @@
+"""Colour spaces: from spectra to XYZ, and from XYZ to chromaticity, linear sRGB and CIELAB, with the difference ΔE2000.
+
+XYZ is relative: Y = 1 is a perfect white in the light at hand. A matrix acts on columns, as in the literature:
+xyz = M rgb for one colour, `rgb @ M.T` for an array (..., 3) of them. sRGB's curve is in `camviz.scenes.light`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.colour.spectra import observer
+from camviz.lenses.base import Array
+
+D65_XY = (0.3127, 0.3290)  # the white of sRGB (IEC 61966-2-1:1999)
+D50_XY = (0.3457, 0.3585)  # the white of ICC profiles (ISO 22028-1:2016)
+_SRGB_PRIMARIES_XY = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))
+
+_KNEE, _SLOPE = 216 / 24389, 24389 / 27  # where L* leaves its cube root for a straight line, (6/29)³ and (29/3)³
+
+
+# From spectra ---------------------------------------------------------------------------------------------------------
+
+
+def tristimulus(light: ArrayLike, reflectance: ArrayLike = 1.0) -> Array:
+    """XYZ (..., 3) of surfaces of reflectance (..., 81) in a light of power (..., 81); Y = 1 is perfect white.
+
+    X = k Σ light · reflectance · x̄ with k = 1 / Σ light · ȳ, and so on (CIE 15:2004, 7.1).
+    """
+    light, bars = np.asarray(light, dtype=float), observer()
+    return (light * np.asarray(reflectance, dtype=float)) @ bars / (light @ bars[:, 1:2])
+
+
+# Chromaticity ---------------------------------------------------------------------------------------------------------
+
+
+def chromaticity(xyz: ArrayLike) -> Array:
+    """CIE (x, y) (..., 2) of XYZ (..., 3); NaN for black, which has none."""
+    xyz = np.asarray(xyz, dtype=float)
+    total = xyz.sum(axis=-1, keepdims=True)
+    return np.divide(xyz[..., :2], total, out=np.full((*xyz.shape[:-1], 2), np.nan), where=total != 0)
+
+
+def from_chromaticity(xy: ArrayLike, luminance: ArrayLike = 1.0) -> Array:
+    """XYZ (..., 3) of CIE (x, y) (..., 2) and Y (...): the way back from xyY."""
+    x, y = np.moveaxis(np.asarray(xy, dtype=float), -1, 0)
+    return np.stack([x / y, np.ones_like(y), (1 - x - y) / y], axis=-1) * np.asarray(luminance, dtype=float)[..., None]
+
+
+# sRGB -----------------------------------------------------------------------------------------------------------------
+
+
+def xyz_from_primaries(primaries_xy: ArrayLike, white_xy: ArrayLike) -> Array:
+    """The matrix (3, 3) from linear RGB to XYZ of a screen with these primaries (3, 2), whose (1, 1, 1) is the white.
+
+    Its columns are the primaries' XYZ, each as bright as it takes for their sum to be the white.
+    """
+    primaries = from_chromaticity(primaries_xy).T
+    return primaries * np.linalg.solve(primaries, from_chromaticity(white_xy))
+
+
+XYZ_FROM_SRGB = xyz_from_primaries(_SRGB_PRIMARIES_XY, D65_XY)
+SRGB_FROM_XYZ = np.linalg.inv(XYZ_FROM_SRGB)
+for _matrix in (XYZ_FROM_SRGB, SRGB_FROM_XYZ):
+    _matrix.flags.writeable = False
+
+
+def to_srgb(xyz: ArrayLike) -> Array:
+    """Linear sRGB (..., 3) of XYZ (..., 3) under D65. Outside 0 … 1 lies what no sRGB screen can show."""
+    return np.asarray(xyz, dtype=float) @ SRGB_FROM_XYZ.T
+
+
+def from_srgb(rgb: ArrayLike) -> Array:
+    """XYZ (..., 3) under D65 of linear sRGB (..., 3)."""
+    return np.asarray(rgb, dtype=float) @ XYZ_FROM_SRGB.T
+
+
+# CIELAB and colour difference -----------------------------------------------------------------------------------------
+
+
+def to_lab(xyz: ArrayLike, white: ArrayLike) -> Array:
+    """CIELAB (..., 3), L* a* b*, of XYZ (..., 3) beside a white (3,) of XYZ (CIE 15:2004, 8.2.1)."""
+    t = np.asarray(xyz, dtype=float) / np.asarray(white, dtype=float)
+    x, y, z = np.moveaxis(np.where(t > _KNEE, np.cbrt(t), (_SLOPE * t + 16) / 116), -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+def from_lab(lab: ArrayLike, white: ArrayLike) -> Array:
+    """XYZ (..., 3) of CIELAB (..., 3): the inverse of `to_lab`."""
+    lightness, a, b = np.moveaxis(np.asarray(lab, dtype=float), -1, 0)
+    y = (lightness + 16) / 116
+    f = np.stack([y + a / 500, y, y - b / 200], axis=-1)
+    return np.where(f**3 > _KNEE, f**3, (116 * f - 16) / _SLOPE) * np.asarray(white, dtype=float)
+
+
+def difference(lab1: ArrayLike, lab2: ArrayLike) -> Array:
+    """ΔE2000 (...) between two CIELAB colours (..., 3): about 1 is the least that an eye sees side by side.
+
+    After G. Sharma, W. Wu and E. N. Dalal, The CIEDE2000 color-difference formula, Color Res. Appl. 30 (2005).
+    """
+    (l1, a1, b1), (l2, a2, b2) = (np.moveaxis(np.asarray(lab, dtype=float), -1, 0) for lab in (lab1, lab2))
+    stretch = 1.5 - 0.5 * _share(np.hypot(a1, b1) / 2 + np.hypot(a2, b2) / 2)  # of a*, for greys
+    (c1, h1), (c2, h2) = _polar(stretch * a1, b1), _polar(stretch * a2, b2)
+    turn = np.where(c1 * c2 == 0, 0, (h2 - h1 + 180) % 360 - 180)
+    turn = np.where((turn == -180) & (h2 > h1), 180, turn)
+    lightness, chroma = (l1 + l2) / 2, (c1 + c2) / 2
+    hue = np.where(c1 * c2 == 0, h1 + h2, h1 + turn / 2) % 360
+    terms = (
+        (l2 - l1) / (1 + 0.015 * (lightness - 50) ** 2 / np.sqrt(20 + (lightness - 50) ** 2)),
+        (c2 - c1) / (1 + 0.045 * chroma),
+        2 * np.sqrt(c1 * c2) * _sin(turn / 2) / (1 + 0.015 * chroma * _hue_weight(hue)),
+    )
+    blue = -_sin(60 * np.exp(-(((hue - 275) / 25) ** 2))) * 2 * _share(chroma)
+    return np.sqrt(np.maximum(terms[0] ** 2 + terms[1] ** 2 + terms[2] ** 2 + blue * terms[1] * terms[2], 0))
+
+
+def _share(chroma: Array) -> Array:
+    """sqrt(C⁷ / (C⁷ + 25⁷)): 0 for greys, 1 for strong colours."""
+    return np.sqrt(chroma**7 / (chroma**7 + 25.0**7))
+
+
+def _polar(a: Array, b: Array) -> tuple[Array, Array]:
+    """Chroma, and hue in degrees 0 … 360."""
+    return np.hypot(a, b), np.degrees(np.arctan2(b, a)) % 360
+
+
+def _hue_weight(hue: Array) -> Array:
+    """T of the formula, hue in degrees."""
+    return (
+        1 - 0.17 * _cos(hue - 30) + 0.24 * _cos(2 * hue) + 0.32 * _cos(3 * hue + 6) - 0.20 * _cos(4 * hue - 63)
+    )  # fmt: skip
+
+
+def _sin(degrees: ArrayLike) -> Array:
+    return np.sin(np.radians(degrees))
+
+
+def _cos(degrees: ArrayLike) -> Array:
+    return np.cos(np.radians(degrees))
+
+
+# Chromatic adaptation -------------------------------------------------------------------------------------------------
+
+ADAPTATIONS: Mapping[str, Array] = {
+    "Bradford": np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]),
+    "von Kries": np.array([[0.40024, 0.70760, -0.08081], [-0.22630, 1.16532, 0.04570], [0.0, 0.0, 0.91822]]),
+    "XYZ": np.eye(3),
+}
+"""Where the three channels are scaled: Bradford's sharpened cones (Lam 1985), the cones of Hunt, Pointer and Estevez
+under D65, and XYZ itself, which is the wrong place."""
+
+
+def adaptation(white_from: ArrayLike, white_to: ArrayLike, method: str = "Bradford") -> Array:
+    """The matrix (3, 3) that takes XYZ seen beside one white (3,) to XYZ that look alike beside another (3,).
+
+    M⁻¹ diag(M white_to / M white_from) M, each channel of M scaled by itself (von Kries 1902). ValueError for a method
+    that is not one of ADAPTATIONS.
+    """
+    if method not in ADAPTATIONS:
+        raise ValueError(f"method must be one of {', '.join(ADAPTATIONS)}, got {method!r}")
+    m = ADAPTATIONS[method]
+    gains = (m @ np.asarray(white_to, dtype=float)) / (m @ np.asarray(white_from, dtype=float))
+    return np.linalg.solve(m, gains[:, None] * m)

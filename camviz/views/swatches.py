@@ -1,0 +1,81 @@
+"""Patches of colour: the chart with truth and estimate side by side, a colour for each step, a spectrum in colours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+
+from camviz.colour.spaces import to_srgb
+from camviz.colour.spectra import WAVELENGTHS_NM, observer
+from camviz.draw import svg
+from camviz.draw.panel import Panel
+from camviz.scenes.light import to_display
+
+_MARGIN = 0.04  # of a patch, in black between the patches
+
+
+def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarray, chosen: int) -> str:
+    """The chart's 24 patches: linear sRGB above left of each diagonal, the truth below right of it, ΔE on it."""
+    estimates, truths = hexadecimal(rgb), hexadecimal(to_srgb(true_xyz))
+    light = to_display(rgb).astype(float) @ (0.3, 0.6, 0.1) > 140
+    parts = [svg.rectangle(0, 0, panel.width, panel.height, "black", style="fill:#111")]
+    for i, (estimate, truth) in enumerate(zip(estimates, truths, strict=True)):
+        row, column = divmod(i, 6)
+        left, top = panel.place((column + _MARGIN, row + _MARGIN))
+        right, bottom = panel.place((column + 1 - _MARGIN, row + 1 - _MARGIN))
+        parts.append(svg.rectangle(left, top, right - left, bottom - top, "patch", style=f"fill:{truth}"))
+        corner = [(left, top), (right, top), (left, bottom)]
+        parts.append(svg.polygon(corner, "patch", style=f"fill:{estimate}"))
+        ink = "#111" if light[i] else "#fff"
+        parts.append(svg.text((left + 5, top + 16), f"{errors[i]:.1f}", "tick", style=f"fill:{ink}"))
+    row, column = divmod(chosen, 6)
+    corners = panel.place([(column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1)])
+    frame = [("#fff", 5), ("#111", 2)]  # stands out from any colour
+    return "".join(parts) + "".join(
+        svg.polygon(corners, "", style=f"stroke:{ink};stroke-width:{width}px;fill:none") for ink, width in frame
+    )
+
+
+def steps(x: float, y: float, colours: Mapping[str, np.ndarray]) -> str:
+    """A swatch for each step, linear sRGB (1 or 2, 3), two side by side, with its name and its numbers."""
+    parts = []
+    for i, (name, rgb) in enumerate(colours.items()):
+        left = x + 234 * i
+        for k, fill in enumerate(hexadecimal(rgb)):
+            width = 60 / len(rgb)
+            parts.append(svg.rectangle(left + k * width, y, width, 60, "patch", style=f"fill:{fill}"))
+        parts.append(svg.rectangle(left, y, 60, 60, "frame"))
+        parts.append(svg.text((left + 70, y + 13), name, "label"))
+        for k, colour in enumerate(rgb):
+            words = " ".join(f"{value:.3f}" for value in colour).replace("-", "−")
+            parts.append(
+                svg.text((left + 70, y + 35 + 19 * k), words, f"number {('blue', 'orange')[k] if len(rgb) > 1 else ''}")
+            )
+    return "".join(parts)
+
+
+def rainbow(panel: Panel, power: np.ndarray) -> str:
+    """The area under a spectrum (81,) in the colours of its wavelengths, as near as a screen comes to them."""
+    width = panel.width / (len(WAVELENGTHS_NM) - 1)
+    bars = [
+        svg.rectangle(
+            x - width / 2, y, width, panel.height - y, "half", style=f"fill:{fill};shape-rendering:crispEdges"
+        )
+        for (x, y), fill in zip(
+            panel.place(np.stack([WAVELENGTHS_NM, power], axis=-1)).tolist(), _wavelength_colours(), strict=True
+        )
+    ]
+    return "".join(bars)
+
+
+def hexadecimal(rgb: np.ndarray) -> list[str]:
+    """Linear sRGB (n, 3) as "#rrggbb"."""
+    return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in to_display(rgb).tolist()]
+
+
+@cache
+def _wavelength_colours() -> list[str]:
+    linear = np.maximum(to_srgb(observer()), 0) / 1.6
+    return hexadecimal(linear)

@@ -1,0 +1,169 @@
+"""The colour visualizer: what it shows is what the physics says, and every control shows."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.colour import balance, spectra
+from camviz.colour.spaces import to_srgb
+from camviz.photographs import photograph
+from camviz.scenes.light import to_display, to_encoded, to_linear
+from camviz.views.colour import LAMPS, ColourView
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    import colour
+
+
+def test_the_chart_is_as_far_from_the_truth_as_colour_science_says():
+    view = ColourView(method="chosen patch", patch=20, light="daylight", kelvin=5000, tint=0.3)
+    white = colour.xy_to_XYZ((0.3127, 0.3290))
+    space = colour.RGB_COLOURSPACES["sRGB"].copy()
+    space.use_derived_transformation_matrices(True)
+    lab = [
+        colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white))
+        for xyz in (colour.RGB_to_XYZ(view.chart, space), view.shot.true_chart)
+    ]
+    np.testing.assert_allclose(view.errors, colour.delta_E(*lab, method="CIE 2000"), atol=1e-4)
+
+
+def test_what_the_picture_says_is_on_the_patches():
+    view = ColourView()
+    written = re.findall(r'class="tick" style="fill:#\w+">([\d.]+)</text>', view.figure(draft=True).svg())
+    assert written == [f"{error:.1f}" for error in view.errors]
+
+
+def test_without_balance_nothing_is_multiplied_and_balance_makes_its_patch_grey():
+    assert ColourView(method="none").gains.tolist() == [1, 1, 1]
+    for patch in (18, 21):
+        view = ColourView(method="chosen patch", patch=patch)
+        np.testing.assert_allclose(np.ptp(view.chart[patch]), 0, atol=1e-9)
+    assert np.ptp(ColourView(method="chosen patch", patch=14).chart[19]) > 0.2  # red taken for grey
+
+
+@pytest.mark.parametrize("light", ["Planckian", "daylight", *LAMPS])
+def test_a_balanced_camera_with_a_matrix_is_nearly_right_in_every_light(light):
+    view = ColourView(light=light, method="chosen patch", patch=20, kelvin=4500)
+    assert view.errors.mean() < 1.2
+    assert view.but(matrix="off").errors.mean() > 4 * view.errors.mean()
+    assert view.but(method="none").errors.mean() > 10
+
+
+def test_a_matrix_made_for_daylight_is_worse_in_other_light():
+    view = ColourView(kelvin=2850, method="chosen patch", patch=20)
+    assert view.but(matrix="for daylight").errors.mean() > 1.5 * view.errors.mean()
+
+
+def test_after_gamma_the_same_numbers_are_wrong():
+    view = ColourView(kelvin=2850, method="chosen patch", patch=20)
+    assert view.but(gamma="before the balance").errors.mean() > 8 * view.errors.mean()
+
+
+def test_a_tinted_light_needs_a_set_tint():
+    """Temperature alone leaves a green cast; with the tint that the light has, greys are grey."""
+    view = ColourView(light="daylight", kelvin=5000, tint=0.5, method="by hand", camera="CIE observer")
+    kelvin, duv = (float(part) for part in re.findall(r"[\d.+]+", view.numbers()["light"]))
+    best = min(view.but(set_kelvin=float(k)).errors[18:].mean() for k in range(2000, 12001, 250))
+    assert best > 5
+    assert view.but(set_kelvin=kelvin, set_tint=duv).errors[18:].mean() < 0.5
+
+
+def test_grey_world_believes_the_photograph():
+    """Coffee on a brown table is taken for brown light: the chart comes out bluish."""
+    view = ColourView(light="daylight", kelvin=6500, method="grey world", scene="coffee")
+    rgb = view.chart[20]
+    assert rgb[2] > 1.3 * rgb[0]
+    own = view.but(picture=np.full((40, 60, 3), 128, np.uint8))
+    np.testing.assert_allclose(np.ptp(own.chart[20]), 0, atol=0.02)
+
+
+def test_metamers_are_one_colour_to_the_camera_and_two_to_the_eye():
+    view = ColourView(metamer=True, patch=5)
+    one, other = view.shot.raw(view.reflectances)
+    np.testing.assert_allclose(one, other, atol=1e-12)
+    seen = balance.seen(view.power, view.reflectances)
+    assert np.abs(to_srgb(seen[0] - seen[1])).max() > 0.01
+    assert "sensor 0" in view.numbers()["its metamer"]
+    assert "none" in view.but(camera="CIE observer").numbers()["its metamer"]
+
+
+def test_the_photograph_is_that_of_the_surfaces_pixel_by_pixel():
+    """A camera that sees as the eye, its balance and its matrix give back, in daylight, the photograph that went in."""
+    view = ColourView(light="daylight", kelvin=6504, camera="CIE observer", method="chosen patch", patch=20)
+    small = cv2.resize(photograph("coffee"), None, fx=416 / 600, fy=416 / 600, interpolation=cv2.INTER_AREA)
+    image = view.image(draft=False)
+    assert np.abs(image.astype(int) - small).mean() < 1.5
+
+
+def test_the_encoded_picture_is_multiplied_after_the_curve():
+    view = ColourView(gamma="before the balance", method="chosen patch", matrix="off")
+    raw = view._surfaces(208) @ view.shot.raw_from_srgb.T
+    expected = to_encoded(np.clip(raw, 0, 1)) * view.gains
+    image = view.image(draft=True)
+    np.testing.assert_allclose(image / 255, np.clip(expected, 0, 1), atol=0.012)
+    on_chart = to_linear(np.clip(to_encoded(view.shot.raw_chart) * view.gains, 0, 1))
+    np.testing.assert_allclose(view.chart, on_chart, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("start", "changes"),
+    [
+        ({}, [{"kelvin": 2000}, {"kelvin": 12000}, {"tint": -1}, {"tint": 1}]),
+        ({}, [{"light": one} for one in ("daylight", *LAMPS)]),
+        ({}, [{"camera": one} for one in spectra.CAMERAS]),
+        ({}, [{"method": one} for one in ("grey world", "white patch", "chosen patch", "by hand")]),
+        ({"method": "by hand"}, [{"set_kelvin": 2000}, {"set_kelvin": 12000}, {"set_tint": -0.03}, {"set_tint": 0.03}]),
+        ({}, [{"matrix": "for daylight"}, {"matrix": "off"}, {"gamma": "before the balance"}, {"metamer": True}]),
+        ({}, [{"scene": "astronaut"}, {"scene": "chelsea"}, {"scene": "rocket"}]),
+    ],
+)
+def test_every_control_changes_the_picture(start, changes):
+    pictures = [ColourView(**start).figure(draft=True)] + [
+        ColourView(**{**start, **change}).figure(draft=True) for change in changes
+    ]
+    shown = {(picture.svg(), picture.photographs["photograph"]) for picture in pictures}
+    assert len(shown) >= len(changes)
+
+
+def test_a_click_chooses_a_patch_and_arrows_walk_over_the_chart():
+    view = ColourView(patch=0)
+    panel = view._chart_panel
+    assert view.dragged("chart", panel.x + 1, panel.y + 1, 0, 0).patch == 0
+    assert view.dragged("chart", panel.x + panel.width - 1, panel.y + panel.height - 1, 0, 0).patch == 23
+    assert view.dragged("chart", panel.x + panel.width * 1.5 / 6, panel.y + panel.height * 2.5 / 4, 0, 0).patch == 13
+    assert view.pressed("chart", "ArrowRight").patch == 1
+    assert view.pressed("chart", "ArrowDown").patch == 6
+    assert view.pressed("chart", "ArrowLeft").patch == view.pressed("chart", "ArrowUp").patch == 0
+    assert ColourView(patch=23).pressed("chart", "ArrowRight").patch == 23
+    assert view.dragged("elsewhere", 0, 0, 5, 5) == view
+
+
+def test_daylight_begins_at_4000_kelvin():
+    assert ColourView(light="daylight").offered()["kelvin"].low == 4000
+    assert ColourView(light="Planckian").offered()["kelvin"].low == 2000
+    np.testing.assert_array_equal(
+        ColourView(light="daylight", kelvin=2000).power, ColourView(light="daylight", kelvin=4000).power
+    )
+
+
+def test_the_description_states_the_state():
+    words = ColourView(light="fluorescent, three bands", tint=-0.5, metamer=True).figure(draft=True).description
+    for part in ("fluorescent, three bands with tint −0.50", "white balance none", "mean ΔE2000", "metamer eye ΔE"):
+        assert part in words
+
+
+@pytest.mark.parametrize("bad", [{"kelvin": np.nan}, {"light": "moon"}, {"patch": 24}, {"patch": True}, {"metamer": 1}])
+def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        ColourView(**bad)
+
+
+def test_a_photograph_given_is_shown_and_kept_in_its_shape():
+    given = to_display(to_linear(np.full((300, 200, 3), 0.5)))
+    assert ColourView(picture=given).image(draft=False).shape == (300, 200, 3)
+    assert ColourView(picture=given).image(draft=True).shape[0] == 208
