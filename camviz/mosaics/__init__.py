@@ -1,5 +1,16 @@
 """Colour filter arrays: patterns and mosaics, demosaicing, and measures of what it gets wrong."""
 
+from camviz.mosaics.demosaicing import (
+    ALGORITHMS,
+    ANY_PATTERN,
+    bilinear,
+    demosaic,
+    edge_aware,
+    malvar,
+    menon,
+    nearest,
+    opencv,
+)
 from camviz.mosaics.patterns import (
     BAYER,
     BLUE,
@@ -16,6 +27,8 @@ from camviz.mosaics.patterns import (
 )
 
 __all__ = [
+    "ALGORITHMS",
+    "ANY_PATTERN",
     "BAYER",
     "BLUE",
     "GREEN",
@@ -26,6 +39,13 @@ __all__ = [
     "WHITE",
     "XTRANS",
     "Pattern",
+    "bilinear",
+    "demosaic",
+    "edge_aware",
     "in_colour",
+    "malvar",
+    "menon",
     "mosaic",
+    "nearest",
+    "opencv",
 ]
