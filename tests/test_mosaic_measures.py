@@ -184,7 +184,8 @@ def test_better_algorithms_are_better_by_every_measure(pair):
         assert better.psnr_db > worse.psnr_db
         assert better.false_colour < worse.false_colour
         assert better.zipper < worse.zipper
-    assert compare(*pair) == (psnr(*pair), false_colour(*pair), zipper(*pair))
+    found = compare(*pair)
+    assert (found.psnr_db, found.false_colour, found.zipper) == (psnr(*pair), false_colour(*pair), zipper(*pair))
 
 
 @pytest.mark.parametrize(

@@ -22,18 +22,23 @@ _NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
 class Measures(NamedTuple):
-    """What `compare` finds: see `psnr`, `false_colour` and `zipper`."""
+    """What `compare` finds: see `psnr`, `colour_error` and `zipper`."""
 
     psnr_db: float
-    false_colour: float
+    colour_error: Values
     zipper: float
+
+    @property
+    def false_colour(self) -> float:
+        """Mean error of colour: see `false_colour`."""
+        return float(self.colour_error.mean())
 
 
 def compare(picture: ArrayLike, truth: ArrayLike) -> Measures:
-    """All three measures of a picture against the truth."""
+    """All measures of a picture against the truth."""
     given, true = _pair(picture, truth)
     seen = lab(given), lab(true)
-    return Measures(_decibels(given, true), float(_colour_error(*seen).mean()), _zipper(*seen))
+    return Measures(_decibels(given, true), _colour_error(*seen), _zipper(*seen))
 
 
 def psnr(picture: ArrayLike, truth: ArrayLike) -> float:
