@@ -181,10 +181,7 @@ class DemosaicingView(View):
             return heat_panel(
                 self._panel, width, height, 0, _WORST, "ΔC", marks, title="What colour is false", **heading
             )
-        if self.show == "mosaic":
-            pixels = to_display(mosaics.in_colour(self.measured, self.filters))
-        else:
-            pixels = self.rebuilt
+        pixels = to_display(mosaics.in_colour(self.measured, self.filters)) if self.show == "mosaic" else self.rebuilt
         title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
         photographs["picture"] = jpeg(pixels, 90)
         return self._panel.show(drawn(self._panel, "picture", width, height) + marks, title=title, **heading)
