@@ -59,7 +59,7 @@ def test_the_loupe_names_the_frequency_and_the_beat():
     view = DemosaicingView(highest=0.5, u=230.9, v=128)
     fu, fv = view.frequency
     assert (fu, fv) == pytest.approx((0.4, 0), abs=0.003)
-    assert view.numbers()["carrier"] == "(½, 0): colours repeat after 10 px"
+    assert view.numbers()["carrier"] == "(½, 0): beats once in 10 px"
     assert "cycles/px" not in " ".join(DemosaicingView(picture="garden").numbers().values())
 
 

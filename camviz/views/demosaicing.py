@@ -139,7 +139,7 @@ class DemosaicingView(View):
         fu, fv = self.frequency
         near, (du, dv) = nearest_carrier(self.filters, fu, fv)
         away = float(np.hypot(du, dv))
-        beat = f"colours repeat after {1 / away:.0f} px" if away > 0.005 else "one even colour"
+        beat = f"beats once in {1 / away:.0f} px" if away > 0.005 else "no beat"
         return {"loupe at": f"({fu:.2f}, {fv:.2f}) cycles/px".replace("-", "−"), "carrier": f"{_place(near)}: {beat}"}
 
     def description(self) -> str:
