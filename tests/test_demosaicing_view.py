@@ -127,8 +127,8 @@ def test_dragging_moves_the_loupe_and_nothing_else():
 def test_a_photograph_of_ones_own_is_shown_as_it_is_or_smaller(size):
     own = np.random.default_rng(0).integers(0, 256, (*size, 3), dtype=np.uint8)
     view = DemosaicingView(photograph=own)
-    assert max(view.truth.shape) == min(max(size), 320)
-    if max(size) <= 320:
+    assert max(view.truth.shape) == min(max(size), 256)
+    if max(size) <= 256:
         np.testing.assert_allclose(view.truth.astype(int), own, atol=1)
     assert "photograph" in view.figure(draft=True).description
 

@@ -26,7 +26,7 @@ from camviz.scenes import render, textured_scene, to_display, to_linear
 from camviz.views.base import View, choice, slider
 
 LOUPE = 14  # pixels across
-LARGEST = 320  # pixels of a picture's longer side
+LARGEST = 256  # pixels of a picture's longer side
 _MAIN, _SMALL = 472, 118  # widths in picture units
 _WORST = 60.0  # of the map of errors, in units of CIELAB
 _TICKS = [(-0.5, "−½"), (0.0, "0"), (0.5, "½")]
@@ -157,7 +157,7 @@ class DemosaicingView(View):
         body = "".join(
             [
                 svg.rectangle(0, 0, 960, 552, "paper"),
-                self._large_panel(photographs),
+                self._large_panel(photographs, draft),
                 self._loupe_panels(photographs),
                 self._spectrum_panel(photographs),
                 self._words(),
@@ -170,14 +170,15 @@ class DemosaicingView(View):
         height, width = self.truth.shape[:2]
         return image_panel("picture", 20, 34, _MAIN, width, height, tallest=_MAIN)
 
-    def _large_panel(self, photographs: dict[str, bytes]) -> str:
+    def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
         height, width = self.truth.shape[:2]
         marks = self._predicted() + self._frame()
         label = "The picture; drag or press the arrow keys to move the loupe"
         heading: dict[str, Any] = {"hint": "drag the loupe", "drag": "loupe", "label": label}
         if self.show == "false colour":
-            error = heat_map(self.measures.colour_error, 0, _WORST, "error")
-            photographs |= {"picture": error, "picture key": heat_key("error")}
+            error = self.measures.colour_error
+            coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
+            photographs |= {"picture": heat_map(coarse, 0, _WORST, "error"), "picture key": heat_key("error")}
             return heat_panel(
                 self._panel, width, height, 0, _WORST, "ΔC", marks, title="What colour is false", **heading
             )
