@@ -11,6 +11,7 @@ from camviz.mosaics.demosaicing import (
     nearest,
     opencv,
 )
+from camviz.mosaics.measures import Measures, colour_error, compare, false_colour, psnr, zipper
 from camviz.mosaics.patterns import (
     BAYER,
     BLUE,
@@ -25,6 +26,7 @@ from camviz.mosaics.patterns import (
     in_colour,
     mosaic,
 )
+from camviz.mosaics.sampling import Carrier, carriers, low_pass, zone_plate
 
 __all__ = [
     "ALGORITHMS",
@@ -38,14 +40,24 @@ __all__ = [
     "RGBW",
     "WHITE",
     "XTRANS",
+    "Carrier",
+    "Measures",
     "Pattern",
     "bilinear",
+    "carriers",
+    "colour_error",
+    "compare",
     "demosaic",
     "edge_aware",
+    "false_colour",
     "in_colour",
+    "low_pass",
     "malvar",
     "menon",
     "mosaic",
     "nearest",
     "opencv",
+    "psnr",
+    "zipper",
+    "zone_plate",
 ]

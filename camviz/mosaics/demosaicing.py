@@ -132,7 +132,7 @@ def _in_rgb(planes: dict[int, Array]) -> Array:
     if RED not in planes:
         return np.repeat(planes[WHITE][..., None], 3, axis=-1)
     rgb = np.stack([planes[RED], planes[GREEN], planes[BLUE]], axis=-1)
-    return rgb + (planes[WHITE] - rgb.mean(axis=-1))[..., None] if WHITE in planes else rgb
+    return rgb + (planes[WHITE] - rgb @ np.full(3, 1 / 3))[..., None] if WHITE in planes else rgb
 
 
 def _spread(measured: Array, pattern: Pattern, channel: int) -> Array:
@@ -149,7 +149,7 @@ def _spread(measured: Array, pattern: Pattern, channel: int) -> Array:
     return spread
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)
 def _weights(pattern: Pattern, channel: int, height: int, width: int) -> Array:
     mask = pattern.mask(channel, height, width).astype(float)
     return _filtered(mask, _tent(pattern, channel), cv2.BORDER_CONSTANT)
@@ -171,7 +171,7 @@ def _in_every_window(seen: NDArray[np.bool_], reach: int) -> bool:
     return bool(windows.any(axis=(-2, -1)).all())
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)
 def _nearest_pixels(pattern: Pattern, channel: int, height: int, width: int) -> tuple[NDArray, NDArray]:
     """Row and column (height, width) of the nearest pixel that measures the channel."""
     rows, columns = distance_transform_edt(

@@ -97,7 +97,7 @@ def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
     height, width = light.shape[:2]
     seen = pattern.channels(height, width)
     if WHITE in pattern.present:
-        light = np.concatenate([light, light.mean(axis=-1, keepdims=True)], axis=-1)
+        light = np.concatenate([light, light @ np.full((3, 1), 1 / 3)], axis=-1)
     return np.take_along_axis(light, seen[..., None].astype(np.intp), axis=-1)[..., 0]
 
 

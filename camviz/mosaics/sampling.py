@@ -1,0 +1,99 @@
+"""What goes wrong where a mosaic samples light: carriers of false colour, a zone plate that shows them, a remedy.
+
+Frequencies are in cycles per pixel, along u (right) and v (down).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import dctn, idctn
+
+from camviz.lenses.base import Array
+from camviz.mosaics.patterns import BLUE, GREEN, RED, Pattern, as_picture
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """A frequency (fu, fv) at which a grey grating looks to the mosaic like an even colour.
+
+    `colour` (R, G, B) is what the grating's crest, of height 1 on the first pixel, adds to each channel; its imaginary
+    part belongs to a grating moved by a quarter of its period.
+    """
+
+    fu: float
+    fv: float
+    colour: tuple[complex, complex, complex]
+
+    @property
+    def strength(self) -> float:
+        """How colourful that is: the length of what of the colour is not grey."""
+        return float(np.linalg.norm(np.array(self.colour) - np.mean(self.colour)))
+
+
+@lru_cache(maxsize=16)
+def carriers(pattern: Pattern) -> tuple[Carrier, ...]:
+    """The frequencies that a pattern mistakes for colour, the strongest first, one of f and −f; none without colours.
+
+    The spectrum of a mosaic holds that of the picture's brightness and, moved to these frequencies, those of its
+    colours; so fine detail that lies there is taken for colour. A grating at f shows as false colour of the frequency
+    f − carrier. (D. Alleysson, S. Süsstrunk and J. Hérault, "Linear demosaicing inspired by the human visual system",
+    IEEE Transactions on Image Processing 14 (2005); for any tile, from its discrete Fourier transform.)
+    """
+    if not {RED, GREEN, BLUE} <= set(pattern.present):
+        return ()
+    tile = np.array(pattern.tile)
+    spectra = [np.fft.fft2(tile == channel) / (tile == channel).sum() for channel in (RED, GREEN, BLUE)]
+    found = []
+    for row, column in np.ndindex(*tile.shape):
+        if (row, column) <= (-row % pattern.height, -column % pattern.width):  # of f and −f, the first
+            red, green, blue = (complex(spectrum[row, column]) for spectrum in spectra)
+            found.append(Carrier(_folded(column / pattern.width), _folded(row / pattern.height), (red, green, blue)))
+    coloured = (one for one in found if one.strength > 1e-9)
+    return tuple(sorted(coloured, key=lambda one: -round(one.strength, 9)))
+
+
+def _folded(frequency: float) -> float:
+    """The frequency between −½, left out, and ½ that looks the same on whole pixels."""
+    return frequency - 1 if frequency > 0.5 + 1e-12 else frequency
+
+
+@lru_cache(maxsize=4)
+def zone_plate(size: int = 256, highest: float = 0.5) -> Array:
+    """Grey rings (size, size, 3) in linear light, ever finer from the middle to `highest` cycles/pixel at the sides.
+
+    On it the frequency (fu, fv) is found at one place, (fu, fv) · size / (2 highest) from the middle. Each pixel takes
+    the mean over its area, as a sensor's pixel does; read-only.
+    """
+    if size < 8 or not highest > 0:
+        raise ValueError(f"size must be at least 8 pixels and highest above 0, got {size} and {highest}")
+    points = (np.arange(4 * size) + 0.5) / 4 - size / 2
+    phase = 2 * np.pi * highest / size * points**2
+    # cos(a + b) = cos a cos b − sin a sin b, and the mean over an area is a mean of a mean.
+    cos, sin = (part.reshape(size, 4).mean(axis=1) for part in (np.cos(phase), np.sin(phase)))
+    rings = 0.5 + 0.5 * (np.outer(cos, cos) - np.outer(sin, sin))
+    plate = np.repeat(rings[..., None], 3, axis=-1)
+    plate.flags.writeable = False
+    return plate
+
+
+def low_pass(picture: ArrayLike, spots_px: float) -> NDArray[np.float32]:
+    """The picture (height, width, 3) behind a birefringent filter: each point becomes four spots, `spots_px` apart.
+
+    Two plates of quartz do this, one splitting the light to the right and left, one up and down. What is left of a
+    frequency is cos(π d fu) cos(π d fv), nothing at 1/(2d): with d = 1 nothing at the carriers of Bayer's pattern.
+    (J. E. Greivenkamp, "Color dependent optical prefilter for the suppression of aliasing artifacts", Applied Optics 29
+    (1990).) The picture is taken as mirrored at its borders, and as having no detail finer than its pixels.
+    """
+    light = as_picture(picture).astype(np.float32)
+    if not spots_px >= 0:
+        raise ValueError(f"spots_px must be a distance of 0 or more pixels, got {spots_px}")
+    if spots_px == 0:
+        return light
+    passed = [np.cos(np.pi * spots_px * np.arange(count) / (2 * count)) for count in light.shape[:2]]
+    spectrum = dctn(light, axes=(0, 1))
+    spectrum *= np.outer(*passed)[..., None]
+    return idctn(spectrum, axes=(0, 1), overwrite_x=True)

@@ -1,0 +1,369 @@
+"""The demosaicing visualizer: a mosaic, the picture rebuilt from it, what is false in it, and where that had to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import fftshift, rfft2
+
+from camviz import mosaics
+from camviz.cameras import Camera, Intrinsics
+from camviz.draw import plot, svg
+from camviz.draw.heat import heat_key, heat_map, heat_panel
+from camviz.draw.panel import Panel, image_panel
+from camviz.draw.panel import photograph as drawn
+from camviz.draw.picture import Picture, jpeg, png
+from camviz.lenses.base import Array
+from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
+from camviz.mosaics.measures import Measures
+from camviz.photographs import photograph
+from camviz.scenes import render, textured_scene, to_display, to_linear
+from camviz.views.base import View, choice, slider
+
+LOUPE = 14  # pixels across
+LARGEST = 256  # pixels of a picture's longer side
+_MAIN, _SMALL = 472, 118  # widths in picture units
+_WORST = 60.0  # of the map of errors, in units of CIELAB
+_TICKS = [(-0.5, "−½"), (0.0, "0"), (0.5, "½")]
+
+Source = tuple[str, float] | tuple[bytes, tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class DemosaicingView(View):
+    """A picture under a colour filter array, demosaiced. Light is linear in the mosaic, sRGB on the screen.
+
+    The loupe stands on the pixel (u, v). With `photograph` (height, width, 3) uint8, that is the picture.
+    """
+
+    title: ClassVar[str] = "Demosaicing"
+
+    picture: str = choice("zone plate", "astronaut", "garden", help="grey rings, a photograph, or the virtual garden")
+    highest: float = slider(
+        0.6, 0.2, 0.7, 0.01, label="finest rings", unit="cycles/px", help="of the zone plate, at its sides"
+    )
+    pattern: str = choice(*BAYER, "X-Trans", "RGBW", help="the filters over the pixels, from the upper left")
+    algorithm: str = choice("bilinear", *(one for one in ALGORITHMS if one != "bilinear"), help="how to rebuild it")
+    spots_px: float = slider(
+        0.0,
+        0.0,
+        1.5,
+        0.05,
+        label="blur before sampling",
+        unit="px",
+        help="a birefringent filter: four spots, so far apart",
+    )
+    show: str = choice("rebuilt", "mosaic", "false colour", help="the large picture")
+    u: float = 235.0
+    v: float = 128.0
+    photograph: NDArray[np.uint8] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        own = self.photograph
+        if own is not None and not (own.dtype == np.uint8 and own.shape[2:] == (3,) and min(own.shape[:2]) >= LOUPE):
+            takes = f"uint8 (height, width, 3), at least {LOUPE} pixels each way"
+            raise ValueError(f"photograph must be {takes}, got {own.dtype} {own.shape}")
+
+    # What is true ----------------------------------------------------------------------------------------------------
+
+    @property
+    def filters(self) -> Pattern:
+        return PATTERNS[self.pattern]
+
+    @property
+    def used(self) -> str:
+        """The algorithm, or bilinear interpolation where that one is for Bayer's patterns only."""
+        return self.algorithm if self.filters.is_bayer or self.algorithm in ANY_PATTERN else "bilinear"
+
+    @property
+    def source(self) -> Source:
+        """What the picture is known by."""
+        if self.photograph is not None:
+            return self.photograph.tobytes(), self.photograph.shape
+        return self.picture, self.highest if self.picture == "zone plate" else 0.0
+
+    @cached_property
+    def truth(self) -> NDArray[np.uint8]:
+        """The picture, not blurred, as sRGB bytes (height, width, 3)."""
+        return _shown(self.source)
+
+    @cached_property
+    def measured(self) -> Array:
+        """The mosaic (height, width), linear."""
+        return _measured(self.source, self.filters, self.spots_px)
+
+    @cached_property
+    def rebuilt(self) -> NDArray[np.uint8]:
+        """The demosaiced picture, as sRGB bytes (height, width, 3)."""
+        return _rebuilt(self.source, self.filters, self.spots_px, self.used)
+
+    @cached_property
+    def measures(self) -> Measures:
+        """How far it is from the picture."""
+        return _compared(self.source, self.filters, self.spots_px, self.used)
+
+    @property
+    def frequency(self) -> Array | None:
+        """Of the zone plate's rings under the loupe, (fu, fv) in cycles/pixel; None on another picture."""
+        if self.picture != "zone plate" or self.photograph is not None:
+            return None
+        size = self.truth.shape[0]
+        return (np.array(self.at) - 0.5 - (size - 1) / 2) * 2 * self.highest / size
+
+    @property
+    def at(self) -> tuple[int, int]:
+        """The pixel under the middle of the loupe, which stays inside the picture."""
+        height, width = self.truth.shape[:2]
+        half = LOUPE // 2
+        return round(min(max(self.u, half), width - half)), round(min(max(self.v, half), height - half))
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        found = self.measures
+        return {
+            "PSNR": f"{found.psnr_db:.2f} dB",
+            "false colour": f"ΔC = {found.false_colour:.1f} on average",
+            "zippers": f"{100 * found.zipper:.1f} % of the pixels",
+            **self._under_the_loupe(),
+        }
+
+    def _under_the_loupe(self) -> dict[str, str]:
+        if self.frequency is None:
+            return {"loupe at": f"column {self.at[0]}, row {self.at[1]}"}
+        fu, fv = self.frequency
+        near, (du, dv) = nearest_carrier(self.filters, fu, fv)
+        away = float(np.hypot(du, dv))
+        beat = f"beats once in {1 / away:.0f} px" if away > 0.005 else "no beat"
+        return {"loupe at": f"({fu:.2f}, {fv:.2f}) cycles/px".replace("-", "−"), "carrier": f"{_place(near)}: {beat}"}
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        blur = f"four spots {self.spots_px:g} px apart" if self.spots_px else "no blur before sampling"
+        name = "a photograph" if self.photograph is not None else f"the {self.picture}"
+        rings = f" up to {self.highest:g} cycles/px" if self.frequency is not None else ""
+        return f"{name}{rings} under {self.pattern}, {blur}, by {self.used}: {figures}. Shown: {self.show}."
+
+    # What it looks like ----------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        photographs: dict[str, bytes] = {}
+        body = "".join(
+            [
+                svg.rectangle(0, 0, 960, 552, "paper"),
+                self._large_panel(photographs, draft),
+                self._loupe_panels(photographs),
+                self._spectrum_panel(photographs),
+                self._words(),
+            ]
+        )
+        return Picture(body, 960, 552, self.title, self.description(), photographs)
+
+    @cached_property
+    def _panel(self) -> Panel:
+        height, width = self.truth.shape[:2]
+        return image_panel("picture", 20, 34, _MAIN, width, height, tallest=_MAIN)
+
+    def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
+        height, width = self.truth.shape[:2]
+        marks = self._predicted() + self._frame()
+        label = "The picture; drag or press the arrow keys to move the loupe"
+        heading: dict[str, Any] = {"hint": "drag the loupe", "drag": "loupe", "label": label}
+        if self.show == "false colour":
+            error = self.measures.colour_error
+            coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
+            photographs |= {"picture": heat_map(coarse, 0, _WORST, "error"), "picture key": heat_key("error")}
+            return heat_panel(
+                self._panel, width, height, 0, _WORST, "ΔC", marks, title="What colour is false", **heading
+            )
+        pixels = to_display(mosaics.in_colour(self.measured, self.filters)) if self.show == "mosaic" else self.rebuilt
+        title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
+        photographs["picture"] = jpeg(pixels, 90)
+        return self._panel.show(drawn(self._panel, "picture", width, height) + marks, title=title, **heading)
+
+    def _rebuilt_by(self) -> str:
+        return self.used if self.used == self.algorithm else f"{self.used} ({self.algorithm} is for Bayer's patterns)"
+
+    def _predicted(self) -> str:
+        """Rings on the zone plate where its frequency is one that the pattern takes for colour."""
+        if self.frequency is None:
+            return ""
+        size = self.truth.shape[0]
+        places = (size - 1) / 2 + _everywhere(self.filters, self.highest) * size / (2 * self.highest)
+        return _rings(self._panel.place(places), 13)
+
+    def _frame(self) -> str:
+        """The loupe's outline on the picture."""
+        u, v = self.at
+        corners = np.array([(0, 0), (LOUPE, 0), (LOUPE, LOUPE), (0, LOUPE)]) + (
+            u - LOUPE / 2 - 0.5,
+            v - LOUPE / 2 - 0.5,
+        )
+        outline = self._panel.place(corners)
+        return svg.polygon(outline, "paper-line") + svg.polygon(outline, "blue thick")
+
+    def _loupe_panels(self, photographs: dict[str, bytes]) -> str:
+        u, v = self.at
+        window = np.s_[v - LOUPE // 2 : v + LOUPE // 2, u - LOUPE // 2 : u + LOUPE // 2]
+        filters = self.filters.cropped(u - LOUPE // 2, v - LOUPE // 2)
+        seen = {
+            "measured": to_display(mosaics.in_colour(self.measured[window], filters)),
+            "rebuilt": self.rebuilt[window],
+            "truth": self.truth[window],
+        }
+        body = ""
+        for i, (name, pixels) in enumerate(seen.items()):
+            panel = Panel(f"loupe {name}", 560 + i * (_SMALL + 13), 34, _SMALL, _SMALL, 0, 1, 0, 1)
+            photographs[panel.name] = png(np.ascontiguousarray(pixels))
+            content = svg.image(panel.name, 0, 0, _SMALL, _SMALL, style="image-rendering:pixelated")
+            body += panel.show(content, title=name)
+        return body
+
+    def _spectrum_panel(self, photographs: dict[str, bytes]) -> str:
+        panel = plot.plot_panel("spectrum", 604, 200, 196, 196, (-0.5, 0.5), (0.5, -0.5))
+        photographs["spectrum"] = jpeg(_spectrum(self.source, self.filters, self.spots_px))
+        places = _everywhere(self.filters, 0.5)
+        content = svg.image("spectrum", 0, 0, panel.width, panel.height) + _rings(panel.place(places), 9)
+        axes = plot.axes(panel, "fu [cycles/px]", "fv [cycles/px]", _TICKS, _TICKS)
+        listed = [svg.text((818, 212), "taken for colour", "note")]
+        for i, carrier in enumerate(mosaics.carriers(self.filters)[:7]):
+            listed.append(svg.text((818, 234 + 19 * i), f"○ {_place(carrier)}", "tick"))
+            listed.append(svg.text((938, 234 + 19 * i), f"{carrier.strength:.2f}", "tick end"))
+        return panel.show(content, title="Spectrum of the mosaic") + axes + "".join(listed)
+
+    def _words(self) -> str:
+        rows = []
+        for i, (name, value) in enumerate(self.numbers().items()):
+            rows.append(svg.text((560, 454 + 21 * i), name, "note"))
+            rows.append(svg.text((654, 454 + 21 * i), value, "label"))
+        return "".join(rows)
+
+    # What can be dragged ---------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> DemosaicingView:
+        if handle != "loupe":
+            return self
+        panel, here = self._panel, np.array(self.at, dtype=float)
+        moved = here + np.array([dx, dy]) / panel.scale if np.isnan(x) else panel.data((x - panel.x, y - panel.y))
+        height, width = self.truth.shape[:2]
+        u, v = np.clip(moved, 0, (width - 1, height - 1)).tolist()
+        return self.but(u=u, v=v)
+
+    def pressed(self, handle: str, key: str) -> DemosaicingView:
+        """An arrow moves the loupe by one pixel, so that its phase can be followed."""
+        across, down = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}.get(
+            key, (0, 0)
+        )
+        u, v = self.at
+        return self.but(u=float(u + across), v=float(v + down)) if handle == "loupe" else self
+
+
+def nearest_carrier(pattern: Pattern, fu: float, fv: float) -> tuple[Carrier, Array]:
+    """The carrier nearest to a frequency, and (2,) how far the frequency is from it, whole pixels being blind to ±1."""
+    best, shortest = mosaics.carriers(pattern)[0], np.array([np.inf, np.inf])
+    for carrier in mosaics.carriers(pattern):
+        for sign in (1, -1):
+            away = np.array([fu, fv]) - (sign * carrier.fu, sign * carrier.fv)
+            away -= np.rint(away)
+            if np.hypot(*away) < np.hypot(*shortest) - 1e-9:
+                best, shortest = carrier, away
+    return best, shortest
+
+
+def _everywhere(pattern: Pattern, highest: float) -> Array:
+    """The carriers (n, 2) at each of the frequencies, up to `highest`, that look alike on whole pixels."""
+    places = set()
+    for one in mosaics.carriers(pattern):
+        for sign in (1, -1):
+            for across, down in np.ndindex(3, 3):
+                fu, fv = sign * one.fu + across - 1, sign * one.fv + down - 1
+                if max(abs(fu), abs(fv)) <= highest + 1e-9:
+                    places.add((round(fu, 9), round(fv, 9)))
+    return np.array(sorted(places), dtype=float).reshape(-1, 2)
+
+
+def _rings(centres: Array, radius: float) -> str:
+    turn = np.linspace(0, 2 * np.pi, 25)
+    circle = radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    lines = [centre + circle for centre in centres]
+    return svg.path(lines, "paper-line") + svg.path(lines, "ink")
+
+
+_FRACTIONS = {0.5: "½", 0.25: "¼", 1 / 3: "⅓", 1 / 6: "⅙", 0.0: "0"}
+
+
+def _place(carrier: Carrier) -> str:
+    """A carrier's frequency in words: (½, 0)."""
+    words = []
+    for frequency in (carrier.fu, carrier.fv):
+        name = next(
+            (word for value, word in _FRACTIONS.items() if abs(abs(frequency) - value) < 1e-9), f"{frequency:.3g}"
+        )
+        words.append(("−" if frequency < 0 else "") + name)
+    return f"({', '.join(words)})"
+
+
+# Each step of the chain, kept for as long as nothing before it changes -----------------------------------------------
+
+
+@lru_cache(maxsize=2)
+def _light(source: Source) -> NDArray:
+    """The picture in linear light (height, width, 3)."""
+    name, given = source
+    if isinstance(name, bytes):
+        return _reduced(np.frombuffer(name, np.uint8).reshape(given), LARGEST)  # type: ignore[arg-type]
+    if name == "zone plate":
+        return mosaics.zone_plate(256, float(given))  # type: ignore[arg-type]
+    return _reduced(photograph("astronaut"), 256) if name == "astronaut" else _garden()
+
+
+def _reduced(picture: NDArray[np.uint8], largest: int) -> NDArray[np.float32]:
+    """Light averaged over areas, so that what another camera interpolated is mostly gone."""
+    light = to_linear(picture).astype(np.float32)
+    scale = largest / max(light.shape[:2])
+    return cv2.resize(light, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else light
+
+
+@lru_cache(maxsize=1)
+def _garden() -> NDArray:
+    camera = Camera(Intrinsics.from_fov(256, 256, 40))
+    return np.clip(render(textured_scene(), camera, supersample=3), 0, 1)
+
+
+@lru_cache(maxsize=2)
+def _shown(source: Source) -> NDArray[np.uint8]:
+    return to_display(_light(source))
+
+
+@lru_cache(maxsize=2)
+def _measured(source: Source, pattern: Pattern, spots_px: float) -> Array:
+    return mosaics.mosaic(mosaics.low_pass(_light(source), spots_px), pattern)
+
+
+@lru_cache(maxsize=2)
+def _rebuilt(source: Source, pattern: Pattern, spots_px: float, algorithm: str) -> NDArray[np.uint8]:
+    return to_display(mosaics.demosaic(_measured(source, pattern, spots_px), pattern, algorithm))
+
+
+@lru_cache(maxsize=2)
+def _compared(source: Source, pattern: Pattern, spots_px: float, algorithm: str) -> Measures:
+    return mosaics.compare(_rebuilt(source, pattern, spots_px, algorithm), _shown(source))
+
+
+@lru_cache(maxsize=2)
+def _spectrum(source: Source, pattern: Pattern, spots_px: float) -> NDArray[np.uint8]:
+    """The mosaic's spectrum as a grey picture, by logarithm: −½ … ½ cycles/pixel each way, zero in the middle."""
+    values = _measured(source, pattern, spots_px).astype(np.float32)
+    values = values - values.mean()
+    height, width = values.shape
+    values *= np.outer(np.hanning(height), np.hanning(width)).astype(np.float32)
+    half = fftshift(np.abs(rfft2(values)), axes=0)
+    small = cv2.resize(half, (66, 132), interpolation=cv2.INTER_AREA)
+    level = np.log10(np.maximum(np.hstack([small[::-1, :0:-1], small]), 1e-6))
+    return np.clip(255 * (level - level.max() + 3) / 3, 0, 255).astype(np.uint8)
