@@ -147,6 +147,14 @@ def test_a_panorama_turned_over_the_pole_is_the_panorama_turned_upside_down_and_
     np.testing.assert_array_equal(over, np.roll(picture[::-1, ::-1], 256, axis=1))
 
 
+def test_straight_up_lies_between_the_first_row_and_the_first_row_half_way_round(rng):
+    picture = rng.random((256, 512)).astype(np.float32)
+    up = window(1, 1, 1, pitch_deg=90, yaw_deg=180 * 3 / 512)
+    u = source_pixels(AROUND, up, np.zeros(2))[0]
+    across = np.interp([u, (u + 256) % 512], np.arange(512), picture[0])
+    np.testing.assert_allclose(reproject(picture, AROUND, up, antialias=False), [[across.mean()]], atol=0.02)
+
+
 def test_a_panorama_with_its_middle_elsewhere_is_joined_where_it_ends():
     shifted = Camera(replace(AROUND.intrinsics, cx=100.0), AROUND.lens)
     u = (np.arange(512) - 100.0) * 2 * np.pi / 512
