@@ -18,6 +18,7 @@ browser:
 bench:
 	$(BIN)/python benchmarks/kernel.py
 	$(BIN)/python benchmarks/calibration.py
+	$(BIN)/python benchmarks/wide.py
 	$(BIN)/python benchmarks/browser.py
 
 # Newest versions that pyproject.toml allows, for every platform and Python, with hashes and without naming any host.

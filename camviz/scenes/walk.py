@@ -11,7 +11,7 @@ from camviz.scenes.standard import BOARD_COLUMNS, BOARD_ROWS, board_corners
 
 
 def around_board(count: int) -> list[RigidTransform]:
-    """Poses world_from_cam of `count` cameras 1.1 to 1.5 m from the board, which they see up to 70° off their axes."""
+    """Poses world_from_cam of `count` cameras 1.1 to 1.5 m from the board, which they see up to 58° off their axes."""
     corners = board_corners().reshape(BOARD_ROWS, BOARD_COLUMNS, 3)
     right, down = unit(corners[0, -1] - corners[0, 0]), unit(corners[-1, 0] - corners[0, 0])
     middle, out = corners.mean(axis=(0, 1)), -np.cross(right, down)
