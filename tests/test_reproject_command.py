@@ -26,6 +26,7 @@ def room(tmp_path, monkeypatch):
     cv2.imwrite("wrong.png", sky[:, :100])
     Path("text.png").write_text("not a picture")
     Path("empty.png").write_bytes(b"")
+    Path("torn.png").write_bytes(Path("sky.png").read_bytes()[:2000])
     return tmp_path
 
 
@@ -132,6 +133,7 @@ def test_a_projection_shows_the_field_it_was_asked_for_or_says_why_not(name, sid
         ("sky.png -o out.png --from equirectangular --to perspective --hfov 0", "above 0"),
         ("text.png -o out.png --from equirectangular --to cube", "expected a picture"),
         ("empty.png -o out.png --from equirectangular --to cube", "expected a picture"),
+        ("torn.png -o out.png --from equirectangular --to cube", "expected a picture"),
         ("absent.png -o out.png --from equirectangular --to cube", "no such picture"),
         (". -o out.png --from equirectangular --to cube", "this is not a file"),
         ("sky.png -o sky.png --from equirectangular --to cube", "overwrite"),
@@ -147,10 +149,10 @@ def test_a_projection_shows_the_field_it_was_asked_for_or_says_why_not(name, sid
         ("sky.png --from equirectangular --to cube", "required"),
     ],
 )
-def test_what_cannot_be_done_is_one_sentence_and_leaves_no_file(capsys, room, words, sentence):
+def test_what_cannot_be_done_is_one_sentence_and_leaves_no_file(capfd, room, words, sentence):
     before = sorted(room.rglob("*"))
     assert main(["reproject", *words.format(data=DATA).split()]) == 2
-    out, err = capsys.readouterr()
+    out, err = capfd.readouterr()
     assert out == ""
     assert err.startswith("camviz: ")
     assert err.count("\n") == 1

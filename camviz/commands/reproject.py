@@ -198,10 +198,15 @@ def _read(path: Path) -> np.ndarray:
     if not path.is_file():
         raise Refusal(f"{path}: there is no such picture." if not path.exists() else f"{path}: this is not a file.")
     data = np.frombuffer(path.read_bytes(), np.uint8)
+    level = cv2.utils.logging.setLogLevel(
+        cv2.utils.logging.LOG_LEVEL_SILENT
+    )  # what is wrong with a picture is said here, once
     try:
         picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     except cv2.error:
         picture = None
+    finally:
+        cv2.utils.logging.setLogLevel(level)
     if picture is None:
         raise Refusal(f"{path}: expected a picture (PNG, JPEG, TIFF, WebP …), this cannot be read as one.")
     if max(picture.shape[:2]) > LONGEST:
