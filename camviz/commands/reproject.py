@@ -206,7 +206,7 @@ def _read(path: Path) -> np.ndarray:
     except cv2.error:
         picture = None
     finally:
-        cv2.utils.logging.setLogLevel(level)
+        log.setLogLevel(level)
     if picture is None:
         raise Refusal(f"{path}: expected a picture (PNG, JPEG, TIFF, WebP …), this cannot be read as one.")
     if max(picture.shape[:2]) > LONGEST:
