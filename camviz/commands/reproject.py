@@ -198,9 +198,8 @@ def _read(path: Path) -> np.ndarray:
     if not path.is_file():
         raise Refusal(f"{path}: there is no such picture." if not path.exists() else f"{path}: this is not a file.")
     data = np.frombuffer(path.read_bytes(), np.uint8)
-    level = cv2.utils.logging.setLogLevel(
-        cv2.utils.logging.LOG_LEVEL_SILENT
-    )  # what is wrong with a picture is said here, once
+    log = cv2.utils.logging
+    level = log.setLogLevel(log.LOG_LEVEL_SILENT)  # what is wrong with a picture is said here, once
     try:
         picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     except cv2.error:
