@@ -4,10 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.cameras import Camera
-from camviz.reprojection import reproject
 from camviz.scenes import snapshot, textured_scene
-from camviz.views import garden
 from camviz.views.fisheye import EQUATIONS, LENSES, FisheyeView
 
 
@@ -44,13 +41,14 @@ def test_an_equidistant_lens_gives_every_degree_as_many_pixels():
     assert numbers["pixels a degree, 0°"] == numbers["pixels a degree, 80°"] == f"{150 * np.pi / 180:.2f}"
 
 
-def test_the_window_shows_what_a_perspective_camera_there_would_photograph():
+@pytest.mark.parametrize("draft", [True, False])
+def test_the_window_shows_what_a_perspective_camera_there_would_photograph(draft):
     view = FisheyeView(yaw_deg=20.0, pitch_deg=-5.0, hfov_deg=70.0)
-    image, _ = garden.taken(view.camera, garden.FINE)
-    small = Camera(view.camera.intrinsics.within(garden.FINE), view.camera.lens)
-    cut = cv2.GaussianBlur(reproject(image, small, view.window), (0, 0), 3).astype(float)
-    truth = cv2.GaussianBlur(snapshot(textured_scene(), view.window), (0, 0), 3).astype(float)
-    assert np.corrcoef(cut.ravel(), truth.ravel())[0, 1] > 0.99
+    data = np.frombuffer(view.figure(draft=draft).photographs["window"], np.uint8)
+    cut = cv2.resize(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1], (320, 240))
+    truth = snapshot(textured_scene(), view.window)
+    soft = [cv2.GaussianBlur(picture, (0, 0), 4).astype(float).ravel() for picture in (cut, truth)]
+    assert np.corrcoef(*soft)[0, 1] > 0.98
 
 
 @pytest.mark.parametrize("projection", ["equidistant", "stereographic", "equisolid"])

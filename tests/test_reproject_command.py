@@ -83,6 +83,26 @@ def test_a_fisheye_of_a_calibration_file_is_straightened_as_opencv_does(room):
     assert psnr(cv2.imread("straight.png"), theirs) > 40
 
 
+def test_a_face_is_turned_in_the_frame_of_the_whole_cube(room):
+    """Pitch turns about the axis that the right face looks along: its middle stays, and up is not in it."""
+    middles = []
+    for turn in ([], ["--pitch", "90"]):
+        words = ["--from", "equirectangular", "--to", "cube:right", "--size", "33x33", *turn]
+        assert main(["reproject", "sky.png", "-o", "face.png", *words]) == 0
+        middles.append(cv2.imread("face.png")[16, 16])
+    np.testing.assert_array_equal(*middles)
+
+
+def test_the_edge_of_a_shrunk_ball_is_transparent_but_not_dark(room):
+    cv2.imwrite("white.png", np.full((1024, 2048, 3), 255, np.uint8))
+    words = ["--from", "equirectangular", "--to", "fisheye:orthographic", "--size", "60x60"]
+    assert main(["reproject", "white.png", "-o", "ball.png", *words]) == 0
+    ball = cv2.imread("ball.png", cv2.IMREAD_UNCHANGED)
+    partly = (ball[..., 3] > 20) & (ball[..., 3] < 255)
+    assert partly.any()
+    assert ball[..., :3][partly].min() > 245
+
+
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_grey_and_16_bit_pictures_stay_what_they_are(room, kind):
     cv2.imwrite("grey.png", np.full((64, 128), 100 if kind is np.uint8 else 40_000, kind))
