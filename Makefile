@@ -18,7 +18,11 @@ browser:
 bench:
 	$(BIN)/python benchmarks/kernel.py
 	$(BIN)/python benchmarks/calibration.py
+	$(BIN)/python benchmarks/optics.py
+	$(BIN)/python benchmarks/wide.py
+	$(BIN)/python benchmarks/lightfield.py
 	$(BIN)/python benchmarks/mosaics.py
+	$(BIN)/python benchmarks/noise.py
 	$(BIN)/python benchmarks/browser.py
 
 # Newest versions that pyproject.toml allows, for every platform and Python, with hashes and without naming any host.

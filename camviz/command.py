@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 
 import camviz
-from camviz.commands import board, calibrate, convert, doctor, inspect, lab, noise, show, teacher
+from camviz.commands import board, calibrate, convert, doctor, inspect, lab, noise, reproject, show, teacher
 from camviz.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, say
 
 DESCRIPTION = """\
@@ -26,6 +26,8 @@ examples:
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
   camviz convert cam.yml model --to colmap   write the same camera for another program
+  camviz reproject earth.jpg -o front.png --from equirectangular --to cube:front
+                                             take a picture through another lens
   camviz noise shots/                        measure a sensor from its frames: gain, noise, patterns, dark current
   camviz teacher for-me                      write the lessons with solutions and timings into ./for-me
 
@@ -64,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
     commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    for subcommand in (lab, doctor, board, calibrate, inspect, show, convert, noise, teacher):
+    for subcommand in (lab, doctor, board, calibrate, inspect, show, convert, reproject, noise, teacher):
         subcommand.add(commands)
     return everything
 

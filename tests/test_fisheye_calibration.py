@@ -1,0 +1,59 @@
+"""A fisheye calibrated from rendered pictures of a board is the fisheye that took them."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.calibration import calibrate, detect
+from camviz.cameras import Camera, Intrinsics
+from camviz.files import Board
+from camviz.lenses import KannalaBrandt
+from camviz.scenes import board_corners, snapshot, textured_scene
+from camviz.scenes.standard import SQUARE
+from camviz.scenes.walk import around_board
+
+TUM_VI = Camera(
+    Intrinsics(1024, 1024, 379.045, 379.008, 505.512, 509.969).within(640),
+    KannalaBrandt(0.00693023, -0.0013828, -0.000272596, -0.000452646),
+)
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("boards")
+    for i, pose in enumerate(around_board(12)):
+        cv2.imwrite(str(folder / f"{i:02d}.png"), snapshot(textured_scene(), TUM_VI.at(pose))[..., ::-1])
+    board = Board(9, 6, SQUARE)
+    found = detect(sorted(folder.iterdir()), board, workers=1)
+    assert len(found.pictures) == 12
+    calibration = calibrate(found, board, "fisheye")
+    return next(iter(calibration.cameras.values()))
+
+
+def test_rays_land_where_the_true_fisheye_has_them(solved):
+    """Held by their curve, which the corners know out to 58°: single coefficients trade against each other."""
+    theta = np.radians(np.arange(1, 70))
+    rays = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
+    off = np.linalg.norm(
+        replace(solved, world_from_cam=TUM_VI.world_from_cam).project(rays) - TUM_VI.project(rays), axis=-1
+    )
+    assert off[:58].max() < 0.15
+    assert off.max() < 1
+
+
+def test_focal_length_and_middle_come_back(solved):
+    truth = TUM_VI.intrinsics
+    assert solved.intrinsics.fx == pytest.approx(truth.fx, rel=1e-3)
+    assert solved.intrinsics.cx == pytest.approx(truth.cx, abs=0.2)
+    assert solved.intrinsics.cy == pytest.approx(truth.cy, abs=0.2)
+
+
+def test_the_walk_shows_the_board_all_over_the_picture():
+    seen = np.array([TUM_VI.at(pose).project(board_corners().reshape(-1, 3)) for pose in around_board(12)])
+    assert TUM_VI.intrinsics.contains(seen).all()
+    directions = np.arctan2(*(seen.mean(axis=1) - 319.5).T[::-1])
+    assert len(np.unique(np.floor(directions / (np.pi / 3)))) >= 5
+    rays = TUM_VI.lens.unproject(TUM_VI.intrinsics.from_pixels(seen))
+    assert np.degrees(np.arccos(rays[..., 2].min())) == pytest.approx(58, abs=1)

@@ -1,0 +1,92 @@
+"""The fisheye visualizer shows true numbers and a window that is truly cut out of its picture."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.scenes import snapshot, textured_scene
+from camviz.views.fisheye import EQUATIONS, LENSES, FisheyeView
+
+
+@pytest.mark.parametrize(
+    ("projection", "radii"),
+    [
+        ("stereographic", (0.535898, 1.154701, 2.0)),
+        ("equidistant", (0.523599, 1.047198, 1.570796)),
+        ("equisolid", (0.517638, 1.0, 1.414214)),
+        ("orthographic", (0.5, 0.866025, 1.0)),
+        ("perspective", (0.577350, 1.732051, np.nan)),
+    ],
+)
+def test_radii_at_30_60_and_90_degrees_are_the_textbook_s(projection, radii):
+    view = FisheyeView(projection=projection)
+    np.testing.assert_allclose(view.radius(np.radians([30.0, 60.0, 90.0])), radii, atol=1e-6)
+    words = " ".join(f"{r:.3f}" if np.isfinite(r) else "    ∞" for r in radii)
+    assert words in view.figure(draft=True).body
+
+
+def test_only_the_perspective_lens_loses_a_ray_at_90_degrees():
+    lost = [name for name in LENSES if "nowhere" in FisheyeView(projection=name).numbers()["a ray at 90° lands at"]]
+    assert lost == ["perspective"]
+
+
+@pytest.mark.parametrize(("projection", "across"), [("equidistant", "183°"), ("stereographic", "155°")])
+def test_the_field_is_that_of_the_picture_s_edges(projection, across):
+    """240 px from the middle at f = 150 px: 2 · 1.6 rad, and 4 atan 0.8."""
+    assert FisheyeView(projection=projection, f=150.0).numbers()["across the picture"] == across
+
+
+def test_an_equidistant_lens_gives_every_degree_as_many_pixels():
+    numbers = FisheyeView(f=150.0).numbers()
+    assert numbers["pixels a degree, 0°"] == numbers["pixels a degree, 80°"] == f"{150 * np.pi / 180:.2f}"
+
+
+@pytest.mark.parametrize("draft", [True, False])
+def test_the_window_shows_what_a_perspective_camera_there_would_photograph(draft):
+    view = FisheyeView(yaw_deg=20.0, pitch_deg=-5.0, hfov_deg=70.0)
+    data = np.frombuffer(view.figure(draft=draft).photographs["window"], np.uint8)
+    cut = cv2.resize(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1], (320, 240))
+    truth = snapshot(textured_scene(), view.window)
+    soft = [cv2.GaussianBlur(picture, (0, 0), 4).astype(float).ravel() for picture in (cut, truth)]
+    assert np.corrcoef(*soft)[0, 1] > 0.98
+
+
+@pytest.mark.parametrize("projection", ["equidistant", "stereographic", "equisolid"])
+def test_a_dragged_window_follows_the_pointer(projection):
+    view = FisheyeView(projection=projection, yaw_deg=10.0, pitch_deg=-10.0)
+    middle = np.array([159.5, 119.5])
+    before = view.camera.project(view.window.unproject(middle))
+    moved = view.dragged("window", 0, 0, 30, -20)
+    after = moved.camera.project(moved.window.unproject(middle))
+    np.testing.assert_allclose(after - before, np.array([30, -20]) * 480 / 320, atol=0.05)
+
+
+def test_a_window_is_not_dragged_out_of_the_picture():
+    view = FisheyeView(projection="orthographic", f=150.0, yaw_deg=60.0, pitch_deg=0.0)
+    assert view.dragged("window", 0, 0, 300, 0) == view
+
+
+def test_keys_move_the_window_zoom_it_and_walk_around_the_dome():
+    view = FisheyeView(yaw_deg=0.0, pitch_deg=0.0)
+    assert view.pressed("window", "ArrowRight").yaw_deg > 0
+    assert view.pressed("window", "ArrowUp").pitch_deg > 0
+    assert view.pressed("window", "+").hfov_deg == 75
+    assert view.pressed("window", "-").hfov_deg == 85
+    assert view.but(hfov_deg=20.0).pressed("window", "+").hfov_deg == 20
+    assert view.pressed("eye", "ArrowLeft").eye != view.eye
+    assert view.dragged("eye", 0, 0, 9, 9).yaw_deg == 0
+
+
+@pytest.mark.parametrize("draft", [True, False])
+def test_every_control_changes_the_picture_at_both_ends(draft):
+    base = FisheyeView()
+    shown = {(picture.body, picture.photographs["window"]) for picture in [base.figure(draft=draft)]}
+    states = []
+    for name, control in FisheyeView.controls().items():
+        states += [base.but(**{name: value}) for value in control.choices[1:] or (control.low, control.high)]
+    for state in states:
+        picture = state.figure(draft=draft)
+        shown.add((picture.body, picture.photographs["window"]))
+        assert EQUATIONS[state.projection] in picture.description
+        assert "nan" not in picture.body
+    assert len(shown) == len(states) + 1
