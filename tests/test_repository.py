@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-FLOOR_1 = ("cameras", "lenses", "distortion", "scenes", "twoview", "files", "calibration")
+FLOOR_1 = ("cameras", "lenses", "distortion", "scenes", "twoview", "files", "calibration", "mirrors", "ring")
 HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)|(?:src|href)=\"([^\"#]+)\"")
 
