@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Intrinsics
 from camviz.lenses import UnifiedSphere
-from camviz.mirrors import Catadioptric, Mirror, direction_error, eccentricity, miss, photograph
+from camviz.mirrors import Catadioptric, Mirror, MirrorLens, direction_error, eccentricity, miss, photograph
 from camviz.scenes import Scene, Texture
 from camviz.scenes.surfaces import Sphere
 
@@ -61,6 +61,16 @@ def test_a_traced_mirror_is_the_unified_sphere(mirror):
     lens = UnifiedSphere(xi)
     np.testing.assert_allclose(scale * lens.project(directions), xy, atol=1e-9 * camera.rim())
     np.testing.assert_allclose(lens.unproject(xy / scale), directions, atol=1e-9)
+
+
+@CENTRAL
+def test_what_a_calibration_of_directions_knows_of_a_central_camera_is_the_unified_sphere(mirror):
+    camera = Catadioptric.central(mirror)
+    xi, scale = camera.unified
+    xy = disc(camera, np.random.default_rng(4)) * 0.999
+    lens = MirrorLens(camera)
+    np.testing.assert_allclose(lens.unproject(xy), UnifiedSphere(xi).unproject(xy / scale), atol=1e-9)
+    np.testing.assert_allclose(lens.project(lens.unproject(xy)), xy, atol=1e-6 * camera.rim())
 
 
 def test_xi_goes_from_a_flat_mirror_to_a_paraboloid():
