@@ -7,7 +7,7 @@ looks back along -z. A mirror swaps left and right; image points are given with 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 from math import inf, isfinite, sqrt
 
 import numpy as np
@@ -19,6 +19,8 @@ from camviz.lenses.base import Array, as_points, unit
 from camviz.lenses.fisheye import Fisheye
 from camviz.scenes import Scene
 from camviz.scenes.rays import Floats
+
+TABLE = 2049  # image radii whose rays are traced to find those of angles
 
 
 def eccentricity(xi: float) -> float:
@@ -179,27 +181,30 @@ class Catadioptric:
 class MirrorLens(Fisheye):
     """What a calibration of a mirror's directions knows: as if all its rays passed through one point.
 
-    For a central camera that is the truth, and `UnifiedSphere` its formula. The angle of an image radius is traced; the
-    inverse is looked up in a table of 4097, which errs by less than 1e-6 of the rim's image.
+    For a central camera that is the truth, and `UnifiedSphere` its formula. Both ways are looked up in a table of
+    traced rays, which errs by less than 1e-6 of the rim's image and of a radian.
     """
 
     camera: Catadioptric
 
-    @cached_property
-    def _table(self) -> tuple[Array, Array]:
-        radii = np.linspace(0, self.camera.rim() * (1 - 1e-12), 4097)
-        return self.angle(radii), radii
-
     @property
     def max_angle(self) -> float:
-        return float(self._table[0][-1])
+        return float(_angles(self.camera)[0][-1])
 
     def radial(self, theta: ArrayLike) -> Array:
-        return np.interp(np.asarray(theta, dtype=float), *self._table)
+        return np.interp(np.asarray(theta, dtype=float), *_angles(self.camera))
 
     def angle(self, radius: Array) -> Array:
-        _, directions = self.camera.trace(np.stack([radius, 0 * radius], axis=-1))
-        return np.arctan2(directions[..., 0], directions[..., 2])
+        angles, radii = _angles(self.camera)
+        return np.interp(radius, radii, angles)
+
+
+@lru_cache(maxsize=4)
+def _angles(camera: Catadioptric) -> tuple[Array, Array]:
+    """Angles from the axis, traced, and the image radii (n,) of their rays, out to the rim."""
+    radii = np.linspace(0, camera.rim() * (1 - 1e-9), TABLE)
+    _, directions = camera.trace(np.stack([radii, 0 * radii], axis=-1))
+    return np.arctan2(directions[:, 0], directions[:, 2]), radii
 
 
 def miss(points: ArrayLike, directions: ArrayLike, viewpoint: ArrayLike = (0, 0, 0)) -> Array:
