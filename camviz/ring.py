@@ -17,14 +17,16 @@ from camviz.scenes.rays import Floats
 
 @dataclass(frozen=True)
 class Ring:
-    """`cameras` alike, evenly spaced on a level circle of `radius` metres around the origin, the first towards z.
+    """`cameras` alike, evenly spaced on a level circle of `radius` metres around the origin, looking outwards.
 
-    Each shows what lies nearest its own direction, and `overlap` (0 … 1) of the way into its neighbours' parts.
+    The first looks `turn` radians to the right of z. Each shows what lies nearest its own direction, and `overlap`
+    (0 … 1) of the way into its neighbours' parts.
     """
 
     cameras: int
     radius: float
     overlap: float = 0.0
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
         if self.cameras != int(self.cameras) or self.cameras < 2:
@@ -33,6 +35,8 @@ class Ring:
             raise ValueError(f"radius must be a number of metres, at least 0, got {self.radius}")
         if not 0 <= self.overlap <= 1:
             raise ValueError(f"overlap must lie between 0 and 1, got {self.overlap}")
+        if not isfinite(self.turn):
+            raise ValueError(f"turn must be a finite angle in radians, got {self.turn}")
 
     @property
     def half_angle(self) -> float:
@@ -47,26 +51,30 @@ class Ring:
     @property
     def centres(self) -> Array:
         """Where the cameras are, (n, 3)."""
-        return self.radius * _towards(2 * self.half_angle * np.arange(self.cameras))
+        return self.radius * _towards(self.turn + 2 * self.half_angle * np.arange(self.cameras))
 
     @property
     def seams(self) -> Array:
         """The longitudes (n,) in radians, -π … π, at which the panorama changes from one camera to the next."""
-        return np.sort((self.half_angle * (2 * np.arange(self.cameras) + 1) + pi) % (2 * pi) - pi)
+        return np.sort((self.turn + self.half_angle * (2 * np.arange(self.cameras) + 1) + pi) % (2 * pi) - pi)
 
     def nearest(self, longitudes: ArrayLike) -> NDArray[np.intp]:
         """Which camera (...) looks most nearly at longitudes (...)."""
-        turns = np.asarray(longitudes, dtype=float) / (2 * self.half_angle)
+        turns = self._turns(longitudes)
         return np.rint(turns).astype(np.intp) % self.cameras
 
     def second(self, longitudes: ArrayLike) -> tuple[NDArray[np.intp], Array]:
         """The next nearest camera (...), and its share (...) of the picture: half at a seam, 0 beyond the overlap."""
-        turns = np.asarray(longitudes, dtype=float) / (2 * self.half_angle)
+        turns = self._turns(longitudes)
         off = turns - np.rint(turns)  # ±½ at the seams
         other = (np.rint(turns) + np.where(off < 0, -1, 1)).astype(np.intp) % self.cameras
         if self.overlap == 0:
             return other, np.zeros_like(off)
         return other, np.maximum(0.5 - (0.5 - np.abs(off)) / self.overlap, 0)
+
+    def _turns(self, longitudes: ArrayLike) -> Array:
+        """Longitudes (...) counted in cameras from the first."""
+        return (np.asarray(longitudes, dtype=float) - self.turn) / (2 * self.half_angle)
 
     def parallax(self, distance: ArrayLike, stitched: float) -> Array:
         """How far apart (...) in radians a panorama shows the two images of a point straight out at a seam.
@@ -98,15 +106,16 @@ class Ring:
 
         `pixels.fx` is the number of pixels per radian. Where cameras overlap, their pictures are faded into each other.
         """
-        angles = pixels.from_pixels(pixels.grid())
-        directions, spread = Equirectangular().unproject(angles), 1 / pixels.fx
-        light = scene.trace(*self.rays(directions, stitched), spread)[0]
-        camera, share = self.second(angles[..., 0])
+        angles = pixels.from_pixels(pixels.grid()).reshape(-1, 2)
+        directions = Equirectangular().unproject(angles)
+        camera, share = self.second(angles[:, 0])
         mixed = share > 0
-        if mixed.any():
-            other = scene.trace(*self.rays(directions[mixed], stitched, camera[mixed]), spread)[0]
-            light[mixed] += share[mixed, None].astype(np.float32) * (other - light[mixed])
-        return light
+        both = self.rays(directions, stitched), self.rays(directions[mixed], stitched, camera[mixed])
+        starts, rays = (np.concatenate(parts) for parts in zip(*both, strict=True))
+        light = scene.trace(starts, rays, 1 / pixels.fx)[0]
+        light, other = light[: len(angles)], light[len(angles) :]
+        light[mixed] += share[mixed, None].astype(np.float32) * (other - light[mixed])
+        return light.reshape(pixels.height, pixels.width, 3)
 
 
 def all_round(width: int, up_deg: float = 45.0) -> Intrinsics:

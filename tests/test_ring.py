@@ -20,6 +20,10 @@ def test_the_cameras_stand_evenly_on_the_circle_and_look_outwards():
     assert ring.baseline == pytest.approx(0.1)  # a hexagon's side is its radius
     np.testing.assert_allclose(np.rad2deg(ring.seams), [-150, -90, -30, 30, 90, 150])
     assert ring.nearest(np.deg2rad([0, 29, 31, -31, 180])).tolist() == [0, 0, 1, 5, 3]
+    turned = Ring(6, 0.1, turn=np.deg2rad(20))
+    np.testing.assert_allclose(np.rad2deg(turned.seams), [-130, -70, -10, 50, 110, 170])
+    np.testing.assert_allclose(turned.centres[0], 0.1 * np.array([np.sin(np.pi / 9), 0, np.cos(np.pi / 9)]))
+    assert turned.nearest(np.deg2rad([0, 49, 51, -11])).tolist() == [0, 0, 1, 5]
 
 
 def test_the_parallax_is_the_one_of_two_lines_drawn_with_a_ruler():
