@@ -14,6 +14,7 @@ from camviz.lenses import Perspective, UnifiedSphere
 from camviz.scenes import Scene, Texture, render, to_display
 from camviz.scenes.paint import checkerboard
 from camviz.scenes.surfaces import Rectangle
+from camviz.views.valley import valley_picture
 
 BOARD = Board(8, 5, 0.03)
 CAMERA = Camera(Intrinsics(800, 640, 560, 563, 402, 317), UnifiedSphere(1.1))
@@ -116,3 +117,14 @@ def test_only_a_unified_sphere_has_such_a_valley():
     poses = boards(np.random.default_rng(1), 1, 0.1)
     with pytest.raises(ValueError, match="camera must have a UnifiedSphere lens, got Perspective"):
         valley(camera, BOARD, np.zeros((1, 40, 2)), poses, [1.0], [500.0])
+
+
+def test_the_drawing_of_a_valley_says_its_least_misfit_and_marks_the_calibrated_camera():
+    rng = np.random.default_rng(6)
+    poses = boards(rng, 3, 0.5)
+    uv = corners_of(CAMERA, poses, rng, 0.1)
+    found = valley(CAMERA, BOARD, uv, poses, np.linspace(0.5, 1.7, 7), np.linspace(400, 720, 9))
+    picture = valley_picture(("three boards", found), true_xi=1.1, true_focal=560)
+    assert f"three boards: least {found.misfit.min():.2f} px" in picture.description
+    assert picture.body.count("ink thick") >= 1
+    assert set(picture.photographs) == {"valley0", "scale"}
