@@ -133,6 +133,13 @@ class OmnidirectionalView(View):
             return "paraboloid, ξ = 1"
         return "flat, ξ = 0" if self.xi == 0 else f"e = {e:.3f}, ξ = {self.xi:g}"
 
+    def equation(self) -> str:
+        """The image of a direction in the doughnut, with this state's numbers."""
+        if not self.central:
+            return "no formula: a pixel's ray, and no common point"
+        f = self.camera(_COUNTED).intrinsics.fx
+        return f"u = {f:.1f} X / (Z + {self._xi:g} D), of {_COUNTED} pixels across the doughnut"
+
     def description(self) -> str:
         """The state in words and numbers."""
         figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
@@ -167,15 +174,16 @@ class OmnidirectionalView(View):
         photographs["window"] = jpeg(_resampled(picture, camera, self.window(112 if draft else 320), draft))
         photographs["unrolled"] = jpeg(_resampled(picture, camera, self._unrolled(draft), draft))
         body = [
-            svg.rectangle(0, 0, 960, 606, "paper"),
+            svg.rectangle(0, 0, 960, 614, "paper"),
             space,
             self._doughnut_panel(),
             self._window_panel(),
             self._section_panel(),
             self._unrolled_panel(),
             self._numbers_column(),
+            svg.text((320, 606), self.equation(), "note"),
         ]
-        return Picture("".join(body), 960, 606, self.title, self.description(), photographs)
+        return Picture("".join(body), 960, 614, self.title, self.description(), photographs)
 
     def _unrolled(self, draft: bool) -> Camera:
         if self.unroll == "cube map":

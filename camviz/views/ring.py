@@ -89,6 +89,10 @@ class RingView(View):
             there: _signed(self.parallax_px(known)),
         }
 
+    def equation(self) -> str:
+        """What remains far away of the parallax, with this state's numbers."""
+        return f"far away: b (1/Z − 1/S) = {self.ring.baseline:.3f} m × (1/Z − 1/{self.stitched_m:g} m) radians"
+
     def description(self) -> str:
         """The state in words and numbers."""
         figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
@@ -112,13 +116,14 @@ class RingView(View):
         panorama = self.panorama(draft=draft)
         photographs = {"panorama": jpeg(panorama, 90), "loupe": jpeg(self.loupe(draft=draft), 90)}
         body = [
-            svg.rectangle(0, 0, 960, 530, "paper"),
+            svg.rectangle(0, 0, 960, 544, "paper"),
             self._panorama_panel(),
             self._plan_panel(),
             self._loupe_panel(),
             self._plot_panel(),
+            svg.text((20, 536), self.equation(), "note"),
         ]
-        return Picture("".join(body), 960, 530, self.title, self.description(), photographs)
+        return Picture("".join(body), 960, 544, self.title, self.description(), photographs)
 
     def _panorama_panel(self) -> str:
         pixels = all_round(_FINE, _UP_DEG)
