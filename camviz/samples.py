@@ -12,6 +12,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, overload
 
@@ -250,3 +251,40 @@ def _garden_pair(width: int, sentence: str) -> StereoSample:
     f = left.intrinsics.fx
     true = (f * 0.193001 / (distance * rays[..., 2])).astype(np.float32)
     return StereoSample(snapshot(scene, left), snapshot(scene, right), true, f, 0.193001, 0.0, False, sentence)
+
+
+# A panorama that no one here rendered --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Panorama:
+    """An equirectangular picture (height, 2 height, 3), uint8 sRGB, of all directions; else as `Pictures`."""
+
+    picture: NDArray[np.uint8]
+    real: bool
+    sentence: str
+
+
+def earth_map(width: int = 1024) -> Panorama:
+    """The map of the earth in PyVista's wheel, `width` pixels wide, longitude −180° … 180°; else the garden's panorama.
+
+    The file is read without importing PyVista.
+    """
+    import cv2
+
+    found = find_spec("pyvista")
+    folders = (found.submodule_search_locations or []) if found else []
+    paths = [Path(folder) / "examples" / "2k_earth_daymap.jpg" for folder in folders]
+    data = next((cv2.imread(str(path), cv2.IMREAD_COLOR) for path in paths if path.is_file()), None)
+    if data is None:
+        return _garden_around(width, "No installed PyVista has the map of the earth; the garden takes its place.")
+    small = cv2.resize(data, (width, width // 2), interpolation=cv2.INTER_AREA)
+    credit = "The map of the earth by day, 2k_earth_daymap.jpg, from PyVista's examples."
+    return Panorama(np.ascontiguousarray(small[..., ::-1]), True, credit)
+
+
+def _garden_around(width: int, sentence: str) -> Panorama:
+    from camviz.reprojection import equirectangular_camera
+    from camviz.scenes import snapshot, textured_scene
+
+    return Panorama(snapshot(textured_scene(), equirectangular_camera(width, width // 2)), False, sentence)

@@ -11,7 +11,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-FLOOR_1 = ("cameras", "lenses", "distortion", "scenes", "twoview", "files", "calibration", "sensors")
+FLOOR_1 = (
+    *("cameras", "lenses", "distortion", "scenes", "twoview", "files", "calibration", "optics", "reprojection"),
+    *("mirrors", "ring", "lightfields", "mosaics", "colour", "sensors"),
+)
 HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)|(?:src|href)=\"([^\"#]+)\"")
 

@@ -152,3 +152,20 @@ def test_a_damaged_file_among_those_fetched_before_is_not_used(tmp_path):
     assert samples.local_sample("left01.jpg") is None
     with pytest.raises(SampleUnavailable):
         sample("left01.jpg")
+
+
+def test_the_map_of_the_earth_lies_as_maps_do_and_the_garden_takes_its_place(monkeypatch):
+    """Land is less blue than sea: the Sahara (20° N, 10° E) and the middle of the Pacific (0° N, 150° W)."""
+    earth = samples.earth_map(720)
+    assert earth.picture.shape == (360, 720, 3)
+    if not earth.real:
+        pytest.skip(earth.sentence)
+    red, _, blue = earth.picture[140, 380].astype(int)
+    assert red > blue
+    red, _, blue = earth.picture[180, 60].astype(int)
+    assert blue > red
+    monkeypatch.setattr(samples, "find_spec", lambda name: None)
+    garden = samples.earth_map(64)
+    assert not garden.real
+    assert "takes its place" in garden.sentence
+    assert garden.picture.shape == (32, 64, 3)

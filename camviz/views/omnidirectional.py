@@ -1,0 +1,300 @@
+"""The omnidirectional visualizer: a camera in a mirror, its doughnut of a picture, unrolled, and a window in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import degrees, isfinite
+from typing import ClassVar
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.cameras import Camera
+from camviz.cubemap import cubemap_camera
+from camviz.draw import svg
+from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.picture import Picture, jpeg
+from camviz.draw.space import Eye, draw_space, space_panel
+from camviz.lenses import Lens, UnifiedSphere
+from camviz.lenses.base import Array
+from camviz.mirrors import Catadioptric, MirrorLens, direction_error, miss
+from camviz.mirrors import photograph as photographed
+from camviz.reprojection import equirectangular_camera, reproject, window
+from camviz.scenes import textured_scene, to_display
+from camviz.views import garden
+from camviz.views.base import View, choice, slider
+from camviz.views.marks import on_photograph
+from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
+
+BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
+UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))
+_DRAFT, _FINE = 160, 480  # pixels across the doughnut
+_GREY = (69, 69, 69)  # of what a picture does not show
+_COUNTED = 400  # pixels across the picture whose focal length is told
+
+
+@dataclass(frozen=True)
+class OmnidirectionalView(View):
+    """A camera that looks up into a mirror in the garden, and what can be made of its picture.
+
+    A hyperbolic mirror has the shape that goes with `xi`; at 0 it is flat, at 1 it is the parabolic one. The camera
+    stands in its second focus, or `shift_mm` below. The middle of the picture is straight down, its top ahead.
+    """
+
+    title: ClassVar[str] = "Omnidirectional camera"
+
+    xi: float = slider(0.92, 0.0, 1.0, 0.01, label="ξ", help="0 is a flat mirror, a pinhole; 1 a paraboloid")
+    mirror: str = choice("hyperbolic", "parabolic", "spherical", help="only the first two have a single viewpoint")
+    rim_deg: float = slider(112.0, 70.0, 125.0, 1.0, label="rim", unit="°", help="how far from the axis it shows")
+    shift_mm: float = slider(
+        0.0, -25.0, 60.0, 1.0, label="camera moved", unit="mm", help="away from the mirror, out of its second focus"
+    )
+    yaw_deg: float = slider(20.0, -180.0, 180.0, 1.0, label="look to the right", unit="°")
+    pitch_deg: float = slider(-14.0, -70.0, 30.0, 1.0, label="look up", unit="°")
+    hfov_deg: float = slider(64.0, 20.0, 120.0, 1.0, label="zoom: field of view", unit="°")
+    unroll: str = choice("equirectangular", "cube map", help="the same picture, rolled out or folded")
+    model: str = choice("mirror", "sphere", label="drawn as", help="cut along the axis: the mirror, or the sphere")
+    eye: Eye = Eye(target=(0.0, 0.3, 0.0), distance=2.7, yaw_deg=75, pitch_deg=12)
+
+    # What is true ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def rig(self) -> Catadioptric:
+        """The mirror and its camera."""
+        return mirror_camera(self.mirror, self.xi, self.rim_deg, self.shift_mm)
+
+    @cached_property
+    def central(self) -> bool:
+        """Whether all rays pass through one point."""
+        return self.mirror != "spherical" and (self.shift_mm == 0 or not isfinite(self.rig.distance))
+
+    @cached_property
+    def lens(self) -> Lens:
+        """The lens of a calibration that takes all rays to pass through one point."""
+        return UnifiedSphere(self.rig.unified[0]) if self.central else MirrorLens(self.rig)
+
+    @property
+    def _xi(self) -> float:
+        return 1.0 if self.mirror == "parabolic" else self.xi
+
+    @cached_property
+    def rim_angle_deg(self) -> float:
+        """The angle from the axis at the mirror's rim."""
+        return degrees(MirrorLens(self.rig).max_angle)
+
+    def camera(self, side: int) -> Camera:
+        """The camera that has a single viewpoint, `side` pixels across its doughnut."""
+        scale = self.rig.unified[1] if self.central else 1.0
+        return Camera(picture_pixels(side, self.rig.rim() / scale), self.lens, UP)
+
+    def window(self, width: int = 320) -> Camera:
+        """The virtual pan-tilt-zoom camera."""
+        return window(width, width * 3 // 4, self.hfov_deg, yaw_deg=self.yaw_deg, pitch_deg=self.pitch_deg)
+
+    @cached_property
+    def looking(self) -> Array:
+        """The direction (3,) of the window's middle, in the viewpoint's frame."""
+        return np.asarray(UP.inv().as_matrix()[:3, :3] @ self.window().extrinsics[0][2], dtype=float)
+
+    @cached_property
+    def missed_mm(self) -> float:
+        """How far the rays pass from the best single viewpoint, root mean square."""
+        xs = np.linspace(0.02, 0.98, 60) * self.rig.rim()
+        points, directions = self.rig.trace(np.stack([xs, 0 * xs], axis=-1))
+        misses = miss(points, directions, (0, 0, viewpoint(self.rig)))
+        return float(1000 * np.sqrt(np.nanmean(misses**2)))
+
+    def numbers(self) -> dict[str, str]:
+        """The state's key figures, as text."""
+        f = self.camera(_COUNTED).intrinsics.fx
+        model = {"f/(1 + ξ)": f"{f / (1 + self._xi):.1f} px", "f": f"{f:.1f} px"} if self.central else {}
+        error = [degrees(direction_error(self.missed_mm / 1000, z)) for z in (0.3, 3.0)]
+        missed = {
+            "rays miss one point by": f"{self.missed_mm:.1f} mm",
+            "wrong at 0.3 m by": f"{error[0]:.2f}°",
+            "wrong at 3 m by": f"{error[1]:.3f}°",
+        }
+        return {
+            "mirror": self._shape(),
+            "rim": f"{self.rim_angle_deg:.0f}° from the axis",
+            **model,
+            **({"viewpoint": "single"} if self.central else missed),
+            "window looks": f"{self.yaw_deg:g}° right, {self.pitch_deg:g}° up".replace("-", "−"),
+            "window is": f"{self.hfov_deg:g}° wide",
+        }
+
+    def _shape(self) -> str:
+        e = self.rig.mirror.eccentricity
+        if self.mirror == "spherical":
+            return "sphere"
+        if e == 1:
+            return "paraboloid, ξ = 1"
+        return "flat, ξ = 0" if self.xi == 0 else f"e = {e:.3f}, ξ = {self.xi:g}"
+
+    def equation(self) -> str:
+        """The image of a direction in the doughnut, with this state's numbers."""
+        if not self.central:
+            return "no formula: a pixel's ray, and no common point"
+        f = self.camera(_COUNTED).intrinsics.fx
+        return f"u = {f:.1f} X / (Z + {self._xi:g} D), of {_COUNTED} pixels across the doughnut"
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        return f"A camera looks up into a {self.mirror} mirror: {figures}. The picture is unrolled as {self.unroll}."
+
+    # The pictures ----------------------------------------------------------------------------------------------------
+
+    def doughnut(self, side: int = _FINE, *, draft: bool = False) -> np.ndarray:
+        """What the camera photographs (side, side, 3), left and right put right, the camera itself in the middle."""
+        camera = self.camera(side)
+        if draft or self.central:
+            picture = garden.glimpse(camera) if draft else garden.taken(camera, side)[0].copy()
+        else:
+            picture = _traced(self.rig, side).copy()
+        rim, blind = (side / 2 * self._share(angle) for angle in (self.rim_angle_deg, BLIND_DEG))
+        y, x = np.ogrid[:side, :side]
+        r2 = (x - (side - 1) / 2) ** 2 + (y - (side - 1) / 2) ** 2
+        picture[(r2 > rim**2) | (r2 < blind**2)] = _GREY
+        return picture
+
+    def _share(self, angle_deg: float) -> float:
+        """Where an angle from the axis is in the picture, in radii of its rim."""
+        camera, angle = self.camera(2), np.radians(angle_deg)
+        x = camera.lens.project([np.sin(angle), 0, np.cos(angle)])[0]
+        return float(x * camera.intrinsics.fx)
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        side = _DRAFT if draft else _FINE
+        picture, camera = self.doughnut(side, draft=draft), self.camera(side)
+        space, photographs = self._space_panel(picture, draft)
+        photographs["doughnut"] = jpeg(picture)
+        photographs["window"] = jpeg(_resampled(picture, camera, self.window(112 if draft else 320), draft))
+        photographs["unrolled"] = jpeg(_resampled(picture, camera, self._unrolled(draft), draft))
+        body = [
+            svg.rectangle(0, 0, 960, 614, "paper"),
+            space,
+            self._doughnut_panel(),
+            self._window_panel(),
+            self._section_panel(),
+            self._unrolled_panel(),
+            self._numbers_column(),
+            svg.text((320, 606), self.equation(), "note"),
+        ]
+        return Picture("".join(body), 960, 614, self.title, self.description(), photographs)
+
+    def _unrolled(self, draft: bool) -> Camera:
+        if self.unroll == "cube map":
+            return cubemap_camera(40 if draft else 120)
+        return equirectangular_camera(160 if draft else 480, 80 if draft else 240)
+
+    # The panels ------------------------------------------------------------------------------------------------------
+
+    def _space_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("space", 20, 34, 280, 270)
+        small = cv2.resize(picture, (128, 128), interpolation=cv2.INTER_AREA)
+        items = in_space(self.rig, small, self.looking, draft=draft)
+        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer="wire")
+        label = "Mirror and camera in space; drag or press the arrow keys to walk around"
+        return panel.show(
+            content, title="Mirror and camera", hint="drag to turn", drag="orbit", label=label
+        ), photographs
+
+    @property
+    def _doughnut_box(self) -> Panel:
+        return image_panel("doughnut", 320, 34, 270, _FINE, _FINE)
+
+    def _doughnut_panel(self) -> str:
+        panel, camera = self._doughnut_box, self.camera(_FINE)
+        frame = self.window()
+        outline = frame.unproject(frame.intrinsics.border(12))
+        uv = camera.project(np.vstack([outline, outline[:1]]))
+        turn = np.linspace(-np.pi, np.pi, 73)
+        horizon = camera.project(np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=-1))
+        seen = photograph(panel, "doughnut", _FINE, _FINE)
+        marks = svg.line(panel.place(horizon), "yellow dashed thin") + on_photograph([panel.place(uv)], "orange")
+        middle = camera.project(frame.extrinsics[0][2])
+        words = svg.text((panel.width / 2, panel.height / 2 + 4), "camera", "note halo middle")
+        dot = svg.dots([panel.place(middle)], "orange", 8)
+        return panel.show(
+            seen + marks + words + dot,
+            title="What it photographs",
+            hint="drag to look around",
+            drag="doughnut",
+            label="The doughnut picture; drag or press the arrow keys to turn the window",
+        )
+
+    def _window_panel(self) -> str:
+        panel = image_panel("window", 610, 34, 330, 320, 240)
+        label = "The virtual pan-tilt-zoom window; drag or press the arrow keys to look around, + and - to zoom"
+        seen = photograph(panel, "window", 320, 240)
+        return panel.show(seen, title="A window in it", hint="drag to look around", drag="window", label=label)
+
+    def _section_panel(self) -> str:
+        angle = degrees(np.arctan2(np.hypot(*self.looking[:2]), self.looking[2]))
+        if self.model == "sphere" and self.central:
+            panel = Panel("section", 20, 340, 280, 250, -2.24, 2.24, -1.9, 2.1)
+            return panel.show(sphere(panel, self._xi, self.rim_angle_deg, angle), title="The same, as a sphere")
+        panel = Panel("section", 20, 340, 280, 250, -64, 64, -30, 84.3)
+        note = "" if self.model == "mirror" else "no sphere without one viewpoint"
+        return panel.show(section(panel, self.rig, angle), title="Cut along the axis", note=note)
+
+    def _unrolled_panel(self) -> str:
+        camera = self._unrolled(False)
+        width, height = camera.intrinsics.width, camera.intrinsics.height
+        panel = image_panel("unrolled", 320, 340, 440, width, height, tallest=250)
+        frame = self.window()
+        outline = frame.unproject(frame.intrinsics.border(24))
+        uv = panel.place(camera.project(np.vstack([outline, outline[:1]])))
+        jump = np.linalg.norm(np.diff(uv, axis=0), axis=-1) > 40
+        uv[1:][jump] = np.nan  # from one edge of the picture to another
+        seen = photograph(panel, "unrolled", width, height)
+        title = "Unrolled: longitude and latitude" if self.unroll == "equirectangular" else "Folded out: a cube map"
+        return panel.show(seen + svg.line(uv, "orange"), title=title)
+
+    def _numbers_column(self) -> str:
+        x, rows = 784, [svg.text((784, 332), "This camera", "title")]
+        for i, (name, figure) in enumerate(self.numbers().items()):
+            rows.append(svg.text((x, 354 + 38 * i), name, "note"))
+            rows.append(svg.text((x, 371 + 38 * i), figure, "label"))
+        return "".join(rows)
+
+    # The hands -------------------------------------------------------------------------------------------------------
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> OmnidirectionalView:
+        if handle == "orbit":
+            return self.but(eye=self.eye.orbited(dx, dy))
+        if handle == "window" or np.isnan(x):
+            per_unit = self.hfov_deg / 330
+            return self._looking(self.yaw_deg - per_unit * dx, self.pitch_deg + per_unit * dy)
+        panel = self._doughnut_box
+        ahead = self.camera(_FINE).unproject(panel.data((x - panel.x, y - panel.y)))
+        if not np.isfinite(ahead).all():
+            return self
+        yaw, pitch = np.arctan2(ahead[0], ahead[2]), np.arctan2(-ahead[1], np.hypot(ahead[0], ahead[2]))
+        return self._looking(degrees(yaw), degrees(pitch))
+
+    def pressed(self, handle: str, key: str) -> OmnidirectionalView:
+        if handle == "orbit":
+            return self.but(eye=self.eye.key(key))
+        zoom = {"+": -4, "=": -4, "-": 4, "_": 4}.get(key, 0)
+        turns = {"ArrowLeft": (-4, 0), "ArrowRight": (4, 0), "ArrowUp": (0, 4), "ArrowDown": (0, -4)}
+        right, up = turns.get(key, (0, 0))
+        wider = float(min(120, max(20, self.hfov_deg + zoom)))
+        return self.but(hfov_deg=wider)._looking(self.yaw_deg + right, self.pitch_deg + up)
+
+    def _looking(self, yaw_deg: float, pitch_deg: float) -> OmnidirectionalView:
+        yaw = (yaw_deg + 180) % 360 - 180
+        return self.but(yaw_deg=round(float(yaw), 1), pitch_deg=round(float(min(30, max(-70, pitch_deg))), 1))
+
+
+def _resampled(picture: np.ndarray, source: Camera, target: Camera, draft: bool) -> np.ndarray:
+    return np.asarray(reproject(picture, source, target, antialias=not draft), dtype=np.uint8)
+
+
+@lru_cache(maxsize=2)
+def _traced(rig: Catadioptric, side: int) -> np.ndarray:
+    """The garden in the mirror (side, side, 3), every ray followed from where it leaves the mirror."""
+    return to_display(photographed(textured_scene(), rig, picture_pixels(side, rig.rim()), UP))

@@ -1,0 +1,111 @@
+"""The omnidirectional visualizer shows true numbers and true pictures."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.lenses import UnifiedSphere
+from camviz.reprojection import reproject
+from camviz.scenes import snapshot, textured_scene
+from camviz.views.omnidirectional import BLIND_DEG, OmnidirectionalView
+
+
+def test_the_window_shows_what_a_camera_in_its_place_would_have_seen():
+    """Through the mirror and out again: the garden as a perspective camera takes it, only softer."""
+    view = OmnidirectionalView()
+    picture = view.doughnut(1400)
+    cut = reproject(picture, view.camera(1400), view.window(160))
+    taken = snapshot(textured_scene(), view.window(160))
+    soft = [cv2.GaussianBlur(one, (0, 0), 2) for one in (cut, taken)]
+    assert cv2.PSNR(*soft) > 27
+    assert cv2.PSNR(soft[0], np.roll(soft[1], 8, axis=1)) < 22
+    assert cv2.PSNR(soft[0], soft[1][:, ::-1].copy()) < 18  # a mirror's left and right have been put right
+
+
+def test_a_single_viewpoint_s_picture_is_the_one_traced_by_way_of_the_mirror():
+    """The doughnut is photographed through the unified sphere; a camera a micrometre off its focus is traced."""
+    view = OmnidirectionalView(xi=0.9)
+    model, traced = view.doughnut(200), view.but(shift_mm=0.001).doughnut(200)
+    assert not view.but(shift_mm=0.001).central
+    y, x = np.mgrid[:200, :200] - 99.5
+    seen = (np.hypot(x, y) < 97) & (np.hypot(x, y) > 12)
+    off = np.abs(model.astype(int) - traced)[seen]
+    assert off.mean() < 1.5
+
+
+def test_the_numbers_of_a_paraboloid_are_those_of_the_stereographic_projection():
+    """r = 2 f tan(θ/2) at half the focal length: 200 px from the axis at 112°; ξ = 1, and f/(1 + ξ) is half of f."""
+    view = OmnidirectionalView(mirror="parabolic")
+    f = 200 / np.tan(np.radians(56))
+    numbers = view.numbers()
+    assert numbers["f"] == f"{f:.1f} px"
+    assert numbers["f/(1 + ξ)"] == f"{f / 2:.1f} px"
+    assert numbers["viewpoint"] == "single"
+
+
+def test_one_lens_goes_from_a_pinhole_to_a_paraboloid():
+    rays = np.array([[0.3, -0.2, 1.0], [1.0, 0.5, 0.3]])
+    flat = OmnidirectionalView(xi=0.0).camera(400)
+    pinhole = flat.intrinsics.fx * rays[:, :2] / rays[:, 2:] + 199.5
+    np.testing.assert_allclose(flat.intrinsics.to_pixels(flat.lens.project(rays)), pinhole, atol=1.5)  # ξ = 0.001
+    assert OmnidirectionalView(xi=1.0).camera(400).lens == UnifiedSphere(1.0)
+    assert OmnidirectionalView(xi=1.0).camera(400) == OmnidirectionalView(mirror="parabolic").camera(400)
+
+
+def test_a_sphere_and_a_moved_camera_have_no_single_viewpoint_and_say_by_how_much():
+    for view in (OmnidirectionalView(mirror="spherical"), OmnidirectionalView(shift_mm=20)):
+        numbers = view.numbers()
+        assert "f/(1 + ξ)" not in numbers
+        assert float(numbers["rays miss one point by"].split()[0]) > 1
+        near, far = (float(numbers[f"wrong at {z} m by"][:-1]) for z in ("0.3", "3"))
+        assert near == pytest.approx(np.degrees(view.missed_mm / 300), abs=0.006)
+        assert near == pytest.approx(10 * far, abs=0.012)
+    assert OmnidirectionalView(mirror="parabolic", shift_mm=40).central  # an orthographic camera stands anywhere
+
+
+def test_the_middle_hides_the_camera_and_beyond_the_rim_there_is_nothing():
+    picture = OmnidirectionalView().doughnut(160, draft=True)
+    assert np.ptp(picture[76:84, 76:84], axis=(0, 1)).max() == 0
+    assert np.ptp(picture[:8, :8], axis=(0, 1)).max() == 0
+    view = OmnidirectionalView(pitch_deg=-70, hfov_deg=90)
+    at = view.camera(400).project([np.sin(np.radians(BLIND_DEG)), np.cos(np.radians(BLIND_DEG)), 0])
+    assert np.hypot(*(at - 199.5)) == pytest.approx(200 * view._share(BLIND_DEG), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", OmnidirectionalView.controls())
+def test_every_control_changes_the_picture_at_both_ends(name):
+    control = OmnidirectionalView.controls()[name]
+    base = OmnidirectionalView()
+    ends = control.choices or (control.low, control.high)
+    views = [base.but(**{name: end}) for end in ends] + [base]
+    assert len({(view.figure(draft=True).svg(), *view.figure(draft=True).photographs.values()) for view in views}) >= 2
+    drawn = [view.figure(draft=True) for view in views[:2]]
+    assert drawn[0].svg() != drawn[1].svg() or drawn[0].photographs != drawn[1].photographs
+
+
+def test_dragging_the_window_turns_it_and_the_doughnut_points_it():
+    view = OmnidirectionalView()
+    turned = view.dragged("window", 700, 100, 33, 0)
+    assert turned.yaw_deg == pytest.approx(view.yaw_deg - 6.4)
+    box = view._doughnut_box
+    target = np.array([1.0, 0.1, 1.0]) / np.linalg.norm([1.0, 0.1, 1.0])
+    x, y = box.place(view.camera(480).project(target)) + (box.x, box.y)
+    pointed = view.dragged("doughnut", x, y, 1, 1)
+    assert pointed.yaw_deg == pytest.approx(45, abs=0.2)
+    assert pointed.pitch_deg == pytest.approx(-np.degrees(np.arctan(0.1 / np.sqrt(2))), abs=0.2)
+    assert view.pressed("window", "ArrowRight").yaw_deg == 24
+    assert view.pressed("window", "+").hfov_deg == 60
+    assert view.pressed("orbit", "ArrowLeft").eye != view.eye
+    assert view.but(yaw_deg=179).pressed("doughnut", "ArrowRight").yaw_deg == -177
+
+
+def test_the_description_states_the_state():
+    words = OmnidirectionalView(mirror="spherical").description()
+    assert "spherical mirror" in words
+    assert "rays miss one point by 3.2 mm" in words
+
+
+@pytest.mark.parametrize("bad", [{"xi": np.nan}, {"mirror": "flat"}, {"unroll": 3}])
+def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        OmnidirectionalView(**bad)
