@@ -18,7 +18,18 @@ _HOME = {
     "look_at": "camviz.cameras",
 }
 
-_PARTS = ("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics", "optics", "scenes", "sensors", "twoview")
+_PARTS = (
+    "cameras",
+    "colour",
+    "distortion",
+    "lenses",
+    "lightfields",
+    "mosaics",
+    "optics",
+    "scenes",
+    "sensors",
+    "twoview",
+)
 
 __all__ = ["Calibration", "Camera", "Intrinsics", "Rig", "__version__", "explore", "load", "look_at", *_PARTS]
 
