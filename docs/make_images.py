@@ -5,11 +5,19 @@ from pathlib import Path
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 from camviz.views.calibration import CalibrationView
+from camviz.views.colour import ColourView
+from camviz.views.demosaicing import DemosaicingView
+from camviz.views.depth_of_field import DepthOfFieldView
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.fault_lab import FaultLabView
+from camviz.views.fisheye import FisheyeView
 from camviz.views.frustum import FrustumView
+from camviz.views.image_sensor import ImageSensorView
 from camviz.views.intrinsics import IntrinsicsView
+from camviz.views.light_field import LightFieldView
+from camviz.views.noise import PhotonTransferView
+from camviz.views.omnidirectional import OmnidirectionalView
 from camviz.views.pinhole import PinholeView
 from camviz.views.rectification import RectificationView
 
@@ -27,6 +35,14 @@ PICTURES = {
     "calibration": CalibrationView(tilt=2.0),
     "epipolar": EpipolarView(),
     "rectification": RectificationView(),
+    "colour": ColourView(),
+    "demosaicing": DemosaicingView(),
+    "depth_of_field": DepthOfFieldView(),
+    "fisheye": FisheyeView(),
+    "image_sensor": ImageSensorView(),
+    "light_field": LightFieldView(),
+    "noise": PhotonTransferView(),
+    "omnidirectional": OmnidirectionalView(),
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 
