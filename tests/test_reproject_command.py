@@ -192,3 +192,18 @@ def test_the_help_teaches_the_models(capsys):
     assert stopped.value.code == 0
     words = capsys.readouterr().out
     assert all(name in words for name in PROJECTIONS if not name.startswith("cube:") or name == "cube:front")
+
+
+@pytest.mark.parametrize("side", ["from", "to"])
+def test_a_file_without_a_size_takes_that_of_the_picture_it_belongs_to(room, side):
+    """OpenCV's intrinsics.yml holds none: IN has one, and --size says OUT's."""
+    Path("K.yml").write_text(
+        "%YAML:1.0\n---\nK: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+        "   data: [ 100., 0., 63.5, 0., 100., 31.5, 0., 0., 1. ]\n"
+        "D: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ 0., 0., 0., 0., 0. ]\n"
+    )
+    other = "perspective" if side == "from" else "equirectangular"
+    words = {"from": ["--from", "K.yml", "--to", other], "to": ["--from", other, "--to", "K.yml", "--size", "128x64"]}
+    assert main(["reproject", "sky.png", "-o", "out.png", *words[side]]) == 0
+    if side == "to":
+        assert cv2.imread("out.png").shape == (64, 128, 3)

@@ -103,7 +103,7 @@ def reproject(options: argparse.Namespace) -> int:
 
 def _source(options: argparse.Namespace, width: int, height: int) -> Camera:
     """The camera that took IN."""
-    if (camera := _calibrated(options.source, options.from_camera, "--from-camera")) is not None:
+    if (camera := _calibrated(options.source, options.from_camera, "--from-camera", (width, height))) is not None:
         own = camera.intrinsics
         if options.from_hfov is not None:
             raise Refusal(f"--from-hfov: the calibration {options.source} says what field of view its camera has.")
@@ -124,7 +124,7 @@ def _target(options: argparse.Namespace, source: Camera) -> Camera:
     if options.size is not None and not all(1 <= side <= LONGEST for side in options.size):
         width, height = options.size
         raise Refusal(f"--size: expected 1 to {LONGEST} pixels a side, got {width}x{height}.")
-    if (camera := _calibrated(options.target, options.to_camera, "--to-camera")) is not None:
+    if (camera := _calibrated(options.target, options.to_camera, "--to-camera", options.size)) is not None:
         if options.hfov is not None:
             raise Refusal(f"--hfov: the calibration {options.target} says what field of view its camera has.")
         sized = camera.intrinsics.resized(*options.size) if options.size else camera.intrinsics
@@ -167,8 +167,8 @@ def _named(what: str, model: str, width: int, height: int, hfov_deg: float | Non
         raise Refusal(f"{what}: {error}.") from error
 
 
-def _calibrated(model: str, name: str | None, option: str) -> Camera | None:
-    """The camera of a calibration file; None where the model is no file but a name."""
+def _calibrated(model: str, name: str | None, option: str, size: tuple[int, int] | None) -> Camera | None:
+    """The camera of a calibration file, which may hold no size; None where the model is no file but a name."""
     from camviz.projections import PROJECTIONS
 
     path = Path(model)
@@ -176,7 +176,12 @@ def _calibrated(model: str, name: str | None, option: str) -> Camera | None:
         if name is not None:
             raise Refusal(f"{option}: {model} is no calibration file, of whose cameras one could be named.")
         return None
-    cameras = loaded(path, None).cameras
+    try:
+        cameras = loaded(path, None).cameras
+    except Refusal:
+        if size is None:
+            raise
+        cameras = loaded(path, size).cameras
     if name is None and len(cameras) > 1:
         raise Refusal(f"{path}: holds the cameras {', '.join(cameras)}; say with {option} which one.")
     if name is not None and name not in cameras:
