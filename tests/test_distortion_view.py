@@ -47,7 +47,7 @@ def test_a_fold_behind_the_camera_is_given_by_its_angle():
 @pytest.mark.parametrize("size", [(640, 480), (480, 640), (1000, 300)])
 def test_the_straight_lines_reach_beyond_every_corner_of_the_undistorted_picture(size):
     intrinsics = Intrinsics.from_fov(*size, 80)
-    lines = intrinsics.to_pixels(_grid_lines(intrinsics))
+    lines = intrinsics.to_pixels(_grid_lines(intrinsics, 65))
     assert (lines.reshape(-1, 2).min(axis=0) < -0.5).all()
     assert (lines.reshape(-1, 2).max(axis=0) > np.array(size) - 0.5).all()
 

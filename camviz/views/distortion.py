@@ -138,8 +138,8 @@ class DistortionView(View):
         body = "".join(
             [
                 svg.rectangle(0, 0, 960, 602, "paper"),
-                self._picture_panel(),
-                self._field_panel(),
+                self._picture_panel(draft),
+                self._field_panel(draft),
                 self.curve_panel(70, 370, 420, 180),
                 lens_panel,
                 self._numbers_column(),
@@ -185,10 +185,10 @@ class DistortionView(View):
             return self.camera.lens.project(on_plane(xy))
         return self.camera.lens.distort(xy)
 
-    def _picture_panel(self) -> str:
+    def _picture_panel(self, draft: bool) -> str:
         width, height = self.intrinsics.width, self.intrinsics.height
         panel = image_panel("picture", 20, 34, _WIDTH, width, height, tallest=_TALLEST)
-        straight = _grid_lines(self.intrinsics)
+        straight = _grid_lines(self.intrinsics, 33 if draft else 65)
         lines = self._bend(straight) if self.show == "distorted" else straight
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "yellow thin")
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
@@ -211,17 +211,22 @@ class DistortionView(View):
     def _distorted(self, uv: np.ndarray) -> np.ndarray:
         return self.intrinsics.to_pixels(self._bend(self.intrinsics.from_pixels(uv)))
 
-    def _field_panel(self) -> str:
+    def _field_panel(self, draft: bool) -> str:
         width, height = self.intrinsics.width, self.intrinsics.height
         panel = image_panel("field", 420, 34, _WIDTH, width, height, tallest=_TALLEST)
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
-        content = self._folded_area(panel) + arrows + self._contours(panel) + self._fold_circle(panel, bent=False)
+        content = (
+            self._folded_area(panel)
+            + arrows
+            + self._contours(panel, 33 if draft else 65)
+            + self._fold_circle(panel, bent=False)
+        )
         return panel.show(content, title="Where each point goes", note="contours: shift in px")
 
-    def _contours(self, panel: Panel) -> str:
-        uv = _pixel_grid(self.intrinsics, 65)
+    def _contours(self, panel: Panel, samples: int) -> str:
+        uv = _pixel_grid(self.intrinsics, samples)
         contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self.moved(uv)))
         lines = {level: [panel.place(line) for line in contours.lines(level)] for level in _LEVELS}
         names = [
@@ -322,13 +327,17 @@ class DistortionView(View):
         return "".join(rows)
 
 
-def _grid_lines(intrinsics: Intrinsics) -> np.ndarray:
-    """Straight lines (m, n, 2) across and beyond the image, in lens coordinates."""
+def _grid_lines(intrinsics: Intrinsics, samples: int) -> np.ndarray:
+    """Straight lines (m, samples, 2) across and beyond the image, in lens coordinates."""
     corners = intrinsics.from_pixels([(-0.5, -0.5), (intrinsics.width - 0.5, intrinsics.height - 0.5)])
     (left, top), (right, bottom) = 1.6 * corners
-    along = np.linspace(0, 1, 65)
-    rows = [np.stack([left + (right - left) * along, np.full(65, y)], axis=-1) for y in np.linspace(top, bottom, 13)]
-    columns = [np.stack([np.full(65, x), top + (bottom - top) * along], axis=-1) for x in np.linspace(left, right, 17)]
+    along = np.linspace(0, 1, samples)
+    rows = [
+        np.stack([left + (right - left) * along, np.full(samples, y)], axis=-1) for y in np.linspace(top, bottom, 13)
+    ]
+    columns = [
+        np.stack([np.full(samples, x), top + (bottom - top) * along], axis=-1) for x in np.linspace(left, right, 17)
+    ]
     return np.array(rows + columns)
 
 
