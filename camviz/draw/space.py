@@ -99,7 +99,7 @@ def draw_space(
         from camviz.draw.solid import draw_solid
 
         return draw_solid(sight, [*scenery, *items], panel.name, draft)
-    return draw_wire(sight, items, panel.name, 0.7 if draft else 2, scenery)
+    return draw_wire(sight, items, panel.name, 0.5 if draft else 2, scenery)
 
 
 @lru_cache(maxsize=4)

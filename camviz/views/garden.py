@@ -16,7 +16,7 @@ from camviz.lenses.base import Array
 from camviz.scenes import snapshot, textured_scene, to_display
 from camviz.scenes.scene import NEUTRAL
 
-DRAFT, FINE = 168, 416  # pixels on the longer side; at 4:3 the tracer takes a fine picture as four blocks of rays
+DRAFT, FINE = 136, 416  # pixels on the longer side; at 4:3 the tracer takes a fine picture as four blocks of rays
 
 Pose = tuple[float, ...]
 
