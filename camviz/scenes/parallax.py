@@ -232,10 +232,13 @@ def _span(covered: Floats) -> slice:
 
 def _grown(values: Floats, covered: Floats) -> Floats:
     """The values (h, w, ...), continued beyond the outline: near it by the mean around, farther by the whole mean."""
-    weight = covered[..., None] if values.ndim == 3 else covered
-    total, share = values * weight, covered
-    mean = total.sum(axis=(0, 1)) / share.sum()
-    around, of = cv2.blur(total, (9, 9)), cv2.blur(share, (9, 9))
-    of = of[..., None] if values.ndim == 3 else of
-    beyond = np.where(of > 1e-3, around / np.maximum(of, 1e-3), mean)
-    return np.where(weight > 0, values, beyond).astype(np.float32)
+    inside = covered > 0
+    around, of = (
+        cv2.blur(values * (covered[..., None] if values.ndim == 3 else covered), (9, 9)),
+        cv2.blur(covered, (9, 9)),
+    )
+    near = of > 1e-3
+    beyond = around / np.maximum(of, np.float32(1e-3)).reshape(of.shape + (1,) * (values.ndim - 2))
+    beyond[~near] = values[inside].mean(axis=0)
+    np.copyto(beyond, values, where=inside.reshape(inside.shape + (1,) * (values.ndim - 2)))
+    return beyond

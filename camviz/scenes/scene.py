@@ -100,11 +100,15 @@ class Scene:
             return
         x, y, z = runs.directions.reshape(3, -1)[:, missed]
         depth[missed] = np.nan
+        light[missed] = self.sky.mean if self.sky.is_plain else self._sky_at(x, y, z, spread)
+        light[missed[(x == 0) & (y == 0) & (z == 0)]] = NEUTRAL
+
+    def _sky_at(self, x: Floats, y: Floats, z: Floats, spread: float) -> Floats:
+        """Its light (n, 3) from directions (n,)."""
         s, r = on_sphere(x, y, -z)
         rows = self.sky.width / 2  # of a whole sphere
         r = np.minimum(r * np.float32(rows / self.sky.height), np.float32(1 - 0.5 / self.sky.height))
-        light[missed] = self.sky.sample(s, r, spread * rows / np.pi)
-        light[missed[(x == 0) & (y == 0) & (z == 0)]] = NEUTRAL
+        return self.sky.sample(s, r, spread * rows / np.pi)
 
     def outlines(self) -> Wireframe:
         """The same scene as lines, each named after its surface."""

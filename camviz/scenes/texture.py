@@ -40,6 +40,11 @@ class Texture:
         return cls(to_linear(rgb).reshape(1, 1, 3))
 
     @property
+    def is_plain(self) -> bool:
+        """Whether it is one colour everywhere."""
+        return self.width == self.height == 1
+
+    @property
     def photograph(self) -> NDArray[np.uint8]:
         """The finest copy as sRGB bytes (height, width, 3)."""
         return to_display(self._mosaic[: self.height, : self.width].astype(np.float32) / _FULL)
