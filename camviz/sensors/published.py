@@ -102,7 +102,7 @@ KAF_50100 = PublishedSensor(
         reference_temperature_c=60, measured_at_nm=550,
     ),
     70.2,
-    "KAF-50100 datasheet, ON Semiconductor; its peak efficiency is taken to be at 550 nm",
+    "KAF-50100 datasheet, ON Semiconductor, as quoted in a public note; its peak efficiency is taken to be at 550 nm",
     ("gain_dn_per_e", "offset_dn", "bits", "measured_at_nm", "dsnu_e", "prnu"),
 )  # fmt: skip
 
