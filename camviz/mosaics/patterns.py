@@ -94,11 +94,12 @@ def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
     sensor it gathers about three times as many photons, which is why it is there.) ValueError for another shape.
     """
     light = as_picture(picture)
-    height, width = light.shape[:2]
-    seen = pattern.channels(height, width)
-    if WHITE in pattern.present:
-        light = np.concatenate([light, light @ np.full((3, 1), 1 / 3)], axis=-1)
-    return np.take_along_axis(light, seen[..., None].astype(np.intp), axis=-1)[..., 0]
+    measured = np.empty(light.shape[:2], light.dtype)
+    rows, columns = np.shape(pattern.tile)
+    for (row, column), channel in np.ndenumerate(np.array(pattern.tile)):
+        alike = np.s_[row::rows, column::columns]
+        measured[alike] = light[alike].mean(axis=-1) if channel == WHITE else light[alike][..., channel]
+    return measured
 
 
 def in_colour(values: ArrayLike, pattern: Pattern) -> Array:
@@ -109,8 +110,9 @@ def in_colour(values: ArrayLike, pattern: Pattern) -> Array:
 
 
 def as_picture(picture: ArrayLike) -> Array:
-    """The picture as float (height, width, 3). ValueError for another shape."""
-    light = np.asarray(picture, dtype=float)
+    """The picture (height, width, 3) as float, in single precision if it has no more. ValueError for another shape."""
+    light = np.asarray(picture)
+    light = np.asarray(light, dtype=np.float32 if light.dtype == np.float32 else float)
     if light.ndim != 3 or light.shape[2] != 3:
         raise ValueError(f"picture must have the shape (height, width, 3), got {light.shape}")
     return light

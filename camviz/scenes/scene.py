@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from itertools import product
 
 import cv2
 import numpy as np
@@ -15,14 +16,15 @@ from camviz.lenses import Lens
 from camviz.lenses.base import Array, as_points
 from camviz.scenes.light import to_display
 from camviz.scenes.meeting import Meeting
-from camviz.scenes.rays import RUN, Bounds, Floats, Runs
-from camviz.scenes.surfaces import Mesh, Surface, on_sphere
-from camviz.scenes.texture import Texture
+from camviz.scenes.rays import SIDE, TILE, Bounds, Floats, Rays
+from camviz.scenes.surfaces import Mesh, Rectangle, Surface, on_sphere
+from camviz.scenes.texture import LIGHT, Texture
 from camviz.scenes.together import Indices, Traced, together
 from camviz.scenes.wireframe import Wireframe
 
-BLOCK = 1 << 15  # rays traced together: few enough to stay in the processor's cache
+BLOCK = 1 << 17  # rays traced together, which take about 12 MB
 KEPT = 640 * 480  # rays of a camera that are kept at most, in single precision: 4 MB
+Block = tuple[slice, slice]
 NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be mistaken for a hole in the scene
 
 
@@ -51,60 +53,68 @@ class Scene:
         _require_rays(origins, directions)
         if 0 in shape:
             return np.zeros(shape, np.float32), np.zeros(shape[:-1], np.float32)
-        origins, directions = _flat(origins, shape), np.broadcast_to(directions, shape).reshape(-1, 3)
-        light, depth = np.empty(directions.shape, np.float32), np.empty(len(directions), np.float32)
-        for start in range(0, len(directions), BLOCK):
-            block = slice(start, start + BLOCK)
-            runs = Runs.gather(origins[block] if len(origins) > 1 else origins, directions[block])
-            light[block], depth[block] = self.follow(runs, spread, len(directions[block]))
+        height, width = _laid_out(shape[:-1])
+        directions = np.broadcast_to(directions, shape).reshape(height, width, 3)
+        one = origins.size == 3
+        origins = origins.reshape(3) if one else np.broadcast_to(origins, shape).reshape(height, width, 3)
+        light, depth = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
+        for block in _blocks(height, width):
+            rays = Rays.gather(origins if one else origins[block], directions[block])
+            light[block], depth[block] = self.follow(rays, spread)
         return light.reshape(shape), depth.reshape(shape[:-1])
 
     @cached_property
     def _bounds(self) -> Bounds:
-        return Bounds.around([surface.balls() for surface in self.surfaces])
+        corners = {i: wall.corners for i, wall in enumerate(self.surfaces) if isinstance(wall, Rectangle)}
+        return Bounds.around([surface.balls() for surface in self.surfaces], corners)
 
     @cached_property
     def _traced(self) -> list[tuple[Traced, list[int]]]:
         return together(self.surfaces)
 
-    def follow(self, runs: Runs, spread: float, count: int) -> tuple[Floats, Floats]:
-        """As `trace` does, light (count, 3) and distance (count,) of the first `count` of the rays in `runs`."""
-        depth = np.full(runs.count, np.inf, dtype=np.float32)
-        light = np.empty((depth.size, 3), dtype=np.float32)
+    def follow(self, rays: Rays, spread: float) -> tuple[Floats, Floats]:
+        """As `trace` does, for rays in tiles: light (height, width, 3) and distance (height, width)."""
+        depth = np.full(rays.directions[0].size, np.inf, dtype=np.float32)
+        light = np.empty((depth.size, LIGHT), dtype=np.float32)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            may_meet = runs.may_meet(self._bounds)
+            may_meet = rays.may_meet(self._bounds)
             for surfaces, members in self._traced:
-                member, run = np.nonzero(may_meet[members])
-                if run.size:
-                    self._meet(surfaces, member, run, runs, depth, light, spread)
-            self._paint_sky(runs, depth, light, spread)
-        return light[:count], depth[:count]
+                member, tile = np.nonzero(may_meet[members])
+                if tile.size:
+                    self._meet(surfaces, member, tile, rays, depth, light, spread)
+            self._paint_sky(rays, depth, light, spread)
+        return cv2.cvtColor(rays.picture(light), cv2.COLOR_RGBA2RGB), rays.picture(depth)
 
     def _meet(
-        self, surfaces: Traced, member: Indices, run: Indices, runs: Runs, depth: Floats, light: Floats, spread: float
+        self, surfaces: Traced, member: Indices, tile: Indices, rays: Rays, depth: Floats, light: Floats, spread: float
     ) -> None:
-        """Let each `run` (p,) of rays meet one surface, and where that is the nearest so far, see it."""
-        at = surfaces.meet(*runs.pick(run), member)
-        hit = np.flatnonzero(at.depth < depth.reshape(-1, RUN).take(run, axis=0).ravel())
-        ray = run[hit // RUN] * RUN + hit % RUN
-        np.minimum.at(depth, ray, at.depth[hit])
-        nearest = np.flatnonzero(at.depth[hit] == depth[ray])
+        """Let each `tile` (p,) of rays meet one surface, and where that is the nearest so far, see it."""
+        at = surfaces.meet(*rays.pick(tile), member)
+        hit = np.flatnonzero(at.depth < depth.reshape(-1, TILE).take(tile, axis=0).ravel())
+        pair = hit // TILE
+        ray = hit + (TILE * (tile - np.arange(tile.size))).take(pair)
+        distance = at.depth.take(hit)
+        np.minimum.at(depth, ray, distance)
+        nearest = np.flatnonzero(distance == depth.take(ray))
         if nearest.size:
-            hit, ray = hit[nearest], ray[nearest]
-            seen = Meeting(at.depth[hit], at.place.take(hit, axis=1))
-            light[ray] = surfaces.radiance(seen, spread, member[hit // RUN])
+            seen = Meeting(distance.take(nearest), at.place.take(hit.take(nearest), axis=1))
+            radiance = surfaces.radiance(seen, spread, member.take(pair.take(nearest)))
+            _whole(light)[ray.take(nearest)] = _whole(radiance)
 
-    def _paint_sky(self, runs: Runs, depth: Floats, light: Floats, spread: float) -> None:
+    def _paint_sky(self, rays: Rays, depth: Floats, light: Floats, spread: float) -> None:
         missed = np.flatnonzero(depth == np.inf)
         if missed.size == 0:
             return
-        x, y, z = runs.directions.reshape(3, -1)[:, missed]
+        x, y, z = rays.directions.reshape(3, -1).take(missed, axis=1)
         depth[missed] = np.nan
-        light[missed] = self.sky.mean if self.sky.is_plain else self._sky_at(x, y, z, spread)
+        if self.sky.is_plain:
+            light[missed, :3] = self.sky.mean
+        else:
+            _whole(light)[missed] = _whole(self._sky_at(x, y, z, spread))
         light[missed[(x == 0) & (y == 0) & (z == 0)]] = NEUTRAL
 
     def _sky_at(self, x: Floats, y: Floats, z: Floats, spread: float) -> Floats:
-        """Its light (n, 3) from directions (n,)."""
+        """Its light (n, LIGHT) from directions (n,)."""
         s, r = on_sphere(x, y, -z)
         rows = self.sky.width / 2  # of a whole sphere
         r = np.minimum(r * np.float32(rows / self.sky.height), np.float32(1 - 0.5 / self.sky.height))
@@ -130,8 +140,8 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
     pixels = camera.intrinsics
     fine = pixels.resized(pixels.width * supersample, pixels.height * supersample)
     light = np.empty((fine.height, fine.width, 3), dtype=np.float32)
-    for rows, strip in _traced(scene, replace(camera, intrinsics=fine)):
-        light[rows] = strip
+    for block, seen in _traced(scene, replace(camera, intrinsics=fine)):
+        light[block] = seen
     if supersample == 1:
         return light
     return np.asarray(cv2.resize(light, (pixels.width, pixels.height), interpolation=cv2.INTER_AREA), dtype=np.float32)
@@ -140,53 +150,60 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
 def snapshot(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
     """The picture (height, width, 3) that the camera takes as sRGB bytes: to_display(render(scene, camera))."""
     picture = np.empty((camera.intrinsics.height, camera.intrinsics.width, 3), dtype=np.uint8)
-    for rows, strip in _traced(scene, camera):
-        picture[rows] = to_display(strip)
+    for block, seen in _traced(scene, camera):
+        picture[block] = to_display(seen)
     return picture
 
 
-def _traced(scene: Scene, camera: Camera) -> Iterator[tuple[slice, Floats]]:
-    """The picture in strips: which rows, and their linear light (rows, width, 3)."""
+def _traced(scene: Scene, camera: Camera) -> Iterator[tuple[Block, Floats]]:
+    """The picture in blocks: where, and their linear light (rows, columns, 3)."""
     pixels = camera.intrinsics
     small = pixels.width * pixels.height <= KEPT
-    strips, spread = _kept_strips(pixels, camera.lens) if small else _strips(pixels, camera.lens)
-    for i, runs in enumerate(strips):
-        top, bottom = i * _rows(pixels), min((i + 1) * _rows(pixels), pixels.height)
-        light, _ = scene.follow(runs.moved(camera.world_from_cam), spread, (bottom - top) * pixels.width)
-        yield slice(top, bottom), light.reshape(-1, pixels.width, 3)
+    blocks, spread = _kept_rays(pixels, camera.lens) if small else _rays(pixels, camera.lens)
+    for block, rays in zip(_blocks(pixels.height, pixels.width), blocks, strict=True):
+        yield block, scene.follow(rays.moved(camera.world_from_cam), spread)[0]
 
 
-def _flat(origins: Array, shape: tuple[int, ...]) -> Array:
-    """(1, 3) for a single origin, otherwise one (n, 3) for each ray."""
-    return origins.reshape(1, 3) if origins.size == 3 else np.broadcast_to(origins, shape).reshape(-1, 3)
+def _whole(light: Floats) -> NDArray[np.complex128]:
+    """The same light (n, LIGHT) as (n,) single things, which NumPy moves about several times as fast."""
+    return light.view(np.complex128)[:, 0]
+
+
+def _laid_out(shape: tuple[int, ...]) -> tuple[int, int]:
+    """Height and width of a picture of rays with this shape; neighbours in it should be neighbours in the world."""
+    count = int(np.prod(shape))
+    width = shape[-1] if len(shape) > 1 and shape[-1] < BLOCK else count
+    return count // width, width
+
+
+def _blocks(height: int, width: int) -> list[Block]:
+    """A picture in pieces of about BLOCK rays."""
+    tall, wide = (1, BLOCK) if height == 1 else (max(BLOCK // width // SIDE, 1) * SIDE, width)
+    corners = product(range(0, height, tall), range(0, width, wide))
+    return [np.s_[top : min(top + tall, height), left : min(left + wide, width)] for top, left in corners]
 
 
 def _require_rays(origins: Array, directions: Array) -> None:
-    """Of the directions one in RUN is looked at: a wrong scale is seldom wrong once."""
+    """Of the directions one in TILE is looked at: a wrong scale is seldom wrong once."""
     if not np.isfinite(origins).all():
         raise ValueError("origins must be finite points, got NaN or infinity among them")
-    lengths = np.linalg.norm(directions.reshape(-1, 3)[::RUN], axis=-1)
+    lengths = np.linalg.norm(directions.reshape(-1, 3)[::TILE], axis=-1)
     wrong = lengths[np.abs(lengths - 1) > 1e-3]
     if wrong.size:
         raise ValueError(f"directions must be unit vectors, got one of length {wrong[0]:g}")
 
 
-def _strips(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Runs, ...], float]:
-    """A camera's rays, as seen by itself, in strips of `_rows` rows, and the typical angle between neighbours."""
-    strips, steps = [], []
-    for top in range(0, pixels.height, _rows(pixels)):
-        strip = pixels.cropped(0, top, pixels.width, min(_rows(pixels), pixels.height - top))
-        rays = lens.unproject(strip.from_pixels(strip.grid()))
+def _rays(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Rays, ...], float]:
+    """A camera's rays, as seen by itself, in blocks, and the typical angle between neighbours."""
+    blocks, steps = [], []
+    for rows, columns in _blocks(pixels.height, pixels.width):
+        part = pixels.cropped(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
+        rays = lens.unproject(part.from_pixels(part.grid()))
         steps.append(np.linalg.norm(np.diff(rays[::8], axis=1), axis=-1).ravel())
-        strips.append(Runs.gather(np.zeros((1, 3)), rays.reshape(-1, 3)))
+        blocks.append(Rays.gather(np.zeros(3), rays))
     apart = np.concatenate(steps)
     apart = apart[np.isfinite(apart)]
-    return tuple(strips), float(np.median(apart)) if apart.size else 0.0
+    return tuple(blocks), float(np.median(apart)) if apart.size else 0.0
 
 
-_kept_strips = lru_cache(maxsize=1)(_strips)  # while the camera only moves; one, for a class shares one memory
-
-
-def _rows(pixels: Intrinsics) -> int:
-    """How many rows of a picture are traced together."""
-    return max(BLOCK // pixels.width, 1)
+_kept_rays = lru_cache(maxsize=1)(_rays)  # while the camera only moves; one, for a class shares one memory

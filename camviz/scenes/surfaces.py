@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -60,7 +61,7 @@ class Surface(Protocol):
         ...
 
     def radiance(self, at: Meeting, spread: float) -> Floats:
-        """Linear light (n, 3) that leaves the surface towards rays `spread` radians apart."""
+        """Linear light (n, LIGHT) that leaves the surface towards rays `spread` radians apart."""
         ...
 
     def outline(self) -> tuple[Array, ...]:
@@ -177,9 +178,12 @@ class Ground:
         s, r, cosine = at.place
         apart = texels(at.depth, cosine, spread * self.texture.width / self.tile) if spread > 0 else 0.0
         light = self.texture.sample(s, r, apart)
-        clear = np.exp(at.depth * np.float32(-1 / self.sight))[:, None]
-        haze = np.asarray(self.haze, dtype=np.float32)
-        return haze + (light - haze) * clear
+        clear = np.exp(at.depth * np.float32(-1 / self.sight))
+        haze = np.array([*np.asarray(self.haze, dtype=float), 0], dtype=np.float32)
+        light -= haze
+        light *= clear[:, None]
+        light += haze
+        return light
 
     def outline(self) -> tuple[Array, ...]:
         return ()
@@ -329,8 +333,11 @@ def _vector(values: ArrayLike, name: str) -> Array:
 
 
 def around(x: Floats, z: Floats) -> Floats:
-    """How far round (n,) a direction points, 0…1: 0.5 along +z, more to the right."""
-    return np.arctan2(x, z) * np.float32(0.5 / np.pi) + HALF
+    """How far round (n,) a direction points, 0…1: 0.5 along +z, more to the right.
+
+    OpenCV's arctangent is off by up to 0.01°, a thirtieth of a texel here, in a fortieth of NumPy's time.
+    """
+    return cv2.phase(-z, -x).ravel() * np.float32(0.5 / np.pi)
 
 
 def on_sphere(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:

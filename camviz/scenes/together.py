@@ -18,17 +18,17 @@ Indices = NDArray[np.intp]
 
 
 class Traced(Protocol):
-    """What the tracer meets: some surfaces, each with those runs of rays that come near it."""
+    """What the tracer meets: some surfaces, each with those tiles of rays that come near it."""
 
     def meet(self, origins: Array, directions: Floats, member: Indices) -> Meeting:
-        """Where the rays of p runs, directions (3, p, RUN), meet the surface that each is to meet, `member` (p,).
+        """Where the rays of p tiles, directions (3, p, TILE), meet the surface that each is to meet, `member` (p,).
 
-        Origins are (3, 1, 1) or (3, p, RUN); distances and places come flat, (p RUN,) and (3, p RUN).
+        Origins are (3, 1, 1) or (3, p, TILE); distances and places come flat, (p TILE,) and (3, p TILE).
         """
         ...
 
     def radiance(self, at: Meeting, spread: float, member: Indices) -> Floats:
-        """Linear light (n, 3) that leaves the surfaces `member` (n,) towards rays `spread` radians apart."""
+        """Linear light (n, LIGHT) that leaves the surfaces `member` (n,) towards rays `spread` radians apart."""
         ...
 
 

@@ -132,7 +132,7 @@ class DigitalCamera:
         """Photons behind each pixel's filter, and the electrons they are expected to free, (height, width) each."""
         gathered = mosaic(lux, self.pattern).astype(np.float32) * np.float32(exposure_s * self.pitch_um**2)
         kind = self.pattern.channels(*gathered.shape)
-        photons, electrons = (np.asarray(one, dtype=np.float32)[kind] for one in self.channels)
+        photons, electrons = (np.asarray(one, dtype=np.float32).take(kind) for one in self.channels)
         return gathered * photons, gathered * electrons
 
     def white_exposure_s(self, share: float = 0.8) -> float:
