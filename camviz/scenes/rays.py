@@ -60,7 +60,7 @@ class Rays:
 
     `directions` (3, tiles, TILE) are unit vectors, zero where there is no ray; `origins` are (3, 1, 1) or
     (3, tiles, TILE). The cones: unit `axis` (3, tiles), `cosine` and `sine` of the half angle (tiles,), all origins of
-    a tile within `slack` metres of `centre` (3, tiles) or (3, 1). A tile without any ray has the cosine inf.
+    a tile within `slack` metres of `centre` (3, tiles) or (3, 1). A tile without any ray has the cosine 2.
     """
 
     shape: tuple[int, int]
@@ -85,7 +85,7 @@ class Rays:
         along[none] = 1
         cosine = np.minimum(along.min(axis=1), np.float32(1))
         sine = np.sqrt(1 - cosine * cosine)
-        cosine[none.all(axis=1)] = np.inf
+        cosine[none.all(axis=1)] = 2
         centre = starts.mean(axis=2)
         slack = np.sqrt(((starts - centre[..., None]) ** 2).sum(axis=0).max(axis=1))
         shape = (directions.shape[0], directions.shape[1])
@@ -137,7 +137,7 @@ class Rays:
         may = bounds.of_any(ball & plane)
         if bounds.flat.size and not self.slack.any():
             may[bounds.flat] &= self._reach(bounds.corners)
-        return ((self.cosine <= 0) | may) & (self.cosine < np.inf)
+        return ((self.cosine <= 0) | may) & (self.cosine <= 1)
 
     def _reach(self, corners: Array) -> NDArray[np.bool_]:
         """False (m, tiles) where cones from the one origin pass by parallelograms with these corners (m, 4, 3).
