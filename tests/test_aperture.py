@@ -1,5 +1,7 @@
 """The thin-lens camera: what its rays make agrees with the closed forms, and the fast way with every ray traced."""
 
+from itertools import product
+
 import cv2
 import numpy as np
 import pytest
@@ -74,6 +76,20 @@ def test_the_fast_picture_is_the_one_with_every_ray_traced(focal, number, focus)
     )
     sharp = to_display(render(textured_scene(), camera.camera))
     assert cv2.PSNR(fast, exact) > max(33, cv2.PSNR(sharp, exact) + 3)
+
+
+@pytest.mark.parametrize("focus", [0.7, 1.3, 2.3, 6.0])
+def test_a_rough_picture_is_softer_but_every_part_of_it_is_where_it_belongs(focus):
+    """To a fifth of a pixel in each quarter of the picture, whatever the enlargement."""
+    camera = ThinLensCamera(240, 180, 36, 50, 4.0, focus, world_from_cam=PLACE)
+    fine, rough = (
+        cv2.cvtColor(parallax.photograph(textured_scene(), camera, 16, rough=rough), cv2.COLOR_RGB2GRAY)
+        for rough in (False, True)
+    )
+    assert cv2.PSNR(to_display(fine), to_display(rough)) > 30
+    for rows, columns in product((np.s_[:90], np.s_[90:]), (np.s_[:120], np.s_[120:])):
+        shift, _ = cv2.phaseCorrelate(fine[rows, columns], rough[rows, columns])
+        assert np.abs(shift).max() < 0.2
 
 
 def test_a_camera_that_is_turned_sees_the_same_both_ways():
