@@ -68,9 +68,9 @@ def photograph(scene: Scene, camera: ThinLensCamera, samples: int = 64, *, rough
     pixels = camera.camera.intrinsics
     shorter = _ZOOM ** np.floor(np.log(pixels.fx) / np.log(_ZOOM)) if rough else pixels.fx
     parts = _kept(scene, replace(pixels, fx=shorter, fy=shorter), pose, margin)
-    return looked_through(
-        tuple(_enlarged(part, pixels, shorter) for part in parts) if rough else parts, camera, samples
-    )
+    if rough:
+        parts = tuple(_enlarged(part, pixels, shorter) for part in parts)
+    return looked_through(parts, camera, samples)
 
 
 def _enlarged(part: Layer, pixels: Intrinsics, fx: float) -> Layer:
