@@ -27,6 +27,17 @@ def test_a_glimpse_shows_what_the_tracer_shows(lens):
     assert cv2.PSNR(garden.glimpse(turned), softened) < 27
 
 
+def test_a_camera_that_turns_where_it_stands_is_drafted_from_the_all_round_picture_of_that_place():
+    """The first draft from a place is traced, for the camera may be on its way; the second is the same, but softer."""
+    for place in ([-0.6, -0.5, 0.2], [1.2, -0.3, 0.9]):
+        camera = Camera(VIEW, world_from_cam=RigidTransform.from_translation(place))
+        first, again = garden.drafted(camera)[0], garden.drafted(camera)[0]
+        np.testing.assert_array_equal(first, garden.taken(camera, garden.DRAFT)[0])
+        np.testing.assert_array_equal(again, garden.glimpse(camera))
+        soft_first, soft_again = (cv2.GaussianBlur(picture, (0, 0), 1.0) for picture in (first, again))
+        assert cv2.PSNR(soft_first, soft_again) > 28
+
+
 def test_a_glimpse_has_a_join_behind_the_camera_that_nobody_sees():
     back = RigidTransform.from_rotation(Rotation.from_euler("y", 180, degrees=True))
     near = Intrinsics.from_fov(208, 156, 15)  # each texel of the all-round picture spreads over several pixels

@@ -134,7 +134,7 @@ class FrustumView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        image, taken = garden.taken(self.camera, garden.DRAFT if draft else garden.FINE)
+        image, taken = garden.drafted(self.camera) if draft else garden.taken(self.camera, garden.FINE)
         world, photographs = self._world_panel(image, draft)
         body = svg.rectangle(0, 0, 960, 580, "paper") + world + self._picture_panel() + self._numbers_panel()
         return Picture(body, 960, 580, self.title, self.description(), photographs | {"camera": taken})

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
+from itertools import count
 
 import cv2
 import numpy as np
@@ -19,6 +22,8 @@ from camviz.scenes.scene import NEUTRAL
 DRAFT, FINE = 136, 416  # pixels on the longer side; at 4:3 the tracer takes a fine picture as four blocks of rays
 
 Pose = tuple[float, ...]
+Place = tuple[float, ...]
+ORIGIN: Place = (0.0, 0.0, 0.0)
 
 
 def taken(camera: Camera, side: int) -> tuple[np.ndarray, bytes]:
@@ -31,25 +36,36 @@ def distances(camera: Camera, side: int) -> NDArray[np.float32]:
     return _distances(camera.intrinsics.within(side), camera.lens, _pose(camera))
 
 
+def drafted(camera: Camera) -> tuple[np.ndarray, bytes]:
+    """What `taken` takes as a draft; once the camera stays where it is, and only turns or zooms, a glimpse."""
+    if next(_drafts_from(_place(camera))) == 0:
+        return taken(camera, DRAFT)
+    image = glimpse(replace(camera, intrinsics=camera.intrinsics.within(DRAFT)))
+    return image, jpeg(image)
+
+
+@lru_cache(maxsize=1)
+def _drafts_from(place: Place) -> Iterator[int]:
+    """Counts the drafts taken from one place without any from another in between."""
+    return count()
+
+
 def glimpse(camera: Camera) -> np.ndarray:
-    """What a camera at the world's origin sees, looked up in one all-round picture: softer, in a third of the time."""
-    return glimpsed(camera.rays())
-
-
-def glimpsed(rays: Array) -> np.ndarray:
-    """What rays (height, width, 3) from the world's origin see, looked up in the same picture."""
-    around, picture, nothing = _all_round()
-    uv = np.nan_to_num(around.project(rays), nan=-9).astype(np.float32)
+    """What a camera sees, looked up in one all-round picture from its place: softer, in a third of the time."""
+    around, picture, nothing = _all_round(_place(camera))
+    uv = np.nan_to_num(around.project(camera.rays()), nan=-9).astype(np.float32)
     return cv2.remap(picture, uv, None, cv2.INTER_LINEAR, borderValue=nothing)
 
 
-@cache
-def _all_round() -> tuple[Camera, np.ndarray, tuple[int, ...]]:
-    """A camera at the origin that sees every way, the picture it takes, its edges joined, and the colour of no ray."""
-    width = 1024
+@lru_cache(maxsize=2)
+def _all_round(place: Place) -> tuple[Camera, np.ndarray, tuple[int, ...]]:
+    """A camera at the origin that sees every way, the picture it takes at a place, its edges joined, and the colour of
+    no ray; a little coarser from places other than the origin, where most views do not begin."""
+    width = 1024 if place == ORIGIN else 768
     f = width / (2 * np.pi)
     around = Camera(Intrinsics(width, width // 2, f, f, (width - 1) / 2, (width // 2 - 1) / 2), Equirectangular())
-    picture = cv2.copyMakeBorder(snapshot(textured_scene(), around), 1, 1, 1, 1, cv2.BORDER_WRAP)
+    seen = snapshot(textured_scene(), around.at(RigidTransform.from_translation(place)))
+    picture = cv2.copyMakeBorder(seen, 1, 1, 1, 1, cv2.BORDER_WRAP)
     k = around.intrinsics.cropped(-1, -1, width + 2, width // 2 + 2)
     return Camera(k, around.lens), picture, tuple(to_display(np.full(3, NEUTRAL, np.float32)).tolist())
 
@@ -81,6 +97,10 @@ def _landmarks(intrinsics: Intrinsics, lens: Lens, pose: Pose) -> Array:
     rays = camera.unproject(pixels)
     _, distance = textured_scene().trace(camera.centre, rays)
     return (camera.centre + distance[:, None] * rays)[distance < 12]
+
+
+def _place(camera: Camera) -> Place:
+    return tuple(camera.centre.tolist())
 
 
 def _pose(camera: Camera) -> Pose:
