@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz.cameras import Camera, Intrinsics
 from camviz.cubemap import Cubemap, cells, joined
 from camviz.lenses import Cylindrical, Equirectangular
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, times
 
 Picture = NDArray[Any]
 Floats = NDArray[np.float32]
@@ -95,7 +95,7 @@ def equirectangular_camera(width: int, height: int) -> Camera:
 def source_pixels(source: Camera, target: Camera, uv: Array) -> Array:
     """The pixels (..., 2) of `source` that belong at pixels `uv` (..., 2) of `target`; NaN where it sees nothing."""
     pixels = source.intrinsics
-    seen = pixels.to_pixels(source.lens.project(target.unproject(uv) @ source.extrinsics[0].T))
+    seen = pixels.to_pixels(source.lens.project(times(target.unproject(uv), source.extrinsics[0].T)))
     if _goes_round(source):
         seen[..., 0] = (seen[..., 0] + 0.5) % pixels.width - 0.5
     seen[~pixels.contains(seen)] = np.nan

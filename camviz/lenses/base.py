@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-12  # how far beyond the rim of its image a point may lie and still be a rounded point of the rim
+ALONE = 1 << 17  # multiplications of a matrix product that OpenBLAS does without threads; they begin at twice as many
 BLOCK = 16384  # points worked on at a time, so that the temporaries stay in the processor's cache
 
 
@@ -108,6 +109,22 @@ def as_points(values: ArrayLike, size: int, name: str) -> Array:
 def on_plane(xy: Array) -> Array:
     """Directions (..., 3) through points (..., 2) of the plane z = 1."""
     return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
+
+
+def times(vectors: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
+    """The products vectors @ matrix, (..., n) times (n, m), some thousands of vectors at a time.
+
+    For more at once OpenBLAS wakes threads, which afterwards wait in a busy loop for tens of milliseconds, on the very
+    core where a browser wants to show the picture.
+    """
+    part = ALONE // matrix.size
+    if vectors.ndim == 1 or vectors[..., 0].size <= part:
+        return np.asarray(vectors @ matrix)
+    flat = vectors.reshape(-1, vectors.shape[-1])
+    product = np.empty((len(flat), matrix.shape[-1]), dtype=np.result_type(vectors, matrix))
+    for start in range(0, len(flat), part):
+        np.matmul(flat[start : start + part], matrix, out=product[start : start + part])
+    return product.reshape(*vectors.shape[:-1], -1)
 
 
 def unit(vectors: Array) -> Array:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from camviz.lenses.base import Array, unit
+from camviz.lenses.base import ALONE, Array, unit
 
 Floats = NDArray[np.float32]
 SIDE = 8  # of a tile in a picture, in rays
@@ -103,12 +104,11 @@ class Rays:
         """The same rays of a camera whose centre was the origin, where the camera stands now."""
         turn = world_from_cam.as_matrix()[:3, :3].astype(np.float32)
         centre = np.asarray(world_from_cam.translation, dtype=float)[:, None]
-        directions = (turn @ self.directions.reshape(3, -1)).reshape(self.directions.shape)
         return replace(
             self,
             origins=centre[..., None],
-            directions=directions,
-            axis=turn @ self.axis,
+            directions=turned(turn, self.directions),
+            axis=turned(turn, self.axis),
             centre=centre.astype(np.float32),
         )
 
@@ -132,7 +132,7 @@ class Rays:
         limit = self.cosine * np.sqrt(1 - sine * sine) - self.sine * sine - _ROUNDING
         ball = (distance <= grown) | (along >= limit * distance)
         height = bounds.normal[:, :1] * -x + bounds.normal[:, 1:2] * -y + bounds.normal[:, 2:] * -z
-        towards = -np.sign(height) * (bounds.normal @ self.axis)
+        towards = -np.sign(height) * turned(bounds.normal, self.axis)
         plane = (np.abs(height) <= self.slack) | (towards >= -self.sine - _ROUNDING)
         may = bounds.of_any(ball & plane)
         if bounds.flat.size and not self.slack.any():
@@ -148,8 +148,17 @@ class Rays:
         sides = np.cross(seen, np.roll(seen, -1, axis=1))
         inwards = np.sign((sides * np.roll(seen, -2, axis=1)).sum(axis=-1, keepdims=True))
         sides = unit(inwards * sides).astype(np.float32)
-        within = sides.reshape(-1, 3) @ self.axis >= -self.sine - _ROUNDING
+        within = turned(sides.reshape(-1, 3), self.axis) >= -self.sine - _ROUNDING
         return np.logical_and.reduce(within.reshape(len(corners), 4, -1), axis=1)
+
+
+def turned(rows: NDArray[Any], vectors: NDArray[Any]) -> NDArray[Any]:
+    """The products rows @ vectors (m, ...) of a matrix's `rows` (m, 3) and vectors (3, ...), without waking threads."""
+    flat, part = vectors.reshape(3, -1), ALONE // rows.size
+    product = np.empty((len(rows), flat.shape[1]), dtype=np.result_type(rows, vectors))
+    for start in range(0, flat.shape[1], part):
+        np.matmul(rows, flat[:, start : start + part], out=product[:, start : start + part])
+    return product.reshape(len(rows), *vectors.shape[1:])
 
 
 def _tile(height: int) -> tuple[int, int]:

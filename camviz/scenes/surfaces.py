@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from camviz.lenses.base import Array, unit
 from camviz.scenes.light import sunlight, to_display, to_linear
 from camviz.scenes.meeting import FAR, HALF, Meeting, meet_circle, meet_plane, meet_square, texels
-from camviz.scenes.rays import Ball, Floats
+from camviz.scenes.rays import Ball, Floats, turned
 from camviz.scenes.texture import Texture
 
 
@@ -347,8 +347,8 @@ def on_sphere(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
 
 def _in_frame(local_from_world: Array, point: Array, origins: Array, directions: Floats) -> tuple[Floats, Floats]:
     """Origins and directions of rays in a frame at `point`."""
-    start = (local_from_world @ (origins - point[:, None])).astype(np.float32)
-    return start, local_from_world.astype(np.float32) @ directions
+    start = turned(local_from_world, origins - point[:, None]).astype(np.float32)
+    return start, turned(local_from_world.astype(np.float32), directions)
 
 
 def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.intp]]:
