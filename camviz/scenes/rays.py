@@ -154,7 +154,7 @@ class Rays:
 
 def turned(rows: NDArray[Any], vectors: NDArray[Any]) -> NDArray[Any]:
     """The products rows @ vectors (m, ...) of a matrix's `rows` (m, 3) and vectors (3, ...), without waking threads."""
-    flat, part = vectors.reshape(3, -1), ALONE // rows.size
+    flat, part = vectors.reshape(3, -1), ALONE // max(rows.size, 1)
     product = np.empty((len(rows), flat.shape[1]), dtype=np.result_type(rows, vectors))
     for start in range(0, flat.shape[1], part):
         np.matmul(rows, flat[:, start : start + part], out=product[:, start : start + part])
