@@ -223,17 +223,17 @@ class Studio:
         pixels, depths = vtkUnsignedCharArray(), vtkFloatArray()
         self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, False, pixels)
         self.window.GetZbufferData(0, 0, width - 1, height - 1, depths)
-        rgba = np.flipud(vtk_to_numpy(pixels).reshape(height, width, 4))
+        rgba = np.ascontiguousarray(np.flipud(vtk_to_numpy(pixels).reshape(height, width, 4)))
         near, far = self.renderer.GetActiveCamera().GetClippingRange()
         d = np.flipud(vtk_to_numpy(depths).reshape(height, width))
         # The depth buffer holds d = (1/near - 1/z) / (1/near - 1/far).
         depth = np.where(d < 1, near * far / (far - d * (far - near)), np.inf)
-        return Shot(_unmixed(rgba), np.ascontiguousarray(rgba[..., 3]), cv2.dilate(depth, np.ones((3, 3))), scale)
+        return Shot(_unmixed(rgba), cv2.extractChannel(rgba, 3), cv2.dilate(depth, np.ones((3, 3))), scale)
 
 
 def _unmixed(rgba: np.ndarray) -> np.ndarray:
     """Colours (h, w, 3) without the background that shows through: c = alpha * colour + (1 - alpha) * background."""
-    rgb = np.ascontiguousarray(rgba[..., :3])
+    rgb = cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
     mixed = (rgba[..., 3] > 0) & (rgba[..., 3] < 255)
     alpha = rgba[mixed][:, 3:] / 255
     rgb[mixed] = np.clip(np.rint((rgb[mixed] - (1 - alpha) * _BACKGROUND) / alpha), 0, 255)

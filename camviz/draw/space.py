@@ -17,6 +17,7 @@ from camviz.draw.panel import Panel
 from camviz.draw.wire import Sight, draw_wire
 from camviz.lenses.base import Array
 from camviz.scenes import Scene, wireframe_scene
+from camviz.scenes.surfaces import Mesh
 
 __all__ = [
     "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "chosen_renderer",
@@ -115,9 +116,10 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     """
     meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
-        pictures: dict[bytes, np.ndarray] = {}
-        shared = [pictures.setdefault(p.tobytes(), p) for p in (mesh.picture for mesh in meshes)]
-        return tuple(Sheet(m.vertices, m.quads, m.uv, p) for m, p in zip(meshes, shared, strict=True))
+        alike: dict[bytes, list[Mesh]] = {}
+        for mesh in meshes:
+            alike.setdefault(mesh.picture.tobytes(), []).append(mesh)
+        return tuple(_sheet(those) for those in alike.values())
     flat = [mesh for mesh in meshes if len(mesh.quads) == 1 and mesh.name != "terrace"]
     fills = [Face(mesh.vertices[mesh.quads[0]], f"#{bytes(mesh.rgb).hex()}", 0.25) for mesh in flat]
     lines = [(name, line) for name, line in scene.outlines() if _near(name, line)]
@@ -127,6 +129,14 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     squares = [Line(line, "ink", 0.7) for _, line in wireframe_scene().only("board")]
     ground = [Line(line, "grid", 1.2) for _, line in wireframe_scene().only("ground")]
     return (*ground, *fills, *drawn, *squares)
+
+
+def _sheet(meshes: Sequence[Mesh]) -> Sheet:
+    """Meshes with one picture as one sheet: a renderer's time goes with the sheets rather than with their faces."""
+    counts = [len(mesh.vertices) for mesh in meshes]
+    quads = [first + mesh.quads for first, mesh in zip(np.cumsum([0, *counts]), meshes, strict=False)]
+    vertices, uv = (np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in ("vertices", "uv"))
+    return Sheet(vertices, np.concatenate(quads), uv, meshes[0].picture)
 
 
 def _near(name: str, points: Array) -> bool:
