@@ -19,7 +19,7 @@ from camviz.lenses.base import Array
 from camviz.scenes import snapshot, textured_scene, to_display
 from camviz.scenes.scene import NEUTRAL
 
-DRAFT, FINE = 136, 416  # pixels on the longer side; at 4:3 the tracer takes a fine picture as four blocks of rays
+DRAFT, FINE = 136, 400  # pixels on the longer side; the tracer takes a fine picture at 4:3 as one block of rays
 
 Pose = tuple[float, ...]
 Place = tuple[float, ...]
