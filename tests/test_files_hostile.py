@@ -2,6 +2,8 @@
 
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -312,32 +314,49 @@ def test_deep_nesting_stays_shallow(tmp_path, text):
     assert "32 levels" in refusal(tmp_path, text)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[" + "1," * (MAX_BYTES // 2 - 2) + "]",
-        "<opencv_storage><a>" + "1 " * (MAX_BYTES // 2 - 40) + "</a></opencv_storage>",
-        "<opencv_storage>" + "<a/>" * (MAX_BYTES // 4 - 20) + "</opencv_storage>",
-        "a: " + "x" * (MAX_BYTES - 10),
-        "a" * (MAX_BYTES - 10),
-        "9" * (MAX_BYTES - 10),
-        "# " + "x" * (MAX_BYTES - 10),
-        '"' + "\\n" * (MAX_BYTES // 2 - 10),
-        "{'lensmodel': [" + "1," * (MAX_BYTES // 2 - 20) + "]}",
-        "{'lensmodel': '" + "\\x" * (MAX_BYTES // 2 - 20),
-        "#\r\n" * (MAX_BYTES // 3 - 10) + "x",
-        "1 PINHOLE 640 480 " + "1 " * (MAX_BYTES // 2 - 40),
-        "1 PINHOLE 640 480 1 1 1 1" + "\n" * (MAX_BYTES - 40),
-        "P0: " + "1 " * (MAX_BYTES // 2 - 40),
-        "P0: 1" + "\n" * (MAX_BYTES - 40),
-        "<document>" + "<a b='1'/>" * (MAX_BYTES // 10 - 20) + "</document>",
-    ],
-    ids=["list", "xml words", "xml elements", "word", "plain text", "number", "comment", "open string"]
-    + ["literal", "open literal", "comments", "colmap line", "colmap lines", "kitti line", "kitti lines", "attributes"],
-)
+LARGEST = {
+    "list": "[" + "1," * (MAX_BYTES // 2 - 2) + "]",
+    "xml words": "<opencv_storage><a>" + "1 " * (MAX_BYTES // 2 - 40) + "</a></opencv_storage>",
+    "xml elements": "<opencv_storage>" + "<a/>" * (MAX_BYTES // 4 - 20) + "</opencv_storage>",
+    "word": "a: " + "x" * (MAX_BYTES - 10),
+    "plain text": "a" * (MAX_BYTES - 10),
+    "number": "9" * (MAX_BYTES - 10),
+    "comment": "# " + "x" * (MAX_BYTES - 10),
+    "open string": '"' + "\\n" * (MAX_BYTES // 2 - 10),
+    "literal": "{'lensmodel': [" + "1," * (MAX_BYTES // 2 - 20) + "]}",
+    "open literal": "{'lensmodel': '" + "\\x" * (MAX_BYTES // 2 - 20),
+    "comments": "#\r\n" * (MAX_BYTES // 3 - 10) + "x",
+    "colmap line": "1 PINHOLE 640 480 " + "1 " * (MAX_BYTES // 2 - 40),
+    "colmap lines": "1 PINHOLE 640 480 1 1 1 1" + "\n" * (MAX_BYTES - 40),
+    "kitti line": "P0: " + "1 " * (MAX_BYTES // 2 - 40),
+    "kitti lines": "P0: 1" + "\n" * (MAX_BYTES - 40),
+    "attributes": "<document>" + "<a b='1'/>" * (MAX_BYTES // 10 - 20) + "</document>",
+}
+
+
+@pytest.mark.parametrize("text", LARGEST.values(), ids=LARGEST)
 def test_the_largest_allowed_file_is_refused(tmp_path, text):
-    """Seconds each; work that grew with the square of the size would take hours."""
     refusal(tmp_path, text)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sets limits that only Linux keeps")
+def test_the_largest_allowed_files_need_neither_hours_nor_gigabytes(tmp_path):
+    """All of them in a process that the system ends after two minutes of work, and gives 2 GB beside what it loads."""
+    for name, text in LARGEST.items():
+        (tmp_path / f"{name}.yml").write_text(text)
+    code = (
+        "import resource, sys, pathlib, camviz.files.loading\n"
+        "from camviz.files import CalibrationError\n"
+        "loaded = int(pathlib.Path('/proc/self/statm').read_text().split()[0]) * resource.getpagesize()\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (loaded + 2 * 2**30,) * 2)\n"
+        "resource.setrlimit(resource.RLIMIT_CPU, (120, 120))\n"
+        "for path in sorted(pathlib.Path(sys.argv[1]).iterdir()):\n"
+        "    try: camviz.load(path)\n"
+        "    except CalibrationError: print(path.stem)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert run.stdout.splitlines() == sorted(LARGEST)
 
 
 def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):
