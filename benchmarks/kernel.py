@@ -54,8 +54,8 @@ def import_ms(module: str, repeats: int = 7) -> float:
     return float(np.median([float(run.stdout) for run in runs])) * 1000
 
 
-def lesson_mb(lesson: Path, renderer: str) -> float:
-    """Megabytes that a lesson's kernel holds after all of its cells have run."""
+def lesson_mb(lesson: Path, renderer: str) -> tuple[float, float]:
+    """Megabytes that a lesson's kernel holds after all of its cells have run, and how many another one would add."""
     cells = json.loads(lesson.read_text(encoding="utf-8"))["cells"]
     manager = KernelManager()
     path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
@@ -68,10 +68,17 @@ def lesson_mb(lesson: Path, renderer: str) -> float:
         for cell in cells:
             if cell["cell_type"] == "code":
                 _run(client, "".join(cell["source"]), lesson)
-        return psutil.Process(manager.provisioner.pid).memory_info().rss / 2**20
+        kernel = psutil.Process(manager.provisioner.pid)
+        return kernel.memory_info().rss / 2**20, _of_its_own_mb(kernel.pid)
     finally:
         client.stop_channels()
         manager.shutdown_kernel(now=True)
+
+
+def _of_its_own_mb(pid: int) -> float:
+    """Megabytes of a process that it has written itself: the rest, the code of libraries, all processes share."""
+    lines = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii").splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("Private_Dirty")) / 2**10
 
 
 def _run(client: object, source: str, lesson: Path) -> None:
@@ -126,8 +133,8 @@ def main() -> None:
     head = ["lens", "project, M points/s", "OpenCV", "unproject, M points/s", "trace 640 × 480, ms"]
     print(table(head, [lens_row(name) for name in LENSES]), flush=True)
     lessons = sorted((ROOT / "lessons").glob("*.ipynb"))
-    rows = [[path.stem, *(f"{lesson_mb(path, renderer):.0f}" for renderer in ("wire", "solid"))] for path in lessons]
-    print(table(["lesson's kernel", "wire, MB", "solid, MB"], rows))
+    rows = [[path.stem, *(f"{mb:.0f}" for r in ("wire", "solid") for mb in lesson_mb(path, r))] for path in lessons]
+    print(table(["lesson's kernel", "wire, MB", "of its own", "solid, MB", "of its own"], rows))
 
 
 if __name__ == "__main__":
