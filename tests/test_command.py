@@ -397,6 +397,7 @@ def jupyter(monkeypatch):
     labapp.LabApp = types.SimpleNamespace(launch_instance=started.append)
     monkeypatch.setitem(sys.modules, "jupyterlab.labapp", labapp)
     monkeypatch.setenv("PYTHONPATH", "")
+    monkeypatch.setattr(lab.os, "geteuid", lambda: 1000, raising=False)
     return started
 
 
@@ -405,6 +406,16 @@ def test_a_checkout_opens_its_own_lessons(jupyter, room, capsys):
     (words,) = jupyter
     assert words[:3] == [f"--ServerApp.root_dir={(ROOT / 'lessons').resolve()}", "--no-browser", "--port=9999"]
     assert list(room.iterdir()) == []
+
+
+@pytest.mark.parametrize("asked", [[], ["--allow-root"]])
+def test_root_is_let_in_and_told(jupyter, room, monkeypatch, capsys, asked):
+    """In a container one is root, where JupyterLab by itself would end with an error."""
+    monkeypatch.setattr(lab.os, "geteuid", lambda: 0, raising=False)
+    assert main(["lab", "--no-browser", "--", *asked]) == 0
+    (words,) = jupyter
+    assert words.count("--allow-root") == 1
+    assert ("You are root" in capsys.readouterr().out) == (not asked)
 
 
 def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatch, capsys):

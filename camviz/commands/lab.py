@@ -39,7 +39,11 @@ def lab(options: argparse.Namespace, beyond: list[str]) -> int:
     if not (folder.exists() and folder.samefile(source)) and edition(folder) != "teacher":
         for sentence in lay_out(source, folder, camviz.__version__):
             print(sentence)
-    return _start_jupyter(folder.resolve(), ["--no-browser"] * options.no_browser + beyond)
+    extra = ["--no-browser"] * options.no_browser + beyond
+    if hasattr(os, "geteuid") and os.geteuid() == 0 and "--allow-root" not in extra:
+        print("You are root, as one is in a container, so JupyterLab runs as root: what you run in it may do anything.")
+        extra.append("--allow-root")
+    return _start_jupyter(folder.resolve(), extra)
 
 
 def _start_jupyter(folder: Path, extra: list[str]) -> int:
