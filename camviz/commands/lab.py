@@ -41,7 +41,10 @@ def lab(options: argparse.Namespace, beyond: list[str]) -> int:
             print(sentence)
     extra = ["--no-browser"] * options.no_browser + beyond
     if hasattr(os, "geteuid") and os.geteuid() == 0 and "--allow-root" not in extra:
-        print("You are root, as one is in a container, so JupyterLab runs as root: what you run in it may do anything.")
+        print(
+            "You are root, as one is in a container, so JupyterLab runs as root: what you run in it may do anything.",
+            flush=True,
+        )
         extra.append("--allow-root")
     return _start_jupyter(folder.resolve(), extra)
 
