@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment, sagittas, twisted
+from camviz.calibration.arrowhead import inverse
 from camviz.calibration.slopes import lens_parameters, pixel_slopes, with_parameters
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Calibration
@@ -108,6 +109,15 @@ def test_covariances_are_those_of_the_dense_inverse(problem, request) -> None:
     expected = mean @ covariance @ mean.T
     unit = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert np.abs((adjustment.mean_twist_covariance - expected) / unit).max() < 1e-5
+
+
+def test_what_is_not_determined_has_a_variance_beyond_all_digits_and_no_warning() -> None:
+    """A view without corners says nothing of its pose: zeros all over, inverted beside a view that is well known."""
+    known = np.array([[4.0, 1.0], [1.0, 9.0]])
+    variances = inverse(np.stack([np.zeros((2, 2)), known]))
+    assert np.isfinite(variances).all()
+    assert (np.diag(variances[0]) > 1e14).all()
+    np.testing.assert_allclose(variances[1], np.linalg.inv(known), rtol=1e-12)
 
 
 def test_no_residual_is_left_and_no_gradient(pair) -> None:

@@ -100,5 +100,5 @@ def inverse(matrices: Array) -> Array:
     scale = np.where(scale > 0, scale, 1)[..., None]
     scale = scale * np.swapaxes(scale, -1, -2)
     values, vectors = np.linalg.eigh(matrices / scale)
-    floor = values.shape[-1] * np.finfo(float).eps * values[..., -1:]
+    floor = values.shape[-1] * np.finfo(float).eps * np.maximum(values[..., -1:], 1)  # less than 1: nothing but zeros
     return (vectors / np.maximum(values, floor)[..., None, :]) @ np.swapaxes(vectors, -1, -2) / scale
