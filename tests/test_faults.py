@@ -55,6 +55,16 @@ def test_a_set_up_is_the_same_whatever_the_strength():
     assert np.abs(directions[0] - directions[1]).max() < 0.02
 
 
+@pytest.mark.parametrize(("seed", "views"), [(20_007, 1), (20_010, 2), (20_006, 3)])
+def test_views_counted_backwards_do_not_wreck_the_pair(seed, views):
+    """With these seeds they once did: lenses that folded, and ten findings beside the one that matters."""
+    truth = pair(np.random.default_rng(seed)).cameras
+    solved = FAULTS["order flipped"].inject(np.random.default_rng(seed), views).calibration
+    for camera, true in zip(solved.cameras.values(), truth, strict=True):
+        assert camera.intrinsics.fx == pytest.approx(true.intrinsics.fx, rel=0.01)
+    assert [mask.all(axis=1).sum() for mask in solved.set_aside.values()] == [0, views]
+
+
 @pytest.mark.parametrize("make", [single, pair])
 def test_all_boards_of_a_set_up_are_seen_whole(make):
     set_up = make(np.random.default_rng(11))

@@ -24,6 +24,7 @@ __all__ = ["MODELS", "calibrate", "calibrate_pair"]
 FEWEST_VIEWS = 3
 MOST_ROUNDS = 20
 TRIMMINGS = 10
+OTHERWISE = np.radians(45)  # a symmetric board counted in another order seems turned by 180° or 90°
 FOLDED = (
     "the lens that fits the views folds inside the image: take views that reach into the corners of the image, "
     "or a model with fewer parameters"
@@ -71,7 +72,7 @@ def calibrate_pair(
         )
     shared = {name: _only(detections, places) for name, detections in both.items()}
     alone = {name: _alone(name, shared[name], board, kind, estimated, robust) for name in both}
-    pair = _paired(alone, board, estimated if joint else ())
+    pair = _paired(alone, board, estimated if joint else (), robust)
     pair = _robust(pair) if robust else _settled(pair)
     if not joint:
         pair = replace(pair, estimated=dict.fromkeys(both, estimated))
@@ -144,21 +145,27 @@ def _solved(
     return camera, RigidTransform.concatenate([poses, silent])[order]
 
 
-def _paired(alone: Mapping[str, Adjustment], board: Board, estimated: tuple[str, ...]) -> Adjustment:
-    """Two cameras as a pair: the right one stands where the middle of the views has it."""
+def _paired(alone: Mapping[str, Adjustment], board: Board, estimated: tuple[str, ...], robust: bool) -> Adjustment:
+    """Two cameras as a pair: the right one stands where the middle of the views has it.
+
+    Where a view has it quite otherwise, its right corners may have been counted in another order. If it is to be
+    `robust` they are set aside to begin with, for one such view can wreck a solution that begins with it.
+    """
     left, right = alone.values()
     right_from_left = right.first_from_board * left.first_from_board.inv()
     apart = np.linalg.norm(right_from_left.translation - np.median(right_from_left.translation, axis=0), axis=1)
-    right_camera = right.cameras["right"].at(right_from_left[int(np.argmin(apart))].inv())
-    poses = [left.first_from_board, right_from_left[int(np.argmin(apart))].inv() * right.first_from_board]
-    better = np.argmax([left.used["left"].sum(axis=1), right.used["right"].sum(axis=1)], axis=0)
+    middle = right_from_left[int(np.argmin(apart))]
+    right_camera = right.cameras["right"].at(middle.inv())
+    poses = [left.first_from_board, middle.inv() * right.first_from_board]
+    otherwise = robust & ((right_from_left.rotation * middle.rotation.inv()).magnitude() > OTHERWISE)
+    better = np.argmax([left.used["left"].sum(axis=1), right.used["right"].sum(axis=1) * ~otherwise], axis=0)
     return Adjustment(
         board,
         {"left": left.cameras["left"], "right": right_camera},
         {**left.detections, **right.detections},
         RigidTransform.concatenate([poses[camera][view] for view, camera in enumerate(better)]),
         dict.fromkeys(alone, estimated),
-        {**left.set_aside, **right.set_aside},
+        {**left.set_aside, "right": right.set_aside["right"] | otherwise[:, None]},
     )
 
 
