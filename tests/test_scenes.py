@@ -576,6 +576,14 @@ def test_tiles_are_ruled_out_for_surfaces_that_none_of_their_rays_meets_and_for_
     assert may_meet[flat].sum() <= 1.6 * meets[flat].sum() + tiles
 
 
+def test_every_ray_begins_where_it_is_said_to():
+    """Two bundles of parallel rays, one of which begins beside a wall and passes it by; each is one tile."""
+    origins = np.repeat([[5.0, 0, 0], [0.0, 0, 0]], TILE, axis=0)
+    wall = Rectangle(np.array([-1.0, -1, 2]), np.array([2.0, 0, 0]), np.array([0, 2.0, 0]), RED)
+    _, depth = Scene([wall]).trace(origins, np.broadcast_to([0.0, 0, 1], origins.shape))
+    np.testing.assert_array_equal(np.isnan(depth), np.repeat([True, False], TILE))
+
+
 @pytest.mark.parametrize(("yaw", "x"), [(12, -0.6), (140, 1.0), (-60, 3.0)])
 def test_surfaces_that_are_alike_look_together_as_they_do_one_by_one(yaw, x):
     """The garden's lamps and walls are traced together; a scene for each surface tells which of them is nearest."""

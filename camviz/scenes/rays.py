@@ -135,7 +135,7 @@ class Rays:
         towards = -np.sign(height) * turned(bounds.normal, self.axis)
         plane = (np.abs(height) <= self.slack) | (towards >= -self.sine - _ROUNDING)
         may = bounds.of_any(ball & plane)
-        if bounds.flat.size and not self.slack.any():
+        if bounds.flat.size and self.centre.shape[1] == 1:  # all rays begin at one point
             may[bounds.flat] &= self._reach(bounds.corners)
         return ((self.cosine <= 0) | may) & (self.cosine <= 1)
 
