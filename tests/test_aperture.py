@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import optics
+from camviz.cameras import Intrinsics
 from camviz.scenes import Rectangle, Scene, Texture, aperture, parallax, render, textured_scene, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera, spiral
 
@@ -90,6 +91,13 @@ def test_a_rough_picture_is_softer_but_every_part_of_it_is_where_it_belongs(focu
     for rows, columns in product((np.s_[:90], np.s_[90:]), (np.s_[:120], np.s_[120:])):
         shift, _ = cv2.phaseCorrelate(fine[rows, columns], rough[rows, columns])
         assert np.abs(shift).max() < 0.2
+
+
+def test_a_layer_of_a_single_pixel_is_enlarged_to_one():
+    pixels, one = Intrinsics.from_fov(64, 48, 60), np.ones((1, 1), np.float32)
+    part = parallax.Layer(10, 7, np.dstack([one] * 4), one, 1.0)
+    larger = parallax._enlarged(part, pixels, pixels.fx / 1.05)
+    assert larger.nearness.tolist() == [[1.0]]
 
 
 def test_a_camera_that_is_turned_sees_the_same_both_ways():

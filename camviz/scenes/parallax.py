@@ -77,7 +77,7 @@ def _enlarged(part: Layer, pixels: Intrinsics, fx: float) -> Layer:
     """A layer as a camera with these pixels sees it, from how one with the focal length `fx` does."""
     zoom, centre = pixels.fx / fx, np.array([pixels.cx, pixels.cy])
     first = np.ceil(centre + zoom * ([part.left, part.top] - centre))
-    last = np.floor(centre + zoom * ([part.right - 1, part.bottom - 1] - centre))
+    last = np.maximum(first, np.floor(centre + zoom * ([part.right - 1, part.bottom - 1] - centre)))
     from_first = np.column_stack([np.eye(2) / zoom, centre + (first - centre) / zoom - [part.left, part.top]])
     size, how = (last - first + 1).astype(int).tolist(), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     light, nearness = (
