@@ -93,11 +93,12 @@ def test_a_rough_picture_is_softer_but_every_part_of_it_is_where_it_belongs(focu
         assert np.abs(shift).max() < 0.2
 
 
-def test_a_layer_of_a_single_pixel_is_enlarged_to_one():
-    pixels, one = Intrinsics.from_fov(64, 48, 60), np.ones((1, 1), np.float32)
-    part = parallax.Layer(10, 7, np.dstack([one] * 4), one, 1.0)
+def test_a_layer_of_a_single_column_is_enlarged_to_one():
+    """Its rows 7 … 11, seen from row 23.5, the middle, are 6.2 … 10.4 then: four of them."""
+    pixels, column = Intrinsics.from_fov(64, 48, 60), np.ones((5, 1), np.float32)
+    part = parallax.Layer(10, 7, np.dstack([column] * 4), column, 1.0)
     larger = parallax._enlarged(part, pixels, pixels.fx / 1.05)
-    assert larger.nearness.tolist() == [[1.0]]
+    assert (larger.top, larger.nearness.shape) == (7, (4, 1))
 
 
 def test_a_camera_that_is_turned_sees_the_same_both_ways():
