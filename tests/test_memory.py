@@ -5,6 +5,11 @@ import sys
 
 import pytest
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.scenes import snapshot, textured_scene
+from camviz.scenes.scene import _kept_rays
+from camviz.widgets.memory import give_back
+
 PROGRAM = """
 import numpy as np, psutil
 from IPython.core.interactiveshell import InteractiveShell
@@ -28,3 +33,10 @@ def test_what_a_cell_no_longer_needs_is_given_back_after_it():
     ).stdout.split()
     assert float(freed) > 100
     assert int(hooks) == 1
+
+
+def test_the_rays_of_the_last_camera_are_given_back_too():
+    snapshot(textured_scene(), Camera(Intrinsics.from_fov(32, 24, 60)))
+    assert _kept_rays.cache_info().currsize == 1
+    give_back()
+    assert _kept_rays.cache_info().currsize == 0

@@ -7,11 +7,14 @@ import sys
 
 from IPython import get_ipython
 
+from camviz.scenes.scene import forget_rays
+
 _trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None  # glibc's
 
 
 def give_back(*_: object) -> None:
     """Return to the system what pictures and cells needed while they were made, where the C library can."""
+    forget_rays()
     if _trim:
         _trim(0)
 
