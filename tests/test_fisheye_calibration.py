@@ -39,7 +39,7 @@ def test_rays_land_where_the_true_fisheye_has_them(solved):
     off = np.linalg.norm(
         replace(solved, world_from_cam=TUM_VI.world_from_cam).project(rays) - TUM_VI.project(rays), axis=-1
     )
-    assert off[:58].max() < 0.15
+    assert off[:58].max() < 0.2  # where half a grey level, by which renderings may differ, is worth 0.04
     assert off.max() < 1
 
 
