@@ -41,10 +41,9 @@ _BACKGROUND = 128
 def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> tuple[str, dict[str, bytes]]:
     """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
 
-    The photograph has FINE pixels per picture unit, only one where solid pictures are `too_slow`, or DRAFT.
+    The photograph has FINE pixels per picture unit, or DRAFT.
     """
-    scale = DRAFT if draft else 1 if too_slow() else FINE
-    shot = _stage().submit(_shoot, sight, items, scale).result()
+    shot = _stage().submit(_shoot, sight, items, DRAFT if draft else FINE).result()
     fragment, photographs = _cut_out(shot, sight, name)
     fragment += draw_lines(sight, items, shot.hides) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
