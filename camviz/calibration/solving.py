@@ -24,7 +24,7 @@ __all__ = ["MODELS", "calibrate", "calibrate_pair"]
 FEWEST_VIEWS = 3
 MOST_ROUNDS = 20
 TRIMMINGS = 10
-OTHERWISE = np.radians(45)  # a symmetric board counted in another order seems turned by 180° or 90°
+ANOTHER_WAY_DEG = 45.0  # from the other views: a symmetric board's other order turns by 180° or 90°
 FOLDED = (
     "the lens that fits the views folds inside the image: take views that reach into the corners of the image, "
     "or a model with fewer parameters"
@@ -157,7 +157,7 @@ def _paired(alone: Mapping[str, Adjustment], board: Board, estimated: tuple[str,
     middle = right_from_left[int(np.argmin(apart))]
     right_camera = right.cameras["right"].at(middle.inv())
     poses = [left.first_from_board, middle.inv() * right.first_from_board]
-    otherwise = robust & ((right_from_left.rotation * middle.rotation.inv()).magnitude() > OTHERWISE)
+    otherwise = robust & (np.degrees((right_from_left.rotation * middle.rotation.inv()).magnitude()) > ANOTHER_WAY_DEG)
     better = np.argmax([left.used["left"].sum(axis=1), right.used["right"].sum(axis=1) * ~otherwise], axis=0)
     return Adjustment(
         board,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from camviz.calibration.solving import ANOTHER_WAY_DEG
 from camviz.cameras import Camera
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import Evidence
@@ -29,7 +30,6 @@ SQUARES = (0.0005, 0.5)  # the same for the side of a square
 SAME_LENGTH = 0.02
 BLACK = 0.4  # of a rectified picture
 TURNED_DEG = 35.0
-ANOTHER_WAY_DEG = 45.0  # from the other views: a symmetric board's other order turns by 180° or 90°
 AGAIN_DEG = 10.0
 NO_PAIR = Lacking("the file holds no stereo pair")
 
