@@ -26,11 +26,12 @@ def warp(px: Array, sheet: Sheet, view: Intrinsics, scale: float) -> Window | No
     if (high <= low).any():
         return None
     width, height = np.ceil((high - low) * scale).astype(int)
-    canvas = np.zeros((height, width, 4), np.uint8)
+    colours, cover = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
     for corners, source in _cells(px, sheet):
-        _stamp(canvas, sheet.picture, source, (corners - low) * scale)
-    canvas[..., 3] = np.rint(canvas[..., 3] * sheet.opacity)
-    return (float(low[0]), float(low[1]), width / scale, height / scale), canvas
+        _stamp(colours, cover, sheet.picture, source, (corners - low) * scale)
+    alpha = cv2.convertScaleAbs(cover, alpha=sheet.opacity)
+    picture = cv2.insertChannel(alpha, cv2.cvtColor(colours, cv2.COLOR_RGB2RGBA), 3)
+    return (float(low[0]), float(low[1]), width / scale, height / scale), picture
 
 
 def _cells(px: Array, sheet: Sheet) -> Iterator[tuple[Array, Array]]:
@@ -42,10 +43,10 @@ def _cells(px: Array, sheet: Sheet) -> Iterator[tuple[Array, Array]]:
             yield px[quad], source[quad]
 
 
-def _stamp(canvas: np.ndarray, image: np.ndarray, source: Array, corners: Array) -> None:
-    """One cell of the picture, by the homography of its four corners, laid into the canvas."""
+def _stamp(colours: np.ndarray, cover: np.ndarray, image: np.ndarray, source: Array, corners: Array) -> None:
+    """One cell of the picture, by the homography of its four corners, laid into colours where it covers them more."""
     low = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
-    high = np.minimum(np.ceil(corners.max(axis=0)).astype(int), canvas.shape[1::-1])
+    high = np.minimum(np.ceil(corners.max(axis=0)).astype(int), cover.shape[::-1])
     if (high <= low).any() or cv2.contourArea(corners.astype(np.float32)) < 0.5:
         return
     to_cell = cv2.getPerspectiveTransform((source - 0.5).astype(np.float32), (corners - low - 0.5).astype(np.float32))
@@ -53,7 +54,6 @@ def _stamp(canvas: np.ndarray, image: np.ndarray, source: Array, corners: Array)
     cell = cv2.warpPerspective(image, to_cell, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     mask = np.zeros(size[::-1], np.uint8)
     cv2.fillConvexPoly(mask, np.rint((corners - low - 0.5) * 16).astype(np.int32), 255, cv2.LINE_AA, 4)
-    window = canvas[low[1] : high[1], low[0] : high[0]]
-    fresh = mask > window[..., 3]
-    window[fresh, :3] = cell[fresh]
-    np.maximum(window[..., 3], mask, out=window[..., 3])
+    window = np.s_[low[1] : high[1], low[0] : high[0]]
+    cv2.copyTo(cell, cv2.compare(mask, cover[window], cv2.CMP_GT), colours[window])
+    cv2.max(cover[window], mask, cover[window])
