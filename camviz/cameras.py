@@ -78,14 +78,19 @@ class Intrinsics:
 
     def to_pixels(self, xy: ArrayLike) -> Array:
         """Pixels (..., 2) of lens coordinates (..., 2)."""
-        x, y = np.moveaxis(as_points(xy, 2, "xy"), -1, 0)
-        return np.stack([self.fx * x + self.skew * y + self.cx, self.fy * y + self.cy], axis=-1)
+        xy = as_points(xy, 2, "xy")
+        x, y = xy[..., 0], xy[..., 1]
+        uv = np.empty(xy.shape)
+        uv[..., 0], uv[..., 1] = self.fx * x + self.skew * y + self.cx, self.fy * y + self.cy
+        return uv
 
     def from_pixels(self, uv: ArrayLike) -> Array:
         """Lens coordinates (..., 2) of pixels (..., 2)."""
-        u, v = np.moveaxis(as_points(uv, 2, "uv"), -1, 0)
-        y = (v - self.cy) / self.fy
-        return np.stack([(u - self.cx - self.skew * y) / self.fx, y], axis=-1)
+        uv = as_points(uv, 2, "uv")
+        xy = np.empty(uv.shape)
+        xy[..., 1] = (uv[..., 1] - self.cy) / self.fy
+        xy[..., 0] = (uv[..., 0] - self.cx - self.skew * xy[..., 1]) / self.fx
+        return xy
 
     def contains(self, uv: ArrayLike) -> np.ndarray:
         """True where a pixel (..., 2) lies on the image; NaN does not."""

@@ -3,7 +3,7 @@
 NaN interrupts a line and hides a mark, as everywhere in camviz: "no such point" draws nothing.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from html import escape
 from math import isfinite
@@ -60,10 +60,10 @@ def dots(points: ArrayLike, class_: str, diameter: float = 5, **attributes: Any)
     return element("path", d=data, class_=f"{class_} dots", style=style, **attributes) if data else ""
 
 
-def text(point: ArrayLike, words: str, class_: str = "label", **attributes: Any) -> str:
+def text(point: Sequence[float] | np.ndarray, words: str, class_: str = "label", **attributes: Any) -> str:
     """Words at a point (2,); nothing where the point does not exist."""
-    x, y = np.asarray(point, dtype=float)
-    if not np.isfinite([x, y]).all():
+    x, y = map(float, point)
+    if not (isfinite(x) and isfinite(y)):
         return ""
     return element("text", escape(words, quote=False), x=x, y=y, class_=class_, **attributes)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isfinite, nan
 
 import numpy as np
 
@@ -241,17 +242,36 @@ def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
 
 def _fills(sight: Sight, items: Sequence[Item], name: str, scale: float) -> Iterator[Fill]:
     """Every face and sheet in view."""
-    for i, item in enumerate(items):
+    solids = [(i, item) for i, item in enumerate(items) if isinstance(item, Face | Sheet)]
+    if not solids:
+        return
+    points_cam = sight.points_cam(np.concatenate([item.vertices for _, item in solids]))
+    px = sight.place(points_cam)
+    end = 0
+    for i, item in solids:
+        here = slice(end, end := end + len(item.vertices))
         if isinstance(item, Face):
-            vertices = _cut_near(sight.points_cam(item.vertices))
-            if len(vertices) > 2 and np.isfinite(vertices).all():
-                yield float(vertices[:, 2].mean()), _fill(sight.place(vertices), item), {}
-        elif isinstance(item, Sheet):
-            points = sight.points_cam(item.vertices)
-            window = warp(sight.place(points), item, sight.camera.intrinsics, scale)
-            if window is not None:
-                key, (x, y, width, height), pixels = f"{name}-{i}", *window
-                yield float(np.nanmean(points[..., 2])), svg.image(key, x, y, width, height), {key: png(pixels)}
+            fill = _face(sight, item, points_cam[here], px[here])
+        else:
+            fill = _sheet(sight, item, points_cam[here], px[here], f"{name}-{i}", scale)
+        if fill is not None:
+            yield fill
+
+
+def _face(sight: Sight, face: Face, points_cam: Array, px: Array) -> Fill | None:
+    if points_cam[:, 2].min() < NEAR:
+        points_cam = _cut_near(points_cam)
+        px = sight.place(points_cam)
+    depth = float(points_cam[:, 2].mean()) if len(points_cam) > 2 else nan
+    return (depth, _fill(px, face), {}) if isfinite(depth) else None
+
+
+def _sheet(sight: Sight, sheet: Sheet, points_cam: Array, px: Array, name: str, scale: float) -> Fill | None:
+    window = warp(px, sheet, sight.camera.intrinsics, scale)
+    if window is None:
+        return None
+    rectangle, pixels = window
+    return float(np.nanmean(points_cam[:, 2])), svg.image(name, *rectangle), {name: png(pixels)}
 
 
 def _fill(px: Array, face: Face) -> str:

@@ -168,12 +168,14 @@ class EpipolarView(TwoCameras):
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
         if not self.baseline:
             return ""
-        axes = self.left.extrinsics[0]
-        along, first = self._plane_axes(axes[2] if abs(self._along @ axes[2]) < 0.9 else axes[0])
-        turn = np.arange(_PLANES) * (2 * np.pi / _PLANES)
-        across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(along, first)
-        lines = clipped(panel, panel.place(camera.project(camera.centre + _half_planes(along, across, 40))))
-        return svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
+        if panel.name not in self.drawn:
+            axes = self.left.extrinsics[0]
+            along, first = self._plane_axes(axes[2] if abs(self._along @ axes[2]) < 0.9 else axes[0])
+            turn = np.arange(_PLANES) * (2 * np.pi / _PLANES)
+            across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(along, first)
+            lines = clipped(panel, panel.place(camera.project(camera.centre + _half_planes(along, across, 40))))
+            self.drawn[panel.name] = svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
+        return self.drawn[panel.name]
 
     def _own_line(self, panel: Panel, camera: Camera) -> str:
         """The epipolar line of the chosen point, and in the right picture strong where its ray can be seen."""
@@ -263,12 +265,12 @@ class EpipolarView(TwoCameras):
 
     def _bodies(self, images: dict[str, np.ndarray], draft: bool) -> tuple[Item, ...]:
         """The two cameras; the same objects again until one of them moves."""
-        if draft not in self._drawn:
+        if draft not in self.drawn:
             s = self._nearness
             left = camera_body(self.left, 0.6 * s, image=images["left"], colour="blue")
             right = camera_body(self.right, 0.6 * s, image=images["right"], colour="orange")
-            self._drawn[draft] = (*left, *right)
-        return self._drawn[draft]
+            self.drawn[draft] = (*left, *right)
+        return self.drawn[draft]
 
     def _space_items(self) -> list[Item]:
         left, right, point, s = self.left.centre, self.right.centre, self.point, self._nearness

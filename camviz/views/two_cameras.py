@@ -12,7 +12,6 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import bends
-from camviz.draw.items import Item
 from camviz.lenses import BrownConrady, Equidistant, Perspective
 from camviz.lenses.base import Array, unit
 from camviz.scenes import textured_scene
@@ -21,6 +20,7 @@ from camviz.views.base import View, choice, slider, switch
 
 _TURN: dict[str, Any] = {"low": -40.0, "high": 40.0, "step": 0.5, "unit": "°"}
 _OF_THE_POINT = {"u", "v", "depth", "noise", "matches", "normalised", "truth", "eye"}  # the cameras stand still
+_OF_THE_CAMERAS = {"left", "right", "baseline", "F", "drawn"}
 _STAND = RigidTransform.from_translation([-0.4, 0.0, 0.0])  # of the left camera in the garden
 _CAMERAS = {
     "perspective": Camera(Intrinsics.from_fov(640, 480, 65), Perspective()),
@@ -81,13 +81,12 @@ class TwoCameras(View):
         """The same view with some fields changed; cameras that nobody moves are kept, and what was drawn of them."""
         changed = super().but(**changes)
         if not changes.keys() - _OF_THE_POINT:
-            kept = {name: made for name, made in vars(self).items() if name in ("left", "right", "baseline", "_drawn")}
-            vars(changed).update(kept)
+            vars(changed).update({name: made for name, made in vars(self).items() if name in _OF_THE_CAMERAS})
         return changed
 
     @cached_property
-    def _drawn(self) -> dict[bool, tuple[Item, ...]]:
-        """The cameras' bodies, as drawn in drafts and in fine pictures."""
+    def drawn(self) -> dict[Any, Any]:
+        """What a view has drawn of the two cameras alone, under names of its own."""
         return {}
 
     # The geometry ----------------------------------------------------------------------------------------------------
