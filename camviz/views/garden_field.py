@@ -69,4 +69,4 @@ def all_views(field: LightField, width: int = 424) -> bytes:
     shown = field.views if field.views.dtype == np.uint8 else to_display(field.views)
     small = max(4, width // field.columns), max(3, round(width / field.columns * field.height / field.width))
     views = [[cv2.resize(one, small, interpolation=cv2.INTER_AREA) for one in row] for row in shown]
-    return jpeg(to_mosaic(np.array(views)))
+    return jpeg(to_mosaic(np.array(views)), quality=70)

@@ -10,7 +10,7 @@ import traitlets
 
 from camviz.draw.picture import style
 from camviz.views.base import Control, View
-from camviz.widgets.memory import give_back_after_cells
+from camviz.widgets.memory import give_back_after_cells, keep_between_pictures
 from camviz.widgets.still import StillWidget
 
 _HERE = files("camviz.widgets")
@@ -40,6 +40,7 @@ class Explorer(StillWidget):
         super().__init__(controls=described, **_shown(view, controls, answers=0, draft=False))
         self._controls = controls
         self.on_msg(self._receive)
+        keep_between_pictures()
         give_back_after_cells()
 
     def set(self, **changes: Any) -> Explorer:
