@@ -26,11 +26,12 @@ def keep_between_pictures() -> None:
     """Let the process keep what it frees, up to some 60 MB, until `give_back`, where the C library is glibc.
 
     Left to itself it returns every array of more than 100 kB at once, and then gets the next one page by cleared page:
-    a quarter of the time that a fine picture takes.
+    a quarter of the time that a fine picture takes. Arrays of more than a megabyte still go back, for what OpenCV's
+    threads keep of them nobody can return.
     """
     if _mallopt:
         _mallopt(_TRIM_THRESHOLD, _KEPT)
-        _mallopt(_MMAP_THRESHOLD, _KEPT // 4)
+        _mallopt(_MMAP_THRESHOLD, 1 << 20)
 
 
 def give_back_after_cells() -> None:
