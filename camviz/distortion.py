@@ -27,7 +27,8 @@ def polynomial(lens: Lens) -> BrownConrady | None:
 
 
 def fold_radius(lens: Lens) -> float:
-    """The ideal radius where a lens's radial polynomial turns back, the first positive root of g'; infinity if none.
+    """The ideal radius where a lens's radial polynomial turns back: the first positive root of g', unless a pole comes
+    before it; else infinity.
 
     In the polynomial's own variable: r of the plane it acts on, or for Kannala-Brandt the angle θ in radians.
     """

@@ -155,6 +155,16 @@ def test_a_lens_cut_open_sends_its_rays_where_a_thin_lens_between_its_planes_wou
         assert view._bent(ray) == pytest.approx(at_first)
 
 
+@pytest.mark.parametrize("lens", ["triplet", "telephoto"])
+def test_the_highest_image_is_inside_the_section(lens):
+    height = LensElementsView.controls()["image_mm"].high
+    view = LensElementsView(lens=lens, image_mm=height)
+    panel = view._panel
+    x, y = panel.place((view.prescription.length_mm + view.prescription.back_focal_mm, height))
+    assert 0 < x < panel.width
+    assert 0 < y < panel.height
+
+
 @pytest.mark.parametrize(("name", "value"), [("lens", "telephoto"), ("opening", 0.1), ("image_mm", 15.0)])
 def test_every_control_of_the_lens_cut_open_changes_it(name, value):
     assert LensElementsView(**{name: value}).figure().body != LensElementsView().figure().body

@@ -114,6 +114,14 @@ def test_the_fold_is_where_the_radial_curve_stops_rising(lens):
     assert fold_radius(lens) == pytest.approx(first, abs=2e-5)
 
 
+def test_no_ray_gets_to_a_fold_beyond_a_pole():
+    """g = r (1 - 0.28 r² + 0.07 r⁴)/(1 - r²) rises to infinity at r = 1; at 1.893 it turns, unseen."""
+    lens = BrownConrady(-0.28, 0.07, k4=-1)
+    assert lens.radial(1.893) > lens.radial([1.8, 2.0]).max()
+    assert (fold_radius(lens), fold_angle(lens), pole_radius(lens)) == (inf, inf, 1)
+    assert np.isfinite(lens.project([np.tan(np.pi / 4 - 1e-6), 0, 1])).all()
+
+
 def test_a_pole_is_a_root_of_the_denominator_and_a_near_pole_almost_one():
     assert pole_radius(BrownConrady(k4=-0.25)) == pytest.approx(2)
     assert weakest_denominator(BrownConrady(k4=-0.25), 1) == pytest.approx((1, 0.75))

@@ -132,6 +132,14 @@ def test_the_description_counts_the_corners_in_view():
     assert "has no image" in away.figure(draft=True).svg()
 
 
+@pytest.mark.parametrize(
+    ("there", "pointed"), [({}, False), ({"x": 6.0}, True), ({"x": -6.0}, True), ({"y": 6.0}, True)]
+)
+def test_an_arrow_leads_to_a_camera_that_is_out_of_the_onlookers_sight(there, pointed):
+    assert ("the camera is this way" in FrustumView(**there).figure().body) is pointed
+    assert "the camera is this way" not in FrustumView(seen_from="camera view", **there).figure().body
+
+
 def test_a_camera_tipped_straight_down_is_still_drawn():
     down = FrustumView(pitch_deg=-90.0, yaw_deg=45.0, roll_deg=-30.0)
     np.testing.assert_allclose(down.numbers()["R"][2], (0, 1, 0), atol=1e-12)

@@ -94,7 +94,8 @@ def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top 
     """Names of the lines in one corner of the panel: (class, words) pairs, each with a sample of its line."""
     x = 10 if "left" in corner else panel.width - 20 - 7 * max(len(words) for _, words in entries) - 20
     y = 18 if "top" in corner else panel.height - 18 * len(entries) + 6
-    rows = []
+    width, height = 34 + 6.1 * max(len(words) for _, words in entries), 18 * len(entries) + 2
+    rows = [svg.rectangle(x - 6, y - 15, width, height, "card", fill_opacity=0.85)]
     for i, (class_, words) in enumerate(entries):
         rows.append(svg.line([(x, y + 18 * i - 4), (x + 20, y + 18 * i - 4)], class_))
         rows.append(svg.text((x + 27, y + 18 * i), words, "note halo"))

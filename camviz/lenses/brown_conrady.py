@@ -92,11 +92,15 @@ class BrownConrady(RayLens):
 
     @cached_property
     def fold_radius(self) -> float:
-        """The smallest positive root of g'(r), where the radial part turns back; infinity if it never does."""
+        """The smallest positive root of g'(r), where the radial part turns back; infinity if no ray gets there.
+
+        It never turns back, or has a pole before it does, at which it is infinite and all images end.
+        """
         N, D = self.numerator, self.denominator
         # g' = (N D + 2 s (N' D - N D')) / D²
         rising = N * D + Polynomial([0, 2]) * (N.deriv() * D - N * D.deriv())
-        return sqrt(first_positive_root(rising.coef))
+        fold = sqrt(first_positive_root(rising.coef))
+        return fold if fold < self.pole_radius else inf
 
     @cached_property
     def pole_radius(self) -> float:

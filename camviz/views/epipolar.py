@@ -212,7 +212,7 @@ class EpipolarView(TwoCameras):
         if camera.intrinsics.contains(uv):
             words = "epipole: the other camera’s centre"
             side = "end" if at[0] > panel.width / 2 else ""
-            return ring(at, "yellow", 8) + svg.text(at + (-14 if side else 14, -8), words, f"yellow halo {side}")
+            return ring(at, "yellow", 8) + svg.text(at + (-14 if side else 14, -8), words, f"label halo {side}")
         toward = at - (panel.width / 2, panel.height / 2) if np.isfinite(uv).all() else _heading(camera, other)
         return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}, this way")
 
@@ -227,7 +227,7 @@ class EpipolarView(TwoCameras):
         marks = ring(at, "red", 8) + svg.dots([at], "red", 5)
         if self.truth and np.isfinite(self.surface).all():
             true = panel.place(_inside(camera, camera.project(self.surface)))
-            marks = ring(true, "sky", 13) + svg.text(true + (17, 5), "the surface", "sky halo") + marks
+            marks = ring(true, "sky", 13) + svg.text(true + (17, 5), "the surface", "label halo") + marks
         return marks
 
     @cached_property

@@ -28,11 +28,11 @@ from camviz.draw.space import (
     space_panel,
 )  # fmt: skip
 from camviz.lenses import Lens, Perspective
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, unit
 from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
-from camviz.views.marks import clipped
+from camviz.views.marks import border_arrow, clipped
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
 
@@ -150,7 +150,15 @@ class FrustumView(View):
         )
         title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
+        content += self._whereabouts(panel, np.zeros(3) if from_camera else self.camera.centre)
         return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs
+
+    def _whereabouts(self, panel: Panel, centre: Array) -> str:
+        """An arrow towards the camera's centre (3,) where that is out of the panel."""
+        onlooker = self.eye.camera(int(panel.width), int(panel.height))
+        if onlooker.sees(centre):
+            return ""
+        return border_arrow(panel, unit(transform(onlooker.cam_from_world, centre)[:2]), "the camera is this way")
 
     def _items(self, image: np.ndarray) -> list[Item]:
         near = self.near if self.near < self.far else 0

@@ -18,6 +18,8 @@ from camviz.views.base import View, choice, slider
 _LENSES = {"triplet": (optics.COOKE_TRIPLET, 5.0), "telephoto": (optics.TELEPHOTO, 5.6)}
 _BEFORE = 0.35  # of the focal length, that is drawn before the first surface
 _EDGE = 1.12  # how much wider the glass is than the light
+_WIDE, _TALL = 920, 290  # of the section, in picture units
+_HIGHEST_MM = 15.0  # image
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class LensElementsView(View):
 
     lens: str = choice("triplet", "telephoto", label="lens", help="50 mm f/5, or 600 mm f/5.6")
     opening: float = slider(1.0, 0.1, 1.0, 0.05, label="opening", help="share of the full aperture that the rays fill")
-    image_mm: float = slider(0.0, 0.0, 15.0, 0.5, label="image height", unit="mm", help="where the light meets")
+    image_mm: float = slider(0.0, 0.0, _HIGHEST_MM, 0.5, label="image height", unit="mm", help="where the light meets")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -71,8 +73,8 @@ class LensElementsView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, 372, "paper") + self._section() + self._numbers()
-        return Picture(body, 960, 372, self.title, self.description())
+        body = svg.rectangle(0, 0, 960, _TALL + 152, "paper") + self._section() + self._numbers()
+        return Picture(body, 960, _TALL + 152, self.title, self.description())
 
     @cached_property
     def _panel(self) -> Panel:
@@ -80,8 +82,8 @@ class LensElementsView(View):
         lens = self.prescription
         end = lens.length_mm + lens.back_focal_mm
         left, right = min(-_BEFORE * lens.focal_mm, lens.front_principal_mm - 0.06 * end), 1.06 * end
-        half = (right - left) * 220 / 920 / 2
-        return Panel("section", 20, 34, 920, 220, left, right, half, -half)
+        half = max((right - left) * _TALL / _WIDE / 2, 1.1 * _HIGHEST_MM)
+        return Panel("section", 20, 34, _WIDE, _TALL, right - 2 * half * _WIDE / _TALL, right, half, -half)
 
     def _section(self) -> str:
         panel, lens = self._panel, self.prescription
@@ -131,7 +133,7 @@ class LensElementsView(View):
     def _numbers(self) -> str:
         rows = ""
         for i, (name, value) in enumerate(self.numbers().items()):
-            x, y = 20 + 470 * (i // 3), 286 + 26 * (i % 3)
+            x, y = 20 + 470 * (i // 3), _TALL + 66 + 26 * (i % 3)
             rows += svg.text((x, y), name, "note") + svg.text((x + 170, y), value, "label")
         return rows
 

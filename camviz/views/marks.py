@@ -22,7 +22,7 @@ def border_arrow(panel: Panel, toward: Array, words: str) -> str:
     arrow = svg.polygon([tip + 8 * toward, tip - 6 * toward + 7 * across, tip - 6 * toward - 7 * across], "fill-yellow")
     side = "end" if toward[0] > 0.5 else "" if toward[0] < -0.5 else "middle"
     below = -12 if tip[1] > centre[1] - 14 else 22
-    return arrow + svg.text(tip + (-14 * np.sign(toward[0]) * (side != "middle"), below), words, f"yellow halo {side}")
+    return arrow + svg.text(tip + (-14 * np.sign(toward[0]) * (side != "middle"), below), words, f"label halo {side}")
 
 
 def camera_outline(panel: Panel, camera: Camera, other: Camera, depth: float, class_: str) -> str:

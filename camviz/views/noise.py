@@ -149,7 +149,7 @@ class PhotonTransferView(View):
             "exposure": _seconds(self.exposure_s),
             "gain K": f"{K:.4g} DN/e⁻",
             "K from the curve": f"{fitted:.4g} DN/e⁻, {fitted / K:.3g} × K" if isfinite(fitted) else "none",
-            "on the card": f"{self.card_e:.4g} e⁻ ± {whole:.3g}",
+            "on the card": f"{_electrons(self.card_e)} e⁻ ± {_electrons(whole)}",
             "signal / noise": f"{self.card_e / max(whole, 1e-9):.3g}" if full < 0.5 else "saturated",
             "mostly from": max(parts, key=lambda name: float(parts[name][0])),
             "card saturated": f"{100 * full:.0f} %",
@@ -249,15 +249,20 @@ class PhotonTransferView(View):
         K = self.sensor.gain_dn_per_e
         signal = np.logspace(panel.left, panel.right, 40)
         parts = self.parts(signal / K)
-        lines, legend = [], []
-        for name, (class_, slope) in _STYLES.items():
-            part = parts.get(name, np.zeros(1))
-            if part.max() > 0:
-                lines.append(plot.curve(panel, np.log10(signal), np.log10(part), class_))
-                legend.append((class_, f"{name} (slope {slope})"))
+        lines = [
+            plot.curve(panel, np.log10(signal), np.log10(parts[name]), class_)
+            for name, (class_, _) in _STYLES.items()
+            if name in parts and parts[name].max() > 0
+        ]
         whole = np.sqrt(sum(part**2 for part in parts.values()))
-        lines.append(plot.curve(panel, np.log10(signal), np.log10(whole), "ink"))
-        return "".join(lines) + plot.legend(panel, [("ink", "all together"), *legend], "top left")
+        return "".join(lines) + plot.curve(panel, np.log10(signal), np.log10(whole), "ink")
+
+    def _legend(self) -> str:
+        """Beside the numbers: wherever it stood among the curves, some gain would lead one through it."""
+        parts = self.parts(np.array([self.card_e]))
+        drawn = [(_STYLES[name], name) for name in _STYLES if name in parts and parts[name].max() > 0]
+        named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
+        return svg.group(plot.legend(self._plot, [("ink", "all together"), *named]), transform="translate(764 454)")
 
     def _points(self, panel: Panel, pixels: int) -> str:
         """What frames of the card say, and the exposure of the picture."""
@@ -274,8 +279,8 @@ class PhotonTransferView(View):
         rows = [svg.text((490, 448), "On the card", "title")]
         for i, (name, value) in enumerate(self.numbers(pixels).items()):
             rows.append(svg.text((490, 472 + 20 * i), name, "note"))
-            rows.append(svg.text((620, 472 + 20 * i), value, "label"))
-        return "".join(rows)
+            rows.append(svg.text((600, 472 + 20 * i), value, "label"))
+        return "".join([*rows, self._legend()])
 
     # The exposure is dragged along the curve --------------------------------------------------------------------------
 
@@ -334,6 +339,10 @@ def _garden(side: int) -> np.ndarray:
 def _card_slices(height: int, width: int) -> tuple[slice, slice]:
     left, top, right, bottom = _CARD
     return slice(round(top * height), round(bottom * height)), slice(round(left * width), round(right * width))
+
+
+def _electrons(count: float) -> str:
+    return f"{count:,.0f}" if count >= 1000 else f"{count:.3g}"
 
 
 def _seconds(seconds: float) -> str:

@@ -179,7 +179,8 @@ class RingView(View):
             far = centres[i] + 4 * (post - centres[i]) / np.linalg.norm(post - centres[i])
             drawn += svg.line(panel.place(np.stack([centres[i], far])), "blue")
         drawn += svg.dots(panel.place(centres), "ink", 7) + svg.dots([panel.place(post)], "red", 9)
-        drawn += svg.text(panel.place(post) + (10, 4), "1.5 m", "label red halo")
+        side = "end" if post[0] > 1 else ""
+        drawn += svg.text(panel.place(post) + (-10 if side else 10, 4), "1.5 m", f"label red halo {side}")
         return panel.show(drawn, title="From above", note=f"{100 * self.ring.baseline:.1f} cm apart")
 
     def _plot_panel(self) -> str:
