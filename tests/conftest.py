@@ -1,5 +1,6 @@
 """What every test runs under."""
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # Two cores shared by several workers: no deadlines. The same examples on every run, so that a red run can be repeated.
@@ -7,3 +8,11 @@ settings.register_profile(
     "camviz", deadline=None, derandomize=True, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("camviz")
+
+
+@pytest.fixture
+def room(tmp_path, monkeypatch):
+    """An empty current folder, apart from the files the tests read."""
+    (tmp_path / "room").mkdir()
+    monkeypatch.chdir(tmp_path / "room")
+    return tmp_path / "room"

@@ -1,4 +1,4 @@
-"""Colour: spectra, colour spaces, white balance and matrices, against published values and colour-science."""
+"""Colour: spaces, temperature, white balance and matrices, against published values and colour-science."""
 
 from __future__ import annotations
 
@@ -7,105 +7,14 @@ import warnings
 import cv2
 import numpy as np
 import pytest
+from raw_charts import raw_chart
 
-from camviz.cameras import Camera, Intrinsics
 from camviz.colour import balance, charts, spaces, spectra, temperature
-from camviz.colour.developing import Shot
-from camviz.photographs import photograph
-from camviz.scenes import Rectangle, Scene, Texture, render, textured_scene
-from camviz.scenes.light import to_display, to_encoded
+from camviz.scenes.light import to_encoded
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
     import colour
-
-
-def published_at(spectrum):
-    """A spectrum of colour-science at those of camviz's wavelengths where it was measured, and which these are."""
-    known = np.isin(spectra.WAVELENGTHS_NM, spectrum.domain)
-    return np.array([spectrum[nm] for nm in spectra.WAVELENGTHS_NM[known]]), known
-
-
-# Spectra -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", spectra.ILLUMINANTS)
-def test_illuminants_are_as_published(name):
-    values, known = published_at(colour.SDS_ILLUMINANTS[name])
-    np.testing.assert_allclose(spectra.illuminant(name)[known], values, rtol=1e-6)
-    assert known.all()
-
-
-def test_the_observer_is_as_published():
-    cmfs = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-    np.testing.assert_allclose(spectra.observer(), cmfs[spectra.WAVELENGTHS_NM], rtol=1e-6, atol=1e-12)
-
-
-def test_the_chart_is_as_published():
-    chart = colour.SDS_COLOURCHECKERS["cc_ohta"]
-    for one, name, sd in zip(spectra.reflectances(), spectra.patch_names(), chart.values(), strict=True):
-        np.testing.assert_allclose(one, sd[spectra.WAVELENGTHS_NM], rtol=1e-6, err_msg=name)
-    assert [name.partition(" (")[0] for name in chart] == list(spectra.patch_names())
-
-
-@pytest.mark.parametrize(
-    ("camera", "its"), [("Nikon D5100", "Nikon 5100 (NPL)"), ("Sigma SD1 Merrill", "Sigma SDMerill (NPL)")]
-)
-def test_cameras_are_as_published(camera, its):
-    theirs = colour.MSDS_CAMERA_SENSITIVITIES[its]
-    known = np.isin(spectra.WAVELENGTHS_NM, theirs.domain)
-    np.testing.assert_allclose(spectra.sensitivities(camera)[known], theirs[spectra.WAVELENGTHS_NM[known]], atol=2e-7)
-    assert spectra.sensitivities(camera).min() >= 0
-
-
-def test_a_black_body_obeys_planck():
-    nm = colour.SpectralShape(380, 780, 5)
-    for kelvin in (1000, 2856, 6500, 20000):
-        theirs = colour.sd_blackbody(kelvin, nm)
-        np.testing.assert_allclose(spectra.planckian(kelvin), 100 * theirs.values / theirs[560], rtol=1e-6)
-
-
-@pytest.mark.parametrize("kelvin", [4000, 5003, 6504, 7000, 12000, 25000])
-def test_daylight_follows_the_cie(kelvin):
-    """The oracle is told not to round its weights either."""
-    xy = colour.temperature.CCT_to_xy_CIE_D(kelvin)
-    np.testing.assert_allclose(spectra.daylight_xy(kelvin), xy, atol=1e-12)
-    theirs = colour.sd_CIE_illuminant_D_series(xy, M1_M2_rounding=False)
-    np.testing.assert_allclose(spectra.daylight(kelvin), theirs[spectra.WAVELENGTHS_NM], rtol=1e-6)
-
-
-def test_the_tabulated_daylight_is_that_of_its_temperature():
-    """D65 is daylight of 6500 K times 1.4388/1.4380, since the constant c2 was measured better after it was named."""
-    np.testing.assert_allclose(spectra.daylight(6500 * 1.4388 / 1.4380), spectra.illuminant("D65"), rtol=2e-3)
-
-
-def test_resampling_keeps_what_it_meets_and_is_dark_outside():
-    light = spectra.illuminant("D65")
-    np.testing.assert_array_equal(
-        spectra.resampled(light, [375, 380, 382.5, 780, 790])[[0, 1, 3, 4]], [0, light[0], light[-1], 0]
-    )
-    assert spectra.resampled(light, 382.5) == pytest.approx((light[0] + light[1]) / 2)
-    assert spectra.resampled(spectra.observer(), np.arange(400, 701, 10)).shape == (31, 3)
-
-
-def test_tables_cannot_be_written_to():
-    with pytest.raises(ValueError, match="read-only"):
-        spectra.illuminant("A")[0] = 1
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: spectra.illuminant("D66"), "illuminant must be one of A, D50"),
-        (lambda: spectra.sensitivities("phone"), "camera must be one of Nikon"),
-        (lambda: spectra.planckian(0), "kelvin must be above 0"),
-        (lambda: spectra.daylight(3000), r"kelvin must be 4000 … 25000 for daylight, got 3000"),
-        (lambda: spectra.daylight(float("nan")), "kelvin must be"),
-    ],
-)
-def test_what_has_no_spectrum_is_refused_by_name(call, words):
-    with pytest.raises(ValueError, match=words):
-        call()
 
 
 # Spaces --------------------------------------------------------------------------------------------------------------
@@ -306,13 +215,6 @@ PHYSICAL = [camera for camera in spectra.CAMERAS if camera != "CIE observer"]
 LIGHTS = ["D65", "A", "FL11"]
 
 
-def raw_chart(camera, name):
-    """The chart's raw colours (24, 3) and a perfect white's (3,), whose green is 1."""
-    light, sensitivity = spectra.illuminant(name), spectra.sensitivities(camera)
-    white = balance.response(light, 1, sensitivity)
-    return balance.response(light, spectra.reflectances(), sensitivity) / white[1], white / white[1]
-
-
 def delta_e(xyz1, xyz2):
     return spaces.difference(spaces.to_lab(xyz1, balance.WHITE), spaces.to_lab(xyz2, balance.WHITE))
 
@@ -470,83 +372,3 @@ def test_a_gel_tints_and_its_opposite_undoes_it():
 def test_what_cannot_be_balanced_or_fitted_is_refused_in_words(call, words):
     with pytest.raises(ValueError, match=words):
         call()
-
-
-# The chart in a photograph -------------------------------------------------------------------------------------------
-
-
-def painted_chart(cast=(1, 1, 1)):
-    """The chart from straight ahead, sRGB bytes: each patch in D65 times a cast."""
-    return to_display(charts.painted(np.clip(charts.published_srgb(), 0, 1) * cast, side=60))
-
-
-def photographed(chart, corners, rng):
-    """The chart between four corners in a photograph of 900 × 600 with a little noise."""
-    height, width = chart.shape[:2]
-    edges = np.float32([(-0.5, -0.5), (width - 0.5, -0.5), (width - 0.5, height - 0.5), (-0.5, height - 0.5)])
-    warp = cv2.getPerspectiveTransform(edges, np.float32(corners))
-    picture = cv2.resize(photograph("coffee"), (900, 600), interpolation=cv2.INTER_AREA)
-    seen = cv2.warpPerspective(np.full((height, width), 255, np.uint8), warp, (900, 600)) > 128
-    picture[seen] = cv2.warpPerspective(chart, warp, (900, 600))[seen]
-    return np.clip(picture + rng.normal(0, 2, picture.shape), 0, 255).astype(np.uint8)
-
-
-UPRIGHT = [(250, 150), (650, 180), (640, 450), (240, 430)]
-
-
-@pytest.mark.parametrize("corners", [UPRIGHT, UPRIGHT[2:] + UPRIGHT[:2]], ids=["upright", "upside down"])
-def test_a_chart_is_found_and_its_colours_read(corners):
-    cast = np.array([0.9, 0.75, 0.5])
-    found = charts.find_chart(photographed(painted_chart(cast), corners, np.random.default_rng(0)))
-    np.testing.assert_allclose(found.rgb, np.clip(charts.published_srgb(), 0, 1) * cast, atol=0.012)
-    assert not found.clipped
-    first, last = np.asarray(corners[0]), np.asarray(corners[2])
-    assert (
-        np.linalg.norm(found.patches[0].mean(axis=0) - first)
-        < 60
-        < np.linalg.norm(found.patches[0].mean(axis=0) - last)
-    )
-
-
-def test_a_matrix_from_the_photographed_chart_undoes_a_cast():
-    found = charts.find_chart(photographed(painted_chart((0.9, 0.75, 0.5)), UPRIGHT, np.random.default_rng(1)))
-    m = balance.fit_matrix(found.rgb, charts.published_srgb())
-    assert charts.differences(found.rgb).mean() > 7
-    assert charts.differences(found.rgb @ m.T).mean() < 1.5
-
-
-def test_a_chart_beside_a_chessboard_is_found_in_a_photograph_of_the_garden():
-    """OpenCV's detector alone takes something else for the chart there."""
-    colours = Texture(0.9 * charts.painted(np.clip(charts.published_srgb(), 0, 1)))
-    chart = Rectangle((-0.3, -0.25, 1.6), (0.84, 0.0, 0.2), (0.0, 0.57, 0.05), colours)
-    garden = textured_scene()
-    camera = Camera(Intrinsics.from_fov(900, 600, 60))
-    bulb = Shot("Nikon D5100", spectra.planckian(2850))
-    picture = to_display(0.9 * render(Scene([*garden.surfaces, chart], garden.sky), camera) @ bulb.raw_from_srgb.T)
-    found = charts.find_chart(picture)
-    first = camera.project(chart.corner + (0.5 / 6 * chart.across + 0.5 / 4 * chart.down))
-    np.testing.assert_allclose(found.patches[0].mean(axis=0), first, atol=5)
-    m = balance.fit_matrix(found.rgb, charts.published_srgb())
-    assert charts.differences(found.rgb).mean() > 10
-    assert charts.differences(found.rgb @ m.T).mean() < 1
-
-
-def test_what_has_not_the_chart_s_colours_is_no_chart():
-    """Whatever the light and the camera, a matrix brings a chart's colours home; it does not bring others there."""
-    chart = raw_chart("Sigma SD1 Merrill", "A")[0]
-    assert charts._alike(chart)
-    assert not charts._alike(chart[::-1])
-    assert not charts._alike(np.random.default_rng(11).permutation(chart))
-    assert not charts._alike(np.random.default_rng(12).uniform(0, 1, (24, 3)))
-
-
-def test_overexposed_patches_are_named():
-    found = charts.find_chart(photographed(painted_chart((1.4, 1.4, 1.4)), UPRIGHT, np.random.default_rng(2)))
-    assert 18 in found.clipped
-
-
-def test_a_picture_without_a_chart_is_refused_in_words():
-    with pytest.raises(ValueError, match="no chart of 24 patches was found in this picture of 600 × 400 pixels: show"):
-        charts.find_chart(photograph("coffee"))
-    with pytest.raises(ValueError, match="uint8"):
-        charts.find_chart(np.zeros((40, 40, 3)))

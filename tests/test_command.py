@@ -1,37 +1,24 @@
 """The command `camviz` does what it says or says in one sentence why not; a reader's lessons are safe from it."""
 
 import io
-import json
 import os
 import re
-import subprocess
 import sys
 import types
 from pathlib import Path
 
 import pytest
-from packaging.requirements import Requirement
+from commandline import refused, run
 
 import camviz
-from camviz import doctor, working_copy
+from camviz import doctor
 from camviz.command import main
-from camviz.commands import lab
-from camviz.working_copy import MANIFEST, lay_out
 
 DATA = Path(__file__).parent / "data"
-ROOT = Path(camviz.__file__).parents[1]
 MONO = "image_width: 640\nimage_height: 480\nK: [{fx}, 0, 320, 0, 500, 240, 0, 0, 1]\nD: [{d}]\n"
 BOMB = "a: &a [x, x, x, x, x, x, x, x]\n" + "".join(
     f"{b}: &{b} [{', '.join([f'*{a}'] * 8)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
 )
-
-
-@pytest.fixture
-def room(tmp_path, monkeypatch):
-    """An empty current folder, apart from the files the tests read."""
-    (tmp_path / "room").mkdir()
-    monkeypatch.chdir(tmp_path / "room")
-    return tmp_path / "room"
 
 
 @pytest.fixture
@@ -41,26 +28,6 @@ def page(monkeypatch):
     writer.write_page = lambda calibration, path: Path(path).write_text(f"page of {calibration.source.name}")
     monkeypatch.setitem(sys.modules, "camviz.page", writer)
     return writer
-
-
-def run(*words, **options):
-    """The command in a process of its own, as a person runs it."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-m", "camviz", *words], capture_output=True, text=True, env=environment, timeout=60, **options
-    )
-
-
-def refused(capsys, room, *words):
-    """The one sentence of a refusal with status 2 that wrote nothing."""
-    before = sorted(room.rglob("*"))
-    assert main(words) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("camviz: ")
-    assert err.count("\n") == 1
-    assert sorted(room.rglob("*")) == before
-    return err
 
 
 def bad_files(folder):
@@ -276,265 +243,3 @@ def test_a_closed_pipe_is_no_complaint(monkeypatch, capsys):
     assert main(["doctor"]) == 0
     sys.stdout.close()
     assert capsys.readouterr().err == ""
-
-
-# The lessons ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def lessons(tmp_path):
-    """A package's lessons: two notebooks and a picture."""
-    source = tmp_path / "package"
-    (source / "images").mkdir(parents=True)
-    for name in ("00_start.ipynb", "01_pinhole.ipynb", "images/box.svg"):
-        (source / name).write_text(f"first {name}")
-    return source
-
-
-def contents(folder):
-    return {
-        path.relative_to(folder).as_posix(): path.read_text()
-        for path in folder.rglob("*")
-        if path.is_file() and path.name != MANIFEST
-    }
-
-
-def test_a_first_copy_has_every_lesson(lessons, tmp_path):
-    (lessons / ".ipynb_checkpoints").mkdir()
-    (lessons / ".ipynb_checkpoints" / "old.ipynb").write_text("old")
-    sentences = lay_out(lessons, tmp_path / "copy", "1")
-    assert set(contents(tmp_path / "copy")) == {"00_start.ipynb", "01_pinhole.ipynb", "images/box.svg"}
-    assert len(sentences) == 1
-
-
-def test_a_second_start_changes_nothing(lessons, tmp_path):
-    lay_out(lessons, tmp_path / "copy", "1")
-    (tmp_path / "copy" / "00_start.ipynb").write_text("mine")
-    before = contents(tmp_path / "copy")
-    assert lay_out(lessons, tmp_path / "copy", "1") == []
-    assert contents(tmp_path / "copy") == before
-
-
-def test_a_lesson_that_was_deleted_comes_back(lessons, tmp_path):
-    lay_out(lessons, tmp_path / "copy", "1")
-    (tmp_path / "copy" / "00_start.ipynb").unlink()
-    lay_out(lessons, tmp_path / "copy", "1")
-    assert contents(tmp_path / "copy")["00_start.ipynb"] == "first 00_start.ipynb"
-
-
-def test_a_new_version_replaces_only_what_was_not_changed(lessons, tmp_path):
-    """The changed lesson stays; its new version lies beside it, is said once, and is itself kept up to date."""
-    copy = tmp_path / "copy"
-    lay_out(lessons, copy, "1")
-    (copy / "00_start.ipynb").write_text("mine")
-    for name in ("00_start.ipynb", "01_pinhole.ipynb"):
-        (lessons / name).write_text(f"second {name}")
-    sentences = lay_out(lessons, copy, "2")
-    assert contents(copy) == {
-        "00_start.ipynb": "mine",
-        "00_start.new-2.ipynb": "second 00_start.ipynb",
-        "01_pinhole.ipynb": "second 01_pinhole.ipynb",
-        "images/box.svg": "first images/box.svg",
-    }
-    assert len(sentences) == 1
-    assert "00_start.new-2.ipynb" in sentences[0]
-    assert lay_out(lessons, copy, "2") == []
-
-
-def test_what_a_reader_wrote_into_the_new_version_stays_too(lessons, tmp_path):
-    copy = tmp_path / "copy"
-    lay_out(lessons, copy, "1")
-    (copy / "00_start.ipynb").write_text("mine")
-    (lessons / "00_start.ipynb").write_text("second")
-    lay_out(lessons, copy, "2")
-    (copy / "00_start.new-2.ipynb").write_text("mine as well")
-    (lessons / "00_start.ipynb").write_text("second, corrected")
-    lay_out(lessons, copy, "2")
-    assert contents(copy)["00_start.ipynb"] == "mine"
-    assert contents(copy)["00_start.new-2.ipynb"] == "mine as well"
-
-
-def test_a_readers_own_files_are_not_touched(lessons, tmp_path):
-    """A file of the same name that camviz never laid out counts as the reader's."""
-    copy = tmp_path / "copy"
-    copy.mkdir()
-    (copy / "00_start.ipynb").write_text("my own")
-    (copy / "notes.md").write_text("my notes")
-    lay_out(lessons, copy, "1")
-    assert contents(copy)["00_start.ipynb"] == "my own"
-    assert contents(copy)["notes.md"] == "my notes"
-    assert contents(copy)["00_start.new-1.ipynb"] == "first 00_start.ipynb"
-
-
-@pytest.mark.parametrize("damage", ["", "[]", '{"files": 3}', "\xff", '{"files": {"../../x": "0"}}'])
-def test_without_its_list_every_change_counts_as_the_readers(lessons, tmp_path, damage):
-    copy = tmp_path / "copy"
-    lay_out(lessons, copy, "1")
-    (copy / MANIFEST).write_text(damage, encoding="latin-1")
-    (copy / "00_start.ipynb").write_text("mine")
-    (lessons / "00_start.ipynb").write_text("second")
-    lay_out(lessons, copy, "2")
-    assert contents(copy)["00_start.ipynb"] == "mine"
-
-
-@pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")
-def test_links_are_not_written_through(lessons, tmp_path):
-    copy = tmp_path / "copy"
-    copy.mkdir()
-    (tmp_path / "elsewhere.ipynb").write_text("elsewhere")
-    (copy / "00_start.ipynb").symlink_to(tmp_path / "elsewhere.ipynb")
-    (copy / "01_pinhole.ipynb").symlink_to(tmp_path / "nowhere.ipynb")
-    lay_out(lessons, copy, "1")
-    assert (tmp_path / "elsewhere.ipynb").read_text() == "elsewhere"
-    assert not (tmp_path / "nowhere.ipynb").exists()
-
-
-@pytest.fixture
-def jupyter(monkeypatch):
-    """Collects what JupyterLab would be started with."""
-    started = []
-    labapp = types.ModuleType("jupyterlab.labapp")
-    labapp.LabApp = types.SimpleNamespace(launch_instance=started.append)
-    monkeypatch.setitem(sys.modules, "jupyterlab.labapp", labapp)
-    monkeypatch.setenv("PYTHONPATH", "")
-    monkeypatch.setattr(lab.os, "geteuid", lambda: 1000, raising=False)
-    return started
-
-
-def test_a_checkout_opens_its_own_lessons(jupyter, room, capsys):
-    assert main(["lab", "--no-browser", "--", "--port=9999"]) == 0
-    (words,) = jupyter
-    assert words[:3] == [f"--ServerApp.root_dir={(ROOT / 'lessons').resolve()}", "--no-browser", "--port=9999"]
-    assert list(room.iterdir()) == []
-
-
-@pytest.mark.parametrize("asked", [[], ["--allow-root"]])
-def test_root_is_let_in_and_told(jupyter, room, monkeypatch, capsys, asked):
-    """In a container one is root, where JupyterLab by itself would end with an error."""
-    monkeypatch.setattr(lab.os, "geteuid", lambda: 0, raising=False)
-    assert main(["lab", "--no-browser", "--", *asked]) == 0
-    (words,) = jupyter
-    assert words.count("--allow-root") == 1
-    assert ("You are root" in capsys.readouterr().out) == (not asked)
-
-
-def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatch, capsys):
-    monkeypatch.setattr(lab, "checkout_lessons", lambda: None)
-    monkeypatch.setattr(lab, "lessons_source", lambda: lessons)
-    assert main(["lab"]) == 0
-    copy = room / "camviz-lessons"
-    assert jupyter == [[f"--ServerApp.root_dir={copy}", str(copy / "00_start.ipynb")]]
-    assert "camviz-lessons" in capsys.readouterr().out
-
-
-def test_the_editions_do_not_overwrite_each_other(jupyter, room, lessons, monkeypatch, capsys):
-    """The teacher's edition is not laid out over students' lessons, and opening it does not make it theirs."""
-    monkeypatch.setattr(lab, "checkout_lessons", lambda: None)
-    monkeypatch.setattr(lab, "lessons_source", lambda: lessons)
-    assert main(["lab"]) == 0
-    capsys.readouterr()
-    assert "the students' lessons are in this one" in refused(capsys, room, "teacher", "camviz-lessons")
-    assert main(["teacher", "mine"]) == 0
-    before = contents(room / "mine")
-    assert main(["lab", "mine"]) == 0
-    assert contents(room / "mine") == before
-    assert main(["teacher", "mine"]) == 0
-
-
-def test_the_lessons_of_a_wheel_are_inside_the_package(tmp_path, monkeypatch):
-    """Where there is no pyproject.toml beside the package, the lessons are in camviz/_lessons."""
-    inside = tmp_path / "site-packages" / "camviz" / "_lessons"
-    inside.mkdir(parents=True)
-    monkeypatch.setattr(working_copy.camviz, "__file__", str(inside.parent / "__init__.py"))
-    assert working_copy.checkout_lessons() is None
-    assert working_copy.lessons_source() == inside
-
-
-def test_lab_refuses_a_file_for_a_folder(jupyter, room, capsys):
-    (room / "file").write_text("")
-    assert "this is a file" in refused(capsys, room, "lab", "file")
-    assert jupyter == []
-
-
-def test_lab_without_jupyterlab_says_how_to_get_it(room, monkeypatch, capsys):
-    monkeypatch.setattr(lab, "find_spec", lambda name: None)
-    assert main(["lab"]) == 1
-    assert "pip install 'camviz[lab]'" in capsys.readouterr().err
-    assert list(room.iterdir()) == []
-
-
-# The doctor ----------------------------------------------------------------------------------------------------------
-
-
-def test_a_package_is_held_against_its_range():
-    assert doctor.package(Requirement("numpy>=1")).status == "ok"
-    old = doctor.package(Requirement("numpy>=999"))
-    assert old.status == "missing"
-    assert old.remedy == "pip install 'numpy>=999'"
-    absent = doctor.package(Requirement("no-such-package-here>=1"), "lab")
-    assert (absent.status, absent.detail) == ("warn", "not installed")
-
-
-def test_the_requirements_are_those_of_the_project():
-    listed = {(extra, requirement.name.casefold()) for extra, requirement in doctor.requirements()}
-    assert {("", "numpy"), ("", "pyyaml"), ("lab", "jupyterlab")} <= listed
-    assert "pytest" not in {name for _, name in listed}
-
-
-@pytest.mark.parametrize(("asked", "status"), [("wire", "ok"), ("solid", "ok"), ("", "ok"), ("wired", "warn")])
-def test_an_unknown_renderer_is_noticed(monkeypatch, asked, status):
-    monkeypatch.setenv("CAMVIZ_RENDERER", asked)
-    assert doctor.renderer().status == status
-
-
-def test_widgets_that_jupyterlab_does_not_find_are_noticed(tmp_path):
-    (tmp_path / "anywidget").mkdir()
-    assert doctor._widget("anywidget", "anywidget", [str(tmp_path)], False).status == "warn"
-    (tmp_path / "anywidget" / "package.json").write_text("{}")
-    assert doctor._widget("anywidget", "anywidget", [str(tmp_path)], False).status == "ok"
-    assert "enable" in doctor._widget("anywidget", "anywidget", [str(tmp_path)], True).remedy
-
-
-def test_missing_samples_are_a_warning_not_a_fault(tmp_path, monkeypatch):
-    monkeypatch.setenv("CAMVIZ_SAMPLES", str(tmp_path))
-    monkeypatch.setattr("camviz.samples._pooch", lambda: types.SimpleNamespace(path=tmp_path))
-    monkeypatch.setattr("camviz.samples.BASE_URL", "http://127.0.0.1:9/")
-    finding = doctor.samples()
-    assert (finding.status, finding.detail[:7]) == ("warn", "0 of 29")
-
-
-def test_the_report_is_the_same_for_people_and_programs(monkeypatch, capsys):
-    findings = [doctor.python(), doctor.Finding("rope", "missing", "none", "buy one")]
-    monkeypatch.setattr(doctor, "examine", lambda: findings)
-    assert main(["doctor"]) == 1
-    assert "→ buy one" in capsys.readouterr().out
-    assert main(["doctor", "--json"]) == 1
-    report = json.loads(capsys.readouterr().out)
-    assert (report["ok"], report["findings"][1]["remedy"]) == (False, "buy one")
-
-
-def test_the_doctor_examines_this_machine():
-    """All of it, as a person runs it; nothing that these tests run on is missing."""
-    result = run("doctor", "--json")
-    report = json.loads(result.stdout)
-    assert (result.returncode, report["ok"], result.stderr) == (0, True, "")
-    names = {finding["name"] for finding in report["findings"]}
-    assert {"Python", "numpy", "OpenGL", "memory", "sample data", "widgets: anywidget"} <= names
-    assert all(finding["remedy"] or finding["status"] == "ok" for finding in report["findings"])
-
-
-# The teacher's edition ----------------------------------------------------------------------------------------------
-
-
-def test_the_teachers_edition_has_every_lesson_and_keeps_a_teachers_notes(room, capsys):
-    assert main(["teacher", "mine"]) == 0
-    lessons = {path.name for path in (ROOT / "lessons").glob("*.ipynb")}
-    assert {path.name for path in (room / "mine").glob("*.ipynb")} == lessons
-    first = room / "mine" / sorted(lessons)[0]
-    first.write_text("my notes")
-    assert main(["teacher", "mine"]) == 0
-    assert first.read_text() == "my notes"
-
-
-def test_the_teachers_edition_is_not_written_over_the_lessons(room, capsys):
-    assert "a folder of its own" in refused(capsys, room, "teacher", str(ROOT / "lessons"))

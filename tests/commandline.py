@@ -1,0 +1,31 @@
+"""The command as the tests run it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import camviz
+from camviz.command import main
+
+ROOT = Path(camviz.__file__).parents[1]
+
+
+def run(*words, **options):
+    """The command in a process of its own, as a person runs it."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-m", "camviz", *words], capture_output=True, text=True, env=environment, timeout=60, **options
+    )
+
+
+def refused(capsys, room, *words):
+    """The one sentence of a refusal with status 2 that wrote nothing."""
+    before = sorted(room.rglob("*"))
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("camviz: ")
+    assert err.count("\n") == 1
+    assert sorted(room.rglob("*")) == before
+    return err
