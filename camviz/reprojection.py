@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from math import pi
 from typing import Any
 
@@ -67,6 +68,7 @@ def reproject(
     return result
 
 
+@lru_cache(maxsize=8)
 def window(
     width: int, height: int, hfov_deg: float, *, yaw_deg: float = 0, pitch_deg: float = 0, roll_deg: float = 0
 ) -> Camera:

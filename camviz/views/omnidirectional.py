@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import degrees, isfinite
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import cv2
 import numpy as np
@@ -33,6 +33,8 @@ UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))
 _DRAFT, _FINE = 160, 480  # pixels across the doughnut
 _GREY = (69, 69, 69)  # of what a picture does not show
 _COUNTED = 400  # pixels across the picture whose focal length is told
+_OF_THE_WINDOW = {"yaw_deg", "pitch_deg", "hfov_deg", "unroll", "model", "eye"}  # the mirror stands still
+_OF_THE_MIRROR = {"rig", "central", "lens", "rim_angle_deg", "missed_mm", "_doughnuts"}
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,13 @@ class OmnidirectionalView(View):
     unroll: str = choice("equirectangular", "cube map", help="the same picture, rolled out or folded")
     model: str = choice("mirror", "sphere", label="drawn as", help="cut along the axis: the mirror, or the sphere")
     eye: Eye = Eye(target=(0.0, 0.3, 0.0), distance=2.7, yaw_deg=75, pitch_deg=12)
+
+    def but(self, **changes: Any) -> Self:
+        """The same view with some fields changed; what depends on the mirror alone is kept while the window turns."""
+        changed = super().but(**changes)
+        if not changes.keys() - _OF_THE_WINDOW:
+            vars(changed).update({name: made for name, made in vars(self).items() if name in _OF_THE_MIRROR})
+        return changed
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -149,6 +158,15 @@ class OmnidirectionalView(View):
 
     def doughnut(self, side: int = _FINE, *, draft: bool = False) -> np.ndarray:
         """What the camera photographs (side, side, 3), left and right put right, the camera itself in the middle."""
+        if (side, draft) not in self._doughnuts:
+            self._doughnuts[side, draft] = self._photographed(side, draft)
+        return self._doughnuts[side, draft]
+
+    @cached_property
+    def _doughnuts(self) -> dict[tuple[int, bool], np.ndarray]:
+        return {}
+
+    def _photographed(self, side: int, draft: bool) -> np.ndarray:
         camera = self.camera(side)
         if draft or self.central:
             picture = garden.glimpse(camera) if draft else garden.taken(camera, side)[0].copy()
@@ -158,6 +176,7 @@ class OmnidirectionalView(View):
         y, x = np.ogrid[:side, :side]
         r2 = (x - (side - 1) / 2) ** 2 + (y - (side - 1) / 2) ** 2
         picture[(r2 > rim**2) | (r2 < blind**2)] = _GREY
+        picture.flags.writeable = False
         return picture
 
     def _share(self, angle_deg: float) -> float:

@@ -1,7 +1,7 @@
 // The pane of every visualizer: controls and a picture. It draws nothing itself and knows no mathematics:
 // it tells the kernel what the reader wants and shows the picture that comes back.
 
-const SETTLE_MS = 5;    // idle time after which a draft is replaced by the fine picture
+const SETTLE_MS = 10;   // idle time after which a draft is replaced by the fine picture; with none, the two would share the processors
 const LATE_MS = 6000;   // silence of the kernel after which the reader is told
 const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
 
