@@ -25,6 +25,25 @@ shell.events.trigger("post_run_cell", None)
 print(full - rss(), len([f for f in shell.events.callbacks["post_run_cell"] if f.__name__ == "give_back"]))
 """
 
+FAULTS = """
+import resource
+import numpy as np
+from camviz.widgets.memory import keep_between_pictures
+
+def pages(pictures=40):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(pictures):
+        scraps = [np.ones(60_000) for _ in range(8)]   # half a megabyte each, as the arrays of a picture are
+        del scraps
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+pages()
+alone = pages()
+keep_between_pictures()
+pages()
+print(alone, pages())
+"""
+
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only glibc can be asked to give memory back")
 def test_what_a_cell_no_longer_needs_is_given_back_after_it():
@@ -40,3 +59,10 @@ def test_the_rays_of_the_last_camera_are_given_back_too():
     assert _kept_rays.cache_info().currsize == 1
     give_back()
     assert _kept_rays.cache_info().currsize == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only glibc can be asked to keep memory")
+def test_a_picture_s_memory_is_that_of_the_last_one():
+    """Counted in pages that the system had to clear and hand out."""
+    alone, kept = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True).stdout.split()
+    assert int(kept) < int(alone) / 20

@@ -33,7 +33,7 @@ COLOURS = {
     "blue": "#2b8cd0", "orange": "#e0752e", "green": "#12a57e", "red": "#e0407f", "sky": "#58aee6", "yellow": "#d6a520",
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
-DRAFT, FINE = 0.65, 1.25
+DRAFT, FINE = 0.65, 1.1
 SLOW = 0.01  # seconds for one pixel a picture unit, beyond which drafts are wireframes: a fifth of a change's time
 _BACKGROUND = 128
 
