@@ -64,5 +64,7 @@ def test_the_rays_of_the_last_camera_are_given_back_too():
 @pytest.mark.skipif(sys.platform != "linux", reason="only glibc can be asked to keep memory")
 def test_a_picture_s_memory_is_that_of_the_last_one():
     """Counted in pages that the system had to clear and hand out."""
-    alone, kept = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True).stdout.split()
+    alone, kept = subprocess.run(
+        [sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert int(kept) < int(alone) / 20
