@@ -1,11 +1,13 @@
 """Marks on photographs lie where they say, and no part of a line lies outside its panel."""
 
+import re
+
 import cv2
 import numpy as np
 
 from camviz.cameras import Intrinsics
 from camviz.draw.panel import Panel, image_panel
-from camviz.views.marks import border_arrow, clipped, crop
+from camviz.views.marks import border_arrow, clipped, crop, on_photograph
 
 PANEL = Panel("test", 0, 0, 200, 100, 0, 200, 0, 100)
 
@@ -19,6 +21,16 @@ def test_a_line_is_clipped_as_opencv_clips_it():
             np.testing.assert_allclose(parts, [np.array([a, b]) / 1000], atol=0.1)
         else:
             assert np.linalg.norm(np.diff(parts, axis=1)) < 0.2
+
+
+def test_segments_and_longer_lines_are_drawn_in_the_same_places_and_none_at_all_as_nothing():
+    corner = np.array([[10.0, 20], [30, 20], [30, 60]])
+    numbers = [re.findall(r"[\d.]+", re.search(r' d="([^"]*)"', drawn)[1]) for drawn in (
+        on_photograph([corner], "green"), on_photograph(np.stack([corner[:-1], corner[1:]], axis=1), "green")
+    )]  # fmt: skip
+    assert list(map(float, numbers[0])) == corner.ravel().tolist()
+    assert list(map(float, numbers[1])) == [10, 20, 30, 20, 30, 20, 30, 60]
+    assert on_photograph([], "green") == ""
 
 
 def test_a_line_inside_stays_whole_and_one_without_an_end_is_left_out():

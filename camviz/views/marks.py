@@ -49,7 +49,7 @@ def clipped(panel: Panel, lines: ArrayLike) -> Array:
 def on_photograph(lines: ArrayLike, class_: str) -> str:
     """Lines (m, n, 2) with an edge in the colour of the paper."""
     lines = np.asarray(lines, dtype=float)
-    if lines.shape[1] == 2:
+    if lines.shape[1:] == (2, 2):
         return "".join(svg.segments(lines[:, 0], lines[:, 1], c) for c in ("paper-line", class_))
     return svg.path(lines, "paper-line") + svg.path(lines, class_)
 
