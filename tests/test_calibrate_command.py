@@ -139,6 +139,10 @@ def test_a_full_disk_leaves_what_was_there(room):
     assert sorted(path.name for path in room.iterdir()) == ["camera.yaml", "shots"]
 
 
+# A shell's background jobs, in which tests may run, ignore Ctrl-C, and so does what they start.
+LISTEN = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+
+
 @pytest.mark.skipif(os.name == "nt", reason="sends Ctrl-C to a group of processes")
 @pytest.mark.parametrize("stage", ["detection", "solving"])
 def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):
@@ -149,8 +153,9 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):
         "solving": "import camviz.calibration.solving as s\ndef new(a):\n    STOP\ns._settled = new",
     }[stage].replace("STOP", stop)
     words = ["calibrate", "shots", *WORDS, "--workers", "2"]
+    start = f"import sys\nfrom camviz.command import main\nsys.exit(main({words!r}))"
     process = subprocess.run(
-        [sys.executable, "-c", f"{code}\nimport sys\nfrom camviz.command import main\nsys.exit(main({words!r}))"],
+        [sys.executable, "-c", f"{LISTEN}{code}\n{start}"],
         capture_output=True,
         text=True,
         cwd=room,
