@@ -150,3 +150,7 @@ def test_the_description_states_the_state():
     assert "slope +1.04 px" in words
     assert "behind a fence" in words
     assert "3.03" in words
+
+
+def test_the_sky_is_infinitely_far_away_and_not_as_far_as_its_slope_is_rounded():
+    assert LightFieldView(column=159).numbers()["in truth"].endswith(" px, ∞")

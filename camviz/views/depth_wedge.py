@@ -59,7 +59,7 @@ def _comb(panel: Panel, focal_baseline: float, right: float, B: float) -> str:
 
 
 def metres(depth: float) -> str:
-    """A length in words, with about three digits that count; none behind the cameras."""
-    if not np.isfinite(depth):
+    """A length in words, with about three digits that count; none behind the cameras, and from 100 km on infinite."""
+    if not abs(depth) < 1e5:
         return "∞" if depth > 0 else "none"
     return f"{depth:.3f} m" if depth < 10 else f"{depth:.2f} m" if depth < 100 else f"{depth:.0f} m"
