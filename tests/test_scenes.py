@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import pytest
+from plain_scenes import AHEAD, BLUE, GREEN, RED, facing, random_rays
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import camviz.lenses
@@ -26,9 +27,6 @@ from camviz.scenes import (
     wireframe_scene,
 )
 from camviz.scenes.rays import TILE, Bounds, Rays
-
-RED, GREEN, BLUE = (Texture(np.eye(3)[i].reshape(1, 1, 3)) for i in range(3))
-AHEAD = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -60,16 +58,6 @@ def lenses():
     found = {name: kwargs for name, kwargs in examples.items() if hasattr(camviz.lenses, name)}
     named = [pytest.param(getattr(camviz.lenses, name)(**kwargs), id=name) for name, kwargs in found.items()]
     return [pytest.param(camviz.lenses.Perspective(), id="Perspective"), pytest.param(Fish(), id="Fish"), *named]
-
-
-def random_rays(n, seed=0):
-    return unit(np.random.default_rng(seed).normal(size=(n, 3)))
-
-
-def facing(z, texture=RED, half=1.0, **kwargs):
-    """A square at distance z in front of the origin."""
-    corner = np.array([-half, -half, z])
-    return Rectangle(corner, np.array([2 * half, 0, 0]), np.array([0, 2 * half, 0]), texture, **kwargs)
 
 
 # The picture and the projection are one geometry
