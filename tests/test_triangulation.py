@@ -1,4 +1,4 @@
-"""Points from their images: triangulation undoes projection, and its errors are those of theory."""
+"""Points from their images: as projection, OpenCV and Hartley and Sturm have them, or nowhere."""
 
 import cv2
 import numpy as np
