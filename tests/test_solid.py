@@ -78,9 +78,9 @@ def test_pyvista_covers_the_same_pixels(eye, monkeypatch):
 def test_the_depth_of_a_surface_is_its_distance_along_the_cameras_axis():
     eye = Eye((0, 0, 3), 6, 0, 0)
     shot = shot_of([Face(SQUARE), Face(SQUARE * (5, 5, 3), "red")], eye)
-    assert shot.depth[180, 240] == pytest.approx(6, rel=1e-3)
-    assert shot.depth[180, 400] == pytest.approx(12, rel=1e-3)
-    assert shot_of([Face(SQUARE)], eye).depth[5, 5] == np.inf
+    assert shot.depth(np.array([(240, 180), (400, 180)])) == pytest.approx([6, 12], rel=1e-3)
+    nowhere = np.array([(5, 5), (-1, 180), (240, 360), (np.nan, np.nan)])
+    assert (shot_of([Face(SQUARE)], eye).depth(nowhere) == np.inf).all()
 
 
 @needs_opengl

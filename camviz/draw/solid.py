@@ -51,19 +51,29 @@ def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> t
 
 @dataclass(frozen=True)
 class Shot:
-    """A solid picture: uint8 rgb (h, w, 3) and alpha (h, w), the depth (h, w) in metres of what is solid, its scale."""
+    """A solid picture: uint8 rgb (h, w, 3) and alpha (h, w), its pixels per picture unit, and OpenGL's depth buffer.
+
+    The buffer (h, w) holds d = (1/near - 1/z) / (1/near - 1/far), 1 where nothing is.
+    """
 
     rgb: np.ndarray
     alpha: np.ndarray
-    depth: np.ndarray
     scale: float
+    buffer: np.ndarray
+    near: float
+    far: float
+
+    def depth(self, px: Array) -> Array:
+        """The depth z (n,) in metres of what is solid at points (n, 2) in picture units, inf where nothing is."""
+        height, width = self.buffer.shape
+        u, v = np.floor(np.nan_to_num(px, nan=-1.0) * self.scale).clip(-1e6, 1e6).astype(int).T
+        inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
+        d = np.where(inside, self.buffer[np.where(inside, v, 0), np.where(inside, u, 0)], 1).astype(float)
+        return np.where(d < 1, self.near * self.far / (self.far - d * (self.far - self.near)), np.inf)
 
     def hides(self, px: Array, depth: Array) -> np.ndarray:
         """Which points, picture units (n, 2) at depths (n,), lie behind a surface by more than a hundredth."""
-        height, width = self.depth.shape
-        u, v = np.floor(np.nan_to_num(px, nan=-1.0) * self.scale).clip(-1e6, 1e6).astype(int).T
-        inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
-        return inside & (depth > 1.01 * self.depth[np.where(inside, v, 0), np.where(inside, u, 0)])
+        return depth > 1.01 * self.depth(px)
 
 
 def _cut_out(shot: Shot, sight: Sight, name: str) -> tuple[str, dict[str, bytes]]:
@@ -222,20 +232,20 @@ class Studio:
         pixels, depths = vtkUnsignedCharArray(), vtkFloatArray()
         self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, False, pixels)
         self.window.GetZbufferData(0, 0, width - 1, height - 1, depths)
-        rgba = np.ascontiguousarray(np.flipud(vtk_to_numpy(pixels).reshape(height, width, 4)))
-        near, far = self.renderer.GetActiveCamera().GetClippingRange()
-        d = np.flipud(vtk_to_numpy(depths).reshape(height, width))
-        # The depth buffer holds d = (1/near - 1/z) / (1/near - 1/far).
-        depth = np.where(d < 1, near * far / (far - d * (far - near)), np.inf)
-        return Shot(_unmixed(rgba), cv2.extractChannel(rgba, 3), cv2.dilate(depth, np.ones((3, 3))), scale)
+        rgba = cv2.flip(vtk_to_numpy(pixels).reshape(height, width, 4), 0)
+        # The farthest of a point and its neighbours: a surface does not hide its own edges.
+        farthest = cv2.dilate(cv2.flip(vtk_to_numpy(depths).reshape(height, width), 0), np.ones((3, 3)))
+        alpha = cv2.extractChannel(rgba, 3)
+        return Shot(_unmixed(rgba, alpha), alpha, scale, farthest, *self.renderer.GetActiveCamera().GetClippingRange())
 
 
-def _unmixed(rgba: np.ndarray) -> np.ndarray:
+def _unmixed(rgba: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     """Colours (h, w, 3) without the background that shows through: c = alpha * colour + (1 - alpha) * background."""
     rgb = cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
-    mixed = (rgba[..., 3] > 0) & (rgba[..., 3] < 255)
-    alpha = rgba[mixed][:, 3:] / 255
-    rgb[mixed] = np.clip(np.rint((rgb[mixed] - (1 - alpha) * _BACKGROUND) / alpha), 0, 255)
+    mixed = np.flatnonzero(alpha.ravel() - np.uint8(1) < 254)  # neither 0, which goes round to 255, nor 255
+    share = alpha.ravel()[mixed, None] / 255
+    pixels = rgb.reshape(-1, 3)
+    pixels[mixed] = np.clip(np.rint((pixels[mixed] - (1 - share) * _BACKGROUND) / share), 0, 255)
     return rgb
 
 
