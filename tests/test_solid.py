@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from camviz.draw import opengl, solid
+from camviz.draw.backdrop import Backdrops
 from camviz.draw.items import Dots, Face, Line, Sheet
 from camviz.draw.opengl import opengl_works, why_not_solid
 from camviz.draw.space import Eye, chosen_renderer, draw_space, space_panel
@@ -81,6 +82,28 @@ def test_the_depth_of_a_surface_is_its_distance_along_the_cameras_axis():
     assert shot.depth(np.array([(240, 180), (400, 180)])) == pytest.approx([6, 12], rel=1e-3)
     nowhere = np.array([(5, 5), (-1, 180), (240, 360), (np.nan, np.nan)])
     assert (shot_of([Face(SQUARE)], eye).depth(nowhere) == np.inf).all()
+
+
+@needs_opengl
+def test_scenery_that_stays_is_drawn_once_and_looks_as_if_it_were_drawn_anew(monkeypatch):
+    """A see-through face that moves before, behind and through a sheet, seen from two places in turns."""
+    scenery = (Sheet(SQUARE, np.array([[0, 1, 2, 3]]), SQUARE[:, :2] / 2 + 0.5, np.full((1, 1, 3), 200, np.uint8)),)
+    eyes = [Eye((0, 0, 3), 5, 30, 20, 60), Eye((0, 0, 3), 6, -40, 10, 60)]
+    moved = [Face(0.5 * SQUARE + (x, 0.1, 1.5), "blue", 0.5) for x in (-0.4, 0.0, 0.5, 0.9)]
+    kept = []
+    monkeypatch.setattr(Backdrops, "keep", lambda self, key, keep=Backdrops.keep: (kept.append(key), keep(self, key)))
+    for face in moved:
+        for eye in eyes:
+            sight = Sight(eye.camera(480, 360), eye.distance)
+            ours, anew = (
+                solid._stage().submit(solid._shoot, sight, items, 1, stays).result()
+                for items, stays in (([face], scenery), ([face, *scenery], ()))
+            )
+            assert (ours.alpha > 0).sum() > 5_000
+            assert (ours.alpha == anew.alpha).mean() > 0.999
+            assert (np.abs(ours.rgb.astype(int) - anew.rgb) <= 2).mean() > 0.999
+            assert (ours.buffer == anew.buffer).mean() > 0.999
+    assert len(kept) == len(set(kept)) == 2
 
 
 @needs_opengl
@@ -201,5 +224,5 @@ def test_what_is_too_slow_to_drag_is_dragged_as_a_wireframe(monkeypatch):
     studio = solid._stage().submit(solid._studio).result()
     monkeypatch.setattr(studio, "pace", [0.2] * 5)
     assert (chosen_renderer(draft=True), chosen_renderer(draft=False)) == ("wire", "solid")
-    monkeypatch.setattr(studio, "pace", [0.2, 0.2, 0.01, 0.2, 0.2])
+    monkeypatch.setattr(studio, "pace", [0.2, 0.2, 0.004, 0.2, 0.2])
     assert chosen_renderer(draft=True) == "solid"

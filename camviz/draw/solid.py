@@ -9,11 +9,12 @@ PyVista's picture is the oracle of the tests.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from math import atan, degrees
+from math import atan, ceil, degrees, log2
 from time import perf_counter
 from typing import Any
 from zlib import crc32
@@ -22,6 +23,7 @@ import cv2
 import numpy as np
 
 from camviz.draw import svg
+from camviz.draw.backdrop import Backdrops
 from camviz.draw.items import Face, Item, Sheet
 from camviz.draw.opengl import opengl_works
 from camviz.draw.picture import jpeg, png
@@ -34,16 +36,19 @@ COLOURS = {
     "purple": "#9a72d2", "ink": "#7b8494", "muted": "#7f8998", "grid": "#8f97a3", "shade": "#40454f",
 }  # fmt: skip
 DRAFT, FINE = 0.65, 1.1
-SLOW = 0.01  # seconds for one pixel a picture unit, beyond which drafts are wireframes: a fifth of a change's time
+SLOW = 0.005  # seconds for one pixel a picture unit, beyond which drafts are wireframes: a tenth of a change's time
 _BACKGROUND = 128
 
 
-def draw_solid(sight: Sight, items: Sequence[Item], name: str, draft: bool) -> tuple[str, dict[str, bytes]]:
+def draw_solid(
+    sight: Sight, items: Sequence[Item], name: str, draft: bool, scenery: tuple[Item, ...] = ()
+) -> tuple[str, dict[str, bytes]]:
     """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
 
-    The photograph has FINE pixels per picture unit, or DRAFT.
+    The photograph has FINE pixels per picture unit, or DRAFT. `scenery` are opaque sheets that stay while other things
+    move: as long as they are seen from one place, they are drawn once.
     """
-    shot = _stage().submit(_shoot, sight, items, DRAFT if draft else FINE).result()
+    shot = _stage().submit(_shoot, sight, items, DRAFT if draft else FINE, scenery).result()
     fragment, photographs = _cut_out(shot, sight, name)
     fragment += draw_lines(sight, items, shot.hides) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
@@ -101,9 +106,9 @@ def _studio() -> Studio:
     return Studio(window)
 
 
-def _shoot(sight: Sight, items: Sequence[Item], scale: float) -> Shot:
+def _shoot(sight: Sight, items: Sequence[Item], scale: float, scenery: tuple[Item, ...] = ()) -> Shot:
     studio, start = _studio(), perf_counter()
-    shot = studio.shoot(sight, items, scale)
+    shot = studio.shoot(sight, items, scale, scenery)
     studio.pace.append((perf_counter() - start) / scale**2)
     return shot
 
@@ -115,13 +120,17 @@ def too_slow() -> bool:
 
 
 def rehearse(window: str) -> None:
-    """Draw a square with the named window class and exit, 0 if it can be seen: for a process of its own."""
+    """Draw a square with the named window class and exit, 0 if it is seen, twice: for a process of its own."""
     from camviz.draw.space import Eye
 
     def square() -> bool:
-        face = Face(np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]), "#ffffff")
-        shot = Studio(window).shoot(Sight(Eye().camera(64, 48), 5), [face], 1)
-        return bool(shot.alpha[24, 32] == 255 and shot.alpha[0, 0] == 0)
+        sight = Sight(Eye().camera(64, 48), 5)
+        corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+        sheet = Sheet(corners, np.array([[0, 1, 2, 3]]), corners[:, :2] / 2 + 0.5, np.full((1, 1, 3), 255, np.uint8))
+        studio = Studio(window)
+        first, nothing, again = (studio.shoot(sight, [], 1, stays) for stays in ((sheet,), (), (sheet,)))
+        seen = all(shot.alpha[24, 32] == 255 and shot.alpha[0, 0] == 0 for shot in (first, again))
+        return bool(seen and not nothing.alpha.any() and (first.buffer == again.buffer).all())
 
     raise SystemExit(0 if _stage().submit(square).result() else 1)
 
@@ -150,17 +159,21 @@ class Studio:
         self.renderer.SetAutomaticLightCreation(False)
         self.opaque, self.clear = self._actor(), self._actor()
         self.sheets: dict[Sheet, Any] = {}
+        self.backdrops = Backdrops(self.window)
         self.size = np.zeros(2, dtype=int)
         self.pace: deque[float] = deque(maxlen=5)
 
-    def shoot(self, sight: Sight, items: Sequence[Item], scale: float) -> Shot:
-        """A picture of the faces and sheets."""
+    def shoot(self, sight: Sight, items: Sequence[Item], scale: float, scenery: tuple[Item, ...] = ()) -> Shot:
+        """A picture of the faces and sheets, and of the scenery, which is sheets."""
         faces = [item for item in items if isinstance(item, Face) and np.isfinite(item.vertices).all()]
         faces.sort(key=lambda face: -sight.points_cam(face.vertices)[:, 2].mean())
         _dress(self.opaque, [face for face in faces if face.opacity == 1])
         _dress(self.clear, [face for face in faces if face.opacity < 1])
-        self._hang([item for item in items if isinstance(item, Sheet)])
-        self._aim(sight, items)
+        staying = [item for item in scenery if isinstance(item, Sheet)]
+        self._hang([*staying, *(item for item in items if isinstance(item, Sheet))])
+        self._aim(sight, [*staying, *items])
+        self._open(*_pixels(sight, scale))
+        self._render(staying)
         return self._develop(sight, scale)
 
     def _actor(self) -> Any:
@@ -212,8 +225,9 @@ class Studio:
         solid = [item.vertices for item in items if isinstance(item, Face | Sheet)]
         depth = sight.points_cam(np.concatenate(solid or [np.zeros((1, 3))]))[:, 2]
         depth = depth[np.isfinite(depth)]
-        far = max(1.05 * depth.max(initial=0), 2 * NEAR)
-        camera.SetClippingRange(max(0.95 * depth.min(initial=far), far / 1e4, NEAR), far)
+        far = _power_of_2(max(1.05 * depth.max(initial=0), 2 * NEAR))
+        near = _power_of_2(max(0.95 * depth.min(initial=far), far / 1e4, NEAR)) / 2
+        camera.SetClippingRange(near, far)
 
     def _open(self, width: int, height: int) -> None:
         """Draw into the window's corner; the window only ever grows, for every change of its size costs memory."""
@@ -222,13 +236,33 @@ class Studio:
             self.window.SetSize(*self.size.tolist())
         self.renderer.SetViewport(0, 0, width / self.size[0], height / self.size[1])
 
+    def _render(self, staying: Sequence[Sheet]) -> None:
+        """Draw all, but of what stays only a kept picture where there is one from here."""
+        backdrop = [self.sheets[sheet] for sheet in staying]
+        if backdrop:
+            moving = [self.clear, self.opaque, *(self.sheets[sheet] for sheet in self.sheets.keys() - set(staying))]
+            key = self._whence, *staying
+            if not self.backdrops.put_back(key):
+                with _hidden(moving):
+                    self.window.Render()
+                self.backdrops.keep(key)
+        with _hidden(backdrop):
+            self.renderer.SetPreserveColorBuffer(bool(backdrop))
+            self.renderer.SetPreserveDepthBuffer(bool(backdrop))
+            self.window.Render()
+
+    @property
+    def _whence(self) -> tuple[float, ...]:
+        """All that a picture of the same things depends on: place, direction, angle, range and size."""
+        camera = self.renderer.GetActiveCamera()
+        seen = *camera.GetPosition(), *camera.GetFocalPoint(), *camera.GetViewUp(), camera.GetViewAngle()
+        return *seen, *camera.GetClippingRange(), *self.renderer.GetViewport(), *self.size.tolist()
+
     def _develop(self, sight: Sight, scale: float) -> Shot:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkFloatArray, vtkUnsignedCharArray
 
-        width, height = (round(scale * n) for n in (sight.camera.intrinsics.width, sight.camera.intrinsics.height))
-        self._open(width, height)
-        self.window.Render()
+        width, height = _pixels(sight, scale)
         pixels, depths = vtkUnsignedCharArray(), vtkFloatArray()
         self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, False, pixels)
         self.window.GetZbufferData(0, 0, width - 1, height - 1, depths)
@@ -237,6 +271,27 @@ class Studio:
         farthest = cv2.dilate(cv2.flip(vtk_to_numpy(depths).reshape(height, width), 0), np.ones((3, 3)))
         alpha = cv2.extractChannel(rgba, 3)
         return Shot(_unmixed(rgba, alpha), alpha, scale, farthest, *self.renderer.GetActiveCamera().GetClippingRange())
+
+
+def _pixels(sight: Sight, scale: float) -> tuple[int, int]:
+    """Width and height of a picture with this many pixels a unit."""
+    return round(scale * sight.camera.intrinsics.width), round(scale * sight.camera.intrinsics.height)
+
+
+def _power_of_2(least: float) -> float:
+    """The least power of 2 not below: a range of depths in such steps mostly stays while things move."""
+    return 2.0 ** ceil(log2(least))
+
+
+@contextmanager
+def _hidden(actors: Sequence[Any]) -> Iterator[None]:
+    """Out of the picture for a while, those that are in it."""
+    actors = [actor for actor in actors if actor.GetVisibility()]
+    for actor in actors:
+        actor.SetVisibility(False)
+    yield
+    for actor in actors:
+        actor.SetVisibility(True)
 
 
 def _unmixed(rgba: np.ndarray, alpha: np.ndarray) -> np.ndarray:

@@ -99,7 +99,7 @@ def draw_space(
     if chosen_renderer(renderer, draft) == "solid":
         from camviz.draw.solid import draw_solid
 
-        return draw_solid(sight, [*scenery, *items], panel.name, draft)
+        return draw_solid(sight, items, panel.name, draft, scenery)
     return draw_wire(sight, items, panel.name, 0.5 if draft else 2, scenery)
 
 
