@@ -131,9 +131,14 @@ function patch(old, fresh) {
 }
 
 function dataAddress(bytes) {
+  return `data:image/${bytes[0] === 0x89 ? "png" : "jpeg"};base64,${bytes.toBase64?.() ?? byHand(bytes)}`;
+}
+
+// Base64 in browsers from before 2025: the other way takes a millisecond less for a fine picture.
+function byHand(bytes) {
   let text = "";
   for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
-  return `data:image/${bytes[0] === 0x89 ? "png" : "jpeg"};base64,${btoa(text)}`;
+  return btoa(text);
 }
 
 function loaded(address) {
