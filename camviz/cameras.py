@@ -9,10 +9,10 @@ from math import isfinite, radians, tan
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.lenses import Lens, Perspective
 from camviz.lenses.base import Array, as_points, times, unit
+from camviz.poses import RigidTransform, Rotation
 
 
 @dataclass(frozen=True)

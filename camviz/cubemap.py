@@ -9,10 +9,10 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array, RayLens
+from camviz.poses import RigidTransform, Rotation
 
 FACES = ("front", "right", "back", "left", "up", "down")
 

@@ -5,11 +5,11 @@ from math import atan, inf, isfinite, pi, radians, tan
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from camviz.cameras import Camera, Intrinsics, rotate
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective, UnifiedSphere
 from camviz.lenses.base import Array, as_points, on_plane
+from camviz.poses import Rotation
 
 WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more than stretch
 

@@ -12,11 +12,11 @@ from math import inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Intrinsics, transform
 from camviz.lenses.base import Array, as_points, unit
 from camviz.lenses.fisheye import Fisheye
+from camviz.poses import RigidTransform
 from camviz.scenes import Scene
 from camviz.scenes.rays import Floats
 

@@ -10,13 +10,13 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz import __version__
 from camviz.cameras import Camera
 from camviz.draw.picture import Picture, style
 from camviz.files import Calibration
 from camviz.lenses import Lens
+from camviz.poses import RigidTransform
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView

@@ -10,12 +10,12 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.cubemap import Cubemap, cells, joined
 from camviz.lenses import Cylindrical, Equirectangular
 from camviz.lenses.base import Array, times
+from camviz.poses import RigidTransform, Rotation
 
 Picture = NDArray[Any]
 Floats = NDArray[np.float32]

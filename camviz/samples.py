@@ -18,9 +18,9 @@ from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.lenses.base import unit
+from camviz.poses import RigidTransform
 
 BASE_URL = "https://raw.githubusercontent.com/opencv/opencv/4.6.0/samples/data/"
 TIMEOUT_S = 5

@@ -8,6 +8,7 @@ import tomllib
 from itertools import chain
 from pathlib import Path
 
+import nbformat
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,6 +36,24 @@ def test_what_is_true_needs_nothing_that_draws(module: str) -> None:
 
 def test_import_of_camviz_loads_not_even_numpy() -> None:
     assert python("import sys, camviz; print('numpy' in sys.modules)").strip() == "False"
+
+
+def first_cells() -> set[str]:
+    """The first code of every lesson, each different one once."""
+    notebooks = (nbformat.read(path, 4) for path in (ROOT / "lessons").glob("*.ipynb"))
+    return {next(cell.source for cell in notebook.cells if cell.cell_type == "code") for notebook in notebooks}
+
+
+@pytest.mark.parametrize("code", sorted(first_cells()))
+def test_a_lesson_begins_without_what_scipy_only_brings_along(code: str) -> None:
+    loaded = "print(*[name for name in ('numpy.f2py', 'numpy.testing', 'scipy.spatial') if name in sys.modules])"
+    assert python(f"{code}\nimport sys; {loaded}").split() == ["scipy.spatial"]
+
+
+def test_numpy_is_as_ever_after_scipy_was_imported_without_parts_of_it() -> None:
+    code = "import numpy; before = dir(numpy), list(numpy.__all__); import camviz.poses; "
+    code += "print(before == (dir(numpy), numpy.__all__), numpy.ma.sum([1, 2]))"
+    assert python(code).split() == ["True", "3"]
 
 
 def test_every_public_name_of_camviz_can_be_had() -> None:

@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.arrowhead import Arrowhead
 from camviz.calibration.slopes import lens_parameters, parameter, pixel_slopes, with_parameters
 from camviz.cameras import Camera, transform
 from camviz.files.calibration import Board, Calibration
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 
 Mask = NDArray[np.bool_]
 

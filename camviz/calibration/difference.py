@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from math import inf, isinf
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import twist_slopes, twisted
 from camviz.calibration.arrowhead import inverse
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.lenses.base import Array, unit
+from camviz.poses import RigidTransform, Rotation
 
 HUBER = np.deg2rad(5) ** 2  # mrcal's: the weighted square of an angle beyond which its cost grows more slowly
 MOST_STEPS = 100

@@ -9,7 +9,6 @@ from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment, moved
 from camviz.calibration.arrowhead import inverse
@@ -18,6 +17,7 @@ from camviz.calibration.uncertainty import projection_slopes, worst_deviation
 from camviz.cameras import Camera
 from camviz.files.calibration import Board
 from camviz.lenses.base import Array, as_points
+from camviz.poses import RigidTransform, Rotation
 
 POSITIONS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the board's middle, in the image's width and height
 SIZES = (0.25, 0.4, 0.6, 0.85)  # of the board, held straight, in the image's width

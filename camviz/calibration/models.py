@@ -8,13 +8,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.detection import CannotCalibrate
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Board
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
 from camviz.lenses.base import Array, unit
+from camviz.poses import RigidTransform, Rotation
 
 PIXELS = ("fx", "fy", "cx", "cy")
 STANDARD = (*PIXELS, "k1", "k2", "p1", "p2", "k3")

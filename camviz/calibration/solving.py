@@ -8,7 +8,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.detection import CannotCalibrate, Detections, seen
@@ -18,6 +17,7 @@ from camviz.calibration.slopes import with_parameters
 from camviz.cameras import Camera
 from camviz.files.calibration import Board, Calibration, Mask
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 
 __all__ = ["MODELS", "calibrate", "calibrate_pair"]
 

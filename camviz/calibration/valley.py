@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.files.calibration import Board
 from camviz.lenses import UnifiedSphere
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 
 STEPS = 6  # of Gauss and Newton for every pose
 HELD = 1e-12  # added to their normal equations: where a board has run away, it has no pose to be solved for

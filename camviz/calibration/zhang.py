@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.lenses.base import Array, as_points
+from camviz.poses import RigidTransform, Rotation
 from camviz.twoview import normalising_transform, to_homogeneous
 
 _UNDECIDED = 1e-10  # of the largest singular value: below this, rounding is all that an equation still says

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.calibration.solving import ANOTHER_WAY_DEG
 from camviz.cameras import Camera
@@ -22,6 +21,7 @@ from camviz.clinic.rig import (
     references,
 )
 from camviz.files.calibration import Board
+from camviz.poses import RigidTransform
 from camviz.twoview import RectifiedPair, rectify
 
 MUCH_BETTER = 5.0  # how many times closer a changed transform must be to what is known

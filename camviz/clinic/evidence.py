@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.models import poses_from_rays
@@ -18,6 +17,7 @@ from camviz.clinic.observed import Observed
 from camviz.files.calibration import Board, Calibration
 from camviz.lenses import Cylindrical, Equirectangular
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 
 if TYPE_CHECKING:
     from camviz.clinic.rig import Pair

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.cameras import Camera
@@ -26,6 +25,7 @@ from camviz.files import kalibr, ros
 from camviz.files.calibration import Calibration
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 
 Rng = np.random.Generator
 

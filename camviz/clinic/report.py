@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import transform
 from camviz.clinic.views import ALIASES, LARGEST, VIEWS, Case, Entry
@@ -21,6 +20,7 @@ from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
 from camviz.page import document, figure, numbers_table
+from camviz.poses import RigidTransform
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline
 from camviz.views.clinic.missing import MissingView

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence, board_poses
 from camviz.files.calibration import Board
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 
 DECLARED = (("left", "right"), ("P0", "P1"), ("P2", "P3"), ("00", "01"), ("02", "03"))  # the last four are KITTI's
 ENOUGH = 6  # corners

@@ -7,13 +7,13 @@ from functools import cached_property
 from math import radians
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration import Detections, calibrate, calibrate_pair
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Board, Calibration
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 
 SIZES = ((640, 480), (1280, 720), (1280, 960), (1920, 1080))
 BOARDS = (Board(9, 6, 0.025), Board(8, 5, 0.03), Board(11, 8, 0.02))

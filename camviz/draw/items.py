@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, transform
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array, as_points
+from camviz.poses import RigidTransform
 
 
 @dataclass(frozen=True, eq=False)

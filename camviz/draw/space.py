@@ -9,13 +9,13 @@ from functools import lru_cache
 from math import cos, exp, radians, sin, tan
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics, look_at
 from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, camera_body, grid_lines
 from camviz.draw.panel import Panel
 from camviz.draw.wire import Sight, draw_wire
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.scenes import Scene, wireframe_scene
 from camviz.scenes.surfaces import Mesh
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from camviz.checks import Arguments, Array, Exercise, Misconception
+from camviz.poses import Rotation
 
 TOLERANCE = 1e-6  # how far from a rotation rounding may take a matrix
 

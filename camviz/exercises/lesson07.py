@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.poses import Rotation
 from camviz.trials import Function
 
 

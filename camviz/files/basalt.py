@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.files.calibration import Calibration, CalibrationError
@@ -15,6 +14,7 @@ from camviz.files.output import as_json, refuse_own_world
 from camviz.files.section import LARGEST_SIDE, Section
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
+from camviz.poses import RigidTransform
 
 GRID = "fx fy cx cy"
 MODELS = [

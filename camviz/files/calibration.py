@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Rig
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 
 if TYPE_CHECKING:
     from camviz.clinic import Inspection

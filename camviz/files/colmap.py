@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera
 from camviz.files import colmap_binary
@@ -26,6 +25,7 @@ from camviz.lenses import (
     Perspective,
     ThinPrismFisheye,
 )
+from camviz.poses import RigidTransform, Rotation
 
 FIRST_PIXEL = 0.5  # "the upper left corner is (0, 0), the centre of the first pixel (0.5, 0.5)"
 MAX_IMAGES = 100_000

@@ -6,8 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from scipy.spatial.transform import RigidTransform
-
 from camviz.files.calibration import Calibration
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.output import as_yaml, only_camera, refuse_own_world
@@ -15,6 +13,7 @@ from camviz.files.section import Section
 from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz.poses import RigidTransform
 
 GRID = "fx fy cx cy"
 RADIAL_TANGENTIAL = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from scipy.spatial.transform import RigidTransform
-
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
@@ -24,6 +22,7 @@ from camviz.lenses import (
     Perspective,
     UnifiedSphere,
 )
+from camviz.poses import RigidTransform
 
 PROJECTIONS = {
     "pinhole": "fu fv pu pv",

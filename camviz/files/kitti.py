@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Calibration, CalibrationError
@@ -15,6 +14,7 @@ from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
 from camviz.files.sizes import agreed_size
 from camviz.files.trees import scalar, shown
 from camviz.lenses import BrownConrady, Perspective
+from camviz.poses import RigidTransform
 
 RECTIFIED = [Model("P", Perspective, "fx fy cx cy skew")]
 RAW = [Model("K and D", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3")]

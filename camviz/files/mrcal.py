@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from scipy.spatial.transform import RigidTransform, Rotation
-
 from camviz.files.calibration import Calibration
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.output import only_camera
@@ -15,6 +13,7 @@ from camviz.files.sizes import pair_of_sides
 from camviz.files.text import HEAD
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, Equirectangular, Perspective, Stereographic
+from camviz.poses import RigidTransform, Rotation
 
 GRID = "fx fy cx cy"
 MODELS = [

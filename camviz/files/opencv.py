@@ -8,13 +8,13 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Board, Calibration, CalibrationError
 from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
 from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
+from camviz.poses import RigidTransform, Rotation
 
 # Spellings are compared without capitals and underscores: Camera_Matrix, cameraMatrix and camera_matrix are one.
 MATRIX = "cameramatrix|intrinsicmatrix|intrinsics|mtx|k|m"

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.files.calibration import Calibration, CalibrationError
+from camviz.poses import RigidTransform
 
 
 def only_camera(calibration: Calibration, title: str) -> tuple[str, Camera]:

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.files.calibration import CalibrationError
 from camviz.files.trees import MAX_NODES, shown
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 
 LARGEST = 1e9  # larger magnitudes are damage, not metres or pixels
 LARGEST_SIDE = 32768  # pixels

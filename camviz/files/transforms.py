@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.calibration import Calibration, CalibrationError
@@ -17,6 +16,7 @@ from camviz.files.section import Section, explained
 from camviz.files.sizes import agreed_size, two_sides
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
+from camviz.poses import RigidTransform, Rotation
 
 FIRST_PIXEL = 0.5
 OPENGL = RigidTransform.from_rotation(Rotation.from_matrix(np.diag([1.0, -1, -1])))  # y up, z backward

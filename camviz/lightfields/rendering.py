@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.lightfields.field import LightField
+from camviz.poses import RigidTransform
 from camviz.scenes import Scene, render, snapshot
 
 

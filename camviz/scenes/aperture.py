@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.scenes.rays import Floats
 from camviz.scenes.scene import Scene, render
 

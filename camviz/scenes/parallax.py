@@ -15,10 +15,10 @@ from itertools import product
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.scenes.aperture import ThinLensCamera
 from camviz.scenes.rays import Floats
 from camviz.scenes.scene import Scene

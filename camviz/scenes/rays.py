@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.lenses.base import ALONE, Array, unit
+from camviz.poses import RigidTransform
 
 Floats = NDArray[np.float32]
 SIDE = 8  # of a tile in a picture, in rays

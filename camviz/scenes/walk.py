@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import look_at
 from camviz.lenses.base import unit
+from camviz.poses import RigidTransform, Rotation
 from camviz.scenes.standard import BOARD_COLUMNS, BOARD_ROWS, board_corners
 
 

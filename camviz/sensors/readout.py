@@ -11,10 +11,10 @@ from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.scenes.scene import Scene
 
 FORGOTTEN = 1e-7  # the share of a charge below which the trail that it leaves is dropped

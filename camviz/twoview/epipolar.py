@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import bends
 from camviz.lenses.base import Array, as_points, unit
+from camviz.poses import RigidTransform
 
 
 def to_homogeneous(uv: ArrayLike) -> Array:

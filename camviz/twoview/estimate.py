@@ -6,9 +6,9 @@ from math import ceil, log, log1p
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.lenses.base import Array, as_points
+from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import sampson_distance, to_homogeneous
 from camviz.twoview.triangulate import ray_distances
 

@@ -7,11 +7,11 @@ from math import atan2
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics, rotate
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import right_from_left
 
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, rotate
 from camviz.lenses.base import Array, as_points
+from camviz.poses import RigidTransform
 from camviz.twoview.epipolar import from_homogeneous, projection_matrix
 
 

@@ -10,7 +10,6 @@ from typing import Any, Self
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.slopes import parameter
@@ -19,6 +18,7 @@ from camviz.cameras import Camera, Intrinsics, transform
 from camviz.files.calibration import Board
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, as_points
+from camviz.poses import RigidTransform, Rotation
 from camviz.views.base import View, choice, slider, switch
 
 BOARD = Board(9, 6, 0.025)

@@ -9,7 +9,6 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
@@ -18,6 +17,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Label, Line, axes_triad, camera_body, draw_space, space_panel
 from camviz.files.calibration import Board, Calibration
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.views.base import Control, View, choice, slider
 from camviz.views.chessboard import outline, rim, squares
 

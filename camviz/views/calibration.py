@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
@@ -16,6 +15,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Label, camera_body, draw_space, space_panel
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
 from camviz.views.chessboard import outline, rim, squares
 

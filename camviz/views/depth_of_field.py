@@ -7,13 +7,13 @@ from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz import optics
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import Ticks, axes, band, curve, logarithmic, plot_panel, upright
+from camviz.poses import RigidTransform
 from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera
 from camviz.views import lens_diagram

@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 from contourpy import contour_generator
-from scipy.spatial.transform import RigidTransform
 
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
@@ -20,6 +19,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import on_plane, unit
+from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch

@@ -8,7 +8,6 @@ from math import atan, degrees, radians, tan
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.draw import svg
@@ -29,6 +28,7 @@ from camviz.draw.space import (
 )  # fmt: skip
 from camviz.lenses import Lens, Perspective
 from camviz.lenses.base import Array, unit
+from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch

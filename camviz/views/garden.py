@@ -10,12 +10,12 @@ from itertools import count
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
 from camviz.lenses import Equirectangular, Lens
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene, to_display
 from camviz.scenes.scene import NEUTRAL
 

@@ -6,11 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
 from camviz.lightfields import LightField, disparity_by_sweep, photograph_field, to_mosaic, true_disparity
+from camviz.poses import RigidTransform
 from camviz.scenes import Rectangle, Scene, Texture, textured_scene, to_display
 
 VIEWS = 9

@@ -7,7 +7,6 @@ from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
@@ -16,6 +15,7 @@ from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
 from camviz.lenses.base import Array, unit
+from camviz.poses import RigidTransform
 from camviz.scenes import render, to_display
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, balloon_rim, balloon_scene, towards_balloon
 from camviz.views.base import Control, View, choice, slider, switch

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Self
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera
 from camviz.cubemap import cubemap_camera
@@ -21,6 +20,7 @@ from camviz.lenses import Lens, UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.mirrors import Catadioptric, MirrorLens, direction_error, miss
 from camviz.mirrors import photograph as photographed
+from camviz.poses import RigidTransform, Rotation
 from camviz.reprojection import equirectangular_camera, reproject, window
 from camviz.scenes import textured_scene, to_display
 from camviz.views import garden

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
@@ -17,6 +16,7 @@ from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import curve, plot_panel
 from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, Sheet, draw_space, space_panel
+from camviz.poses import RigidTransform
 from camviz.scenes import render, snapshot, textured_scene, to_display
 from camviz.views.base import View, slider, switch
 

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Self
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
@@ -17,6 +16,7 @@ from camviz.draw.heat import heat_key, heat_map, heat_panel
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 from camviz.views import stereo_pair
 from camviz.views.base import View, choice, slider
 from camviz.views.depth_wedge import metres, wedge_panel

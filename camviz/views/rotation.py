@@ -8,13 +8,13 @@ from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.picture import Picture
 from camviz.draw.space import Dots, Eye, Item, Label, Line, axes_triad, camera_body, draw_space, space_panel
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 from camviz.views.base import View, slider
 
 _RINGS = (  # name and colour of the turn, radius of its ring, and the axis at right angles to the ring's plane

@@ -11,13 +11,13 @@ from functools import lru_cache
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import bends
 from camviz.lenses import BrownConrady, Lens, Perspective
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 from camviz.views import garden
 
 FINE, COARSE = 480, 192  # pixels on the longer side of what is matched

@@ -7,13 +7,13 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import bends
 from camviz.lenses import BrownConrady, Equidistant, Perspective
 from camviz.lenses.base import Array, unit
+from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.guidance import Candidate, next_board_poses
@@ -19,6 +18,7 @@ from camviz.draw.panel import image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.views.base import View, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.files.calibration import Board
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 
 if TYPE_CHECKING:
     from camviz.files import Calibration

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from camviz import twoview
 from camviz.cameras import Camera
@@ -17,6 +16,7 @@ from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.views import garden
 from camviz.views.base import Control, View, slider
 from camviz.views.clinic.observations import Missing

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera
 from camviz.draw import svg
@@ -17,6 +16,7 @@ from camviz.draw.picture import Picture
 from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
 from camviz.files.calibration import Board
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz.views.base import View, choice
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.observations import Missing
