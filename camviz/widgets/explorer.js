@@ -118,16 +118,17 @@ async function swap(picture, frame) {
 // not touched the browser need not lay out again; a whole new picture takes a quarter longer to get onto the screen.
 function patch(old, fresh) {
   if (old.isEqualNode(fresh)) return;
-  if (old.nodeName !== fresh.nodeName) return old.replaceWith(fresh);
-  if (old.nodeType === Node.TEXT_NODE) {
-    if (old.data !== fresh.data) old.data = fresh.data;
-    return;
-  }
+  if (kind(old) !== kind(fresh)) return old.replaceWith(fresh);
+  if (old.nodeType === Node.TEXT_NODE) return void (old.data = fresh.data);
   for (const { name, value } of fresh.attributes) if (old.getAttribute(name) !== value) old.setAttribute(name, value);
-  for (const { name } of [...old.attributes]) if (!fresh.hasAttribute(name)) old.removeAttribute(name);
   const before = [...old.childNodes], after = [...fresh.childNodes];
   before.slice(after.length).forEach((child) => child.remove());
   after.forEach((child, i) => (before[i] ? patch(before[i], child) : old.append(child)));
+}
+
+// The name of a node and of all its attributes.
+function kind(node) {
+  return [node.nodeName, ...(node.getAttributeNames?.() ?? [])].join();
 }
 
 function dataAddress(bytes) {
