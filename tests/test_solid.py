@@ -92,17 +92,20 @@ def test_scenery_that_stays_is_drawn_once_and_looks_as_if_it_were_drawn_anew(mon
     moved = [Face(0.5 * SQUARE + (x, 0.1, 1.5), "blue", 0.5) for x in (-0.4, 0.0, 0.5, 0.9)]
     kept = []
     monkeypatch.setattr(Backdrops, "keep", lambda self, key, keep=Backdrops.keep: (kept.append(key), keep(self, key)))
-    for face in moved:
-        for eye in eyes:
-            sight = Sight(eye.camera(480, 360), eye.distance)
-            ours, anew = (
-                solid._stage().submit(solid._shoot, sight, items, 1, stays).result()
-                for items, stays in (([face], scenery), ([face, *scenery], ()))
-            )
-            assert (ours.alpha > 0).sum() > 5_000
-            assert (ours.alpha == anew.alpha).mean() > 0.999
-            assert (np.abs(ours.rgb.astype(int) - anew.rgb) <= 2).mean() > 0.999
-            assert (ours.buffer == anew.buffer).mean() > 0.999
+    sights = [Sight(eye.camera(480, 360), eye.distance) for eye in eyes]
+    ours, anew = (
+        [
+            solid._stage().submit(solid._shoot, sight, items(face), 1, stays).result()
+            for face in moved
+            for sight in sights
+        ]
+        for items, stays in ((lambda face: [face], scenery), (lambda face: [face, *scenery], ()))
+    )
+    for one, other in zip(ours, anew, strict=True):
+        assert (one.alpha > 0).sum() > 5_000
+        assert (one.alpha == other.alpha).mean() > 0.999
+        assert (np.abs(one.rgb.astype(int) - other.rgb) <= 2).mean() > 0.999
+        assert (one.buffer == other.buffer).mean() > 0.999
     assert len(kept) == len(set(kept)) == 2
 
 

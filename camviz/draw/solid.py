@@ -9,9 +9,8 @@ PyVista's picture is the oracle of the tests.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from math import atan, ceil, degrees, log2
@@ -243,13 +242,20 @@ class Studio:
             moving = [self.clear, self.opaque, *(self.sheets[sheet] for sheet in self.sheets.keys() - set(staying))]
             key = self._whence, *staying
             if not self.backdrops.put_back(key):
-                with _hidden(moving):
-                    self.window.Render()
+                self._draw_without(moving, onto=False)
                 self.backdrops.keep(key)
-        with _hidden(backdrop):
-            self.renderer.SetPreserveColorBuffer(bool(backdrop))
-            self.renderer.SetPreserveDepthBuffer(bool(backdrop))
-            self.window.Render()
+        self._draw_without(backdrop, onto=bool(backdrop))
+
+    def _draw_without(self, absent: Sequence[Any], *, onto: bool) -> None:
+        """Draw all other actors, onto what the window holds or onto nothing."""
+        self.renderer.SetPreserveColorBuffer(onto)
+        self.renderer.SetPreserveDepthBuffer(onto)
+        absent = [actor for actor in absent if actor.GetVisibility()]
+        for actor in absent:
+            actor.SetVisibility(False)
+        self.window.Render()
+        for actor in absent:
+            actor.SetVisibility(True)
 
     @property
     def _whence(self) -> tuple[float, ...]:
@@ -281,17 +287,6 @@ def _pixels(sight: Sight, scale: float) -> tuple[int, int]:
 def _power_of_2(least: float) -> float:
     """The least power of 2 not below: a range of depths in such steps mostly stays while things move."""
     return 2.0 ** ceil(log2(least))
-
-
-@contextmanager
-def _hidden(actors: Sequence[Any]) -> Iterator[None]:
-    """Out of the picture for a while, those that are in it."""
-    actors = [actor for actor in actors if actor.GetVisibility()]
-    for actor in actors:
-        actor.SetVisibility(False)
-    yield
-    for actor in actors:
-        actor.SetVisibility(True)
 
 
 def _unmixed(rgba: np.ndarray, alpha: np.ndarray) -> np.ndarray:
