@@ -303,6 +303,7 @@ def test_two_halves_of_a_healthy_set_agree_and_a_changed_focus_does_not():
     view = CrossValidationView.of(calibration)
     assert view.numbers()["ratio"] > 2.5
     assert "something besides noise" in view.description()
+    assert too_wide(view.figure()) == []
 
 
 def test_the_board_to_imitate_is_whole_in_the_picture_and_takes_uncertainty_off():
@@ -420,13 +421,21 @@ FISHEYE = replace(
 CASES = {"healthy": single, "sick": sick, "pair": pair, "bare": bare, "fisheye": lambda: FISHEYE}
 
 
+def too_wide(picture) -> list[str]:
+    """Words that begin inside the picture and end beyond its edge, 6 units a letter and 6.8 in labels."""
+    words = [one for one in ElementTree.fromstring(picture.standalone()) if one.tag.endswith("}text")]
+    begun = [one for one in words if one.text and not {"end", "middle"} & set(one.get("class").split())]
+    letter = {one: 6.8 if one.get("class") == "label" else 6.0 for one in begun}
+    return [one.text for one in begun if float(one.get("x")) + letter[one] * len(one.text) > picture.width]
+
+
 @pytest.mark.parametrize("name", VIEWS)
 @pytest.mark.parametrize("case", CASES)
 def test_every_view_draws_every_calibration_or_says_what_is_missing(name, case):
     view = VIEWS[name].view(Case(CASES[case]()))
     for draft in (True, False):
         picture = view.figure(draft=draft)
-        ElementTree.fromstring(picture.standalone())
+        assert too_wide(picture) == []
         assert not re.search(
             r"\bnan\b|\binf\b", re.sub(r"<(title|desc)>.*?</\1>|aria-label=\"[^\"]*\"", "", picture.body)
         )

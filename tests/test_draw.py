@@ -62,6 +62,13 @@ def test_ticks_are_round_and_inside(low, high):
     assert np.isclose(leading, [1, 2, 5]).any()
 
 
+@pytest.mark.parametrize("limits", [(-0.34, 0.34), (1.01, 1.49), (0.0, 0.41), (-3.0, 7.0), (100.0, 340.0)])
+@pytest.mark.parametrize("height", [40, 85, 300])
+def test_an_axis_names_two_values_at_least(limits, height):
+    panel = plot.plot_panel("low", 70, 0, 300, height, (0, 1), limits)
+    assert plot.axes(panel, "", "", xticks=[]).count("tick end") >= 2
+
+
 def picture() -> Picture:
     grey = np.full((4, 6), 100, np.uint8)
     body = svg.image("a", 0, 0, 6, 4) + svg.image("b", 6, 0, 6, 4)

@@ -103,11 +103,13 @@ def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top 
 
 
 def ticks(low: float, high: float, count: float) -> np.ndarray:
-    """Round numbers from `low` to `high`, about `count` at most: multiples of 1, 2 or 5 times a power of ten."""
+    """Round numbers from `low` to `high`, about `count` at most but two at least, for one says nothing of the scale:
+    multiples of 1, 2 or 5 times a power of ten."""
     rough = (high - low) / max(count, 1)
     power = 10.0 ** np.floor(np.log10(rough))
     step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))
-    return step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    values = step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    return values if len(values) > 1 else ticks(low, high, 5)
 
 
 def _found(low: float, high: float, length: float) -> Ticks:

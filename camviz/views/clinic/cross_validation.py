@@ -106,10 +106,9 @@ class CrossValidationView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map()
-        body = svg.rectangle(0, 0, 960, 420, "paper") + shown + self._views()
-        for i, sentence in enumerate(self.sentences()):
-            body += svg.text((20, 386 + 21 * i), sentence, "label")
-        return Picture(body, 960, 420, self.title, self.description(), attached)
+        body = svg.rectangle(0, 0, 960, 440, "paper") + shown + self._views()
+        body += svg.paragraph((20, 386), "\n".join(self.sentences()), 920, "label", line=20)
+        return Picture(body, 960, 440, self.title, self.description(), attached)
 
     @cached_property
     def _values(self) -> Any:

@@ -214,7 +214,7 @@ class UncertaintyRangeView(View):
         content = plot.grid(panel, xticks, yticks)
         boards = np.log10([self.boards.min(), self.boards.max()])
         content += plot.band(panel, boards[0] - 0.005, boards[1] + 0.005, "fill-green")
-        content += svg.text((panel.place((boards.mean(), 0))[0], panel.height - 10), "the boards", "green halo middle")
+        content += svg.text((panel.place((boards.mean(), 0))[0], 16), "the boards", "green halo middle")
         classes = ("blue thick", "orange thick", "purple thick")
         for class_, curve in zip(classes, values, strict=True):
             content += plot.curve(panel, x, np.log10(curve) if log else curve, class_)

@@ -60,7 +60,7 @@ class UndistortedView(View):
         return (
             f"{self.name} at alpha = {self.alpha:g}: new fx = {k.fx:.1f}, fy = {k.fy:.1f}, cx = {k.cx:.1f}, cy = "
             f"{k.cy:.1f}; the "
-            f"rectangle without black starts at ({x0}, {y0}) and is {width} × {height} pixels, {share:.0f} % of "
+            f"rectangle without black starts at ({x0}, {y0}) and is {width} × {height} pixels, {share:.0f}\u00a0% of "
             "the picture."
         )
 
