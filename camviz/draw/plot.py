@@ -109,7 +109,7 @@ def ticks(low: float, high: float, count: float) -> np.ndarray:
     power = 10.0 ** np.floor(np.log10(rough))
     step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))
     values = step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
-    return values if len(values) > 1 else ticks(low, high, 5)
+    return values if len(values) > 1 or count >= 5 else ticks(low, high, 5)
 
 
 def _found(low: float, high: float, length: float) -> Ticks:
