@@ -28,7 +28,7 @@ from camviz.views.clinic.guidance import GuidanceView
 from camviz.views.clinic.histogram import HistogramView
 from camviz.views.clinic.missing import MissingView
 from camviz.views.clinic.numbers import NumbersView
-from camviz.views.clinic.observations import Missing, Observations
+from camviz.views.clinic.observations import Missing, Observations, short_names
 from camviz.views.clinic.outliers import OutliersView
 from camviz.views.clinic.pairs import EpipolarPairsView, SharedViews
 from camviz.views.clinic.radius import RadiusView
@@ -184,6 +184,19 @@ def test_coverage_of_a_board_that_stays_in_one_cell_is_one_cell():
     counts = CoverageView(Observations(TRUE, BOARD, uv, poses(2)), "8 × 6").counts
     assert (counts > 0).sum() == 1
     assert counts[1, 1] == 108
+
+
+def test_views_are_called_by_the_numbers_of_their_pictures():
+    """left10 is missing, so that left11 is the tenth."""
+    files = [f"left{i:02}.jpg" for i in (1, 2, 9, 11)]
+    assert short_names(files, 4) == ("1", "2", "9", "11")
+    for unusable in (files[:3], [*files[:3], "a/left2.jpg"], [*files[:3], "dark.png"], [*files[:3], "1403636579.png"]):
+        assert short_names(unusable, 4) == ("1", "2", "3", "4")
+    seen = replace(perfect(views=4), pictures=tuple(files))
+    residuals, coverage = (view(seen).figure().body for view in (ResidualsView, CoverageView))
+    assert re.findall(r"label orange[^>]*>(\d+)<", ResidualsView(seen, view=4).figure().body) == ["11"]
+    assert set(re.findall(r'class="tick halo">(\d+)<', coverage)) == {"1", "2", "9", "11"}
+    assert ">10<" not in residuals
 
 
 def test_the_worst_corner_is_shown_first():

@@ -25,7 +25,7 @@ def paired(left: Sequence[Path], right: Sequence[Path]) -> Pairs:
     Order decides only where there are as many pictures of one camera as of the other. Raises CannotCalibrate where
     nothing tells the partners.
     """
-    for key in (_name, _last_number):
+    for key in (_name, last_number):
         first, second = _by_key(left, key), _by_key(right, key)
         if first and second and first.keys() & second.keys():
             together = [each for each in first if each in second]
@@ -56,6 +56,7 @@ def _name(path: Path) -> str:
     return path.stem
 
 
-def _last_number(path: Path) -> str:
+def last_number(path: Path) -> str:
+    """The last number in a file's name, without leading zeros; nothing where there is none."""
     numbers = re.findall(r"\d+", path.stem)
     return str(int(numbers[-1])) if numbers else ""

@@ -31,7 +31,8 @@ class BoardPosesView(View):
 
     `cam_from_board` holds one pose per picture. The board's frame has its origin at the first inner corner, x along the
     rows of corners, y along the columns and z away from the camera. `photographs`, uint8 RGB, are the pictures
-    themselves where they are at hand; `hidden` are the indices of poses that are not drawn.
+    themselves where they are at hand; `hidden` are the indices of poses that are not drawn; `names` are what the
+    others are called, their places from 1 on where none are given.
     """
 
     camera: Camera = field(compare=False)
@@ -42,6 +43,7 @@ class BoardPosesView(View):
     photographs: Sequence[NDArray[np.uint8]] = field(default=(), compare=False, repr=False)
     eye: Eye = Eye(distance=0.9, yaw_deg=-50, pitch_deg=20)
     hidden: frozenset[int] = frozenset()
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -138,7 +140,8 @@ class BoardPosesView(View):
         for i, board_from_cam in enumerate(self.cam_from_board.inv()):
             if i in self.hidden:
                 continue
-            items += self._body(board_from_cam, str(i + 1)) if i == self.index else self._pyramid(board_from_cam, i + 1)
+            drawn = self._body if i == self.index else self._pyramid
+            items += drawn(board_from_cam, self._name(i))
         return items
 
     def _boards(self) -> list[Item]:
@@ -151,18 +154,21 @@ class BoardPosesView(View):
             items += self.board_items(cam_from_board, i == self.index)
             if i == self.index or len(self.cam_from_board) <= _MOST_NUMBERED:
                 where = transform(cam_from_board, outline(self.board)[0])
-                items.append(Label(where, str(i + 1), "label orange" if i == self.index else "note"))
+                items.append(Label(where, self._name(i), "label orange" if i == self.index else "note"))
         return items
 
     def _body(self, pose: RigidTransform, name: str) -> list[Item]:
         return camera_body(self.camera.at(pose), 2 * self.board.square_size, colour="orange", name=name)
 
-    def _pyramid(self, pose: RigidTransform, number: int) -> list[Item]:
+    def _name(self, i: int) -> str:
+        return self.names[i] if self.names else str(i + 1)
+
+    def _pyramid(self, pose: RigidTransform, name: str) -> list[Item]:
         """A camera that is not picked out: its four corner rays and the square they end on."""
         a, b, c, d = transform(pose, self._corner_rays)
         centre = np.asarray(pose.translation)
         return [Line(np.array([centre, a, b, centre, c, d, centre, b, c, d, a]), "blue", 1.2),
-                Label(centre, str(number), "label blue")]  # fmt: skip
+                Label(centre, name, "label blue")]  # fmt: skip
 
     @cached_property
     def _corner_rays(self) -> Array:

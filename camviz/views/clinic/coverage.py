@@ -15,7 +15,7 @@ from camviz.draw.picture import Picture, png
 from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
-from camviz.views.clinic.observations import Observations
+from camviz.views.clinic.observations import Observations, short_names
 
 _RINGS = 8
 _MOST_DOTS = 4000
@@ -149,7 +149,8 @@ class CoverageView(View):
         content = plot.grid(panel) + svg.dots(panel.place(points), "blue", 9)
         if len(seen) <= 40:
             content += "".join(
-                svg.text(panel.place(p) + (6, -5), f"{i + 1}", "tick halo") for i, p in enumerate(points)
+                svg.text(panel.place(p) + (6, -5), name, "tick halo")
+                for name, p in zip(short_names(seen.pictures, len(seen)), points, strict=True)
             )
         return panel.show(content, title="How the board was held", note="one dot per view") + plot.axes(
             panel, "tilt against the line of sight [°]", "distance [m]"

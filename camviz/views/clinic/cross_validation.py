@@ -16,7 +16,7 @@ from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import View, choice
-from camviz.views.clinic.observations import Missing
+from camviz.views.clinic.observations import Missing, short_names
 from camviz.views.clinic.uncertainty import adjusted, determined
 
 _GRID = (30, 20)
@@ -151,7 +151,8 @@ class CrossValidationView(View):
             panel,
             [("blue thick", "fitted"), ("orange thick", "held out"), ("ink dashed", "held out, expected from noise")],
         )
-        ticks = [(t, f"{t:g}") for t in (x.tolist() if n <= 20 else plot.ticks(1, n, 10).tolist())]
+        names = short_names(self.pictures, n)
+        ticks = [(t, names[round(t) - 1]) for t in (x.tolist() if n <= 20 else plot.ticks(1, n, 10).tolist())]
         return panel.show(content, title="Corners of every view") + plot.axes(panel, "view", "RMS [px]", xticks=ticks)
 
     def _name(self, view: int) -> str:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.calibration.pairing import last_number
 from camviz.cameras import Camera
 from camviz.files.calibration import Board
 from camviz.lenses.base import Array
@@ -18,11 +20,19 @@ from camviz.poses import RigidTransform
 if TYPE_CHECKING:
     from camviz.files import Calibration
 
+_SHORT = 4  # digits, not a time in nanoseconds
 Photographs = Callable[[int], "NDArray[np.uint8] | None"]
 
 
 class Missing(ValueError):  # noqa: N818 - it says what is the case
     """What a view needs and a calibration does not hold; the message is one sentence for the reader."""
+
+
+def short_names(pictures: Sequence[str], views: int) -> tuple[str, ...]:
+    """What tells views apart in little room: the last numbers in the names of their pictures, or else their places."""
+    numbers = tuple(last_number(Path(name)) for name in pictures)
+    usable = len(set(numbers)) == len(numbers) == views and all(0 < len(number) <= _SHORT for number in numbers)
+    return numbers if usable else tuple(str(view + 1) for view in range(views))
 
 
 def no_photographs(view: int) -> None:

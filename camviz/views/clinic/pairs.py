@@ -16,7 +16,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
 from camviz.views.base import Control, View, slider
-from camviz.views.clinic.observations import Missing, Photographs, no_photographs
+from camviz.views.clinic.observations import Missing, Photographs, no_photographs, short_names
 from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows, clipped, on_photograph
 
@@ -199,7 +199,8 @@ class EpipolarPairsView(View):
                 svg.text(panel.place((i, r)) + (0, -4), f"{r:.2f}", "tick middle halo")
                 for i, r in zip(x, shared.rms, strict=True)
             )
-        ticks = [(t, f"{t:g}") for t in (x.tolist() if n <= 16 else plot.ticks(1, n, 16).tolist())]
+        names = short_names(shared.pictures, n)
+        ticks = [(t, names[round(t) - 1]) for t in (x.tolist() if n <= 16 else plot.ticks(1, n, 16).tolist())]
         label = "One bar per shared view; click, drag or press the arrow keys to choose a view"
         shown = panel.show(
             content, title="Distance from the epipolar lines", drag="bars", hint="click a bar", label=label

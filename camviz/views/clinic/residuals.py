@@ -18,7 +18,7 @@ from camviz.draw.space import Eye, space_panel
 from camviz.lenses.base import Array
 from camviz.views.base import Control, View, slider
 from camviz.views.board_poses import BoardPosesView
-from camviz.views.clinic.observations import Observations
+from camviz.views.clinic.observations import Observations, short_names
 from camviz.views.marks import arrows, cross
 
 _NAMED = 16  # views whose bars have room for names and figures
@@ -229,8 +229,9 @@ class ResidualsView(View):
             self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / Eye().distance
         )
         hidden = frozenset(np.flatnonzero(~seen.shown).tolist())
+        names = short_names(seen.pictures, len(seen))
         return BoardPosesView(
-            seen.camera, seen.cam_from_board, seen.board, "camera", self.index + 1, eye=eye, hidden=hidden
+            seen.camera, seen.cam_from_board, seen.board, "camera", self.index + 1, eye=eye, hidden=hidden, names=names
         )
 
     def _numbers_block(self) -> str:
