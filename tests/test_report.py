@@ -106,6 +106,15 @@ def test_photographs_are_embedded_small(tmp_path):
     assert text.count("data:image/jpeg") >= 10
 
 
+def test_a_board_in_space_is_called_by_the_number_of_its_picture():
+    few = single(views=10)
+    names = tuple(f"left{i:02}.jpg" for i in (*range(1, 10), 11))
+    text = report(Inspection(replace(few, pictures={"camera": names}), (), ()))
+    boards = re.findall(r'aria-label="the board of (left\d+).jpg".*?class="note[^>]*>(\d+)<', text)
+    assert ("left11", "11") in boards
+    assert all(int(name.removeprefix("left")) == int(number) for name, number in boards)
+
+
 def test_of_many_views_the_worst_are_shown_and_the_page_says_so():
     """Five hundred views, the tenth of which is bad."""
     few = single(views=10)

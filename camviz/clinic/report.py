@@ -24,7 +24,7 @@ from camviz.poses import RigidTransform
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline
 from camviz.views.clinic.missing import MissingView
-from camviz.views.clinic.observations import Observations
+from camviz.views.clinic.observations import Observations, short_names
 from camviz.views.clinic.residuals import ResidualsView, bars_panel
 
 if TYPE_CHECKING:
@@ -247,12 +247,13 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
     others = [i for i in range(len(seen)) if i not in links and seen.shown[i]][:MOST_BOARDS]
     items += [item for i in others for item in drawn.board_items(seen.cam_from_board[i], False)]
     content, _ = draw_space(panel, items, eye, renderer="wire")
+    names = short_names(seen.pictures, len(seen))
     for i, link in links.items():
         corners = transform(seen.cam_from_board[i], outline(seen.board))
         group: list[Item] = [
             Face(corners, "orange", 0.35),
             Line(np.vstack([corners, corners[:1]]), "muted", 1.1),
-            Label(corners[0], str(i + 1), "note"),
+            Label(corners[0], names[i], "note"),
         ]
         lines, _ = draw_space(panel, group, eye, renderer="wire")
         content += svg.element(
