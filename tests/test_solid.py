@@ -110,6 +110,15 @@ def test_scenery_that_stays_is_drawn_once_and_looks_as_if_it_were_drawn_anew(mon
 
 
 @needs_opengl
+def test_scenery_that_is_no_opaque_sheet_is_drawn_too():
+    eye, line = Eye((0, 0, 3), 6, 0, 0), Line([(-0.5, 0.1, 2), (0.5, 0.1, 2)], "line")
+    glass = Sheet(SQUARE, np.array([[0, 1, 2, 3]]), SQUARE[:, :2], np.full((1, 1, 3), 200, np.uint8), opacity=0.5)
+    as_scenery = draw_space(PANEL, [], eye, renderer="solid", scenery=(line, glass, Face(SQUARE + (0, 0, 1))))
+    assert as_scenery == draw_space(PANEL, [line, glass, Face(SQUARE + (0, 0, 1))], eye, renderer="solid")
+    assert 'class="line"' in as_scenery[0]
+
+
+@needs_opengl
 def test_lines_behind_a_surface_are_faint_and_lines_before_it_are_not():
     eye = Eye((0, 0, 3), 6, 0, 0)
     lines = [Line([(-0.5, 0.1, z), (0.5, 0.1, z)], f"line{z}") for z in (2, 5)]

@@ -44,10 +44,12 @@ def draw_solid(
 ) -> tuple[str, dict[str, bytes]]:
     """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
 
-    The photograph has FINE pixels per picture unit, or DRAFT. `scenery` are opaque sheets that stay while other things
-    move: as long as they are seen from one place, they are drawn once.
+    The photograph has FINE pixels per picture unit, or DRAFT. `scenery` stays while other things move: as long as its
+    opaque sheets are seen from one place, they are drawn once.
     """
-    shot = _stage().submit(_shoot, sight, items, DRAFT if draft else FINE, scenery).result()
+    staying = tuple(item for item in scenery if isinstance(item, Sheet) and item.opacity == 1)
+    items = [*(item for item in scenery if item not in staying), *items]
+    shot = _stage().submit(_shoot, sight, items, DRAFT if draft else FINE, staying).result()
     fragment, photographs = _cut_out(shot, sight, name)
     fragment += draw_lines(sight, items, shot.hides) + draw_marks(sight, items, shot.hides)
     return fragment, photographs
@@ -105,9 +107,9 @@ def _studio() -> Studio:
     return Studio(window)
 
 
-def _shoot(sight: Sight, items: Sequence[Item], scale: float, scenery: tuple[Item, ...] = ()) -> Shot:
+def _shoot(sight: Sight, items: Sequence[Item], scale: float, staying: tuple[Sheet, ...] = ()) -> Shot:
     studio, start = _studio(), perf_counter()
-    shot = studio.shoot(sight, items, scale, scenery)
+    shot = studio.shoot(sight, items, scale, staying)
     studio.pace.append((perf_counter() - start) / scale**2)
     return shot
 
@@ -162,13 +164,12 @@ class Studio:
         self.size = np.zeros(2, dtype=int)
         self.pace: deque[float] = deque(maxlen=5)
 
-    def shoot(self, sight: Sight, items: Sequence[Item], scale: float, scenery: tuple[Item, ...] = ()) -> Shot:
-        """A picture of the faces and sheets, and of the scenery, which is sheets."""
+    def shoot(self, sight: Sight, items: Sequence[Item], scale: float, staying: tuple[Sheet, ...] = ()) -> Shot:
+        """A picture of the faces and sheets, and of the opaque sheets that stay from one picture to the next."""
         faces = [item for item in items if isinstance(item, Face) and np.isfinite(item.vertices).all()]
         faces.sort(key=lambda face: -sight.points_cam(face.vertices)[:, 2].mean())
         _dress(self.opaque, [face for face in faces if face.opacity == 1])
         _dress(self.clear, [face for face in faces if face.opacity < 1])
-        staying = [item for item in scenery if isinstance(item, Sheet)]
         self._hang([*staying, *(item for item in items if isinstance(item, Sheet))])
         self._aim(sight, [*staying, *items])
         self._open(*_pixels(sight, scale))
