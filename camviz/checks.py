@@ -1,14 +1,15 @@
 """Exercise checking: a reader's function against a reference, on fresh random cases, answered in words.
 
 A checker never raises for what a reader wrote, and never calls a stub, a constant or a function that only fits the
-numbers on the page correct. It knows numpy and nothing about cameras.
+numbers on the page correct. It knows numpy and nothing about cameras. It gives nothing away
+to someone who has not tried: an untouched stub brings neither a hint nor, where a bug is to be found, what the bug is.
 """
 
 from __future__ import annotations
 
-import contextlib
 import io
 from collections.abc import Callable, Iterable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -22,9 +23,11 @@ from camviz.trials import (
     Function,
     Misconception,
     Trial,
+    contained,
     explain,
-    quiet,
+    outcome,
     run,
+    same_outcome,
     signature_complaint,
 )
 
@@ -33,11 +36,12 @@ __all__ = ["SHAPES", "Arguments", "Array", "Exercise", "Misconception", "Verdict
 SHAPES: tuple[tuple[int, ...], ...] = ((), (1,), (6,), (3, 4))
 """The leading axes an exercise's cases should run through: one point, a list of one, a list, a grid."""
 
-_TITLES = {"correct": "✓ *Correct.*", "wrong": "✗ *Not yet.*", "unsolved": "○ *Not solved yet.*"}
+_TITLES = {"correct": "✓ *Correct.*", "wrong": "✗ *Not yet.*", "unsolved": "○ *Not tried yet.*", "hint": "*Hint.*"}
 _COLOURS = {
     "correct": "var(--jp-success-color1, #2e7d32)",
     "wrong": "var(--jp-error-color1, #c62828)",
     "unsolved": "var(--jp-info-color1, #0277bd)",
+    "hint": "var(--jp-info-color1, #0277bd)",
 }
 
 
@@ -46,7 +50,7 @@ class Verdict:
     """What the checker says. Shown by a notebook as a box in words, by a terminal as text; true when correct."""
 
     exercise: str
-    status: Literal["correct", "wrong", "unsolved"]
+    status: Literal["correct", "wrong", "unsolved", "hint"]
     message: str
     hint: str = ""
     printed: str = ""
@@ -81,14 +85,33 @@ def judge(exercise: Exercise, function: Any, rng: np.random.Generator | None = N
         return _unsolved(exercise)
     complaint = signature_complaint(exercise, function)
     if complaint:
-        return _wrong(exercise, complaint, attempt)
-    trials = [run(exercise, function, arguments) for arguments in exercise.cases(rng)]
+        return Verdict(exercise.name, "wrong", complaint)  # no hint: its mathematics may be right
+    trials = _trials(exercise, function, rng)
     printed = next((trial.printed for trial in trials if trial.printed), "")
-    if trials[0].stub and not any(trial.fits for trial in trials):
+    if trials[-1].interrupted:
+        return _wrong(exercise, f"{trials[-1].complaint} Does a loop in it never end?", attempt)
+    if _untouched(exercise, trials):
         return replace(_unsolved(exercise), printed=printed)
     complaint = _complaint(exercise, function, trials, rng)
     verdict = _wrong(exercise, complaint, attempt) if complaint else _correct(exercise)
     return replace(verdict, printed=printed)
+
+
+def _trials(exercise: Exercise, function: Function, rng: np.random.Generator) -> list[Trial]:
+    """A call for each case, until the reader stops one."""
+    trials: list[Trial] = []
+    for arguments in exercise.cases(rng):
+        trials.append(run(exercise, function, arguments))
+        if trials[-1].interrupted:
+            break
+    return trials
+
+
+def _untouched(exercise: Exercise, trials: Sequence[Trial]) -> bool:
+    """True for a stub that returns nothing, and for a faulty function that still does what it did as given."""
+    if exercise.as_given:
+        return _does_the_same(exercise, exercise.as_given, trials)
+    return trials[0].stub and not any(trial.fits for trial in trials)
 
 
 def _correct(exercise: Exercise) -> Verdict:
@@ -96,12 +119,23 @@ def _correct(exercise: Exercise) -> Verdict:
 
 
 def _unsolved(exercise: Exercise) -> Verdict:
-    return Verdict(exercise.name, "unsolved", "Replace the stub by your own lines, then run this cell again.")
+    begin = (
+        "The function still does what it did when it was given to you. Change it,"
+        if exercise.bug
+        else "Replace the stub by your own lines,"
+    )
+    test = f"It is tried on fresh random numbers, and must be right to {exercise.tolerance:g} of 1 + |answer|."
+    hint = f"""Stuck? `check.hint("{exercise.name}")` gives the first of three hints."""
+    return Verdict(exercise.name, "unsolved", f"{begin} then run this cell again. {test} {hint}")
 
 
 def _wrong(exercise: Exercise, message: str, attempt: int) -> Verdict:
-    hint = exercise.hints[min(max(attempt, 1), len(exercise.hints)) - 1]
-    return Verdict(exercise.name, "wrong", message, hint)
+    return Verdict(exercise.name, "wrong", message, hint(exercise, attempt))
+
+
+def hint(exercise: Exercise, attempt: int) -> str:
+    """What is given at the attempt (1 is the first): a stronger hint each time, the last one again and again."""
+    return exercise.hints[min(max(attempt, 1), len(exercise.hints)) - 1]
 
 
 def _complaint(exercise: Exercise, function: Function, trials: Sequence[Trial], rng: np.random.Generator) -> str:
@@ -127,9 +161,9 @@ def _complaint(exercise: Exercise, function: Function, trials: Sequence[Trial], 
 def _broken_law(exercise: Exercise, function: Function, rng: np.random.Generator) -> str:
     for law in exercise.laws:
         try:
-            with contextlib.redirect_stdout(io.StringIO()), quiet():
+            with contained(io.StringIO()):
                 complaint = law(function, rng)
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             complaint = explain(error, function)
         if complaint:
             return complaint
@@ -137,11 +171,17 @@ def _broken_law(exercise: Exercise, function: Function, rng: np.random.Generator
 
 
 def _misconception(exercise: Exercise, trials: Sequence[Trial]) -> str:
-    """The explanation of the known mistake whose answers are the reader's in every case."""
+    """The explanation of the known mistake that does what the reader's function does in every case."""
+    if not any(trial.actual for trial in trials):
+        return ""
     for known in exercise.misconceptions:
-        if all(exercise.same(trial.actual, exercise.answer(trial.arguments, known.reference)) for trial in trials):
+        if _does_the_same(exercise, known.function, trials):
             return known.explanation
     return ""
+
+
+def _does_the_same(exercise: Exercise, function: Function, trials: Sequence[Trial]) -> bool:
+    return all(same_outcome(exercise, outcome(exercise, function, trial.arguments), trial) for trial in trials)
 
 
 def _constant(trials: Sequence[Trial]) -> str:
@@ -177,14 +217,15 @@ _USUAL_CHANGES: tuple[tuple[Callable[[Array], Array], str], ...] = (
 
 
 def _factor(exercise: Exercise, trials: Sequence[Trial]) -> str:
-    """Speaks when every answer is the right one times the same number."""
+    """Speaks when every answer is the right one times the same number, zeros and NaN included."""
     actual, expected = _joined(t.actual for t in trials), _joined(t.expected for t in trials)
     usable = np.isfinite(actual) & np.isfinite(expected) & (np.abs(expected) > 1e-6)
-    if usable.sum() < 3 or not exercise.close(actual, expected)[~np.isfinite(actual) | ~np.isfinite(expected)].all():
+    if usable.sum() < 3:
         return ""
     ratios = actual[usable] / expected[usable]
     factor = float(np.median(ratios))
-    if factor == 0 or not np.allclose(ratios, factor, rtol=1e-6, atol=0):
+    alike = np.allclose(ratios, factor, rtol=1e-6, atol=0)
+    if factor == 0 or not alike or not exercise.close(actual, factor * expected)[~usable].all():
         return ""
     if abs(factor - 1) < 1e-5:
         return f"Close, but not to {exercise.tolerance:g}: is something rounded, or an iteration stopped too early?"
@@ -232,7 +273,21 @@ def _difference(exercise: Exercise, trial: Trial) -> str:
     )
     index = tuple(int(i) for i in np.argwhere(~exercise.close(actual, expected))[0])
     where = f" at index {list(index)}" if index else ""
-    return f"{exercise.call(trial.arguments)} gave {actual[index]:.6g}{where}, where {expected[index]:.6g} is right."
+    got, right = _told_apart(float(actual[index]), float(expected[index]), _answers_yes_or_no(exercise, trial))
+    return f"{exercise.call(trial.arguments)} gave {got}{where}, where {right} is right."
+
+
+def _answers_yes_or_no(exercise: Exercise, trial: Trial) -> bool:
+    answer = exercise.reference(*deepcopy(trial.arguments))
+    return isinstance(answer, bool) or getattr(answer, "dtype", None) == np.bool_
+
+
+def _told_apart(one: float, other: float, yes_or_no: bool) -> tuple[str, str]:
+    """Two different numbers with as many digits as it takes to see the difference."""
+    if yes_or_no and {one, other} <= {0.0, 1.0}:
+        return str(bool(one)), str(bool(other))
+    pairs = ((f"{one:.{digits}g}", f"{other:.{digits}g}") for digits in (6, 9, 12, 17))
+    return next((pair for pair in pairs if pair[0] != pair[1]), (repr(one), repr(other)))
 
 
 def _joined(answers: Iterable[tuple[Array, ...]]) -> Array:

@@ -5,14 +5,17 @@ Nothing that the function does gets out of `run`; it all becomes a `Trial`, for 
 
 from __future__ import annotations
 
+import builtins
 import contextlib
 import inspect
 import io
+import math
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,12 +25,18 @@ Array = NDArray[np.float64]
 Function = Callable[..., Any]
 Arguments = tuple[Any, ...]
 
+HINTS = 3
+"""Every exercise has three: where to look, what to use, and the solution's line with a gap, written ___."""
+
+SHARED: tuple[ModuleType, ...] = (builtins, math, np, np.linalg)
+"""What a reader's function might replace and everybody uses: put back after each call."""
+
 
 @dataclass(frozen=True)
 class Misconception:
     """A known mistake: the function that makes it, and what to say to someone whose answers match it everywhere."""
 
-    reference: Function
+    function: Function
     explanation: str
 
 
@@ -39,7 +48,17 @@ class Exercise:
     answer, an array or a tuple of arrays. `tolerance` is relative to 1 + |answer|. `shown` are the arguments printed in
     the lesson. `canonical` brings answers that mean the same (a matrix up to scale) to one form before they are
     compared. `laws` are further statements, law(function, rng) -> complaint in words, or "" where it holds. `hints` are
-    given one per try, the last one again and again. The stub of a `bug` exercise is a wrong function, to be mended.
+    three, one per try. `as_given` is the faulty function with which the search for a bug begins.
+
+    Known mistakes and other right ways are written below the exercise, under its decorators:
+
+    >>> double = Exercise("00.double", lambda x: 2 * x, lambda rng: [(rng.normal(),)], ("a", "b", "c"), "Twice.")
+    >>> @double.wrong("This is the square: it agrees at 2 and nowhere else.")
+    ... def squared(x):
+    ...     return x**2
+    >>> @double.right
+    ... def added(x):
+    ...     return x + x
     """
 
     name: str
@@ -47,18 +66,36 @@ class Exercise:
     cases: Callable[[np.random.Generator], Iterable[Arguments]]
     hints: tuple[str, ...]
     praise: str
-    misconceptions: tuple[Misconception, ...] = ()
     tolerance: float = 1e-9
     shown: tuple[Arguments, ...] = ()
     canonical: Callable[[Array], Array] | None = None
     laws: tuple[Callable[[Function, np.random.Generator], str], ...] = ()
     bug: bool = False
+    as_given: Function | None = None
+    misconceptions: list[Misconception] = field(default_factory=list)
+    right_ways: list[Function] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        if not self.hints:
-            raise ValueError(f"hints of exercise {self.name} must hold at least one hint")
+        object.__setattr__(self, "misconceptions", list(self.misconceptions))
+        object.__setattr__(self, "bug", self.bug or self.as_given is not None)
+        if not 0 < len(self.hints) <= HINTS:
+            raise ValueError(f"hints of exercise {self.name} must be {HINTS}, got {len(self.hints)}")
         if not self.tolerance > 0:
             raise ValueError(f"tolerance of exercise {self.name} must be positive, got {self.tolerance}")
+
+    def wrong(self, explanation: str) -> Callable[[Function], Function]:
+        """Decorates a wrong function that readers write; the explanation speaks to the thought behind it."""
+
+        def remember(function: Function) -> Function:
+            self.misconceptions.append(Misconception(function, explanation))
+            return function
+
+        return remember
+
+    def right(self, function: Function) -> Function:
+        """Decorates another right way: OpenCV's function, the lesson's own formula, another order of the terms."""
+        self.right_ways.append(function)
+        return function
 
     @property
     def parameters(self) -> list[str]:
@@ -96,13 +133,19 @@ class Exercise:
 
 @dataclass(frozen=True)
 class Trial:
-    """What came of one call. `actual` is () unless numbers came back, `stub` says that nothing did."""
+    """What came of one call.
+
+    `actual` is () unless numbers came back, `stub` says that nothing did, `raised` is the type of what was raised, and
+    `interrupted` that the reader stopped the call.
+    """
 
     arguments: Arguments
-    expected: tuple[Array, ...]
+    expected: tuple[Array, ...] = ()
     actual: tuple[Array, ...] = ()
     complaint: str = ""
     stub: bool = False
+    raised: type[BaseException] | None = None
+    interrupted: bool = False
     mutated: str = ""
     printed: str = ""
     fits: bool = False
@@ -110,25 +153,58 @@ class Trial:
 
 def run(exercise: Exercise, function: Function, arguments: Arguments) -> Trial:
     """Calls the function with a copy of the arguments, silently, and compares what it returns with the answer."""
-    trial = Trial(arguments, exercise.answer(arguments))
-    given, output = deepcopy(arguments), io.StringIO()
+    given, output = deepcopy(arguments), _Printed()
+    trial, result = _called(exercise, function, Trial(arguments), given, output)
+    trial = replace(
+        trial,
+        expected=exercise.answer(arguments),  # not before the call, where the function could find it
+        printed=" ".join(output.getvalue().split())[:200],
+        mutated=_mutated(exercise, arguments, given),
+    )
+    if trial.stub or trial.complaint:
+        return trial
+    return _compared(exercise, trial, result)
+
+
+def _called(exercise: Exercise, function: Function, trial: Trial, given: Arguments, output: _Printed) -> tuple[Trial, Any]:
+    """The trial so far and what the function returned."""
     try:
-        with contextlib.redirect_stdout(output), quiet():
+        with contained(output):
             result = function(*given)
     except NotImplementedError:
-        return _nothing(exercise, trial)
-    except (Exception, SystemExit) as error:
-        return replace(trial, complaint=explain(error, function) + f" It was called as {exercise.call(arguments)}.")
-    printed = " ".join(output.getvalue().split())[:200]
-    trial = replace(trial, printed=printed, mutated=_mutated(exercise, arguments, given))
-    if result is None or result is Ellipsis:
-        return _nothing(exercise, trial)
-    return _compared(exercise, trial, result)
+        return _nothing(exercise, trial), None
+    except KeyboardInterrupt:
+        call = exercise.call(trial.arguments)
+        return replace(trial, interrupted=True, complaint=f"You stopped {call} before it returned."), None
+    except BaseException as error:
+        complaint = explain(error, function) + f" It was called as {exercise.call(trial.arguments)}."
+        return replace(trial, raised=type(error), complaint=complaint), None
+    return (_nothing(exercise, trial) if result is None or result is Ellipsis else trial), result
+
+
+def outcome(exercise: Exercise, function: Function, arguments: Arguments) -> Trial:
+    """What a function of ours does with the arguments, without the care that a reader's needs."""
+    try:
+        with quiet():
+            result = function(*deepcopy(arguments))
+    except Exception as error:
+        return Trial(arguments, raised=type(error))
+    if result is None:
+        return Trial(arguments, stub=True)
+    with quiet():
+        return Trial(arguments, actual=exercise.normalised(result))
+
+
+def same_outcome(exercise: Exercise, one: Trial, other: Trial) -> bool:
+    """True where two functions did the same: numbers that agree, or nothing, or an error of the same type."""
+    if one.actual or other.actual:
+        return exercise.same(one.actual, other.actual)
+    return one.stub == other.stub and one.raised == other.raised
 
 
 def explain(error: BaseException, function: Function) -> str:
     """An exception in words: what happened, and in which line of the function."""
-    what = f"Your function stopped with {type(error).__name__}: {str(error).rstrip('.') or 'no message'}."
+    what = f"Your function stopped with {type(error).__name__}: {_message(error)}."
     home = getattr(getattr(function, "__code__", None), "co_filename", None)
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == home]
     if not frames or not frames[-1].line:
@@ -136,26 +212,50 @@ def explain(error: BaseException, function: Function) -> str:
     return f"{what} It happened in line {frames[-1].lineno}: ``{frames[-1].line}``."
 
 
+def _message(error: BaseException) -> str:
+    try:
+        return str(error).rstrip(".") or "no message"
+    except BaseException as another:
+        return f"a message that cannot be read ({type(another).__name__})"
+
+
 def signature_complaint(exercise: Exercise, function: Function) -> str:
     """What is wrong with the function's parameters, or "" when it can be called as the exercise calls it."""
     try:
         signature = inspect.signature(function)
-    except (TypeError, ValueError):
-        return ""
-    try:
         signature.bind(*exercise.parameters)
-    except TypeError:
-        return f"It will be called with `({', '.join(exercise.parameters)})`, but your function takes `{signature}`."
+    except ValueError:  # a function of C that does not tell its parameters
+        return ""
+    except BaseException as error:
+        if not isinstance(error, TypeError):
+            return f"Its parameters cannot be read: {_message(error)}."
+        return (
+            f"It will be called with `({', '.join(exercise.parameters)})`, but your function takes "
+            f"`{_signature(function)}`."
+        )
     return ""
+
+
+def _signature(function: Function) -> str:
+    try:
+        return str(inspect.signature(function))
+    except TypeError:
+        return "other parameters"
 
 
 def as_arrays(result: Any) -> tuple[Array, ...]:
     """A result as float64 arrays: one for numbers, an array or a list, several for a tuple of arrays."""
     several = isinstance(result, tuple) and any(np.ndim(part) > 0 for part in result)
-    parts = tuple(np.asarray(part) for part in (result if several else (result,)))
-    if any(np.iscomplexobj(part) for part in parts):
+    return tuple(_as_array(part) for part in (result if several else (result,)))
+
+
+def _as_array(part: Any) -> Array:
+    if hasattr(part, "filled"):  # numpy.ma, which need not be imported for this; what is masked is not an answer
+        part = part.astype(np.float64).filled(np.nan)
+    values = np.asarray(part)
+    if np.iscomplexobj(values):
         raise TypeError("complex numbers are no answer here")
-    return tuple(part.astype(np.float64) for part in parts)
+    return values.astype(np.float64)
 
 
 @contextlib.contextmanager
@@ -164,6 +264,33 @@ def quiet() -> Iterator[None]:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         yield
+
+
+@contextlib.contextmanager
+def contained(output: io.StringIO) -> Iterator[None]:
+    """What is called here prints into `output`, and what it replaces in the modules everybody uses is put back."""
+    before = [(module, dict(vars(module))) for module in SHARED]
+    try:
+        with contextlib.redirect_stdout(output), quiet():
+            yield
+    finally:
+        for module, names in before:
+            now = vars(module)
+            for name in [name for name, value in names.items() if now.get(name, module) is not value]:
+                setattr(module, name, names[name])
+
+
+class _Printed(io.StringIO):
+    """What a function prints: the beginning of it, and closing it closes nothing."""
+
+    LONGEST = 2000
+
+    def write(self, text: str) -> int:
+        super().write(text[: max(0, self.LONGEST - self.tell())])
+        return len(text)
+
+    def close(self) -> None:
+        """Stays open: what was printed is still to be read."""
 
 
 def _nothing(exercise: Exercise, trial: Trial) -> Trial:
@@ -175,10 +302,10 @@ def _nothing(exercise: Exercise, trial: Trial) -> Trial:
 
 def _compared(exercise: Exercise, trial: Trial, result: Any) -> Trial:
     try:
-        shapes = [part.shape for part in as_arrays(result)]
-        with quiet():
+        with contained(_Printed()):
+            shapes = [part.shape for part in as_arrays(result)]
             actual = exercise.normalised(result)
-    except (TypeError, ValueError, ArithmeticError, IndexError):  # LinAlgError is a ValueError
+    except BaseException:  # whatever the result's own methods raise, LinAlgError of a canonical form among it
         what = f"something of type {type(result).__name__} that is not an array of real numbers"
         return replace(trial, complaint=f"{exercise.call(trial.arguments)} returned {what}.")
     complaint = _shape_complaint(exercise, trial, shapes)

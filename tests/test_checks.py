@@ -44,7 +44,7 @@ def test_every_reference_passes_its_own_checker(one, seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_every_known_mistake_is_answered_with_its_own_explanation(one, seed):
     for known in one.misconceptions:
-        answer = verdict(known.reference, of=one, seed=seed)
+        answer = verdict(known.function, of=one, seed=seed)
         assert answer.status == "wrong"
         assert answer.message == known.explanation
 
@@ -184,7 +184,7 @@ def test_hints_grow_stronger_with_wrong_tries_but_not_with_stubs():
     check = Tutor(np.random.default_rng(0))
     hints = exercise("05.fold_radius").hints
     assert check("05.fold_radius", lambda k1: None).hint == ""
-    assert [check("05.fold_radius", lambda k1: k1).hint for _ in range(3)] == [hints[0], hints[1], hints[1]]
+    assert [check("05.fold_radius", lambda k1: k1).hint for _ in range(3)] == [hints[0], hints[1], hints[2]]
     assert check("05.distort", lambda xy, k1, k2, k3: xy).hint == exercise("05.distort").hints[0]
 
 
@@ -274,7 +274,7 @@ def test_the_fold_of_k1_minus_0_3_is_the_published_one_and_the_inverse_ends_ther
 @pytest.mark.parametrize(
     ("name", "function", "word"),
     [
-        ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 <= 0 else np.inf, "gave -inf"),
+        ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 <= 0 else np.inf, "divides by zero"),
         ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 < 0 else 7.0, "gave 7, where inf"),
         ("05.distort", lambda xy, k1, k2, k3: exercise("05.distort").reference(xy, k1, k2, 0), "k3"),
         ("01.best_hole", lambda focal_mm, wavelength_nm: 1.56 * np.sqrt(focal_mm * wavelength_nm * 1e-6), "rounded"),

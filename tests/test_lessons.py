@@ -27,10 +27,7 @@ A [fold](00_start_here.ipynb#fold), the [principal point](00_start_here.ipynb#pr
 ## Further reading
 Hartley and Zisserman 2004, section 7.4."""
 
-BUG = """def tangential(xy, p1, p2):
-    x, y = xy[..., 0], xy[..., 1]
-    r2 = x**2 + y**2
-    return np.stack([p1 * x * y + p2 * (r2 + 2 * x**2), p1 * (r2 + 2 * y**2) + 2 * p2 * x * y], axis=-1)"""
+BUG = inspect.getsource(lesson05.tangential_as_given).replace("tangential_as_given", "tangential")
 
 
 def code(source, *tags, **camviz):
@@ -139,7 +136,7 @@ def test_every_solution_passes_its_checker_and_no_stub_does(lesson):
     assert list(solved) == list(unsolved) == list(exercises("05"))
     assert all(solved.values()), solved
     assert not any(unsolved.values())
-    assert unsolved["05.tangential"].message.startswith("This is what you get with `p1*x*y` instead of `2*p1*x*y`")
+    assert {one.status for one in unsolved.values()} == {"unsolved"}
 
 
 def test_the_teacher_s_edition_has_solutions_in_place_notes_visible_and_hidden_tests(lesson):

@@ -4,6 +4,7 @@ from camviz.exercises import Tutor
 
 check = Tutor()
 check("05.distort", distort)
+check.hint("05.distort")
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from camviz.checks import Exercise, Verdict, judge
+from camviz.checks import Exercise, Verdict, hint, judge
 
 
 class Tutor:
@@ -27,9 +28,14 @@ class Tutor:
         """The verdict on a reader's function for the exercise `name`, such as "05.distort"."""
         tries = self._tries.get(name, 0) + 1
         verdict = judge(exercise(name), function, self._rng, tries)
-        if verdict.status == "wrong":
+        if verdict.hint:
             self._tries[name] = tries
         return verdict
+
+    def hint(self, name: str) -> Verdict:
+        """The next of the exercise's three hints, without a try."""
+        tries = self._tries[name] = self._tries.get(name, 0) + 1
+        return Verdict(name, "hint", hint(exercise(name), tries))
 
 
 def exercise(name: str) -> Exercise:

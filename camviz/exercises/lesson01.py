@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 
 def project(points: Array, f: float, cx: float, cy: float) -> Array:
@@ -91,43 +91,52 @@ PROJECT = Exercise(
         "of points broadcasts. Add `(cx, cy)` at the end.",
     ),
     praise="These are the pixels that camviz and OpenCV give, for one point and for any array of them.",
-    misconceptions=(
-        Misconception(
-            lambda points, f, cx, cy: f * points[..., :2] / points[..., 2:],
-            "This is measured from the principal point. A pixel counts from the corner of the image: add (cx, cy).",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: -f * points[..., :2] / points[..., 2:] + (cx, cy),
-            "This is the image on the back wall, turned by 180°. Pixels count in the picture that is turned "
-            "upright again.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * points[..., 2:] / points[..., :2] + (cx, cy),
-            "This is f Z/X: the fraction stands on its head. What is farther away must become *smaller*.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * points[..., :2] / np.linalg.norm(points, axis=-1, keepdims=True) + (cx, cy),
-            "You divide by the distance to the hole. The wall is flat, and similar triangles speak of the "
-            "depth Z alone.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * (points[..., :2] + (cx, cy)) / points[..., 2:],
-            "The principal point is added before the division. It is a place in the image, in pixels: add it last.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * points[..., :2] / points[..., 2:] - (cx, cy),
-            "The principal point is subtracted. That is the way back, from a pixel to its ray; here it is added.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * points[..., :2] / points[..., 2:] + (cy, cx),
-            "cx and cy have changed places: cx goes with u, which counts columns, and cy with v.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: points[..., :2] / (f * points[..., 2:]) + (cx, cy),
-            "You divide by f. A deeper box makes a larger picture: f multiplies.",
-        ),
-    ),
 )
+
+
+@PROJECT.wrong("This is measured from the principal point. A pixel counts from the corner of the image: add (cx, cy).")
+def _(points, f, cx, cy):
+    return f * points[..., :2] / points[..., 2:]
+
+
+@PROJECT.wrong(
+    "This is the image on the back wall, turned by 180°. Pixels count in the picture that is turned upright again."
+)
+def _(points, f, cx, cy):
+    return -f * points[..., :2] / points[..., 2:] + (cx, cy)
+
+
+@PROJECT.wrong("This is f Z/X: the fraction stands on its head. What is farther away must become *smaller*.")
+def _(points, f, cx, cy):
+    return f * points[..., 2:] / points[..., :2] + (cx, cy)
+
+
+@PROJECT.wrong(
+    "You divide by the distance to the hole. The wall is flat, and similar triangles speak of the depth Z alone."
+)
+def _(points, f, cx, cy):
+    return f * points[..., :2] / np.linalg.norm(points, axis=-1, keepdims=True) + (cx, cy)
+
+
+@PROJECT.wrong("The principal point is added before the division. It is a place in the image, in pixels: add it last.")
+def _(points, f, cx, cy):
+    return f * (points[..., :2] + (cx, cy)) / points[..., 2:]
+
+
+@PROJECT.wrong("The principal point is subtracted. That is the way back, from a pixel to its ray; here it is added.")
+def _(points, f, cx, cy):
+    return f * points[..., :2] / points[..., 2:] - (cx, cy)
+
+
+@PROJECT.wrong("cx and cy have changed places: cx goes with u, which counts columns, and cy with v.")
+def _(points, f, cx, cy):
+    return f * points[..., :2] / points[..., 2:] + (cy, cx)
+
+
+@PROJECT.wrong("You divide by f. A deeper box makes a larger picture: f multiplies.")
+def _(points, f, cx, cy):
+    return points[..., :2] / (f * points[..., 2:]) + (cx, cy)
+
 
 VANISHING = Exercise(
     name="01.vanishing_point",
@@ -138,29 +147,34 @@ VANISHING = Exercise(
         "f (A_x + s D_x) / (A_z + s D_z) + cx tends to f D_x / D_z + cx: project the direction as if it were a point.",
     ),
     praise="The starting point dropped out: all parallel lines share this pixel, whichever way along them you walk.",
-    misconceptions=(
-        Misconception(
-            lambda direction, f, cx, cy: f * direction[..., :2] / direction[..., 2:],
-            "This is measured from the principal point. A pixel counts from the corner of the image: add (cx, cy).",
-        ),
-        Misconception(
-            lambda direction, f, cx, cy: f * direction[..., :2] / np.abs(direction[..., 2:]) + (cx, cy),
-            "A direction and its opposite belong to the same lines and meet in the same pixel: keep the sign of D_z.",
-        ),
-        Misconception(
-            lambda direction, f, cx, cy: (
-                f * direction[..., :2] / np.linalg.norm(direction, axis=-1, keepdims=True) + (cx, cy)
-            ),
-            "You divide by the length of the direction. Only its share along the axis, D_z, counts.",
-        ),
-        Misconception(
-            in_front,
-            "For directions that lead away from the camera this is right. A line has two ends: with D_z < 0 "
-            "follow it the "
-            "other way, and it vanishes in the same pixel. There is no NaN here.",
-        ),
-    ),
 )
+
+
+@VANISHING.wrong(
+    "This is measured from the principal point. A pixel counts from the corner of the image: add (cx, cy)."
+)
+def _(direction, f, cx, cy):
+    return f * direction[..., :2] / direction[..., 2:]
+
+
+@VANISHING.wrong(
+    "A direction and its opposite belong to the same lines and meet in the same pixel: keep the sign of D_z."
+)
+def _(direction, f, cx, cy):
+    return f * direction[..., :2] / np.abs(direction[..., 2:]) + (cx, cy)
+
+
+@VANISHING.wrong("You divide by the length of the direction. Only its share along the axis, D_z, counts.")
+def _(direction, f, cx, cy):
+    return f * direction[..., :2] / np.linalg.norm(direction, axis=-1, keepdims=True) + (cx, cy)
+
+
+VANISHING.wrong(
+    "For directions that lead away from the camera this is right. A line has two ends: with D_z < 0 "
+    "follow it the "
+    "other way, and it vanishes in the same pixel. There is no NaN here."
+)(in_front)
+
 
 IN_FRONT = Exercise(
     name="01.in_front",
@@ -174,38 +188,45 @@ IN_FRONT = Exercise(
         "is NaN, and NaN is honest: it draws nothing.",
     ),
     praise="Nothing behind the camera has a pixel any more, and no depth is falsified by a guard.",
-    misconceptions=(
-        Misconception(
-            lambda points, f, cx, cy: f * points[..., :2] / (points[..., 2:] + 1e-8) + (cx, cy),
-            "The `1e-8` keeps the division from failing and hides the question. Points *behind* the camera "
-            "still get ordinary "
-            "pixels, those at Z = 0 enormous ones, and every other point is a little off.",
-        ),
-        Misconception(
-            _mirrored,
-            "The `1e-8` is gone, but points behind the camera still get pixels, as if light went through the "
-            "back wall.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: _mirrored(points * [1, 1, 0] + np.abs(points) * [0, 0, 1], f, cx, cy),
-            "With |Z| what stands behind you is painted over what you see. It has no image at all: NaN.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: in_front(np.maximum(points, [-np.inf, -np.inf, 1e-8]), f, cx, cy),
-            "A depth cut off at a tiny number sends what is behind the camera far out of the picture, but "
-            "still somewhere: "
-            "a line to it is drawn right across. It has no image at all: NaN.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: (
-                f * points[..., :2] / (np.where(points[..., 2:] > 0, points[..., 2:], np.nan) + 1e-8) + (cx, cy)
-            ),
-            "What is behind the camera is NaN now. The `1e-8` is still added to every good depth: it has "
-            "nothing to guard any "
-            "more, take it out.",
-        ),
-    ),
 )
+
+
+@IN_FRONT.wrong(
+    "The `1e-8` keeps the division from failing and hides the question. Points *behind* the camera "
+    "still get ordinary "
+    "pixels, those at Z = 0 enormous ones, and every other point is a little off."
+)
+def _(points, f, cx, cy):
+    return f * points[..., :2] / (points[..., 2:] + 1e-8) + (cx, cy)
+
+
+IN_FRONT.wrong(
+    "The `1e-8` is gone, but points behind the camera still get pixels, as if light went through the back wall."
+)(_mirrored)
+
+
+@IN_FRONT.wrong("With |Z| what stands behind you is painted over what you see. It has no image at all: NaN.")
+def _(points, f, cx, cy):
+    return _mirrored(points * [1, 1, 0] + np.abs(points) * [0, 0, 1], f, cx, cy)
+
+
+@IN_FRONT.wrong(
+    "A depth cut off at a tiny number sends what is behind the camera far out of the picture, but "
+    "still somewhere: "
+    "a line to it is drawn right across. It has no image at all: NaN."
+)
+def _(points, f, cx, cy):
+    return in_front(np.maximum(points, [-np.inf, -np.inf, 1e-8]), f, cx, cy)
+
+
+@IN_FRONT.wrong(
+    "What is behind the camera is NaN now. The `1e-8` is still added to every good depth: it has "
+    "nothing to guard any "
+    "more, take it out."
+)
+def _(points, f, cx, cy):
+    return f * points[..., :2] / (np.where(points[..., 2:] > 0, points[..., 2:], np.nan) + 1e-8) + (cx, cy)
+
 
 RAY = Exercise(
     name="01.ray",
@@ -217,27 +238,32 @@ RAY = Exercise(
         "`np.stack([x, y, np.ones_like(x)], axis=-1)` is a point on the ray, at depth 1. Divide it by its length.",
     ),
     praise="A pixel gives a direction and no more: every positive multiple of it lands there.",
-    misconceptions=(
-        Misconception(
-            lambda uv, f, cx, cy: np.concatenate([(uv - (cx, cy)) / f, np.ones_like(uv[..., :1])], axis=-1),
-            "This is a point on the ray, at depth 1. Divide it by its length to have the *unit* direction.",
-        ),
-        Misconception(
-            lambda uv, f, cx, cy: ray(uv + (cx, cy), f, cx, cy),
-            "This is the ray of the pixel counted from the principal point. Here (u, v) counts from the "
-            "corner of the image: "
-            "subtract (cx, cy) first.",
-        ),
-        Misconception(
-            lambda uv, f, cx, cy: ray(np.array([cx, cy]) - (uv - (cx, cy)), f, cx, cy),
-            "x and y have the wrong sign: a pixel to the right of the principal point looks to the right.",
-        ),
-        Misconception(
-            lambda uv, f, cx, cy: ray(uv, f * f, cx, cy),
-            "The ray is too steep: divide by f once, either x and y or the whole vector, not both.",
-        ),
-    ),
 )
+
+
+@RAY.wrong("This is a point on the ray, at depth 1. Divide it by its length to have the *unit* direction.")
+def _(uv, f, cx, cy):
+    return np.concatenate([(uv - (cx, cy)) / f, np.ones_like(uv[..., :1])], axis=-1)
+
+
+@RAY.wrong(
+    "This is the ray of the pixel counted from the principal point. Here (u, v) counts from the "
+    "corner of the image: "
+    "subtract (cx, cy) first."
+)
+def _(uv, f, cx, cy):
+    return ray(uv + (cx, cy), f, cx, cy)
+
+
+@RAY.wrong("x and y have the wrong sign: a pixel to the right of the principal point looks to the right.")
+def _(uv, f, cx, cy):
+    return ray(np.array([cx, cy]) - (uv - (cx, cy)), f, cx, cy)
+
+
+@RAY.wrong("The ray is too steep: divide by f once, either x and y or the whole vector, not both.")
+def _(uv, f, cx, cy):
+    return ray(uv, f * f, cx, cy)
+
 
 BEST_HOLE = Exercise(
     name="01.best_hole",
@@ -249,31 +275,43 @@ BEST_HOLE = Exercise(
         "d² = 2.44 λ f, with λ = wavelength_nm · 1e-6 and f in millimetres. Then the square root.",
     ),
     praise="For 50 mm and green light that is 0.26 mm: about 1.56 √(f λ).",
-    misconceptions=(
-        Misconception(
-            lambda focal_mm, wavelength_nm: 2.44 * wavelength_nm * 1e-6 * focal_mm, "This is d². Take its square root."
-        ),
-        Misconception(
-            lambda focal_mm, wavelength_nm: np.sqrt(2.44 * wavelength_nm * focal_mm),
-            "This is 1000 times too large. A nanometre is 10⁻⁶ mm, so 550 nm are 0.00055 mm; and the answer is in mm.",
-        ),
-        Misconception(
-            lambda focal_mm, wavelength_nm: np.sqrt(2.44 * wavelength_nm * 1e-9 * focal_mm),
-            "The wavelength is in metres here and the focal length in millimetres: 1 nm = 10⁻⁶ mm.",
-        ),
-        Misconception(
-            lambda focal_mm, wavelength_nm: np.sqrt(1.22 * wavelength_nm * 1e-6 * focal_mm),
-            "1.22 λ f / d is the *radius* of the Airy disc. d is a diameter: compare it with 2.44 λ f / d.",
-        ),
-        Misconception(
-            lambda focal_mm, wavelength_nm: 1.9 * np.sqrt(wavelength_nm * 1e-6 * focal_mm),
-            "This is Rayleigh's constant, 1.9, for another notion of sharpness. Here the hole equals its Airy disc.",
-        ),
-        Misconception(
-            lambda focal_mm, wavelength_nm: 2 * np.sqrt(wavelength_nm * 1e-6 * focal_mm),
-            "This is Young's constant, 2, for another notion of sharpness. Here the hole is to equal its Airy disc.",
-        ),
-    ),
 )
+
+
+@BEST_HOLE.wrong("This is d². Take its square root.")
+def _(focal_mm, wavelength_nm):
+    return 2.44 * wavelength_nm * 1e-6 * focal_mm
+
+
+@BEST_HOLE.wrong(
+    "This is 1000 times too large. A nanometre is 10⁻⁶ mm, so 550 nm are 0.00055 mm; and the answer is in mm."
+)
+def _(focal_mm, wavelength_nm):
+    return np.sqrt(2.44 * wavelength_nm * focal_mm)
+
+
+@BEST_HOLE.wrong("The wavelength is in metres here and the focal length in millimetres: 1 nm = 10⁻⁶ mm.")
+def _(focal_mm, wavelength_nm):
+    return np.sqrt(2.44 * wavelength_nm * 1e-9 * focal_mm)
+
+
+@BEST_HOLE.wrong("1.22 λ f / d is the *radius* of the Airy disc. d is a diameter: compare it with 2.44 λ f / d.")
+def _(focal_mm, wavelength_nm):
+    return np.sqrt(1.22 * wavelength_nm * 1e-6 * focal_mm)
+
+
+@BEST_HOLE.wrong(
+    "This is Rayleigh's constant, 1.9, for another notion of sharpness. Here the hole equals its Airy disc."
+)
+def _(focal_mm, wavelength_nm):
+    return 1.9 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
+
+
+@BEST_HOLE.wrong(
+    "This is Young's constant, 2, for another notion of sharpness. Here the hole is to equal its Airy disc."
+)
+def _(focal_mm, wavelength_nm):
+    return 2 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
+
 
 EXERCISES = (PROJECT, VANISHING, IN_FRONT, RAY, BEST_HOLE)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 
 def image_distance(f: float, u: ArrayLike) -> Array:
@@ -94,27 +94,39 @@ IMAGE = Exercise(
         "`1 / (1 / f - 1 / u)`, for every u: also for one that is infinite, or nearer than f.",
     ),
     praise="An object at infinity has its image at f, one at 2f at 2f, and one inside f a virtual one before the lens.",
-    misconceptions=(
-        Misconception(
-            lambda f, u: 1 / (1 / f + 1 / np.asarray(u)),
-            "The sign: this is 1/f + 1/u. What bends the rays, 1/f, is shared by object *and* image: 1/f = 1/u + 1/v.",
-        ),
-        Misconception(
-            lambda f, u: 1 / f - 1 / np.asarray(u), "This is 1/v. Turn it over once more to have a distance."
-        ),
-        Misconception(
-            lambda f, u: f + 0 * np.where(np.isfinite(u), u, 0),
-            "This puts the image at f whatever the object. That is so at infinity alone; the nearer the object, the "
-            "farther behind the lens its image.",
-        ),
-        Misconception(lambda f, u: np.asarray(u) - f, "The lens equation adds *reciprocals*: 1/f = 1/u + 1/v."),
-        Misconception(
-            lambda f, u: np.abs(image_distance(f, u)),
-            "For objects beyond f this is right. Inside f there is no image behind the lens: v is *negative*, the "
-            "light only seems to come from there. Keep the sign.",
-        ),
-    ),
 )
+
+
+@IMAGE.wrong("The sign: this is 1/f + 1/u. What bends the rays, 1/f, is shared by object *and* image: 1/f = 1/u + 1/v.")
+def _(f, u):
+    return 1 / (1 / f + 1 / np.asarray(u))
+
+
+@IMAGE.wrong("This is 1/v. Turn it over once more to have a distance.")
+def _(f, u):
+    return 1 / f - 1 / np.asarray(u)
+
+
+@IMAGE.wrong(
+    "This puts the image at f whatever the object. That is so at infinity alone; the nearer the object, the "
+    "farther behind the lens its image."
+)
+def _(f, u):
+    return f + 0 * np.where(np.isfinite(u), u, 0)
+
+
+@IMAGE.wrong("The lens equation adds *reciprocals*: 1/f = 1/u + 1/v.")
+def _(f, u):
+    return np.asarray(u) - f
+
+
+@IMAGE.wrong(
+    "For objects beyond f this is right. Inside f there is no image behind the lens: v is *negative*, the "
+    "light only seems to come from there. Keep the sign."
+)
+def _(f, u):
+    return np.abs(image_distance(f, u))
+
 
 VIEW = Exercise(
     name="02.field_of_view",
@@ -126,26 +138,34 @@ VIEW = Exercise(
         "The sensor stands at v = 1 / (1/f − 1/s). Put v where f is.",
     ),
     praise="Now the view narrows when the lens is focused near, as it does in every film whose focus is pulled.",
-    misconceptions=(
-        Misconception(
-            lambda width, f, s: 2 * np.arctan(width / (2 * f)) + 0 * np.where(np.isfinite(s), s, 0),
-            "The focus `s` changes nothing here. With the sensor at f the lens sees sharp at infinity only; focused "
-            "nearer, the sensor has to stand farther back.",
-        ),
-        Misconception(
-            lambda width, f, s: 2 * np.arctan(width / (2 * np.asarray(s))),
-            "This is the angle under which the *subject's place* would see a sensor's width. The triangle behind the "
-            "lens is what counts: its length is v, not s.",
-        ),
-        Misconception(
-            lambda width, f, s: np.arctan(width / (2 * image_distance(f, s))), "This is *half* the field of view."
-        ),
-        Misconception(
-            lambda width, f, s: 2 * np.arctan(width / image_distance(f, s)),
-            "The triangle has *half* the sensor's width for its side: width / 2.",
-        ),
-    ),
 )
+
+
+@VIEW.wrong(
+    "The focus `s` changes nothing here. With the sensor at f the lens sees sharp at infinity only; focused "
+    "nearer, the sensor has to stand farther back."
+)
+def _(width, f, s):
+    return 2 * np.arctan(width / (2 * f)) + 0 * np.where(np.isfinite(s), s, 0)
+
+
+@VIEW.wrong(
+    "This is the angle under which the *subject's place* would see a sensor's width. The triangle behind the "
+    "lens is what counts: its length is v, not s."
+)
+def _(width, f, s):
+    return 2 * np.arctan(width / (2 * np.asarray(s)))
+
+
+@VIEW.wrong("This is *half* the field of view.")
+def _(width, f, s):
+    return np.arctan(width / (2 * image_distance(f, s)))
+
+
+@VIEW.wrong("The triangle has *half* the sensor's width for its side: width / 2.")
+def _(width, f, s):
+    return 2 * np.arctan(width / image_distance(f, s))
+
 
 BLUR = Exercise(
     name="02.blur",
@@ -158,34 +178,41 @@ BLUR = Exercise(
         "Similar triangles: blur / (f/N) = |v(u) − v(s)| / v(u).",
     ),
     praise="It is f²/(N (s − f)) · |u − s|/u, and you had it from two triangles.",
-    misconceptions=(
-        Misconception(
-            lambda f, N, s, u: blur(f, N, s, u) * image_distance(f, u) / image_distance(f, s),
-            "You divide by the *sensor's* distance v(s). The cone's tip is at v(u), and its whole length is v(u).",
-        ),
-        Misconception(
-            lambda f, N, s, u: blur(f, N, s, u) / 2,
-            "This is the radius. The aperture f/N is a diameter, so keep to that.",
-        ),
-        Misconception(
-            lambda f, N, s, u: blur(f, N, s, u) * N / f * N,
-            "The aperture's diameter is f/N: the f-number *divides*, and a larger N makes a smaller blur.",
-        ),
-        Misconception(
-            lambda f, N, s, u: f / N * np.abs(np.asarray(u) - s) / np.asarray(u),
-            "This is the cone cut in front of the lens, at the plane in focus. On the sensor it is smaller by the "
-            "magnification, f/(s − f).",
-        ),
-        Misconception(
-            lambda f, N, s, u: f**2 / (N * s) * np.abs(np.asarray(u) - s) / np.asarray(u),
-            "Close: this takes the sensor to stand at f. With v(s) it is f²/(N (s − f)), which matters near the lens.",
-        ),
-        Misconception(
-            lambda f, N, s, u: f / N * (image_distance(f, u) - image_distance(f, s)) / image_distance(f, u),
-            "Beyond the focus or before it, a disc has a positive diameter: take the absolute value.",
-        ),
-    ),
 )
+
+
+@BLUR.wrong("You divide by the *sensor's* distance v(s). The cone's tip is at v(u), and its whole length is v(u).")
+def _(f, N, s, u):
+    return blur(f, N, s, u) * image_distance(f, u) / image_distance(f, s)
+
+
+@BLUR.wrong("This is the radius. The aperture f/N is a diameter, so keep to that.")
+def _(f, N, s, u):
+    return blur(f, N, s, u) / 2
+
+
+@BLUR.wrong("The aperture's diameter is f/N: the f-number *divides*, and a larger N makes a smaller blur.")
+def _(f, N, s, u):
+    return blur(f, N, s, u) * N / f * N
+
+
+@BLUR.wrong(
+    "This is the cone cut in front of the lens, at the plane in focus. On the sensor it is smaller by the "
+    "magnification, f/(s − f)."
+)
+def _(f, N, s, u):
+    return f / N * np.abs(np.asarray(u) - s) / np.asarray(u)
+
+
+@BLUR.wrong("Close: this takes the sensor to stand at f. With v(s) it is f²/(N (s − f)), which matters near the lens.")
+def _(f, N, s, u):
+    return f**2 / (N * s) * np.abs(np.asarray(u) - s) / np.asarray(u)
+
+
+@BLUR.wrong("Beyond the focus or before it, a disc has a positive diameter: take the absolute value.")
+def _(f, N, s, u):
+    return f / N * (image_distance(f, u) - image_distance(f, s)) / image_distance(f, u)
+
 
 LIMITS = Exercise(
     name="02.limits",
@@ -198,25 +225,30 @@ LIMITS = Exercise(
         "`np.where(s < H, s * (H - f) / (H - s), np.inf)`, and return both: `return near, far`.",
     ),
     praise="Put back into the blur, both limits give c: 30 µm for 30 µm. And beyond H there is no far limit any more.",
-    misconceptions=(
-        Misconception(
-            lambda f, N, s, c: (limits(f, N, s, c)[0], s * (f**2 / (N * c)) / (f**2 / (N * c) + f - s)),
-            "For s < H this is right. From s = H on everything behind is sharp enough: the far limit is `np.inf`, not "
-            "a negative distance.",
-        ),
-        Misconception(
-            lambda f, N, s, c: (limits(f, N, s, c)[0], np.where(s < f**2 / (N * c) + f, limits(f, N, s, c)[1], np.nan)),
-            "For s < H this is right. Beyond, the limit *exists*: it is infinitely far, `np.inf`.",
-        ),
-        Misconception(
-            lambda f, N, s, c: limits(f, N, s, c)[::-1], "Near and far have changed places: return the near one first."
-        ),
-        Misconception(
-            lambda f, N, s, c: _rule_of_thumb(f, N, s, c),
-            "These are the short forms H s/(H ± s), good when s is large beside f. Here the exact ones are wanted.",
-        ),
-    ),
 )
+
+
+@LIMITS.wrong(
+    "For s < H this is right. From s = H on everything behind is sharp enough: the far limit is `np.inf`, not "
+    "a negative distance."
+)
+def _(f, N, s, c):
+    return (limits(f, N, s, c)[0], s * (f**2 / (N * c)) / (f**2 / (N * c) + f - s))
+
+
+@LIMITS.wrong("For s < H this is right. Beyond, the limit *exists*: it is infinitely far, `np.inf`.")
+def _(f, N, s, c):
+    return (limits(f, N, s, c)[0], np.where(s < f**2 / (N * c) + f, limits(f, N, s, c)[1], np.nan))
+
+
+@LIMITS.wrong("Near and far have changed places: return the near one first.")
+def _(f, N, s, c):
+    return limits(f, N, s, c)[::-1]
+
+
+@LIMITS.wrong("These are the short forms H s/(H ± s), good when s is large beside f. Here the exact ones are wanted.")
+def _(f, N, s, c):
+    return _rule_of_thumb(f, N, s, c)
 
 
 def _rule_of_thumb(f: float, N: float, s: Array, c: float) -> tuple[Array, Array]:
@@ -257,29 +289,33 @@ ELEMENTS = Exercise(
         "left. In the end −1 / M[1, 0].",
     ),
     praise="Any lens with a prescription, from a reading glass to a zoom, is now one matrix for you.",
-    misconceptions=(
-        Misconception(
-            _glass_forgotten,
-            "Your light always comes out of air. Keep the index it is in: after a row, `before` becomes that row's "
-            "`after`.",
-        ),
-        Misconception(
-            _wrong_order,
-            "The order is reversed: the ray is on the right, so the first surface stands rightmost: `M = new @ M`.",
-        ),
-        Misconception(
-            _without_gaps,
-            "The surfaces are taken to lie on top of each other. Between them light travels: [[1, d], [0, 1]].",
-        ),
-        Misconception(
-            lambda surfaces: -effective_focal_length(surfaces),
-            "The sign: a ray parallel to the axis comes out with slope C y, downwards when the lens converges; so "
-            "f = −1/C.",
-        ),
-        Misconception(
-            lambda surfaces: -1 / effective_focal_length(surfaces), "This is C itself. The focal length is −1/C."
-        ),
-    ),
 )
+
+ELEMENTS.wrong(
+    "Your light always comes out of air. Keep the index it is in: after a row, `before` becomes that row's `after`."
+)(_glass_forgotten)
+
+
+ELEMENTS.wrong("The order is reversed: the ray is on the right, so the first surface stands rightmost: `M = new @ M`.")(
+    _wrong_order
+)
+
+
+ELEMENTS.wrong("The surfaces are taken to lie on top of each other. Between them light travels: [[1, d], [0, 1]].")(
+    _without_gaps
+)
+
+
+@ELEMENTS.wrong(
+    "The sign: a ray parallel to the axis comes out with slope C y, downwards when the lens converges; so f = −1/C."
+)
+def _(surfaces):
+    return -effective_focal_length(surfaces)
+
+
+@ELEMENTS.wrong("This is C itself. The focal length is −1/C.")
+def _(surfaces):
+    return -1 / effective_focal_length(surfaces)
+
 
 EXERCISES = (IMAGE, VIEW, BLUR, LIMITS, ELEMENTS)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 
 def ray(uv: Array, K: Array) -> Array:
@@ -99,23 +99,26 @@ RAY = Exercise(
         "`@ np.linalg.inv(K).T`, then divide by `np.linalg.norm(..., axis=-1, keepdims=True)`.",
     ),
     praise="Every pixel has its ray, also where the pixel axes lean. This is all that K⁻¹ does.",
-    misconceptions=(
-        Misconception(_unnormalised, "The directions are right, with z = 1. Divide each by its length."),
-        Misconception(
-            _diagonal_inverse,
-            "These are the rays for skew = 0: `(u − cx) / fx` alone is not enough when K[0, 1] is not zero. Solve "
-            "for y first, then take skew · y away from u.",
-        ),
-        Misconception(
-            lambda uv, K: ray(uv, np.linalg.inv(K)),
-            "You multiply by K. K takes rays to pixels; the way back is its inverse.",
-        ),
-        Misconception(
-            lambda uv, K: ray(uv, K.T),
-            "K has been transposed on the way: for row vectors the product is `uv1 @ np.linalg.inv(K).T`.",
-        ),
-    ),
 )
+
+RAY.wrong("The directions are right, with z = 1. Divide each by its length.")(_unnormalised)
+
+
+RAY.wrong(
+    "These are the rays for skew = 0: `(u − cx) / fx` alone is not enough when K[0, 1] is not zero. Solve "
+    "for y first, then take skew · y away from u."
+)(_diagonal_inverse)
+
+
+@RAY.wrong("You multiply by K. K takes rays to pixels; the way back is its inverse.")
+def _(uv, K):
+    return ray(uv, np.linalg.inv(K))
+
+
+@RAY.wrong("K has been transposed on the way: for row vectors the product is `uv1 @ np.linalg.inv(K).T`.")
+def _(uv, K):
+    return ray(uv, K.T)
+
 
 FIELD_OF_VIEW = Exercise(
     name="03.field_of_view",
@@ -128,26 +131,36 @@ FIELD_OF_VIEW = Exercise(
         "width − 0.5 − cx pixels away.",
     ),
     praise="Correct for every principal point, in the picture or outside it.",
-    misconceptions=(
-        Misconception(
-            lambda width, fx, cx: np.degrees(2 * np.arctan(width / (2 * fx))),
-            "This is 2 atan(width / 2f), which holds when the principal point is in the middle. Here it is not.",
-        ),
-        Misconception(
-            lambda width, fx, cx: np.degrees(np.arctan(cx / fx) + np.arctan((width - cx) / fx)),
-            "Half a pixel is missing: this counts pixels from the corner of the first one. With centres at integers "
-            "the edges lie at −0.5 and width − 0.5.",
-        ),
-        Misconception(
-            lambda width, fx, cx: np.degrees(np.arctan(cx / fx) + np.arctan((width - 1 - cx) / fx)),
-            "This is the angle between the *centres* of the first and the last pixel. The picture is half a pixel "
-            "wider on either side.",
-        ),
-        Misconception(
-            lambda width, fx, cx: np.radians(field_of_view(width, fx, cx)), "The angle is right, in radians."
-        ),
-    ),
 )
+
+
+@FIELD_OF_VIEW.wrong(
+    "This is 2 atan(width / 2f), which holds when the principal point is in the middle. Here it is not."
+)
+def _(width, fx, cx):
+    return np.degrees(2 * np.arctan(width / (2 * fx)))
+
+
+@FIELD_OF_VIEW.wrong(
+    "Half a pixel is missing: this counts pixels from the corner of the first one. With centres at integers "
+    "the edges lie at −0.5 and width − 0.5."
+)
+def _(width, fx, cx):
+    return np.degrees(np.arctan(cx / fx) + np.arctan((width - cx) / fx))
+
+
+@FIELD_OF_VIEW.wrong(
+    "This is the angle between the *centres* of the first and the last pixel. The picture is half a pixel "
+    "wider on either side."
+)
+def _(width, fx, cx):
+    return np.degrees(np.arctan(cx / fx) + np.arctan((width - 1 - cx) / fx))
+
+
+@FIELD_OF_VIEW.wrong("The angle is right, in radians.")
+def _(width, fx, cx):
+    return np.radians(field_of_view(width, fx, cx))
+
 
 RESIZED = Exercise(
     name="03.resized",
@@ -160,20 +173,26 @@ RESIZED = Exercise(
         "else in the first row scale as well?",
     ),
     praise="Edges stay edges. Halving a picture with cx = 319.5 gives 159.5, as it must.",
-    misconceptions=(
-        Misconception(
-            _scaled,
-            "This scales K as a whole, c′ = s c. The middle of a 640-pixel row, 319.5, becomes 159.75 when halved, "
-            "but the middle of 320 pixels is 159.5: every ray is off by (s − 1)/2 pixels.",
-        ),
-        Misconception(
-            lambda K, s: np.array([[s * K[0, 0], K[0, 1], s * K[0, 2]], [0, s * K[1, 1], s * K[1, 2]], [0, 0, 1]]),
-            "This is the function as it stood: the focal lengths are right, the principal point and the skew are not.",
-        ),
-        Misconception(_half_pixel_up, "The half-pixel term has the wrong sign: (s − 1)/2 is negative for s < 1."),
-        Misconception(_skew_kept, "Focal lengths and principal point are right. The skew is in pixels too."),
-    ),
 )
+
+RESIZED.wrong(
+    "This scales K as a whole, c′ = s c. The middle of a 640-pixel row, 319.5, becomes 159.75 when halved, "
+    "but the middle of 320 pixels is 159.5: every ray is off by (s − 1)/2 pixels."
+)(_scaled)
+
+
+@RESIZED.wrong(
+    "This is the function as it stood: the focal lengths are right, the principal point and the skew are not."
+)
+def _(K, s):
+    return np.array([[s * K[0, 0], K[0, 1], s * K[0, 2]], [0, s * K[1, 1], s * K[1, 2]], [0, 0, 1]])
+
+
+RESIZED.wrong("The half-pixel term has the wrong sign: (s − 1)/2 is negative for s < 1.")(_half_pixel_up)
+
+
+RESIZED.wrong("Focal lengths and principal point are right. The skew is in pixels too.")(_skew_kept)
+
 
 CROPPED_THEN_BINNED = Exercise(
     name="03.cropped_then_binned",
@@ -184,20 +203,29 @@ CROPPED_THEN_BINNED = Exercise(
         "cx′ = (cx − x0 + ½)/n − ½. Focal lengths and skew are divided by n and do not notice the crop.",
     ),
     praise="In the right order, and each with its own rule: this is what a sensor's region of interest does to K.",
-    misconceptions=(
-        Misconception(
-            lambda K, x0, y0, n: resized(np.array([[1, 0, x0], [0, 1, y0], [0, 0, 1]]) @ K, 1 / n),
-            "The crop has the wrong sign. Columns cut off on the left bring the principal point *nearer* to column 0.",
-        ),
-        Misconception(_binned_first, "This bins first and crops then. x0 and y0 count the pixels *before* binning."),
-        Misconception(
-            lambda K, x0, y0, n: _scaled(np.array([[1, 0, -x0], [0, 1, -y0], [0, 0, 1]]) @ K, 1 / n),
-            "The half-pixel term of the binning is missing: the middle of the first n pixels lies at (n − 1)/2.",
-        ),
-        Misconception(
-            lambda K, x0, y0, n: resized(K, 1 / n), "Only the binning is there: the crop moves the principal point."
-        ),
-    ),
 )
+
+
+@CROPPED_THEN_BINNED.wrong(
+    "The crop has the wrong sign. Columns cut off on the left bring the principal point *nearer* to column 0."
+)
+def _(K, x0, y0, n):
+    return resized(np.array([[1, 0, x0], [0, 1, y0], [0, 0, 1]]) @ K, 1 / n)
+
+
+CROPPED_THEN_BINNED.wrong("This bins first and crops then. x0 and y0 count the pixels *before* binning.")(_binned_first)
+
+
+@CROPPED_THEN_BINNED.wrong(
+    "The half-pixel term of the binning is missing: the middle of the first n pixels lies at (n − 1)/2."
+)
+def _(K, x0, y0, n):
+    return _scaled(np.array([[1, 0, -x0], [0, 1, -y0], [0, 0, 1]]) @ K, 1 / n)
+
+
+@CROPPED_THEN_BINNED.wrong("Only the binning is there: the crop moves the principal point.")
+def _(K, x0, y0, n):
+    return resized(K, 1 / n)
+
 
 EXERCISES = (RAY, FIELD_OF_VIEW, RESIZED, CROPPED_THEN_BINNED)

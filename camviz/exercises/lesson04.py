@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import Arguments, Array, Exercise, Misconception
+from camviz.checks import Arguments, Array, Exercise
 from camviz.poses import Rotation
 
 TOLERANCE = 1e-6  # how far from a rotation rounding may take a matrix
@@ -158,25 +158,36 @@ CENTRE = Exercise(
         "Solve R C + t = 0 for C. R is a rotation, so that its inverse is its transpose, `R.T`.",
     ),
     praise="That is where the camera stands. Put it back: R C + t is zero.",
-    misconceptions=(
-        Misconception(lambda R, t: t, "This is t itself: the world's origin as the camera has it, not the camera."),
-        Misconception(
-            lambda R, t: -t,
-            "This is −t, which is right only for a camera that is not turned. −t is still in the *camera's* axes: turn "
-            "it into the world's.",
-        ),
-        Misconception(
-            lambda R, t: -R @ t,
-            "This is −R t. R takes the world's axes to the camera's; you need the way back, and that is Rᵀ.",
-        ),
-        Misconception(
-            lambda R, t: R.T @ t, "Only the sign is missing: R C + t = 0 has C = *minus* Rᵀ t."
-        ),
-        Misconception(
-            lambda R, t: R @ t, "This is R t. Solve R C + t = 0 for C: the sign changes, and R goes to the other side."
-        ),
-    ),
-)  # fmt: skip
+)
+
+
+@CENTRE.wrong("This is t itself: the world's origin as the camera has it, not the camera.")
+def _(R, t):
+    return t
+
+
+@CENTRE.wrong(
+    "This is −t, which is right only for a camera that is not turned. −t is still in the *camera's* axes: turn "
+    "it into the world's."
+)
+def _(R, t):
+    return -t
+
+
+@CENTRE.wrong("This is −R t. R takes the world's axes to the camera's; you need the way back, and that is Rᵀ.")
+def _(R, t):
+    return -R @ t
+
+
+@CENTRE.wrong("Only the sign is missing: R C + t = 0 has C = *minus* Rᵀ t.")
+def _(R, t):
+    return R.T @ t
+
+
+@CENTRE.wrong("This is R t. Solve R C + t = 0 for C: the sign changes, and R goes to the other side.")
+def _(R, t):
+    return R @ t
+
 
 CHAIN = Exercise(
     name="04.chain",
@@ -189,28 +200,36 @@ CHAIN = Exercise(
         "the inverse of what you were given?",
     ),
     praise="cam_from_world · world_from_board: the worlds cancel. With names like these the order cannot go wrong.",
-    misconceptions=(
-        Misconception(
-            lambda world_from_cam, world_from_board: world_from_board @ np.linalg.inv(world_from_cam),
-            "This is world_from_board · cam_from_world. Between the factors stand *board* and *cam*, which do not "
-            "cancel: the order is wrong.",
-        ),
-        Misconception(
-            lambda world_from_cam, world_from_board: world_from_cam @ world_from_board,
-            "This is world_from_cam · world_from_board. Between the factors stand *cam* and *world*: one of the two "
-            "has to be inverted first.",
-        ),
-        Misconception(
-            lambda world_from_cam, world_from_board: np.linalg.inv(world_from_board) @ world_from_cam,
-            "This is board_from_world · world_from_cam = board_from_cam: it cancels, but it is the inverse of what is "
-            "wanted.",
-        ),
-        Misconception(
-            lambda world_from_cam, world_from_board: world_from_cam @ np.linalg.inv(world_from_board),
-            "This is world_from_cam · board_from_world: you inverted the other of the two.",
-        ),
-    ),
 )
+
+
+@CHAIN.wrong(
+    "This is world_from_board · cam_from_world. Between the factors stand *board* and *cam*, which do not "
+    "cancel: the order is wrong."
+)
+def _(world_from_cam, world_from_board):
+    return world_from_board @ np.linalg.inv(world_from_cam)
+
+
+@CHAIN.wrong(
+    "This is world_from_cam · world_from_board. Between the factors stand *cam* and *world*: one of the two "
+    "has to be inverted first."
+)
+def _(world_from_cam, world_from_board):
+    return world_from_cam @ world_from_board
+
+
+@CHAIN.wrong(
+    "This is board_from_world · world_from_cam = board_from_cam: it cancels, but it is the inverse of what is wanted."
+)
+def _(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_board) @ world_from_cam
+
+
+@CHAIN.wrong("This is world_from_cam · board_from_world: you inverted the other of the two.")
+def _(world_from_cam, world_from_board):
+    return world_from_cam @ np.linalg.inv(world_from_board)
+
 
 IS_ROTATION = Exercise(
     name="04.is_rotation",
@@ -222,30 +241,38 @@ IS_ROTATION = Exercise(
         "`np.allclose(M.T @ M, np.eye(3))`, and `np.linalg.det(M)` is +1 but for rounding.",
     ),
     praise="Lengths, angles and handedness: whatever keeps these three is a rotation.",
-    misconceptions=(
-        Misconception(
-            _orthogonal,
-            "A mirror passes your test: it keeps lengths and angles too, but turns a right hand into a left one. Look "
-            "at the determinant.",
-        ),
-        Misconception(
-            _has_unit_determinant,
-            "A determinant of 1 says that *volumes* are kept. A stretch along x with a squeeze along y does that too.",
-        ),
-        Misconception(
-            lambda M: bool(abs(abs(np.linalg.det(M)) - 1) < TOLERANCE),
-            "A determinant of ±1 says that *volumes* are kept. A mirror passes, and so does a stretch along x with a "
-            "squeeze along y.",
-        ),
-        Misconception(
-            lambda M: bool(np.array_equal(M.T @ M, np.eye(3)) and np.linalg.det(M) == 1),
-            "`==` allows no rounding: nearly every rotation fails. Ask whether the difference is less than 1e-6.",
-        ),
-        Misconception(
-            lambda M: not is_rotation(M), "Every answer is the opposite of the right one."
-        ),
-    ),
-)  # fmt: skip
+)
+
+IS_ROTATION.wrong(
+    "A mirror passes your test: it keeps lengths and angles too, but turns a right hand into a left one. Look "
+    "at the determinant."
+)(_orthogonal)
+
+
+IS_ROTATION.wrong(
+    "A determinant of 1 says that *volumes* are kept. A stretch along x with a squeeze along y does that too."
+)(_has_unit_determinant)
+
+
+@IS_ROTATION.wrong(
+    "A determinant of ±1 says that *volumes* are kept. A mirror passes, and so does a stretch along x with a "
+    "squeeze along y."
+)
+def _(M):
+    return bool(abs(abs(np.linalg.det(M)) - 1) < TOLERANCE)
+
+
+@IS_ROTATION.wrong(
+    "`==` allows no rounding: nearly every rotation fails. Ask whether the difference is less than 1e-6."
+)
+def _(M):
+    return bool(np.array_equal(M.T @ M, np.eye(3)) and np.linalg.det(M) == 1)
+
+
+@IS_ROTATION.wrong("Every answer is the opposite of the right one.")
+def _(M):
+    return not is_rotation(M)
+
 
 INVERT = Exercise(
     name="04.invert",
@@ -257,23 +284,25 @@ INVERT = Exercise(
         "`T[..., :3, 3:]` keeps t as a column so that `@` works.",
     ),
     praise="No general inverse is needed: a transpose and one product. The new translation is the old centre.",
-    misconceptions=(
-        Misconception(
-            _only_transposed,
-            "This is the transpose of the whole 4×4 matrix. Only the 3×3 rotation is inverted by transposing.",
-        ),
-        Misconception(
-            _only_negated,
-            "The rotation is right. The translation is not just −t: it has to be turned as well, −Rᵀ t.",
-        ),
-        Misconception(
-            _forward_turn, "The translation must be turned by the *new* rotation: −Rᵀ t, where you have −R t."
-        ),
-        Misconception(
-            lambda T: T @ T, "This applies the transform twice; the inverse undoes it."
-        ),
-    ),
-)  # fmt: skip
+)
+
+INVERT.wrong("This is the transpose of the whole 4×4 matrix. Only the 3×3 rotation is inverted by transposing.")(
+    _only_transposed
+)
+
+
+INVERT.wrong("The rotation is right. The translation is not just −t: it has to be turned as well, −Rᵀ t.")(
+    _only_negated
+)
+
+
+INVERT.wrong("The translation must be turned by the *new* rotation: −Rᵀ t, where you have −R t.")(_forward_turn)
+
+
+@INVERT.wrong("This applies the transform twice; the inverse undoes it.")
+def _(T):
+    return T @ T
+
 
 RODRIGUES = Exercise(
     name="04.rodrigues",
@@ -286,15 +315,18 @@ RODRIGUES = Exercise(
         "`np.eye(3)` before you divide by zero.",
     ),
     praise="This is `cv2.Rodrigues`, and all that a calibration file means by its three numbers.",
-    misconceptions=(
-        Misconception(
-            _unnormalised,
-            "You put r itself into [·]ₓ. The formula wants the unit vector k = r/θ there; the angle is in the sine and "
-            "cosine already.",
-        ),
-        Misconception(_squared_elements, "`K**2` squares every element. [k]ₓ² is the matrix product, `K @ K`."),
-        Misconception(_in_degrees, "You convert from degrees, but the length of r is in radians already."),
-    ),
 )
+
+RODRIGUES.wrong(
+    "You put r itself into [·]ₓ. The formula wants the unit vector k = r/θ there; the angle is in the sine and "
+    "cosine already."
+)(_unnormalised)
+
+
+RODRIGUES.wrong("`K**2` squares every element. [k]ₓ² is the matrix product, `K @ K`.")(_squared_elements)
+
+
+RODRIGUES.wrong("You convert from degrees, but the length of r is in radians already.")(_in_degrees)
+
 
 EXERCISES = (CENTRE, CHAIN, IS_ROTATION, INVERT, RODRIGUES)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import Arguments, Array, Exercise, Misconception
+from camviz.checks import Arguments, Array, Exercise
 from camviz.poses import Rotation
 from camviz.trials import Function
 
@@ -148,35 +148,41 @@ RMS = Exercise(
         "those that are NaN.",
     ),
     praise="This is the number that OpenCV prints, and that everybody quotes.",
-    misconceptions=(
-        Misconception(
-            lambda found, projected: np.nanmean(np.linalg.norm(found - projected, axis=-1)),
-            "This is the mean of the distances. RMS squares before it averages, so that one bad corner counts for "
-            "more.",
-        ),
-        Misconception(
-            lambda found, projected: np.sqrt(np.nanmean((found - projected) ** 2)),
-            "You average over u and v as well, which is √2 too little: a corner has *one* error, the distance. (Yours "
-            "is the deviation of one coordinate; some programs print that.)",
-        ),
-        Misconception(
-            lambda found, projected: np.sqrt(np.mean(np.sum((found - projected) ** 2, axis=-1))),
-            "One corner that was not found makes your whole answer NaN. Leave such corners out.",
-        ),
-        Misconception(
-            lambda found, projected: np.sqrt(np.mean(np.nan_to_num(np.sum((found - projected) ** 2, axis=-1)))),
-            "A corner that was not found counts as one without an error here. Leave it out of the mean altogether.",
-        ),
-        Misconception(
-            lambda found, projected: np.sqrt(np.nansum((found - projected) ** 2)),
-            "This is the root of the *sum*. Divide by the number of corners found before you take the root.",
-        ),
-        Misconception(
-            lambda found, projected: np.nanmean(np.sum((found - projected) ** 2, axis=-1)),
-            "This is the mean *square*, in pixels². Take its root.",
-        ),
-    ),
 )
+
+
+@RMS.wrong("This is the mean of the distances. RMS squares before it averages, so that one bad corner counts for more.")
+def _(found, projected):
+    return np.nanmean(np.linalg.norm(found - projected, axis=-1))
+
+
+@RMS.wrong(
+    "You average over u and v as well, which is √2 too little: a corner has *one* error, the distance. (Yours "
+    "is the deviation of one coordinate; some programs print that.)"
+)
+def _(found, projected):
+    return np.sqrt(np.nanmean((found - projected) ** 2))
+
+
+@RMS.wrong("One corner that was not found makes your whole answer NaN. Leave such corners out.")
+def _(found, projected):
+    return np.sqrt(np.mean(np.sum((found - projected) ** 2, axis=-1)))
+
+
+@RMS.wrong("A corner that was not found counts as one without an error here. Leave it out of the mean altogether.")
+def _(found, projected):
+    return np.sqrt(np.mean(np.nan_to_num(np.sum((found - projected) ** 2, axis=-1))))
+
+
+@RMS.wrong("This is the root of the *sum*. Divide by the number of corners found before you take the root.")
+def _(found, projected):
+    return np.sqrt(np.nansum((found - projected) ** 2))
+
+
+@RMS.wrong("This is the mean *square*, in pixels². Take its root.")
+def _(found, projected):
+    return np.nanmean(np.sum((found - projected) ** 2, axis=-1))
+
 
 FOCAL_LENGTHS = Exercise(
     name="06.focal_lengths",
@@ -190,30 +196,37 @@ FOCAL_LENGTHS = Exercise(
         "w*w - r*r])` is (1/fx², 1/fy²).",
     ),
     praise="Two unknowns, two equations: one tilted board is enough. Hold it flat, and both equations say 0 = 0.",
-    misconceptions=(
-        Misconception(
-            lambda H, centre: focal_lengths(H, np.zeros(2)),
-            "You did not move the principal point to 0. The constraints hold with B = diag(1/fx², 1/fy², 1) only "
-            "there.",
-        ),
-        Misconception(
-            lambda H, centre: focal_lengths(H, -centre),
-            "You moved the pixels by +centre. What is at the principal point must come to lie at 0: subtract it.",
-        ),
-        Misconception(
-            lambda H, centre: 1 / _inverse_squares(H, centre),
-            "These are fx² and fy². The unknowns were 1/f²: the root is missing.",
-        ),
-        Misconception(
-            lambda H, centre: np.sqrt(_inverse_squares(H, centre)),
-            "These are 1/fx and 1/fy: the unknowns of the linear equations are *inverse* squares.",
-        ),
-        Misconception(
-            lambda H, centre: focal_lengths(_to_centre(-centre) @ (_to_centre(centre) @ H).T, centre),
-            "You took rows of H. Its *columns* are the images of the board's axes: `H[:, 0]` and `H[:, 1]`.",
-        ),
-    ),
 )
+
+
+@FOCAL_LENGTHS.wrong(
+    "You did not move the principal point to 0. The constraints hold with B = diag(1/fx², 1/fy², 1) only there."
+)
+def _(H, centre):
+    return focal_lengths(H, np.zeros(2))
+
+
+@FOCAL_LENGTHS.wrong(
+    "You moved the pixels by +centre. What is at the principal point must come to lie at 0: subtract it."
+)
+def _(H, centre):
+    return focal_lengths(H, -centre)
+
+
+@FOCAL_LENGTHS.wrong("These are fx² and fy². The unknowns were 1/f²: the root is missing.")
+def _(H, centre):
+    return 1 / _inverse_squares(H, centre)
+
+
+@FOCAL_LENGTHS.wrong("These are 1/fx and 1/fy: the unknowns of the linear equations are *inverse* squares.")
+def _(H, centre):
+    return np.sqrt(_inverse_squares(H, centre))
+
+
+@FOCAL_LENGTHS.wrong("You took rows of H. Its *columns* are the images of the board's axes: `H[:, 0]` and `H[:, 1]`.")
+def _(H, centre):
+    return focal_lengths(_to_centre(-centre) @ (_to_centre(centre) @ H).T, centre)
+
 
 CONSTRAINTS = Exercise(
     name="06.constraints",
@@ -226,25 +239,27 @@ CONSTRAINTS = Exercise(
         "h₁ and h₂ are the first two *columns*. In NumPy `H[0]` is a row; the column is `H[:, 0]`.",
     ),
     praise="Columns it is. Try a test with a symmetric H to see why the mistake survived.",
-    misconceptions=(
-        Misconception(
-            lambda H: _constraint_rows(H[0], H[1]),
-            "This is what you get with `H[0]` and `H[1]`, the first two *rows* of H. Zhang's h₁ and h₂ are the images "
-            "of "
-            "the board's x axis and y axis.",
-        ),
-        Misconception(
-            lambda H: _constraint_rows(H[:, 1], H[:, 2]),
-            "These are the second and third column: Zhang counts from 1, NumPy from 0.",
-        ),
-        Misconception(
-            lambda H: np.stack(
-                [_products(H[:, 0], H[:, 1]), _products(H[:, 0], H[:, 0]) + _products(H[:, 1], H[:, 1])]
-            ),
-            "r₁ and r₂ have the *same* length: h₁ᵀBh₁ minus h₂ᵀBh₂ is zero, not their sum.",
-        ),
-    ),
 )
+
+
+@CONSTRAINTS.wrong(
+    "This is what you get with `H[0]` and `H[1]`, the first two *rows* of H. Zhang's h₁ and h₂ are the images "
+    "of "
+    "the board's x axis and y axis."
+)
+def _(H):
+    return _constraint_rows(H[0], H[1])
+
+
+@CONSTRAINTS.wrong("These are the second and third column: Zhang counts from 1, NumPy from 0.")
+def _(H):
+    return _constraint_rows(H[:, 1], H[:, 2])
+
+
+@CONSTRAINTS.wrong("r₁ and r₂ have the *same* length: h₁ᵀBh₁ minus h₂ᵀBh₂ is zero, not their sum.")
+def _(H):
+    return np.stack([_products(H[:, 0], H[:, 1]), _products(H[:, 0], H[:, 0]) + _products(H[:, 1], H[:, 1])])
+
 
 POSE = Exercise(
     name="06.board_pose",
@@ -258,34 +273,40 @@ POSE = Exercise(
         "`U @ Vt` of the SVD of [r₁ r₂ r₃] is the nearest rotation.",
     ),
     praise="Known K, one picture: that is extrinsic calibration, and what every marker in augmented reality does.",
-    misconceptions=(
-        Misconception(
-            lambda H, K: _scaled_pose(H, K, lambda M: 1 / np.linalg.norm(M[:, 0])),
-            "H and −H are the same homography. Some of your boards stand *behind* the camera: choose the sign with "
-            "t_z > 0.",
-        ),
-        Misconception(
-            lambda H, K: _scaled_pose(H, K, lambda M: np.sign(M[2, 2])),
-            "H has an arbitrary scale, and so have your r₁ and t. r₁ is a unit vector: divide by its length.",
-        ),
-        Misconception(
-            lambda H, K: (board_pose(H, K)[0].T, board_pose(H, K)[1]),
-            "R is transposed: r₁ and r₂ are its *columns*.",
-        ),
-        Misconception(
-            lambda H, K: board_pose(H, np.eye(3)),
-            "The camera matrix is still in there: H = λ K [r₁ r₂ t], so begin with K⁻¹H.",
-        ),
-        Misconception(
-            lambda H, K: (board_pose(H, K)[0] * (1, 1, -1), board_pose(H, K)[1]),
-            "Your third axis points the wrong way, and det R = −1: r₃ = r₁ × r₂, in this order.",
-        ),
-        Misconception(
-            lambda H, K: (board_pose(H, K)[0], -board_pose(H, K)[0].T @ board_pose(H, K)[1]),
-            "This t is the camera's centre in the board's frame, −Rᵀt. Wanted is t itself.",
-        ),
-    ),
 )
+
+
+@POSE.wrong(
+    "H and −H are the same homography. Some of your boards stand *behind* the camera: choose the sign with t_z > 0."
+)
+def _(H, K):
+    return _scaled_pose(H, K, lambda M: 1 / np.linalg.norm(M[:, 0]))
+
+
+@POSE.wrong("H has an arbitrary scale, and so have your r₁ and t. r₁ is a unit vector: divide by its length.")
+def _(H, K):
+    return _scaled_pose(H, K, lambda M: np.sign(M[2, 2]))
+
+
+@POSE.wrong("R is transposed: r₁ and r₂ are its *columns*.")
+def _(H, K):
+    return (board_pose(H, K)[0].T, board_pose(H, K)[1])
+
+
+@POSE.wrong("The camera matrix is still in there: H = λ K [r₁ r₂ t], so begin with K⁻¹H.")
+def _(H, K):
+    return board_pose(H, np.eye(3))
+
+
+@POSE.wrong("Your third axis points the wrong way, and det R = −1: r₃ = r₁ × r₂, in this order.")
+def _(H, K):
+    return (board_pose(H, K)[0] * (1, 1, -1), board_pose(H, K)[1])
+
+
+@POSE.wrong("This t is the camera's centre in the board's frame, −Rᵀt. Wanted is t itself.")
+def _(H, K):
+    return (board_pose(H, K)[0], -board_pose(H, K)[0].T @ board_pose(H, K)[1])
+
 
 DEVIATIONS = Exercise(
     name="06.standard_deviations",
@@ -300,26 +321,31 @@ DEVIATIONS = Exercise(
         "columns.",
     ),
     praise="The inverse lets every other parameter give way. That is why a board's unknown distance makes f uncertain.",
-    misconceptions=(
-        Misconception(
-            lambda J, residuals: np.sqrt(residuals @ residuals / (len(residuals) - J.shape[1]) / np.sum(J**2, axis=0)),
-            "You inverted only the diagonal of JᵀJ. That is the deviation of one parameter with all others *known*, "
-            "and it "
-            "is far too small: the boards' poses are not known.",
-        ),
-        Misconception(
-            lambda J, residuals: np.sqrt(residuals @ residuals / len(residuals) * np.diag(np.linalg.inv(J.T @ J))),
-            "Divide by N − k, not by N: k parameters have been fitted to these residuals and made them smaller.",
-        ),
-        Misconception(
-            lambda J, residuals: standard_deviations(J, residuals) ** 2,
-            "These are variances. A standard deviation is the root, in the parameter's own unit.",
-        ),
-        Misconception(
-            lambda J, residuals: np.sqrt(np.diag(np.linalg.inv(J.T @ J))),
-            "This is right for a noise of one pixel. Estimate the noise from the residuals and multiply by it.",
-        ),
-    ),
 )
+
+
+@DEVIATIONS.wrong(
+    "You inverted only the diagonal of JᵀJ. That is the deviation of one parameter with all others *known*, "
+    "and it "
+    "is far too small: the boards' poses are not known."
+)
+def _(J, residuals):
+    return np.sqrt(residuals @ residuals / (len(residuals) - J.shape[1]) / np.sum(J**2, axis=0))
+
+
+@DEVIATIONS.wrong("Divide by N − k, not by N: k parameters have been fitted to these residuals and made them smaller.")
+def _(J, residuals):
+    return np.sqrt(residuals @ residuals / len(residuals) * np.diag(np.linalg.inv(J.T @ J)))
+
+
+@DEVIATIONS.wrong("These are variances. A standard deviation is the root, in the parameter's own unit.")
+def _(J, residuals):
+    return standard_deviations(J, residuals) ** 2
+
+
+@DEVIATIONS.wrong("This is right for a noise of one pixel. Estimate the noise from the residuals and multiply by it.")
+def _(J, residuals):
+    return np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+
 
 EXERCISES = (RMS, FOCAL_LENGTHS, CONSTRAINTS, POSE, DEVIATIONS)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 from camviz.poses import Rotation
 from camviz.trials import Function
 
@@ -181,39 +181,43 @@ FUNDAMENTAL = Exercise(
         "`np.linalg.inv(K_right).T @ E @ …`.",
     ),
     praise="It is the matrix that camviz and OpenCV use, up to its scale, which says nothing.",
-    misconceptions=(
-        Misconception(
-            lambda K_left, K_right, R, t: np.linalg.inv(K_left).T @ cross_matrix(t) @ R @ np.linalg.inv(K_right),
-            "The camera matrices have changed places: x_left stands on the right of F, so K_left⁻¹ does too.",
-        ),
-        Misconception(
-            lambda K_left, K_right, R, t: cross_matrix(t) @ R,
-            "This is E, which takes rays. Pixels become rays by the inverse camera matrices.",
-        ),
-        Misconception(
-            lambda K_left, K_right, R, t: K_right.T @ cross_matrix(t) @ R @ K_left,
-            "This is the way from F to E. From E to F the camera matrices are *inverted*.",
-        ),
-        Misconception(
-            lambda K_left, K_right, R, t: (
-                fundamental(K_left, K_right, np.eye(3), t) @ K_left @ R.T @ np.linalg.inv(K_left)
-            ),
-            "R is transposed here: right_from_left turns a ray of the left camera into the right one's frame.",
-        ),
-        Misconception(
-            lambda K_left, K_right, R, t: np.linalg.inv(K_right).T @ R @ cross_matrix(t) @ np.linalg.inv(K_left),
-            "This is R [t]×. The translation comes after the rotation: E = [t]× R.",
-        ),
-        Misconception(
-            lambda K_left, K_right, R, t: np.linalg.inv(K_right) @ cross_matrix(t) @ R @ np.linalg.inv(K_left),
-            "K_right⁻¹ must be transposed: it comes out of (K_right⁻¹ x_right)ᵀ.",
-        ),
-        Misconception(
-            lambda K_left, K_right, R, t: fundamental(K_left, K_right, R, -R.T @ t),
-            "You used the centre C = −Rᵀt in place of t. The two are in different frames.",
-        ),
-    ),
 )
+
+
+@FUNDAMENTAL.wrong("The camera matrices have changed places: x_left stands on the right of F, so K_left⁻¹ does too.")
+def _(K_left, K_right, R, t):
+    return np.linalg.inv(K_left).T @ cross_matrix(t) @ R @ np.linalg.inv(K_right)
+
+
+@FUNDAMENTAL.wrong("This is E, which takes rays. Pixels become rays by the inverse camera matrices.")
+def _(K_left, K_right, R, t):
+    return cross_matrix(t) @ R
+
+
+@FUNDAMENTAL.wrong("This is the way from F to E. From E to F the camera matrices are *inverted*.")
+def _(K_left, K_right, R, t):
+    return K_right.T @ cross_matrix(t) @ R @ K_left
+
+
+@FUNDAMENTAL.wrong("R is transposed here: right_from_left turns a ray of the left camera into the right one's frame.")
+def _(K_left, K_right, R, t):
+    return fundamental(K_left, K_right, np.eye(3), t) @ K_left @ R.T @ np.linalg.inv(K_left)
+
+
+@FUNDAMENTAL.wrong("This is R [t]×. The translation comes after the rotation: E = [t]× R.")
+def _(K_left, K_right, R, t):
+    return np.linalg.inv(K_right).T @ R @ cross_matrix(t) @ np.linalg.inv(K_left)
+
+
+@FUNDAMENTAL.wrong("K_right⁻¹ must be transposed: it comes out of (K_right⁻¹ x_right)ᵀ.")
+def _(K_left, K_right, R, t):
+    return np.linalg.inv(K_right) @ cross_matrix(t) @ R @ np.linalg.inv(K_left)
+
+
+@FUNDAMENTAL.wrong("You used the centre C = −Rᵀt in place of t. The two are in different frames.")
+def _(K_left, K_right, R, t):
+    return fundamental(K_left, K_right, R, -R.T @ t)
+
 
 LINE = Exercise(
     name="07.epipolar_line",
@@ -226,25 +230,28 @@ LINE = Exercise(
         "`np.linalg.norm(line[..., :2], axis=-1, keepdims=True)`.",
     ),
     praise="With a² + b² = 1 the number a u + b v + c is a distance in pixels, which is what one wants to look at.",
-    misconceptions=(
-        Misconception(
-            lambda F, uv_left: epipolar_line(F.T, uv_left),
-            "This is Fᵀ x, the line in the *left* picture of a right point. (For rows, l = F x is `x @ F.T`.)",
-        ),
-        Misconception(
-            lambda F, uv_left: np.concatenate([uv_left, np.ones_like(uv_left[..., :1])], axis=-1) @ F.T,
-            "The line is right, but its scale is arbitrary: divide by √(a² + b²), so that a u + b v + c is in pixels.",
-        ),
-        Misconception(
-            lambda F, uv_left: _rays(epipolar_line(F, uv_left)),
-            "You divide by the length of all three numbers. Only a and b make the direction: a² + b² = 1.",
-        ),
-        Misconception(
-            lambda F, uv_left: epipolar_line(F, uv_left[..., ::-1]),
-            "u and v have changed places. A pixel is (column, row).",
-        ),
-    ),
 )
+
+
+@LINE.wrong("This is Fᵀ x, the line in the *left* picture of a right point. (For rows, l = F x is `x @ F.T`.)")
+def _(F, uv_left):
+    return epipolar_line(F.T, uv_left)
+
+
+@LINE.wrong("The line is right, but its scale is arbitrary: divide by √(a² + b²), so that a u + b v + c is in pixels.")
+def _(F, uv_left):
+    return np.concatenate([uv_left, np.ones_like(uv_left[..., :1])], axis=-1) @ F.T
+
+
+@LINE.wrong("You divide by the length of all three numbers. Only a and b make the direction: a² + b² = 1.")
+def _(F, uv_left):
+    return _rays(epipolar_line(F, uv_left))
+
+
+@LINE.wrong("u and v have changed places. A pixel is (column, row).")
+def _(F, uv_left):
+    return epipolar_line(F, uv_left[..., ::-1])
+
 
 EPIPOLE = Exercise(
     name="07.right_epipole",
@@ -256,20 +263,23 @@ EPIPOLE = Exercise(
         "`U, s, Vt = np.linalg.svd(F)`: Fᵀ e = 0 is solved by the *last column of U*. Divide by its third number.",
     ),
     praise="That is where the right picture would show the left camera.",
-    misconceptions=(
-        Misconception(
-            lambda F: right_epipole(F.T),
-            "This is the left epipole, F e = 0: the last row of Vt. The right one solves Fᵀ e = 0.",
-        ),
-        Misconception(
-            lambda F: np.linalg.svd(F)[0][2, :2] / np.linalg.svd(F)[0][2, 2],
-            "You took the last *row* of U. Its columns are the singular vectors: `U[:, 2]`.",
-        ),
-        Misconception(
-            lambda F: np.linalg.svd(F)[0][:2, 2], "The third number is not 1 yet: divide by it to get a pixel."
-        ),
-    ),
 )
+
+
+@EPIPOLE.wrong("This is the left epipole, F e = 0: the last row of Vt. The right one solves Fᵀ e = 0.")
+def _(F):
+    return right_epipole(F.T)
+
+
+@EPIPOLE.wrong("You took the last *row* of U. Its columns are the singular vectors: `U[:, 2]`.")
+def _(F):
+    return np.linalg.svd(F)[0][2, :2] / np.linalg.svd(F)[0][2, 2]
+
+
+@EPIPOLE.wrong("The third number is not 1 yet: divide by it to get a pixel.")
+def _(F):
+    return np.linalg.svd(F)[0][:2, 2]
+
 
 EIGHT_POINT = Exercise(
     name="07.eight_point",
@@ -283,24 +293,25 @@ EIGHT_POINT = Exercise(
         "x_rightᵀ (T_rightᵀ F̂ T_left) x_left = 0. What is in the brackets is F.",
     ),
     praise="One line, and the estimate is several times better than without it.",
-    misconceptions=(
-        Misconception(
-            _with_transforms("swapped"),
-            "This is T_leftᵀ F T_right. The left point stands on the right of F, and so does its transform. With two "
-            "pictures that are much alike nobody notices.",
-        ),
-        Misconception(_with_transforms("kept"), "This F is for the moved points. Take it back to pixels."),
-        Misconception(
-            _with_transforms("inverse"),
-            "You inverted T_right; (T x)ᵀ asks for its transpose.",
-        ),
-        Misconception(
-            _with_transforms("untransposed"),
-            "T_right must be transposed: (T x)ᵀ = xᵀ Tᵀ.",
-        ),
-        Misconception(_linear, "This leaves the normalisation out altogether."),
-    ),
 )
+
+EIGHT_POINT.wrong(
+    "This is T_leftᵀ F T_right. The left point stands on the right of F, and so does its transform. With two "
+    "pictures that are much alike nobody notices."
+)(_with_transforms("swapped"))
+
+
+EIGHT_POINT.wrong("This F is for the moved points. Take it back to pixels.")(_with_transforms("kept"))
+
+
+EIGHT_POINT.wrong("You inverted T_right; (T x)ᵀ asks for its transpose.")(_with_transforms("inverse"))
+
+
+EIGHT_POINT.wrong("T_right must be transposed: (T x)ᵀ = xᵀ Tᵀ.")(_with_transforms("untransposed"))
+
+
+EIGHT_POINT.wrong("This leaves the normalisation out altogether.")(_linear)
+
 
 IN_FRONT = Exercise(
     name="07.in_front",
@@ -312,26 +323,33 @@ IN_FRONT = Exercise(
         "has shape (n, 2, 1): λ and μ of every pair.",
     ),
     praise="Of E's four motions just one keeps the world in front of both cameras. That is all there is to cheirality.",
-    misconceptions=(
-        Misconception(
-            lambda R, t, rays_left, rays_right: _distances(R, t, rays_left, rays_right)[:, 0] > 0,
-            "You looked at the left camera only. There are motions with points in front of the left camera that lie "
-            "behind the right one.",
-        ),
-        Misconception(
-            lambda R, t, rays_left, rays_right: _distances(R, t, rays_left, rays_right)[:, 1] > 0,
-            "You looked at the right camera only. There are motions with points in front of the right camera that lie "
-            "behind the left one.",
-        ),
-        Misconception(
-            lambda R, t, rays_left, rays_right: np.ptp(np.sign(_distances(R, t, rays_left, rays_right)), axis=-1) == 0,
-            "The two distances have one sign here; but both may be negative: then the point lies behind *both*.",
-        ),
-        Misconception(
-            lambda R, t, rays_left, rays_right: in_front(R, -t, rays_left, rays_right),
-            "The sign of t is flipped: λ R r_left + t = μ r_right, so t goes to the other side as −t.",
-        ),
-    ),
 )
+
+
+@IN_FRONT.wrong(
+    "You looked at the left camera only. There are motions with points in front of the left camera that lie "
+    "behind the right one."
+)
+def _(R, t, rays_left, rays_right):
+    return _distances(R, t, rays_left, rays_right)[:, 0] > 0
+
+
+@IN_FRONT.wrong(
+    "You looked at the right camera only. There are motions with points in front of the right camera that lie "
+    "behind the left one."
+)
+def _(R, t, rays_left, rays_right):
+    return _distances(R, t, rays_left, rays_right)[:, 1] > 0
+
+
+@IN_FRONT.wrong("The two distances have one sign here; but both may be negative: then the point lies behind *both*.")
+def _(R, t, rays_left, rays_right):
+    return np.ptp(np.sign(_distances(R, t, rays_left, rays_right)), axis=-1) == 0
+
+
+@IN_FRONT.wrong("The sign of t is flipped: λ R r_left + t = μ r_right, so t goes to the other side as −t.")
+def _(R, t, rays_left, rays_right):
+    return in_front(R, -t, rays_left, rays_right)
+
 
 EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, IN_FRONT)

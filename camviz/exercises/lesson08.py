@@ -155,32 +155,38 @@ DEPTH = Exercise(
         "`np.where(shift < 0, np.nan, …)`; and `with np.errstate(divide='ignore'):` lets NumPy write inf for 1/0.",
     ),
     praise="With doffs = 0 it is the formula of every book; with it, it holds for the published pairs too.",
-    misconceptions=(
-        *(
-            Misconception(form, "doffs is left out: it is the disparity of a point at infinity, with its sign turned.")
-            for form in (lambda d, f, B, doffs: depth(d, f, B, 0.0), lambda d, f, B, doffs: _unchecked(d, f, B, 0.0))
-        ),
-        Misconception(
-            lambda d, f, B, doffs: depth(d, f, B, -doffs),
-            "doffs has the wrong sign: it is cx_right − cx_left, and is added.",
-        ),
-        Misconception(
-            _unchecked,
-            "The formula is right. A sum below 0 gives a *negative* depth, though: NaN is the honest answer there.",
-        ),
-        Misconception(
-            lambda d, f, B, doffs: np.where(d + doffs <= 0, np.nan, _unchecked(d, f, B, doffs)),
-            "Where d + doffs is exactly 0 there is an answer: the rays are parallel, the point is infinitely far.",
-        ),
-        Misconception(
-            lambda d, f, B, doffs: np.where(d < 0, np.nan, np.abs(_unchecked(d, f, B, doffs))),
-            "You asked whether d is negative. What must not be negative is d + doffs.",
-        ),
-        Misconception(
-            lambda d, f, B, doffs: (d + doffs) * B / f, "This is upside down: a *larger* disparity is a *nearer* point."
-        ),
-    ),
 )
+
+DEPTH.misconceptions.extend(
+    Misconception(form, "doffs is left out: it is the disparity of a point at infinity, with its sign turned.")
+    for form in (lambda d, f, B, doffs: depth(d, f, B, 0.0), lambda d, f, B, doffs: _unchecked(d, f, B, 0.0))
+)
+
+
+@DEPTH.wrong("doffs has the wrong sign: it is cx_right − cx_left, and is added.")
+def _(d, f, B, doffs):
+    return depth(d, f, B, -doffs)
+
+
+DEPTH.wrong("The formula is right. A sum below 0 gives a *negative* depth, though: NaN is the honest answer there.")(
+    _unchecked
+)
+
+
+@DEPTH.wrong("Where d + doffs is exactly 0 there is an answer: the rays are parallel, the point is infinitely far.")
+def _(d, f, B, doffs):
+    return np.where(d + doffs <= 0, np.nan, _unchecked(d, f, B, doffs))
+
+
+@DEPTH.wrong("You asked whether d is negative. What must not be negative is d + doffs.")
+def _(d, f, B, doffs):
+    return np.where(d < 0, np.nan, np.abs(_unchecked(d, f, B, doffs)))
+
+
+@DEPTH.wrong("This is upside down: a *larger* disparity is a *nearer* point.")
+def _(d, f, B, doffs):
+    return (d + doffs) * B / f
+
 
 BASELINE = Exercise(
     name="08.baseline_for",
@@ -191,25 +197,28 @@ BASELINE = Exercise(
         "B = Z² Δd / (f ΔZ). All of it works on arrays as it stands.",
     ),
     praise="Twice as far at the same error asks for four times the baseline (or the focal length, in pixels).",
-    misconceptions=(
-        Misconception(
-            lambda Z, error, f, disparity_error: Z * disparity_error / (f * error),
-            "The error in metres grows with the *square* of the depth: Z², not Z.",
-        ),
-        Misconception(
-            lambda Z, error, f, disparity_error: Z**2 * disparity_error / error,
-            "The focal length is missing: f and B do the same work here.",
-        ),
-        Misconception(
-            lambda Z, error, f, disparity_error: f * error / (Z**2 * disparity_error),
-            "This is 1/B: turn it over.",
-        ),
-        Misconception(
-            lambda Z, error, f, disparity_error: Z**2 / (f * error),
-            "The error of the disparity is left out, as if it were always one pixel.",
-        ),
-    ),
 )
+
+
+@BASELINE.wrong("The error in metres grows with the *square* of the depth: Z², not Z.")
+def _(Z, error, f, disparity_error):
+    return Z * disparity_error / (f * error)
+
+
+@BASELINE.wrong("The focal length is missing: f and B do the same work here.")
+def _(Z, error, f, disparity_error):
+    return Z**2 * disparity_error / error
+
+
+@BASELINE.wrong("This is 1/B: turn it over.")
+def _(Z, error, f, disparity_error):
+    return f * error / (Z**2 * disparity_error)
+
+
+@BASELINE.wrong("The error of the disparity is left out, as if it were always one pixel.")
+def _(Z, error, f, disparity_error):
+    return Z**2 / (f * error)
+
 
 RECTIFIED = Exercise(
     name="08.rectified",
@@ -222,30 +231,35 @@ RECTIFIED = Exercise(
         "positive.",
     ),
     praise="No depth anywhere in it: that is why rectification needs to know nothing about the scene.",
-    misconceptions=(
-        Misconception(
-            _turned,
-            "Right for all pixels that stay in view. A ray that is turned behind the camera has no pixel: NaN where "
-            "the third number is not positive.",
-        ),
-        Misconception(
-            lambda uv, K, R, K_new: rectified(uv, K, R.T, K_new),
-            "R is transposed: it takes rays of the camera as it was to the turned one. (For rows, R r is `r @ R.T`.)",
-        ),
-        Misconception(
-            lambda uv, K, R, K_new: rectified(uv, K, R, K),
-            "You used K at both ends. The rectified picture has a camera matrix of its own, K_new.",
-        ),
-        Misconception(
-            lambda uv, K, R, K_new: rectified(uv, K_new, R, K),
-            "K and K_new have changed places: pixels come in with K.",
-        ),
-        Misconception(
-            lambda uv, K, R, K_new: _turned(uv, np.eye(3), R, K_new),
-            "Pixels are no rays: K⁻¹ comes first.",
-        ),
-    ),
 )
+
+RECTIFIED.wrong(
+    "Right for all pixels that stay in view. A ray that is turned behind the camera has no pixel: NaN where "
+    "the third number is not positive."
+)(_turned)
+
+
+@RECTIFIED.wrong(
+    "R is transposed: it takes rays of the camera as it was to the turned one. (For rows, R r is `r @ R.T`.)"
+)
+def _(uv, K, R, K_new):
+    return rectified(uv, K, R.T, K_new)
+
+
+@RECTIFIED.wrong("You used K at both ends. The rectified picture has a camera matrix of its own, K_new.")
+def _(uv, K, R, K_new):
+    return rectified(uv, K, R, K)
+
+
+@RECTIFIED.wrong("K and K_new have changed places: pixels come in with K.")
+def _(uv, K, R, K_new):
+    return rectified(uv, K_new, R, K)
+
+
+@RECTIFIED.wrong("Pixels are no rays: K⁻¹ comes first.")
+def _(uv, K, R, K_new):
+    return _turned(uv, np.eye(3), R, K_new)
+
 
 METRIC_DEPTH = Exercise(
     name="08.metric_depth",
@@ -259,42 +273,46 @@ METRIC_DEPTH = Exercise(
         "doffs = `P_right[0, 2] - P_left[0, 2]` is added to the disparity.",
     ),
     praise="Three mistakes, each of them in code that people ship. The first makes everything 16 times too near.",
-    misconceptions=(
-        Misconception(
-            lambda found, K, P_left, P_right: _metric_depth(found, K[0, 0], 0, P_right, 1),
-            "Everything comes out far too near, and not only that. There are three mistakes.",
-        ),
-        Misconception(
-            lambda found, K, P_left, P_right: _metric_depth(found, K[0, 0], 0, P_right, 16),
-            "The sixteenths are pixels now. There are two mistakes left.",
-        ),
-        Misconception(
-            lambda found, K, P_left, P_right: _metric_depth(found, P_left[0, 0], 0, P_right, 1),
-            "The focal length is right now: that of the rectified camera. There are two mistakes left; look at "
-            "the unit of `found`.",
-        ),
-        Misconception(
-            lambda found, K, P_left, P_right: _metric_depth(found, P_left[0, 0], 0, P_right, 16),
-            "One left: a point at infinity has disparity −doffs here, because the two principal points differ.",
-        ),
-        Misconception(
-            lambda found, K, P_left, P_right: _metric_depth(found, K[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 16),
-            "One left: K is the camera matrix of the picture *before* rectification, and so is its f.",
-        ),
-        Misconception(
-            lambda found, K, P_left, P_right: _metric_depth(
-                found, P_left[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 1
-            ),
-            "One left: OpenCV's matchers count in sixteenths of a pixel.",
-        ),
-        Misconception(
-            lambda found, K, P_left, P_right: _metric_depth(
-                found, P_left[0, 0], P_left[0, 2] - P_right[0, 2], P_right, 16
-            ),
-            "doffs has the wrong sign: cx_right − cx_left is *added* to d.",
-        ),
-    ),
 )
+
+
+@METRIC_DEPTH.wrong("Everything comes out far too near, and not only that. There are three mistakes.")
+def _(found, K, P_left, P_right):
+    return _metric_depth(found, K[0, 0], 0, P_right, 1)
+
+
+@METRIC_DEPTH.wrong("The sixteenths are pixels now. There are two mistakes left.")
+def _(found, K, P_left, P_right):
+    return _metric_depth(found, K[0, 0], 0, P_right, 16)
+
+
+@METRIC_DEPTH.wrong(
+    "The focal length is right now: that of the rectified camera. There are two mistakes left; look at "
+    "the unit of `found`."
+)
+def _(found, K, P_left, P_right):
+    return _metric_depth(found, P_left[0, 0], 0, P_right, 1)
+
+
+@METRIC_DEPTH.wrong("One left: a point at infinity has disparity −doffs here, because the two principal points differ.")
+def _(found, K, P_left, P_right):
+    return _metric_depth(found, P_left[0, 0], 0, P_right, 16)
+
+
+@METRIC_DEPTH.wrong("One left: K is the camera matrix of the picture *before* rectification, and so is its f.")
+def _(found, K, P_left, P_right):
+    return _metric_depth(found, K[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 16)
+
+
+@METRIC_DEPTH.wrong("One left: OpenCV's matchers count in sixteenths of a pixel.")
+def _(found, K, P_left, P_right):
+    return _metric_depth(found, P_left[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 1)
+
+
+@METRIC_DEPTH.wrong("doffs has the wrong sign: cx_right − cx_left is *added* to d.")
+def _(found, K, P_left, P_right):
+    return _metric_depth(found, P_left[0, 0], P_left[0, 2] - P_right[0, 2], P_right, 16)
+
 
 LEFT_RIGHT = Exercise(
     name="08.left_right",
@@ -307,26 +325,25 @@ LEFT_RIGHT = Exercise(
         "compare `d_right[partner]` with `d_left`.",
     ),
     praise="The strip beside every near thing, which only one camera sees, is gone, and most mistakes with it.",
-    misconceptions=(
-        Misconception(
-            _same_pixel,
-            "You compare the two disparities at the *same* column. What the left picture shows at u, the right one "
-            "shows at u − d.",
-        ),
-        Misconception(
-            _other_way, "The partner is at u − d, not at u + d: things lie farther left in the right picture."
-        ),
-        Misconception(
-            _wrapped,
-            "An index below 0 counts from the end of the row in NumPy: such a partner is outside, and the answer NaN.",
-        ),
-        Misconception(
-            lambda d_left, d_right, tolerance: np.where(
-                np.isnan(left_right(d_left, d_right, tolerance)), d_left, np.nan
-            ),
-            "You keep what fails and drop what passes.",
-        ),
-    ),
 )
+
+LEFT_RIGHT.wrong(
+    "You compare the two disparities at the *same* column. What the left picture shows at u, the right one "
+    "shows at u − d."
+)(_same_pixel)
+
+
+LEFT_RIGHT.wrong("The partner is at u − d, not at u + d: things lie farther left in the right picture.")(_other_way)
+
+
+LEFT_RIGHT.wrong(
+    "An index below 0 counts from the end of the row in NumPy: such a partner is outside, and the answer NaN."
+)(_wrapped)
+
+
+@LEFT_RIGHT.wrong("You keep what fails and drop what passes.")
+def _(d_left, d_right, tolerance):
+    return np.where(np.isnan(left_right(d_left, d_right, tolerance)), d_left, np.nan)
+
 
 EXERCISES = (DEPTH, BASELINE, RECTIFIED, METRIC_DEPTH, LEFT_RIGHT)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 
 def equidistant(points: Array, f: float, cx: float, cy: float) -> Array:
@@ -116,34 +116,41 @@ EQUIDISTANT = Exercise(
         "(x, y) / np.hypot(x, y).",
     ),
     praise="A ray at 90°, which no pinhole can show, has a pixel now; so have the rays from behind.",
-    misconceptions=(
-        Misconception(
-            lambda points, f, cx, cy: f * _placed(points, _mirrored(points)) + [cx, cy],
-            "Points behind the camera are mirrored: arctan(r / z) ends at 90° and comes back negative. "
-            "Use np.arctan2(r, z), which knows the sign of z.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * _placed(points, np.tan(_theta(points))) + [cx, cy],
-            "This is r = f tan θ, the pinhole. The equidistant lens has r = f θ.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * _placed(points, np.sin(_theta(points))) + [cx, cy],
-            "This is r = f sin θ, the orthographic lens, which folds at 90°. The equidistant lens has r = f θ.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * _placed(points, np.degrees(_theta(points))) + [cx, cy],
-            "Your θ is in degrees. r = f θ wants radians.",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * _placed(points, _theta(points)),
-            "The principal point is missing: pixels begin in the corner of the image, so add (cx, cy).",
-        ),
-        Misconception(
-            lambda points, f, cx, cy: f * points[..., :2] * _theta(points)[..., None] + [cx, cy],
-            "You multiply x and y themselves by f θ. Only their *direction* counts: divide by √(x² + y²).",
-        ),
-    ),
 )
+
+
+@EQUIDISTANT.wrong(
+    "Points behind the camera are mirrored: arctan(r / z) ends at 90° and comes back negative. "
+    "Use np.arctan2(r, z), which knows the sign of z."
+)
+def _(points, f, cx, cy):
+    return f * _placed(points, _mirrored(points)) + [cx, cy]
+
+
+@EQUIDISTANT.wrong("This is r = f tan θ, the pinhole. The equidistant lens has r = f θ.")
+def _(points, f, cx, cy):
+    return f * _placed(points, np.tan(_theta(points))) + [cx, cy]
+
+
+@EQUIDISTANT.wrong("This is r = f sin θ, the orthographic lens, which folds at 90°. The equidistant lens has r = f θ.")
+def _(points, f, cx, cy):
+    return f * _placed(points, np.sin(_theta(points))) + [cx, cy]
+
+
+@EQUIDISTANT.wrong("Your θ is in degrees. r = f θ wants radians.")
+def _(points, f, cx, cy):
+    return f * _placed(points, np.degrees(_theta(points))) + [cx, cy]
+
+
+@EQUIDISTANT.wrong("The principal point is missing: pixels begin in the corner of the image, so add (cx, cy).")
+def _(points, f, cx, cy):
+    return f * _placed(points, _theta(points))
+
+
+@EQUIDISTANT.wrong("You multiply x and y themselves by f θ. Only their *direction* counts: divide by √(x² + y²).")
+def _(points, f, cx, cy):
+    return f * points[..., :2] * _theta(points)[..., None] + [cx, cy]
+
 
 KANNALA_BRANDT = Exercise(
     name="09.kannala_brandt",
@@ -155,23 +162,25 @@ KANNALA_BRANDT = Exercise(
         "np.arctan never gives more than 90°, and a negative z makes it negative. Which function takes y and x apart?",
     ),
     praise="That bug is in OpenCV's own fisheye module: points behind the camera come out mirrored.",
-    misconceptions=(
-        Misconception(
-            lambda points, k1, k2: _placed(points, _polynomial(_mirrored(points), k1, k2)),
-            "This is still arctan(r / z): a point at 135° gets the angle −45° and lands on the other side.",
-        ),
-        Misconception(
-            lambda points, k1, k2: _placed(points, _polynomial(abs(_mirrored(points)), k1, k2)),
-            "The sign alone is not enough: a point at 135° is not at 45°.",
-        ),
-        Misconception(
-            lambda points, k1, k2: _placed(
-                points, _polynomial(np.arctan2(points[..., 2], np.hypot(points[..., 0], points[..., 1])), k1, k2)
-            ),
-            "arctan2's arguments have changed places: this is the angle above the image plane, not from the axis.",
-        ),
-    ),
 )
+
+
+@KANNALA_BRANDT.wrong("This is still arctan(r / z): a point at 135° gets the angle −45° and lands on the other side.")
+def _(points, k1, k2):
+    return _placed(points, _polynomial(_mirrored(points), k1, k2))
+
+
+@KANNALA_BRANDT.wrong("The sign alone is not enough: a point at 135° is not at 45°.")
+def _(points, k1, k2):
+    return _placed(points, _polynomial(abs(_mirrored(points)), k1, k2))
+
+
+@KANNALA_BRANDT.wrong(
+    "arctan2's arguments have changed places: this is the angle above the image plane, not from the axis."
+)
+def _(points, k1, k2):
+    return _placed(points, _polynomial(np.arctan2(points[..., 2], np.hypot(points[..., 0], points[..., 1])), k1, k2))
+
 
 ANGLE = Exercise(
     name="09.angle",
@@ -187,23 +196,23 @@ ANGLE = Exercise(
         "ray is farther than straight behind.",
     ),
     praise="It gives back the ray of every pixel that has one, and NaN where there is none.",
-    misconceptions=(
-        Misconception(
-            lambda radius, k1, k2: (
-                np.asarray(radius) / (1 + k1 * np.asarray(radius) ** 2 + k2 * np.asarray(radius) ** 4)
-            ),
-            "One division is only the first step. Put your θ back into the polynomial and look at what is left.",
-        ),
-        Misconception(
-            lambda radius, k1, k2: _polynomial(np.asarray(radius), k1, k2),
-            "This bends once more, the model forwards. The radius is given, the angle is wanted.",
-        ),
-        Misconception(
-            lambda radius, k1, k2: _polynomial(np.asarray(radius), -k1, -k2),
-            "Flipping the signs is not the inverse, only its first term.",
-        ),
-    ),
 )
+
+
+@ANGLE.wrong("One division is only the first step. Put your θ back into the polynomial and look at what is left.")
+def _(radius, k1, k2):
+    return np.asarray(radius) / (1 + k1 * np.asarray(radius) ** 2 + k2 * np.asarray(radius) ** 4)
+
+
+@ANGLE.wrong("This bends once more, the model forwards. The radius is given, the angle is wanted.")
+def _(radius, k1, k2):
+    return _polynomial(np.asarray(radius), k1, k2)
+
+
+@ANGLE.wrong("Flipping the signs is not the inverse, only its first term.")
+def _(radius, k1, k2):
+    return _polynomial(np.asarray(radius), -k1, -k2)
+
 
 WINDOW_MAP = Exercise(
     name="09.window_map",
@@ -217,24 +226,31 @@ WINDOW_MAP = Exercise(
         "((width − 1)/2, (height − 1)/2).",
     ),
     praise="This is a virtual camera that pans without moving: one fisheye picture holds all its pictures.",
-    misconceptions=(
-        Misconception(
-            lambda *arguments: _window_with(-1, 0, *arguments),
-            "Your window turns to the left for a positive yaw: the ray straight ahead must go to (sin ψ, 0, cos ψ).",
-        ),
-        Misconception(
-            lambda *arguments: _window_with(0, 0, *arguments),
-            "Your window always looks straight ahead: the rays are not turned.",
-        ),
-        Misconception(
-            lambda *arguments: _window_with(1, 0.5, *arguments),
-            "Half a pixel off: the middle of pixels 0 … width − 1 is (width − 1)/2, not width/2.",
-        ),
-        Misconception(
-            lambda *arguments: window_map(*arguments).transpose(1, 0, 2),
-            "Rows and columns have changed places: an image array is indexed [v, u], its shape is (height, width).",
-        ),
-    ),
 )
+
+
+@WINDOW_MAP.wrong(
+    "Your window turns to the left for a positive yaw: the ray straight ahead must go to (sin ψ, 0, cos ψ)."
+)
+def _(*arguments):
+    return _window_with(-1, 0, *arguments)
+
+
+@WINDOW_MAP.wrong("Your window always looks straight ahead: the rays are not turned.")
+def _(*arguments):
+    return _window_with(0, 0, *arguments)
+
+
+@WINDOW_MAP.wrong("Half a pixel off: the middle of pixels 0 … width − 1 is (width − 1)/2, not width/2.")
+def _(*arguments):
+    return _window_with(1, 0.5, *arguments)
+
+
+@WINDOW_MAP.wrong(
+    "Rows and columns have changed places: an image array is indexed [v, u], its shape is (height, width)."
+)
+def _(*arguments):
+    return window_map(*arguments).transpose(1, 0, 2)
+
 
 EXERCISES = (EQUIDISTANT, KANNALA_BRANDT, ANGLE, WINDOW_MAP)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 
 def project(points: Array, xi: float) -> Array:
@@ -121,31 +121,36 @@ PROJECT = Exercise(
         "there is no image: `np.where(depth > 0, depth, np.nan)[..., None]`.",
     ),
     praise="One formula, from the pinhole (ξ = 0) to the parabolic mirror (ξ = 1), behind the camera too.",
-    misconceptions=(
-        Misconception(
-            lambda points, xi: points[..., :2] / np.where(points[..., 2:] > 0, points[..., 2:], np.nan),
-            "This is the pinhole, ξ = 0: nothing beside the camera or behind it has an image.",
-        ),
-        Misconception(
-            _without_nan,
-            "For points that have an image this is right. Where Z + ξ D ≤ 0 there is none, and the formula gives the "
-            "mirror image of a point behind: say NaN there.",
-        ),
-        Misconception(
-            lambda points, xi: np.where(points[..., 2:] > 0, project(points, xi), np.nan),
-            "You drop everything behind the camera, as a pinhole must. The sphere shows what has Z + ξ D > 0.",
-        ),
-        Misconception(
-            lambda points, xi: project(points, xi) * (1 + xi),
-            "Yours is (1 + ξ) times too large: it agrees with a pinhole in the middle. Leave that factor to the focal "
-            "length.",
-        ),
-        Misconception(
-            lambda points, xi: points[..., :2] / (points[..., 2:] + xi),
-            "You add ξ instead of ξ D: that is right only for points on the unit sphere, one metre away.",
-        ),
-    ),
 )
+
+
+@PROJECT.wrong("This is the pinhole, ξ = 0: nothing beside the camera or behind it has an image.")
+def _(points, xi):
+    return points[..., :2] / np.where(points[..., 2:] > 0, points[..., 2:], np.nan)
+
+
+PROJECT.wrong(
+    "For points that have an image this is right. Where Z + ξ D ≤ 0 there is none, and the formula gives the "
+    "mirror image of a point behind: say NaN there."
+)(_without_nan)
+
+
+@PROJECT.wrong("You drop everything behind the camera, as a pinhole must. The sphere shows what has Z + ξ D > 0.")
+def _(points, xi):
+    return np.where(points[..., 2:] > 0, project(points, xi), np.nan)
+
+
+@PROJECT.wrong(
+    "Yours is (1 + ξ) times too large: it agrees with a pinhole in the middle. Leave that factor to the focal length."
+)
+def _(points, xi):
+    return project(points, xi) * (1 + xi)
+
+
+@PROJECT.wrong("You add ξ instead of ξ D: that is right only for points on the unit sphere, one metre away.")
+def _(points, xi):
+    return points[..., :2] / (points[..., 2:] + xi)
+
 
 UNPROJECT = Exercise(
     name="10.unproject",
@@ -159,26 +164,31 @@ UNPROJECT = Exercise(
         "`(xi + np.sqrt(1 + (1 - xi**2) * r2)) / (1 + r2)`; the ray is (η x, η y, η − ξ).",
     ),
     praise="A closed form, and of unit length without any normalising. Few wide models have one.",
-    misconceptions=(
-        Misconception(
-            lambda xy, xi: unproject(xy, 0.0),
-            "This is the pinhole's ray, (x, y, 1) made a unit vector. That is where the line from ξ behind goes, not "
-            "where it meets the sphere.",
-        ),
-        Misconception(
-            lambda xy, xi: unproject(xy, xi) + np.array([0, 0, xi]),
-            "You forgot to subtract ξ: your vector starts at the point ξ behind, not at the centre of the sphere.",
-        ),
-        Misconception(
-            lambda xy, xi: _other_root(xy, xi),
-            "This is the other place where the line meets the sphere, the one behind: take the positive root.",
-        ),
-        Misconception(
-            lambda xy, xi: unproject(xy, xi) * 2,
-            "The direction is right; its length is 2. The conventions ask for unit rays.",
-        ),
-    ),
 )
+
+
+@UNPROJECT.wrong(
+    "This is the pinhole's ray, (x, y, 1) made a unit vector. That is where the line from ξ behind goes, not "
+    "where it meets the sphere."
+)
+def _(xy, xi):
+    return unproject(xy, 0.0)
+
+
+@UNPROJECT.wrong("You forgot to subtract ξ: your vector starts at the point ξ behind, not at the centre of the sphere.")
+def _(xy, xi):
+    return unproject(xy, xi) + np.array([0, 0, xi])
+
+
+@UNPROJECT.wrong("This is the other place where the line meets the sphere, the one behind: take the positive root.")
+def _(xy, xi):
+    return _other_root(xy, xi)
+
+
+@UNPROJECT.wrong("The direction is right; its length is 2. The conventions ask for unit rays.")
+def _(xy, xi):
+    return unproject(xy, xi) * 2
+
 
 DOUBLE_SPHERE = Exercise(
     name="10.double_sphere",
@@ -190,21 +200,23 @@ DOUBLE_SPHERE = Exercise(
         "D₂ is the distance after the point has been moved by ξ D₁ along z: its third coordinate is ξ D₁ + Z, not Z.",
     ),
     praise="Onto one sphere, then onto another, ξ further on. With ξ = 0 it is the unified sphere in its α form.",
-    misconceptions=(
-        Misconception(
-            _with_first_distance,
-            "This is what you get with D₁ in both places: the second sphere is missing. Its distance D₂ is measured to "
-            "the point that was moved, (X, Y, ξ D₁ + Z).",
-        ),
-        Misconception(
-            _with_unshifted_depth, "D₂ is right now; the other term still has Z where the moved depth ξ D₁ + Z belongs."
-        ),
-        Misconception(
-            lambda points, xi, alpha: double_sphere(points, xi, 1 - alpha),
-            "α and 1 − α have changed places: α goes with the distance D₂.",
-        ),
-    ),
 )
+
+DOUBLE_SPHERE.wrong(
+    "This is what you get with D₁ in both places: the second sphere is missing. Its distance D₂ is measured to "
+    "the point that was moved, (X, Y, ξ D₁ + Z)."
+)(_with_first_distance)
+
+
+DOUBLE_SPHERE.wrong("D₂ is right now; the other term still has Z where the moved depth ξ D₁ + Z belongs.")(
+    _with_unshifted_depth
+)
+
+
+@DOUBLE_SPHERE.wrong("α and 1 − α have changed places: α goes with the distance D₂.")
+def _(points, xi, alpha):
+    return double_sphere(points, xi, 1 - alpha)
+
 
 CUBE = Exercise(
     name="10.cube_point",
@@ -216,26 +228,31 @@ CUBE = Exercise(
         "Divide by the largest *size*, `np.max(np.abs(direction), axis=-1, keepdims=True)`: the sign must stay.",
     ),
     praise="Six pinholes of 90°, chosen by one comparison. Which coordinate is ±1 says which face it is.",
-    misconceptions=(
-        Misconception(
-            lambda direction: direction / np.max(direction, axis=-1, keepdims=True),
-            "You divide by the largest coordinate, not by the largest in *size*: a direction to the back or the left "
-            "comes out on the opposite face.",
-        ),
-        Misconception(
-            lambda direction: direction / np.linalg.norm(direction, axis=-1, keepdims=True),
-            "This point is on the *sphere*. On the cube, the largest coordinate is ±1.",
-        ),
-        Misconception(
-            lambda direction: direction / np.abs(direction[..., 2:]),
-            "This is right on the front and the back. To the side, up and down, another coordinate is the largest.",
-        ),
-        Misconception(
-            lambda direction: direction / np.max(np.abs(direction)),
-            "You took the largest coordinate of *all* directions. Each has its own: over the last axis only.",
-        ),
-    ),
 )
+
+
+@CUBE.wrong(
+    "You divide by the largest coordinate, not by the largest in *size*: a direction to the back or the left "
+    "comes out on the opposite face."
+)
+def _(direction):
+    return direction / np.max(direction, axis=-1, keepdims=True)
+
+
+@CUBE.wrong("This point is on the *sphere*. On the cube, the largest coordinate is ±1.")
+def _(direction):
+    return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+
+
+@CUBE.wrong("This is right on the front and the back. To the side, up and down, another coordinate is the largest.")
+def _(direction):
+    return direction / np.abs(direction[..., 2:])
+
+
+@CUBE.wrong("You took the largest coordinate of *all* directions. Each has its own: over the last axis only.")
+def _(direction):
+    return direction / np.max(np.abs(direction))
+
 
 PARALLAX = Exercise(
     name="10.parallax",
@@ -248,33 +265,37 @@ PARALLAX = Exercise(
         "tan ψ = r sin α / (Z − r cos α). The images are 2ψ apart, and a panorama has width/(2π) pixels per radian.",
     ),
     praise="No stitching makes this zero at every distance: the cameras have no common viewpoint.",
-    misconceptions=(
-        Misconception(
-            _one_ray, "This is how far *one* camera's image is from the seam. The other's is as far beyond it."
-        ),
-        Misconception(
-            lambda n, r, z, width: 2 * np.arctan2(r * np.sin(np.pi / n), z) * width / (2 * np.pi),
-            "You measure the distance from the cameras' line; Z counts from the ring's *centre*, so that the cameras "
-            "are r cos α nearer.",
-        ),
-        Misconception(
-            lambda n, r, z, width: _by_baseline(2 * r * np.sin(np.pi / n), z, width),
-            "b/Z is what remains far away. Near the ring it is too small: use the exact angle.",
-        ),
-        Misconception(
-            lambda n, r, z, width: _by_baseline(2 * r, z, width),
-            "You take the ring's diameter for the baseline. Neighbours are 2 r sin(π/n) apart.",
-        ),
-        Misconception(
-            lambda n, r, z, width: parallax(n, r, z, width) * 2 * np.pi / width,
-            "This is the angle in radians. Multiply by the pixels per radian, width/(2π).",
-        ),
-        Misconception(
-            lambda n, r, z, width: parallax(n, r, z, width) * 2 * np.pi,
-            "A panorama has width/(2π) pixels per radian, not width: it goes all the way round.",
-        ),
-    ),
 )
+
+PARALLAX.wrong("This is how far *one* camera's image is from the seam. The other's is as far beyond it.")(_one_ray)
+
+
+@PARALLAX.wrong(
+    "You measure the distance from the cameras' line; Z counts from the ring's *centre*, so that the cameras "
+    "are r cos α nearer."
+)
+def _(n, r, z, width):
+    return 2 * np.arctan2(r * np.sin(np.pi / n), z) * width / (2 * np.pi)
+
+
+@PARALLAX.wrong("b/Z is what remains far away. Near the ring it is too small: use the exact angle.")
+def _(n, r, z, width):
+    return _by_baseline(2 * r * np.sin(np.pi / n), z, width)
+
+
+@PARALLAX.wrong("You take the ring's diameter for the baseline. Neighbours are 2 r sin(π/n) apart.")
+def _(n, r, z, width):
+    return _by_baseline(2 * r, z, width)
+
+
+@PARALLAX.wrong("This is the angle in radians. Multiply by the pixels per radian, width/(2π).")
+def _(n, r, z, width):
+    return parallax(n, r, z, width) * 2 * np.pi / width
+
+
+@PARALLAX.wrong("A panorama has width/(2π) pixels per radian, not width: it goes all the way round.")
+def _(n, r, z, width):
+    return parallax(n, r, z, width) * 2 * np.pi
 
 
 def _other_root(xy: Array, xi: float) -> Array:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 
 def sub_aperture(sensor: Array, n: int, v: int, u: int) -> Array:
@@ -95,21 +95,27 @@ SUB_APERTURE = Exercise(
         "step, `sensor[start::step, …]`.",
     ),
     praise="One line takes a view out of the sensor, and the view has 1/n² of its pixels.",
-    misconceptions=(
-        Misconception(
-            lambda sensor, n, v, u: sensor[u::n, v::n],
-            "v and u have changed places: v counts downwards, so it goes with the rows, the first index.",
-        ),
-        Misconception(
-            lambda sensor, n, v, u: sensor[v * n : (v + 1) * n, u * n : (u + 1) * n],
-            "This is what lies under *one* microlens: one point, from everywhere. A view takes one pixel from each.",
-        ),
-        Misconception(
-            lambda sensor, n, v, u: np.split(np.split(sensor, n, 0)[v], n, 1)[u],
-            "This cuts the sensor into n × n tiles. The views do not lie beside each other, they are interleaved.",
-        ),
-    ),
 )
+
+
+@SUB_APERTURE.wrong("v and u have changed places: v counts downwards, so it goes with the rows, the first index.")
+def _(sensor, n, v, u):
+    return sensor[u::n, v::n]
+
+
+@SUB_APERTURE.wrong(
+    "This is what lies under *one* microlens: one point, from everywhere. A view takes one pixel from each."
+)
+def _(sensor, n, v, u):
+    return sensor[v * n : (v + 1) * n, u * n : (u + 1) * n]
+
+
+@SUB_APERTURE.wrong(
+    "This cuts the sensor into n × n tiles. The views do not lie beside each other, they are interleaved."
+)
+def _(sensor, n, v, u):
+    return np.split(np.split(sensor, n, 0)[v], n, 1)[u]
+
 
 DISPARITY = Exercise(
     name="11.disparity",
@@ -121,25 +127,28 @@ DISPARITY = Exercise(
         "The views were sheared so that it is zero at z_f: subtract what a point there would move, b f / z_f.",
     ),
     praise="Near is positive, far is negative, and the focus stands still.",
-    misconceptions=(
-        Misconception(
-            lambda z, b, f, z_f: b * f / np.asarray(z),
-            "This is the disparity of two parallel cameras. Here points at z_f stand still: take away b f / z_f.",
-        ),
-        Misconception(
-            lambda z, b, f, z_f: b * f / (np.asarray(z) - z_f),
-            "Depths do not subtract, their inverses do: 1/z − 1/z_f, not 1/(z − z_f).",
-        ),
-        Misconception(
-            lambda z, b, f, z_f: b * f * (1 / z_f - 1 / np.asarray(z)),
-            "The sign is flipped: what is nearer than z_f has a positive disparity here, as in stereo.",
-        ),
-        Misconception(
-            lambda z, b, f, z_f: b * (1 / np.asarray(z) - 1 / z_f),
-            "The focal length is left out: f turns the tangent of an angle into pixels.",
-        ),
-    ),
 )
+
+
+@DISPARITY.wrong("This is the disparity of two parallel cameras. Here points at z_f stand still: take away b f / z_f.")
+def _(z, b, f, z_f):
+    return b * f / np.asarray(z)
+
+
+@DISPARITY.wrong("Depths do not subtract, their inverses do: 1/z − 1/z_f, not 1/(z − z_f).")
+def _(z, b, f, z_f):
+    return b * f / (np.asarray(z) - z_f)
+
+
+@DISPARITY.wrong("The sign is flipped: what is nearer than z_f has a positive disparity here, as in stereo.")
+def _(z, b, f, z_f):
+    return b * f * (1 / z_f - 1 / np.asarray(z))
+
+
+@DISPARITY.wrong("The focal length is left out: f turns the tangent of an angle into pixels.")
+def _(z, b, f, z_f):
+    return b * (1 / np.asarray(z) - 1 / z_f)
+
 
 REFOCUSED = Exercise(
     name="11.refocused",
@@ -151,27 +160,34 @@ REFOCUSED = Exercise(
         "Which view stays where it is? Count v and u from the *middle* of the aperture: `v - rows // 2`.",
     ),
     praise="Now the middle view holds still, and the picture no longer slides when you turn the focus.",
-    misconceptions=(
-        Misconception(
-            lambda views, d: _rolled(views, d, centred=False),
-            "The picture is sharp where it should be, but *in another place*: turn the focus, and everything slides. "
-            "The view in the corner holds still; the one in the middle should.",
-        ),
-        Misconception(
-            lambda views, d: _rolled(views, d, centred=True, sign=-1),
-            "The direction is reversed: this focuses nearer where it should focus farther. A point moves to the left "
-            "by d, so its view has to be moved to the right.",
-        ),
-        Misconception(
-            lambda views, d: _rolled(views, d, centred=True, swapped=True),
-            "v and u have changed places: v moves rows, axis 0, and u columns, axis 1.",
-        ),
-        Misconception(
-            lambda views, d: refocused(views, d) * np.prod(views.shape[:2]),
-            "The sum is not divided by the number of views: the picture is many times too bright.",
-        ),
-    ),
 )
+
+
+@REFOCUSED.wrong(
+    "The picture is sharp where it should be, but *in another place*: turn the focus, and everything slides. "
+    "The view in the corner holds still; the one in the middle should."
+)
+def _(views, d):
+    return _rolled(views, d, centred=False)
+
+
+@REFOCUSED.wrong(
+    "The direction is reversed: this focuses nearer where it should focus farther. A point moves to the left "
+    "by d, so its view has to be moved to the right."
+)
+def _(views, d):
+    return _rolled(views, d, centred=True, sign=-1)
+
+
+@REFOCUSED.wrong("v and u have changed places: v moves rows, axis 0, and u columns, axis 1.")
+def _(views, d):
+    return _rolled(views, d, centred=True, swapped=True)
+
+
+@REFOCUSED.wrong("The sum is not divided by the number of views: the picture is many times too bright.")
+def _(views, d):
+    return refocused(views, d) * np.prod(views.shape[:2])
+
 
 SLOPE = Exercise(
     name="11.slope",
@@ -184,21 +200,23 @@ SLOPE = Exercise(
         "zero nothing moves that could be seen: NaN.",
     ),
     praise="Depth from the direction of a line, with two derivatives and one division.",
-    misconceptions=(
-        Misconception(
-            lambda epi: 1 / slope(epi),
-            "This is the slope seen from the other side, views per pixel. Wanted are pixels per view, L_u over L_x.",
-        ),
-        Misconception(
-            lambda epi: -slope(epi),
-            "The sign is flipped: for d > 0 points move to the *left* as u grows, g(x + d u).",
-        ),
-        Misconception(
-            lambda epi: 0.0 if np.isnan(slope(epi)) else slope(epi),
-            "Right where there is something to see. In a plain slice every slope fits equally: NaN, not 0.",
-        ),
-    ),
 )
+
+
+@SLOPE.wrong("This is the slope seen from the other side, views per pixel. Wanted are pixels per view, L_u over L_x.")
+def _(epi):
+    return 1 / slope(epi)
+
+
+@SLOPE.wrong("The sign is flipped: for d > 0 points move to the *left* as u grows, g(x + d u).")
+def _(epi):
+    return -slope(epi)
+
+
+@SLOPE.wrong("Right where there is something to see. In a plain slice every slope fits equally: NaN, not 0.")
+def _(epi):
+    return 0.0 if np.isnan(slope(epi)) else slope(epi)
+
 
 ALPHA = Exercise(
     name="11.alpha",
@@ -209,24 +227,27 @@ ALPHA = Exercise(
         "1/f = 1/z + 1/v gives v = 1 / (1/f − 1/z). α is v(z) / v(z_f).",
     ),
     praise="α is a ratio *behind* the lens. In 1/α, not in α, equal steps are equal steps of slope.",
-    misconceptions=(
-        Misconception(
-            lambda z, f, z_f: 1 / alpha(z, f, z_f),
-            "This is 1/α: the film of a nearer point lies *farther* behind the lens, so α > 1 for z < z_f.",
-        ),
-        Misconception(
-            lambda z, f, z_f: np.asarray(z) / z_f,
-            "This is a ratio of depths before the lens. α compares image distances, behind it.",
-        ),
-        Misconception(
-            lambda z, f, z_f: z_f / np.asarray(z),
-            "This is a ratio of depths before the lens. α compares image distances, behind it.",
-        ),
-        Misconception(
-            lambda z, f, z_f: 1 / (1 / f - 1 / np.asarray(z)) / f,
-            "You divide by the focal length. The sensor is not at f but where z_f is sharp: v(z_f).",
-        ),
-    ),
 )
+
+
+@ALPHA.wrong("This is 1/α: the film of a nearer point lies *farther* behind the lens, so α > 1 for z < z_f.")
+def _(z, f, z_f):
+    return 1 / alpha(z, f, z_f)
+
+
+@ALPHA.wrong("This is a ratio of depths before the lens. α compares image distances, behind it.")
+def _(z, f, z_f):
+    return np.asarray(z) / z_f
+
+
+@ALPHA.wrong("This is a ratio of depths before the lens. α compares image distances, behind it.")
+def _(z, f, z_f):
+    return z_f / np.asarray(z)
+
+
+@ALPHA.wrong("You divide by the focal length. The sensor is not at f but where z_f is sharp: v(z_f).")
+def _(z, f, z_f):
+    return 1 / (1 / f - 1 / np.asarray(z)) / f
+
 
 EXERCISES = (SUB_APERTURE, DISPARITY, REFOCUSED, SLOPE, ALPHA)

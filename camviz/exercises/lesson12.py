@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 from camviz.mosaics import XTRANS
 
 _RGGB = np.array([[0, 1], [1, 2]])
@@ -149,20 +149,23 @@ MOSAIC = Exercise(
         "number for each of them.",
     ),
     praise="It works for Bayer's tile, for X-Trans, and for one that no one has built yet.",
-    misconceptions=(
-        Misconception(_with_tile_across, "Rows and columns of the tile have changed places: it is indexed [v, u]."),
-        Misconception(_blue_first, "Red and blue have changed places: channel 0 is red."),
-        Misconception(
-            _kept_in_three,
-            "Two of your three numbers are always 0. A mosaic has *one* number for each pixel: its shape is "
-            "(height, width).",
-        ),
-        Misconception(
-            lambda picture, tile: picture.mean(axis=-1),
-            "This is the mean of all three, as without filters.",
-        ),
-    ),
 )
+
+MOSAIC.wrong("Rows and columns of the tile have changed places: it is indexed [v, u].")(_with_tile_across)
+
+
+MOSAIC.wrong("Red and blue have changed places: channel 0 is red.")(_blue_first)
+
+
+MOSAIC.wrong(
+    "Two of your three numbers are always 0. A mosaic has *one* number for each pixel: its shape is (height, width)."
+)(_kept_in_three)
+
+
+@MOSAIC.wrong("This is the mean of all three, as without filters.")
+def _(picture, tile):
+    return picture.mean(axis=-1)
+
 
 CROPPED_TILE = Exercise(
     name="12.cropped_tile",
@@ -176,25 +179,33 @@ CROPPED_TILE = Exercise(
         "does not see the difference; for X-Trans one does.",
     ),
     praise="It keeps the phase for any tile, also where 2 × 2 would have hidden the sign.",
-    misconceptions=(
-        Misconception(
-            lambda tile, x0, y0: np.roll(tile, (x0, y0), axis=(0, 1)),
-            "Two mistakes are in it: x0 counts columns, which are axis 1, and cutting moves the tile left and up, not "
-            "right and down.",
-        ),
-        Misconception(
-            lambda tile, x0, y0: np.roll(tile, (y0, x0), axis=(0, 1)),
-            "The axes are right now, and every 2 × 2 tile is too. X-Trans is not: cutting moves the tile left and up.",
-        ),
-        Misconception(
-            lambda tile, x0, y0: np.roll(tile, (-x0, -y0), axis=(0, 1)),
-            "The direction is right now, but x0 still moves rows: columns are axis 1.",
-        ),
-        Misconception(
-            lambda tile, x0, y0: tile[y0:, x0:], "This cuts the tile. It is the mosaic that is cut; the tile repeats."
-        ),
-    ),
 )
+
+
+@CROPPED_TILE.wrong(
+    "Two mistakes are in it: x0 counts columns, which are axis 1, and cutting moves the tile left and up, not "
+    "right and down."
+)
+def _(tile, x0, y0):
+    return np.roll(tile, (x0, y0), axis=(0, 1))
+
+
+@CROPPED_TILE.wrong(
+    "The axes are right now, and every 2 × 2 tile is too. X-Trans is not: cutting moves the tile left and up."
+)
+def _(tile, x0, y0):
+    return np.roll(tile, (y0, x0), axis=(0, 1))
+
+
+@CROPPED_TILE.wrong("The direction is right now, but x0 still moves rows: columns are axis 1.")
+def _(tile, x0, y0):
+    return np.roll(tile, (-x0, -y0), axis=(0, 1))
+
+
+@CROPPED_TILE.wrong("This cuts the tile. It is the mosaic that is cut; the tile repeats.")
+def _(tile, x0, y0):
+    return tile[y0:, x0:]
+
 
 MALVAR_GREEN = Exercise(
     name="12.malvar_green",
@@ -207,22 +218,28 @@ MALVAR_GREEN = Exercise(
         "ones + (middle − mean of the four far ones)/2.",
     ),
     praise="This is the first of the three filters of Malvar, He and Cutler: a Laplacian of red sharpens green.",
-    misconceptions=(
-        Misconception(lambda around: _mean_of_four(around, 1), "This is bilinear: red's say is missing."),
-        Misconception(
-            lambda around: _mean_of_four(around, 1) + around[..., 2, 2] - _mean_of_four(around, 2),
-            "Half of the Laplacian is enough: the whole of it overshoots.",
-        ),
-        Misconception(
-            lambda around: _mean_of_four(around, 1) - (around[..., 2, 2] - _mean_of_four(around, 2)) / 2,
-            "The sign is flipped: where red stands out above its neighbours, green is likely to do so too.",
-        ),
-        Misconception(
-            lambda around: _mean_of_four(around, 1) + (around[..., 2, 2] - 4 * _mean_of_four(around, 2)) / 2,
-            "You take the *sum* of the four far pixels; it is their mean that the middle is compared with.",
-        ),
-    ),
 )
+
+
+@MALVAR_GREEN.wrong("This is bilinear: red's say is missing.")
+def _(around):
+    return _mean_of_four(around, 1)
+
+
+@MALVAR_GREEN.wrong("Half of the Laplacian is enough: the whole of it overshoots.")
+def _(around):
+    return _mean_of_four(around, 1) + around[..., 2, 2] - _mean_of_four(around, 2)
+
+
+@MALVAR_GREEN.wrong("The sign is flipped: where red stands out above its neighbours, green is likely to do so too.")
+def _(around):
+    return _mean_of_four(around, 1) - (around[..., 2, 2] - _mean_of_four(around, 2)) / 2
+
+
+@MALVAR_GREEN.wrong("You take the *sum* of the four far pixels; it is their mean that the middle is compared with.")
+def _(around):
+    return _mean_of_four(around, 1) + (around[..., 2, 2] - 4 * _mean_of_four(around, 2)) / 2
+
 
 FALSE_FREQUENCY = Exercise(
     name="12.false_frequency",
@@ -236,25 +253,37 @@ FALSE_FREQUENCY = Exercise(
         "subtract ½, then subtract the nearest whole number with `np.rint`.",
     ),
     praise="Now you can say what colour a striped shirt will have before you take its picture.",
-    misconceptions=(
-        Misconception(
-            lambda f: np.abs(np.asarray(f) - np.rint(f)),
-            "This is the frequency that the stripes themselves seem to have on pixels, their alias. Colour beats with "
-            "the distance from ½.",
-        ),
-        Misconception(
-            lambda f: np.abs(np.asarray(f) - 0.5),
-            "For stripes below one cycle per pixel this is right. Pixels cannot tell f from f + 1: take the distance "
-            "from the *nearest* of ½, 1½, ….",
-        ),
-        Misconception(lambda f: np.asarray(f) - 0.5 - np.rint(np.asarray(f) - 0.5), "A frequency is not negative."),
-        Misconception(
-            lambda f: np.abs(2 * np.asarray(f) - np.rint(2 * np.asarray(f))) / 2,
-            "This is the alias on every second pixel, for each colour by itself: at f near 0 red and blue have it too, "
-            "but together, and then nothing is coloured. Red *against* blue beats with the distance from ½.",
-        ),
-    ),
 )
+
+
+@FALSE_FREQUENCY.wrong(
+    "This is the frequency that the stripes themselves seem to have on pixels, their alias. Colour beats with "
+    "the distance from ½."
+)
+def _(f):
+    return np.abs(np.asarray(f) - np.rint(f))
+
+
+@FALSE_FREQUENCY.wrong(
+    "For stripes below one cycle per pixel this is right. Pixels cannot tell f from f + 1: take the distance "
+    "from the *nearest* of ½, 1½, …."
+)
+def _(f):
+    return np.abs(np.asarray(f) - 0.5)
+
+
+@FALSE_FREQUENCY.wrong("A frequency is not negative.")
+def _(f):
+    return np.asarray(f) - 0.5 - np.rint(np.asarray(f) - 0.5)
+
+
+@FALSE_FREQUENCY.wrong(
+    "This is the alias on every second pixel, for each colour by itself: at f near 0 red and blue have it too, "
+    "but together, and then nothing is coloured. Red *against* blue beats with the distance from ½."
+)
+def _(f):
+    return np.abs(2 * np.asarray(f) - np.rint(2 * np.asarray(f))) / 2
+
 
 EDGE_GREEN = Exercise(
     name="12.edge_green",
@@ -267,21 +296,27 @@ EDGE_GREEN = Exercise(
         "`np.where`, twice, for the draw.",
     ),
     praise="It looks before it averages: this is the green of Hamilton and Adams, and half of Menon's.",
-    misconceptions=(
-        Misconception(
-            _across_the_edge, "You take the way that changes *more*: across the edge, where the mean mixes both sides."
-        ),
-        Misconception(_edge_without_bend, "The way is right. The green along it lacks bend/4."),
-        Misconception(
-            _draw_by_column,
-            "Right but for a draw: where both ways change as much, green is the mean of both, not the column's.",
-        ),
-        Misconception(
-            _draw_by_row,
-            "Right but for a draw: where both ways change as much, green is the mean of both, not the row's.",
-        ),
-        Misconception(malvar_green, "This is Malvar's green, the same filter everywhere. Here the window decides."),
-    ),
 )
+
+EDGE_GREEN.wrong("You take the way that changes *more*: across the edge, where the mean mixes both sides.")(
+    _across_the_edge
+)
+
+
+EDGE_GREEN.wrong("The way is right. The green along it lacks bend/4.")(_edge_without_bend)
+
+
+EDGE_GREEN.wrong("Right but for a draw: where both ways change as much, green is the mean of both, not the column's.")(
+    _draw_by_column
+)
+
+
+EDGE_GREEN.wrong("Right but for a draw: where both ways change as much, green is the mean of both, not the row's.")(
+    _draw_by_row
+)
+
+
+EDGE_GREEN.wrong("This is Malvar's green, the same filter everywhere. Here the window decides.")(malvar_green)
+
 
 EXERCISES = (MOSAIC, CROPPED_TILE, MALVAR_GREEN, FALSE_FREQUENCY, EDGE_GREEN)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 from camviz.trials import Function
 
 
@@ -93,31 +93,35 @@ RESPONSE = Exercise(
         "reflectance 1, which is `light @ sensitivity`.",
     ),
     praise="Everything that a sensor knows of a surface went through this sum.",
-    misconceptions=(
-        Misconception(
-            lambda light, reflectance, sensitivity: (light * reflectance) @ sensitivity,
-            "This is the sum itself. Divide it, channel by channel, by what a perfect white gives in the same light.",
-        ),
-        Misconception(
-            lambda light, reflectance, sensitivity: reflectance @ sensitivity / sensitivity.sum(axis=0),
-            "The light is missing. What reaches the sensor is light *times* reflectance.",
-        ),
-        Misconception(
-            lambda light, reflectance, sensitivity: (light * reflectance) @ sensitivity / sensitivity.sum(axis=0),
-            "You divide by the sum of the sensitivity. A perfect white gives the sum of light *times* sensitivity.",
-        ),
-        Misconception(
-            lambda light, reflectance, sensitivity: (
-                (light * reflectance) @ sensitivity / (light @ sensitivity)[1] if sensitivity.shape[1] > 1 else light
-            ),
-            "All channels are divided by the white's *green*. Here each channel is to be a share of its own.",
-        ),
-        Misconception(
-            lambda light, reflectance, sensitivity: (light * reflectance) @ sensitivity / light.sum(),
-            "You divide by the sum of the light. A perfect white gives the sum of light times *sensitivity*.",
-        ),
-    ),
 )
+
+
+@RESPONSE.wrong(
+    "This is the sum itself. Divide it, channel by channel, by what a perfect white gives in the same light."
+)
+def _(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity
+
+
+@RESPONSE.wrong("The light is missing. What reaches the sensor is light *times* reflectance.")
+def _(light, reflectance, sensitivity):
+    return reflectance @ sensitivity / sensitivity.sum(axis=0)
+
+
+@RESPONSE.wrong("You divide by the sum of the sensitivity. A perfect white gives the sum of light *times* sensitivity.")
+def _(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity / sensitivity.sum(axis=0)
+
+
+@RESPONSE.wrong("All channels are divided by the white's *green*. Here each channel is to be a share of its own.")
+def _(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity / (light @ sensitivity)[1] if sensitivity.shape[1] > 1 else light
+
+
+@RESPONSE.wrong("You divide by the sum of the light. A perfect white gives the sum of light times *sensitivity*.")
+def _(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity / light.sum()
+
 
 GREY_WORLD = Exercise(
     name="13.grey_world",
@@ -129,30 +133,42 @@ GREY_WORLD = Exercise(
         "`mean[1]` by `mean`.",
     ),
     praise="Two lines, and they believe that the world is grey. Now you know when not to believe them.",
-    misconceptions=(
-        Misconception(lambda raw: 1 / grey_world(raw), "These are the gains upside down: a weak channel needs *more*."),
-        Misconception(
-            lambda raw: raw.reshape(-1, 3).mean(axis=0),
-            "These are the means. The gains are what the channels must be *multiplied* by to make the means equal.",
-        ),
-        Misconception(
-            lambda raw: raw.mean() / raw.reshape(-1, 3).mean(axis=0),
-            "The means come out equal, at the mean of all three. Here green is to stay as it is: its gain is 1.",
-        ),
-        Misconception(
-            lambda raw: 1 / raw.reshape(-1, 3).mean(axis=0),
-            "The means come out equal, at 1: that changes the exposure too. Let green keep its level.",
-        ),
-        Misconception(
-            lambda raw: raw.reshape(-1, 3).max(axis=0)[1] / raw.reshape(-1, 3).max(axis=0),
-            "These gains make the *brightest* of each channel equal: that is the white patch, not the grey world.",
-        ),
-        Misconception(
-            lambda raw: raw.reshape(-1, 3).mean(axis=0).min() / raw.reshape(-1, 3).mean(axis=0),
-            "You scale down to the smallest channel, as `cv2.xphoto` does. Here green's gain is to be 1.",
-        ),
-    ),
 )
+
+
+@GREY_WORLD.wrong("These are the gains upside down: a weak channel needs *more*.")
+def _(raw):
+    return 1 / grey_world(raw)
+
+
+@GREY_WORLD.wrong(
+    "These are the means. The gains are what the channels must be *multiplied* by to make the means equal."
+)
+def _(raw):
+    return raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("The means come out equal, at the mean of all three. Here green is to stay as it is: its gain is 1.")
+def _(raw):
+    return raw.mean() / raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("The means come out equal, at 1: that changes the exposure too. Let green keep its level.")
+def _(raw):
+    return 1 / raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong(
+    "These gains make the *brightest* of each channel equal: that is the white patch, not the grey world."
+)
+def _(raw):
+    return raw.reshape(-1, 3).max(axis=0)[1] / raw.reshape(-1, 3).max(axis=0)
+
+
+@GREY_WORLD.wrong("You scale down to the smallest channel, as `cv2.xphoto` does. Here green's gain is to be 1.")
+def _(raw):
+    return raw.reshape(-1, 3).mean(axis=0).min() / raw.reshape(-1, 3).mean(axis=0)
+
 
 DEVELOP = Exercise(
     name="13.develop",
@@ -164,33 +180,38 @@ DEVELOP = Exercise(
         "The power 1/2.2 belongs at the very end: `raw * gains`, then the matrix, then `np.clip`, then the power.",
     ),
     praise="Light adds up linearly, so gains and matrices belong before gamma. It is the commonest bug of all.",
-    misconceptions=(
-        Misconception(
-            lambda raw, gains, matrix: np.clip((np.clip(raw, 0, 1) ** (1 / 2.2) * gains) @ matrix.T, 0, 1),
-            "This is what you get with gamma *first*: gains and matrix then act on values that are no longer light.",
-        ),
-        Misconception(
-            lambda raw, gains, matrix: np.clip(np.clip(raw * gains, 0, 1) ** (1 / 2.2) @ matrix.T, 0, 1),
-            "Now the gains act on linear data, and the matrix still on encoded ones. It needs light as well.",
-        ),
-        Misconception(
-            lambda raw, gains, matrix: np.clip((raw * gains) @ matrix, 0, 1) ** (1 / 2.2),
-            "The order is right now, and the matrix is transposed: colours are rows here, so it is `@ matrix.T`.",
-        ),
-        Misconception(
-            lambda raw, gains, matrix: np.clip((raw @ matrix.T) * gains, 0, 1) ** (1 / 2.2),
-            "The matrix was fitted to *balanced* colours: gains first, then the matrix.",
-        ),
-        Misconception(
-            lambda raw, gains, matrix: np.clip((raw * gains) @ matrix.T, 0, 1),
-            "This is right, and still linear: the screen wants the power 1/2.2 at the end.",
-        ),
-        Misconception(
-            lambda raw, gains, matrix: np.clip((raw * gains) @ matrix.T, 0, 1) ** 2.2,
-            "The power at the end is upside down: encoding is 1/2.2, it makes the darks lighter.",
-        ),
-    ),
 )
+
+
+@DEVELOP.wrong("This is what you get with gamma *first*: gains and matrix then act on values that are no longer light.")
+def _(raw, gains, matrix):
+    return np.clip((np.clip(raw, 0, 1) ** (1 / 2.2) * gains) @ matrix.T, 0, 1)
+
+
+@DEVELOP.wrong("Now the gains act on linear data, and the matrix still on encoded ones. It needs light as well.")
+def _(raw, gains, matrix):
+    return np.clip(np.clip(raw * gains, 0, 1) ** (1 / 2.2) @ matrix.T, 0, 1)
+
+
+@DEVELOP.wrong("The order is right now, and the matrix is transposed: colours are rows here, so it is `@ matrix.T`.")
+def _(raw, gains, matrix):
+    return np.clip((raw * gains) @ matrix, 0, 1) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("The matrix was fitted to *balanced* colours: gains first, then the matrix.")
+def _(raw, gains, matrix):
+    return np.clip((raw @ matrix.T) * gains, 0, 1) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("This is right, and still linear: the screen wants the power 1/2.2 at the end.")
+def _(raw, gains, matrix):
+    return np.clip((raw * gains) @ matrix.T, 0, 1)
+
+
+@DEVELOP.wrong("The power at the end is upside down: encoding is 1/2.2, it makes the darks lighter.")
+def _(raw, gains, matrix):
+    return np.clip((raw * gains) @ matrix.T, 0, 1) ** 2.2
+
 
 FIT_MATRIX = Exercise(
     name="13.fit_matrix",
@@ -202,25 +223,30 @@ FIT_MATRIX = Exercise(
         "`np.linalg.lstsq(raw, target, rcond=None)[0]` is the X with raw @ X ≈ target. How is X related to M?",
     ),
     praise="Twenty-four patches, nine unknowns. `cv2.ccm` would hand you this matrix transposed.",
-    misconceptions=(
-        Misconception(
-            lambda raw, target: fit_matrix(raw, target).T,
-            "This is M transposed: `raw @ X ≈ target` gives X = Mᵀ. It is the convention of `cv2.ccm`.",
-        ),
-        Misconception(
-            lambda raw, target: fit_matrix(target, raw),
-            "This matrix goes the other way, from target to raw: change places in `lstsq`.",
-        ),
-        Misconception(
-            lambda raw, target: np.linalg.pinv(fit_matrix(target, raw)),
-            "You fitted target → raw and inverted. That makes the error of the *raw* colours least, not of the result.",
-        ),
-        Misconception(
-            lambda raw, target: np.diag((raw * target).sum(axis=0) / (raw**2).sum(axis=0)),
-            "This is diagonal: three gains. A matrix also takes from each channel what belongs to another.",
-        ),
-    ),
 )
+
+
+@FIT_MATRIX.wrong("This is M transposed: `raw @ X ≈ target` gives X = Mᵀ. It is the convention of `cv2.ccm`.")
+def _(raw, target):
+    return fit_matrix(raw, target).T
+
+
+@FIT_MATRIX.wrong("This matrix goes the other way, from target to raw: change places in `lstsq`.")
+def _(raw, target):
+    return fit_matrix(target, raw)
+
+
+@FIT_MATRIX.wrong(
+    "You fitted target → raw and inverted. That makes the error of the *raw* colours least, not of the result."
+)
+def _(raw, target):
+    return np.linalg.pinv(fit_matrix(target, raw))
+
+
+@FIT_MATRIX.wrong("This is diagonal: three gains. A matrix also takes from each channel what belongs to another.")
+def _(raw, target):
+    return np.diag((raw * target).sum(axis=0) / (raw**2).sum(axis=0))
+
 
 UNSEEN = Exercise(
     name="13.unseen",
@@ -235,21 +261,25 @@ UNSEEN = Exercise(
         "`np.linalg.lstsq(sensor, change, rcond=None)[0]` finds w too.",
     ),
     praise="Add your result to any spectrum, and the sensor will never know: a metameric black.",
-    misconceptions=(
-        Misconception(
-            lambda change, sensor: change - unseen(change, sensor),
-            "This is the part that the sensor *does* notice. Subtract it from the change.",
-        ),
-        Misconception(
-            lambda change, sensor: change - sensor @ (sensor.T @ change / (sensor**2).sum(axis=0)),
-            "You took away each channel's share by itself. The curves overlap, so their shares count twice: solve for "
-            "the three weights together.",
-        ),
-        Misconception(
-            lambda change, sensor: change - sensor @ (sensor.T @ change),
-            "The weights are not Sᵀ change, but the solution of (SᵀS) w = Sᵀ change: the curves are no unit vectors.",
-        ),
-    ),
 )
+
+
+@UNSEEN.wrong("This is the part that the sensor *does* notice. Subtract it from the change.")
+def _(change, sensor):
+    return change - unseen(change, sensor)
+
+
+@UNSEEN.wrong(
+    "You took away each channel's share by itself. The curves overlap, so their shares count twice: solve for "
+    "the three weights together."
+)
+def _(change, sensor):
+    return change - sensor @ (sensor.T @ change / (sensor**2).sum(axis=0))
+
+
+@UNSEEN.wrong("The weights are not Sᵀ change, but the solution of (SᵀS) w = Sᵀ change: the curves are no unit vectors.")
+def _(change, sensor):
+    return change - sensor @ (sensor.T @ change)
+
 
 EXERCISES = (RESPONSE, GREY_WORLD, DEVELOP, FIT_MATRIX, UNSEEN)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 PHOTONS_PER_LUX = 4091.0  # of 555 nm, per second and µm²: 1/683 W/m² over h c / λ
 
@@ -66,39 +66,35 @@ EXPECTED_ELECTRONS = Exercise(
     ),
     praise="From lux to electrons, without a constant that a datasheet would not give you.",
     tolerance=1e-6,
-    misconceptions=(
-        Misconception(
-            lambda lux, f_number, pitch_um, exposure_s, efficiency: (
-                expected_electrons(lux, f_number, 1.0, exposure_s, efficiency) * pitch_um
-            ),
-            "You multiplied by the pixel's pitch. Light falls on its *area*, pitch².",
-        ),
-        Misconception(
-            lambda lux, f_number, pitch_um, exposure_s, efficiency: (
-                4 * f_number * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency) / 4
-            ),
-            "The f-number enters squared: N is about the aperture's *diameter*, and light goes through its area.",
-        ),
-        Misconception(
-            lambda lux, f_number, pitch_um, exposure_s, efficiency: (
-                4 * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency)
-            ),
-            "A factor of 4 too many: E = π L / (4 N²), and a matt white wall has L = lux / π.",
-        ),
-        Misconception(
-            lambda lux, f_number, pitch_um, exposure_s, efficiency: expected_electrons(
-                lux, f_number, pitch_um, exposure_s, 1.0
-            ),
-            "These are the *photons*. Only a share η of them frees an electron.",
-        ),
-        Misconception(
-            lambda lux, f_number, pitch_um, exposure_s, efficiency: (
-                expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency) / exposure_s
-            ),
-            "These are electrons per *second*: the exposure is missing.",
-        ),
-    ),
 )
+
+
+@EXPECTED_ELECTRONS.wrong("You multiplied by the pixel's pitch. Light falls on its *area*, pitch².")
+def _(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, 1.0, exposure_s, efficiency) * pitch_um
+
+
+@EXPECTED_ELECTRONS.wrong(
+    "The f-number enters squared: N is about the aperture's *diameter*, and light goes through its area."
+)
+def _(lux, f_number, pitch_um, exposure_s, efficiency):
+    return 4 * f_number * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency) / 4
+
+
+@EXPECTED_ELECTRONS.wrong("A factor of 4 too many: E = π L / (4 N²), and a matt white wall has L = lux / π.")
+def _(lux, f_number, pitch_um, exposure_s, efficiency):
+    return 4 * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency)
+
+
+@EXPECTED_ELECTRONS.wrong("These are the *photons*. Only a share η of them frees an electron.")
+def _(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, pitch_um, exposure_s, 1.0)
+
+
+@EXPECTED_ELECTRONS.wrong("These are electrons per *second*: the exposure is missing.")
+def _(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency) / exposure_s
+
 
 ROW_TIME = Exercise(
     name="14.row_time",
@@ -111,21 +107,25 @@ ROW_TIME = Exercise(
     ),
     praise="A lamp and a telephone are all it takes. Measure yours.",
     tolerance=1e-9,
-    misconceptions=(
-        Misconception(
-            lambda stripes, rows, mains_hz: 2 * row_time(stripes, rows, mains_hz),
-            "A factor of 2 too long: the current flows both ways, so the lamp is bright *twice* in each period.",
-        ),
-        Misconception(
-            lambda stripes, rows, mains_hz: rows * row_time(stripes, rows, mains_hz),
-            "This is the time of the whole frame. From one row to the next is one `rows`-th of it.",
-        ),
-        Misconception(
-            lambda stripes, rows, mains_hz: 1 / (2 * mains_hz * rows * np.asarray(stripes)),
-            "More stripes mean a *slower* sensor: the more often the lamp flickers meanwhile, the longer the frame.",
-        ),
-    ),
 )
+
+
+@ROW_TIME.wrong("A factor of 2 too long: the current flows both ways, so the lamp is bright *twice* in each period.")
+def _(stripes, rows, mains_hz):
+    return 2 * row_time(stripes, rows, mains_hz)
+
+
+@ROW_TIME.wrong("This is the time of the whole frame. From one row to the next is one `rows`-th of it.")
+def _(stripes, rows, mains_hz):
+    return rows * row_time(stripes, rows, mains_hz)
+
+
+@ROW_TIME.wrong(
+    "More stripes mean a *slower* sensor: the more often the lamp flickers meanwhile, the longer the frame."
+)
+def _(stripes, rows, mains_hz):
+    return 1 / (2 * mains_hz * rows * np.asarray(stripes))
+
 
 DYNAMIC_RANGE_DB = Exercise(
     name="14.dynamic_range_db",
@@ -139,25 +139,32 @@ DYNAMIC_RANGE_DB = Exercise(
     ),
     praise="A published result file has this very error: 142 dB, from a camera that has 62.",
     tolerance=1e-6,
-    misconceptions=(
-        Misconception(
-            lambda full_well_e, dark_noise_e: dynamic_range_db(full_well_e, dark_noise_e) * np.log(10),
-            "The ratio is right, and its logarithm is the natural one: for 10 : 1 you get 46, where 20 dB are wanted.",
-        ),
-        Misconception(
-            lambda full_well_e, dark_noise_e: dynamic_range_db(full_well_e, dark_noise_e) / 2,
-            "Half of it: signals, unlike powers, take 20 log10 in EMVA 1288.",
-        ),
-        Misconception(
-            lambda full_well_e, dark_noise_e: 20 * np.log10(np.asarray(full_well_e) / np.asarray(dark_noise_e)),
-            "This divides by the dark noise alone, as older sheets do. EMVA 1288 divides by the threshold, σ_d + ½.",
-        ),
-        Misconception(
-            lambda full_well_e, dark_noise_e: np.log2(np.asarray(full_well_e) / (np.asarray(dark_noise_e) + 0.5)),
-            "These are stops. In decibels it is 20 log10 of the same ratio.",
-        ),
-    ),
 )
+
+
+@DYNAMIC_RANGE_DB.wrong(
+    "The ratio is right, and its logarithm is the natural one: for 10 : 1 you get 46, where 20 dB are wanted."
+)
+def _(full_well_e, dark_noise_e):
+    return dynamic_range_db(full_well_e, dark_noise_e) * np.log(10)
+
+
+@DYNAMIC_RANGE_DB.wrong("Half of it: signals, unlike powers, take 20 log10 in EMVA 1288.")
+def _(full_well_e, dark_noise_e):
+    return dynamic_range_db(full_well_e, dark_noise_e) / 2
+
+
+@DYNAMIC_RANGE_DB.wrong(
+    "This divides by the dark noise alone, as older sheets do. EMVA 1288 divides by the threshold, σ_d + ½."
+)
+def _(full_well_e, dark_noise_e):
+    return 20 * np.log10(np.asarray(full_well_e) / np.asarray(dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("These are stops. In decibels it is 20 log10 of the same ratio.")
+def _(full_well_e, dark_noise_e):
+    return np.log2(np.asarray(full_well_e) / (np.asarray(dark_noise_e) + 0.5))
+
 
 ARRIVING = Exercise(
     name="14.arriving",
@@ -170,24 +177,27 @@ ARRIVING = Exercise(
     ),
     praise="This is why a CCD of 6000 rows needs a transfer efficiency of 0.999999.",
     tolerance=1e-9,
-    misconceptions=(
-        Misconception(
-            lambda electrons, efficiency: electrons * efficiency ** np.arange(len(electrons)),
-            "One shift too few: even row 0 must be shifted once, into the register.",
-        ),
-        Misconception(
-            lambda electrons, efficiency: electrons * efficiency,
-            "Every row loses as much here. A farther one has a longer way: multiply once for each shift.",
-        ),
-        Misconception(
-            lambda electrons, efficiency: electrons * (1 - (1 - efficiency) * (1 + np.arange(len(electrons)))),
-            "Losses do not add, they multiply: each shift leaves behind a share of what is *still there*.",
-        ),
-        Misconception(
-            lambda electrons, efficiency: electrons * (efficiency ** (1 + np.arange(len(electrons))))[::-1],
-            "The order is turned round: row 0 is the nearest to the register and has the shortest way.",
-        ),
-    ),
 )
+
+
+@ARRIVING.wrong("One shift too few: even row 0 must be shifted once, into the register.")
+def _(electrons, efficiency):
+    return electrons * efficiency ** np.arange(len(electrons))
+
+
+@ARRIVING.wrong("Every row loses as much here. A farther one has a longer way: multiply once for each shift.")
+def _(electrons, efficiency):
+    return electrons * efficiency
+
+
+@ARRIVING.wrong("Losses do not add, they multiply: each shift leaves behind a share of what is *still there*.")
+def _(electrons, efficiency):
+    return electrons * (1 - (1 - efficiency) * (1 + np.arange(len(electrons))))
+
+
+@ARRIVING.wrong("The order is turned round: row 0 is the nearest to the register and has the shortest way.")
+def _(electrons, efficiency):
+    return electrons * (efficiency ** (1 + np.arange(len(electrons))))[::-1]
+
 
 EXERCISES = (EXPECTED_ELECTRONS, ROW_TIME, DYNAMIC_RANGE_DB, ARRIVING)

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from camviz.checks import SHAPES, Arguments, Array, Exercise, Misconception
+from camviz.checks import SHAPES, Arguments, Array, Exercise
 
 
 def total_noise(electrons: Array, read_noise: float, prnu: float) -> Array:
@@ -119,33 +119,38 @@ NOISE = Exercise(
         "Three variances under one root: `read_noise**2`, the electrons themselves, and `(prnu * electrons)**2`.",
     ),
     praise="Slopes 0, ½ and 1 on the photon-transfer curve are the three terms under this root.",
-    misconceptions=(
-        Misconception(
-            lambda electrons, read_noise, prnu: read_noise + np.sqrt(electrons) + prnu * electrons,
-            "You add the deviations. Independent noise adds as variances: the squares, then one root over all.",
-        ),
-        Misconception(
-            lambda electrons, read_noise, prnu: np.sqrt(read_noise**2 + electrons),
-            "The pattern is missing: on one frame pixels differ by PRNU times the signal as well.",
-        ),
-        Misconception(
-            lambda electrons, read_noise, prnu: np.sqrt(read_noise**2 + electrons**2 + (prnu * electrons) ** 2),
-            "The *variance* of a Poisson count is its mean, μ; you put in μ², as though the deviation were μ.",
-        ),
-        Misconception(
-            lambda electrons, read_noise, prnu: read_noise**2 + electrons + (prnu * electrons) ** 2,
-            "This is the variance. The noise is its square root.",
-        ),
-        Misconception(
-            lambda electrons, read_noise, prnu: np.sqrt(read_noise + electrons + (prnu * electrons) ** 2),
-            "The read noise is a deviation: its square belongs under the root.",
-        ),
-        Misconception(
-            lambda electrons, read_noise, prnu: np.sqrt(read_noise**2 + electrons + prnu * electrons),
-            "PRNU times the signal is a deviation: its square belongs under the root.",
-        ),
-    ),
 )
+
+
+@NOISE.wrong("You add the deviations. Independent noise adds as variances: the squares, then one root over all.")
+def _(electrons, read_noise, prnu):
+    return read_noise + np.sqrt(electrons) + prnu * electrons
+
+
+@NOISE.wrong("The pattern is missing: on one frame pixels differ by PRNU times the signal as well.")
+def _(electrons, read_noise, prnu):
+    return np.sqrt(read_noise**2 + electrons)
+
+
+@NOISE.wrong("The *variance* of a Poisson count is its mean, μ; you put in μ², as though the deviation were μ.")
+def _(electrons, read_noise, prnu):
+    return np.sqrt(read_noise**2 + electrons**2 + (prnu * electrons) ** 2)
+
+
+@NOISE.wrong("This is the variance. The noise is its square root.")
+def _(electrons, read_noise, prnu):
+    return read_noise**2 + electrons + (prnu * electrons) ** 2
+
+
+@NOISE.wrong("The read noise is a deviation: its square belongs under the root.")
+def _(electrons, read_noise, prnu):
+    return np.sqrt(read_noise + electrons + (prnu * electrons) ** 2)
+
+
+@NOISE.wrong("PRNU times the signal is a deviation: its square belongs under the root.")
+def _(electrons, read_noise, prnu):
+    return np.sqrt(read_noise**2 + electrons + prnu * electrons)
+
 
 GAIN = Exercise(
     name="15.gain",
@@ -157,37 +162,38 @@ GAIN = Exercise(
         "of the dark, divided by mean bright less mean dark.",
     ),
     praise="Four frames and no light meter: Poisson's law is the ruler.",
-    misconceptions=(
-        Misconception(
-            lambda bright, dark: 2 * gain(bright, dark),
-            "The variance of a difference is that of *two* frames: halve it.",
-        ),
-        Misconception(
-            lambda bright, dark: (np.var(bright[0]) - np.var(dark[0])) / (np.mean(bright) - np.mean(dark)),
-            "You took the variance over one frame, in which the pattern counts as noise. Subtract two frames first.",
-        ),
-        Misconception(
-            lambda bright, dark: np.var(bright[0] - bright[1]) / 2 / (np.mean(bright) - np.mean(dark)),
-            "The noise of the dark frames has to be taken off too: it has nothing to do with light.",
-        ),
-        Misconception(
-            lambda bright, dark: (np.var(bright[0] - bright[1]) - np.var(dark[0] - dark[1])) / 2 / np.mean(bright),
-            "The signal begins above the dark: divide by mean bright *less mean dark*.",
-        ),
-        Misconception(
-            lambda bright, dark: 1 / gain(bright, dark),
-            "This is electrons per DN. K is DN per electron, its inverse.",
-        ),
-        Misconception(
-            lambda bright, dark: (
-                (np.std(bright[0] - bright[1]) - np.std(dark[0] - dark[1]))
-                / np.sqrt(2)
-                / (np.mean(bright) - np.mean(dark))
-            ),
-            "These are deviations. Variances are what grows in proportion to the light.",
-        ),
-    ),
 )
+
+
+@GAIN.wrong("The variance of a difference is that of *two* frames: halve it.")
+def _(bright, dark):
+    return 2 * gain(bright, dark)
+
+
+@GAIN.wrong("You took the variance over one frame, in which the pattern counts as noise. Subtract two frames first.")
+def _(bright, dark):
+    return (np.var(bright[0]) - np.var(dark[0])) / (np.mean(bright) - np.mean(dark))
+
+
+@GAIN.wrong("The noise of the dark frames has to be taken off too: it has nothing to do with light.")
+def _(bright, dark):
+    return np.var(bright[0] - bright[1]) / 2 / (np.mean(bright) - np.mean(dark))
+
+
+@GAIN.wrong("The signal begins above the dark: divide by mean bright *less mean dark*.")
+def _(bright, dark):
+    return (np.var(bright[0] - bright[1]) - np.var(dark[0] - dark[1])) / 2 / np.mean(bright)
+
+
+@GAIN.wrong("This is electrons per DN. K is DN per electron, its inverse.")
+def _(bright, dark):
+    return 1 / gain(bright, dark)
+
+
+@GAIN.wrong("These are deviations. Variances are what grows in proportion to the light.")
+def _(bright, dark):
+    return (np.std(bright[0] - bright[1]) - np.std(dark[0] - dark[1])) / np.sqrt(2) / (np.mean(bright) - np.mean(dark))
+
 
 DECIBELS = Exercise(
     name="15.dynamic_range_db",
@@ -200,25 +206,28 @@ DECIBELS = Exercise(
         "The right answer is smaller by the same factor everywhere, 2.3026. What has that value?",
     ),
     praise="Common logarithms. The published result file of a reference data set has this very bug in it.",
-    misconceptions=(
-        Misconception(
-            lambda full_well, dark_noise: 20 * np.log(full_well / (dark_noise + 0.5)),
-            "This is what you get with `np.log`, the *natural* logarithm: ln 10 = 2.3026 times too much.",
-        ),
-        Misconception(
-            lambda full_well, dark_noise: 10 * np.log10(full_well / (dark_noise + 0.5)),
-            "Ten is for ratios of power. EMVA 1288 counts a ratio of signals, with 20.",
-        ),
-        Misconception(
-            lambda full_well, dark_noise: 20 * np.log2(full_well / (dark_noise + 0.5)),
-            "With log2 you count stops (bits). Decibels take the common logarithm.",
-        ),
-        Misconception(
-            lambda full_well, dark_noise: 20 * np.log10(full_well / dark_noise),
-            "The logarithm is right. But the threshold, where signal equals noise, is σ_d + ½: keep the ½.",
-        ),
-    ),
 )
+
+
+@DECIBELS.wrong("This is what you get with `np.log`, the *natural* logarithm: ln 10 = 2.3026 times too much.")
+def _(full_well, dark_noise):
+    return 20 * np.log(full_well / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("Ten is for ratios of power. EMVA 1288 counts a ratio of signals, with 20.")
+def _(full_well, dark_noise):
+    return 10 * np.log10(full_well / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("With log2 you count stops (bits). Decibels take the common logarithm.")
+def _(full_well, dark_noise):
+    return 20 * np.log2(full_well / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("The logarithm is right. But the threshold, where signal equals noise, is σ_d + ½: keep the ½.")
+def _(full_well, dark_noise):
+    return 20 * np.log10(full_well / dark_noise)
+
 
 FLAT_FIELD = Exercise(
     name="15.flat_field",
@@ -230,29 +239,35 @@ FLAT_FIELD = Exercise(
         "mean brightness.",
     ),
     praise="Offsets, PRNU, vignetting and dust go in one line; dead pixels are said to be dead.",
-    misconceptions=(
-        Misconception(
-            lambda frame, dark, flat: frame / flat * np.mean(flat),
-            "The dark was not taken off. Offsets add, so they must be subtracted before anything is divided.",
-        ),
-        Misconception(
-            lambda frame, dark, flat: (frame - dark) / flat * np.mean(flat),
-            "The flat still contains the dark: subtract it there too.",
-        ),
-        Misconception(
-            lambda frame, dark, flat: (frame - dark) / np.where(flat > dark, flat - dark, np.nan),
-            "Divided well. Scale by the mean of flat − dark, so that the frame keeps its brightness.",
-        ),
-        Misconception(
-            lambda frame, dark, flat: (frame - dark) * (flat - dark) / np.mean(flat - dark),
-            "You multiplied by the flat: the shading is there twice now. Divide by it.",
-        ),
-        Misconception(
-            lambda frame, dark, flat: (frame - dark) / (flat - dark) * np.mean(flat - dark),
-            "A dead pixel, whose flat is not above its dark, has no answer: NaN, and it must not count in the mean.",
-        ),
-    ),
 )
+
+
+@FLAT_FIELD.wrong("The dark was not taken off. Offsets add, so they must be subtracted before anything is divided.")
+def _(frame, dark, flat):
+    return frame / flat * np.mean(flat)
+
+
+@FLAT_FIELD.wrong("The flat still contains the dark: subtract it there too.")
+def _(frame, dark, flat):
+    return (frame - dark) / flat * np.mean(flat)
+
+
+@FLAT_FIELD.wrong("Divided well. Scale by the mean of flat − dark, so that the frame keeps its brightness.")
+def _(frame, dark, flat):
+    return (frame - dark) / np.where(flat > dark, flat - dark, np.nan)
+
+
+@FLAT_FIELD.wrong("You multiplied by the flat: the shading is there twice now. Divide by it.")
+def _(frame, dark, flat):
+    return (frame - dark) * (flat - dark) / np.mean(flat - dark)
+
+
+@FLAT_FIELD.wrong(
+    "A dead pixel, whose flat is not above its dark, has no answer: NaN, and it must not count in the mean."
+)
+def _(frame, dark, flat):
+    return (frame - dark) / (flat - dark) * np.mean(flat - dark)
+
 
 MERGE = Exercise(
     name="15.merge",
@@ -265,32 +280,35 @@ MERGE = Exercise(
         "Σ weight · e/t / Σ weight. Give `exposures` axes of length 1 to broadcast; 0/0 is NaN, as it should be.",
     ),
     praise="No other weights would leave less noise. That is what a noise model is for.",
-    misconceptions=(
-        Misconception(
-            partial(_merged_by, "equal"),
-            "All usable frames count alike in yours. The short ones are noisier by far: weigh by 1 / variance.",
-        ),
-        Misconception(
-            partial(_merged_by, "time"),
-            "Weights of t are right for photons alone. In the dark the read noise counts: t² / (σ² + x t).",
-        ),
-        Misconception(
-            partial(_merged_by, "saturated too"),
-            "Full pixels say only 'at least so much'. They must have no weight, and NaN where all are full.",
-        ),
-        Misconception(
-            partial(_merged_by, "own"),
-            "Your weights come from each frame's own, noisy count, which favours those that chance made dark: take x "
-            "from all usable frames together.",
-        ),
-        Misconception(
-            partial(_merged_by, "variance"), "You weigh by the variance: the noisiest count most. Take its inverse."
-        ),
-        Misconception(
-            partial(_merged_by, "longest"),
-            "The longest frame that is not full, alone, is a good start. The others have something to add.",
-        ),
-    ),
 )
+
+MERGE.wrong("All usable frames count alike in yours. The short ones are noisier by far: weigh by 1 / variance.")(
+    partial(_merged_by, "equal")
+)
+
+
+MERGE.wrong("Weights of t are right for photons alone. In the dark the read noise counts: t² / (σ² + x t).")(
+    partial(_merged_by, "time")
+)
+
+
+MERGE.wrong("Full pixels say only 'at least so much'. They must have no weight, and NaN where all are full.")(
+    partial(_merged_by, "saturated too")
+)
+
+
+MERGE.wrong(
+    "Your weights come from each frame's own, noisy count, which favours those that chance made dark: take x "
+    "from all usable frames together."
+)(partial(_merged_by, "own"))
+
+
+MERGE.wrong("You weigh by the variance: the noisiest count most. Take its inverse.")(partial(_merged_by, "variance"))
+
+
+MERGE.wrong("The longest frame that is not full, alone, is a good start. The others have something to add.")(
+    partial(_merged_by, "longest")
+)
+
 
 EXERCISES = (NOISE, GAIN, DECIBELS, FLAT_FIELD, MERGE)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.checks import Arguments, Array, Exercise, Misconception
+from camviz.checks import Arguments, Array, Exercise
 from camviz.poses import Rotation
 
 RAYLEIGH = np.sqrt(2 * np.log(2))  # the median length of a residual over the σ of its coordinates
@@ -145,29 +145,39 @@ VIEW_RMS = Exercise(
         "view's corners without those that are NaN, then the root.",
     ),
     praise="These are the bars of the clinic, and what OpenCV calls perViewErrors.",
-    misconceptions=(
-        Misconception(
-            lambda residuals: np.sqrt(np.nanmean(residuals**2, axis=(-1, -2))),
-            "This is the RMS of one *coordinate*: too small by √2. OpenCV, like its users, counts a corner once.",
-        ),
-        Misconception(
-            lambda residuals: np.nanmean(np.linalg.norm(residuals, axis=-1), axis=-1),
-            "This is the mean length. RMS squares first, then takes the mean, then the root: large errors weigh more.",
-        ),
-        Misconception(
-            lambda residuals: np.sqrt(np.mean(np.sum(residuals**2, axis=-1), axis=-1)),
-            "It is right where every corner was seen. A corner that was not is NaN, and takes the whole mean with it.",
-        ),
-        Misconception(
-            lambda residuals: np.sqrt(np.nansum(residuals**2, axis=(-1, -2)) / residuals.shape[-2]),
-            "It is right where every corner was seen. Divide by the number of corners that *were*, not by all of them.",
-        ),
-        Misconception(
-            lambda residuals: np.nanmean(np.sum(residuals**2, axis=-1), axis=-1),
-            "The mean of the squares still wants its root.",
-        ),
-    ),
 )
+
+
+@VIEW_RMS.wrong("This is the RMS of one *coordinate*: too small by √2. OpenCV, like its users, counts a corner once.")
+def _(residuals):
+    return np.sqrt(np.nanmean(residuals**2, axis=(-1, -2)))
+
+
+@VIEW_RMS.wrong(
+    "This is the mean length. RMS squares first, then takes the mean, then the root: large errors weigh more."
+)
+def _(residuals):
+    return np.nanmean(np.linalg.norm(residuals, axis=-1), axis=-1)
+
+
+@VIEW_RMS.wrong(
+    "It is right where every corner was seen. A corner that was not is NaN, and takes the whole mean with it."
+)
+def _(residuals):
+    return np.sqrt(np.mean(np.sum(residuals**2, axis=-1), axis=-1))
+
+
+@VIEW_RMS.wrong(
+    "It is right where every corner was seen. Divide by the number of corners that *were*, not by all of them."
+)
+def _(residuals):
+    return np.sqrt(np.nansum(residuals**2, axis=(-1, -2)) / residuals.shape[-2])
+
+
+@VIEW_RMS.wrong("The mean of the squares still wants its root.")
+def _(residuals):
+    return np.nanmean(np.sum(residuals**2, axis=-1), axis=-1)
+
 
 ROBUST_SIGMA = Exercise(
     name="16.robust_sigma",
@@ -179,29 +189,37 @@ ROBUST_SIGMA = Exercise(
         "`np.nanmedian` passes over corners that were not seen.",
     ),
     praise="A view that is thirty pixels off no longer moves your idea of what is normal.",
-    misconceptions=(
-        Misconception(
-            lambda residuals: np.nanstd(residuals),
-            "This is the ordinary standard deviation: the wild view, which you want to find, has moved it.",
-        ),
-        Misconception(
-            lambda residuals: np.nanmedian(np.linalg.norm(residuals, axis=-1)),
-            "This is the median length. It is 1.177 σ, not σ: divide by √(2 ln 2).",
-        ),
-        Misconception(
-            lambda residuals: 1.4826 * np.nanmedian(np.abs(residuals)),
-            "A good robust σ, of single *coordinates*. Here it is asked from the median of the lengths.",
-        ),
-        Misconception(
-            lambda residuals: 1.4826 * np.nanmedian(np.linalg.norm(residuals, axis=-1)),
-            "The factor 1.4826 belongs to the absolute value of one number. A length in the plane has √(2 ln 2).",
-        ),
-        Misconception(
-            lambda residuals: np.median(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH,
-            "It is right where every corner was seen; elsewhere NaN gets into the median. There is `np.nanmedian`.",
-        ),
-    ),
 )
+
+
+@ROBUST_SIGMA.wrong("This is the ordinary standard deviation: the wild view, which you want to find, has moved it.")
+def _(residuals):
+    return np.nanstd(residuals)
+
+
+@ROBUST_SIGMA.wrong("This is the median length. It is 1.177 σ, not σ: divide by √(2 ln 2).")
+def _(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1))
+
+
+@ROBUST_SIGMA.wrong("A good robust σ, of single *coordinates*. Here it is asked from the median of the lengths.")
+def _(residuals):
+    return 1.4826 * np.nanmedian(np.abs(residuals))
+
+
+@ROBUST_SIGMA.wrong(
+    "The factor 1.4826 belongs to the absolute value of one number. A length in the plane has √(2 ln 2)."
+)
+def _(residuals):
+    return 1.4826 * np.nanmedian(np.linalg.norm(residuals, axis=-1))
+
+
+@ROBUST_SIGMA.wrong(
+    "It is right where every corner was seen; elsewhere NaN gets into the median. There is `np.nanmedian`."
+)
+def _(residuals):
+    return np.median(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH
+
 
 LINES = Exercise(
     name="16.line_lengths",
@@ -213,18 +231,18 @@ LINES = Exercise(
         "`reshape(rows, columns)`; a row's median runs over its columns, that is along axis 1.",
     ),
     praise="Now a bad column is a bad column. With a board of 9 × 6 the wrong reshape raises no error at all.",
-    misconceptions=(
-        Misconception(
-            _transposed_grid,
-            "The corners are taken apart in the wrong order: they come row by row, so the grid is (rows, columns). "
-            "A bad column is smeared over all lines, and on a square board nobody would notice.",
-        ),
-        Misconception(
-            lambda residuals, rows, columns: line_lengths(residuals, rows, columns)[::-1],
-            "The grid is right now. But the median of a *row* runs along axis 1, over its columns.",
-        ),
-    ),
 )
+
+LINES.wrong(
+    "The corners are taken apart in the wrong order: they come row by row, so the grid is (rows, columns). "
+    "A bad column is smeared over all lines, and on a square board nobody would notice."
+)(_transposed_grid)
+
+
+@LINES.wrong("The grid is right now. But the median of a *row* runs along axis 1, over its columns.")
+def _(residuals, rows, columns):
+    return line_lengths(residuals, rows, columns)[::-1]
+
 
 ROTATION = Exercise(
     name="16.implied_rotation",
@@ -237,21 +255,23 @@ ROTATION = Exercise(
         "1 or −1, so that the result is no mirror.",
     ),
     praise="What is left after this rotation is what two calibrations really disagree about.",
-    misconceptions=(
-        Misconception(
-            lambda first, second: implied_rotation(first, second).T,
-            "This is the rotation from the second to the first: the other way round.",
-        ),
-        Misconception(
-            _maybe_a_mirror,
-            "For rays in all directions this is right. Rays in one plane may give you a *mirror*, det R = −1.",
-        ),
-        Misconception(
-            lambda first, second: np.linalg.lstsq(first, second, rcond=None)[0].T,
-            "This is the best 3 × 3 matrix, and no rotation: it may stretch, which a camera cannot when it turns.",
-        ),
-    ),
 )
+
+
+@ROTATION.wrong("This is the rotation from the second to the first: the other way round.")
+def _(first, second):
+    return implied_rotation(first, second).T
+
+
+ROTATION.wrong("For rays in all directions this is right. Rays in one plane may give you a *mirror*, det R = −1.")(
+    _maybe_a_mirror
+)
+
+
+@ROTATION.wrong("This is the best 3 × 3 matrix, and no rotation: it may stretch, which a camera cannot when it turns.")
+def _(first, second):
+    return np.linalg.lstsq(first, second, rcond=None)[0].T
+
 
 TRIAGE = Exercise(
     name="16.triage",
@@ -264,28 +284,32 @@ TRIAGE = Exercise(
         "corners in a view is `off.mean(axis=(1, 2))`, in columns `off.mean(axis=1)`, in rows `off.mean(axis=2)`.",
     ),
     praise="That is the first thing the clinic does with every set of corners.",
-    misconceptions=(
-        Misconception(
-            lambda residuals: _with_lines(residuals, rows=False),
-            "Columns, corners and views are found; a bad *row* goes as single corners.",
-        ),
-        Misconception(
-            lambda residuals: _with_lines(residuals, columns=False),
-            "Rows, corners and views are found; a bad *column* goes as single corners.",
-        ),
-        Misconception(
-            _by_standard_deviation,
-            "Your σ is the ordinary standard deviation. A bad view makes it so large that nothing is beyond 6 σ.",
-        ),
-        Misconception(
-            lambda residuals: min(triage(residuals), 2),
-            "A bad view is called a bad line. It has bad lines, all of them: ask for the view first.",
-        ),
-        Misconception(
-            lambda residuals: int(triage(residuals) > 0),
-            "Healthy or not is told right. The number should say *what* is off.",
-        ),
-    ),
 )
+
+
+@TRIAGE.wrong("Columns, corners and views are found; a bad *row* goes as single corners.")
+def _(residuals):
+    return _with_lines(residuals, rows=False)
+
+
+@TRIAGE.wrong("Rows, corners and views are found; a bad *column* goes as single corners.")
+def _(residuals):
+    return _with_lines(residuals, columns=False)
+
+
+TRIAGE.wrong("Your σ is the ordinary standard deviation. A bad view makes it so large that nothing is beyond 6 σ.")(
+    _by_standard_deviation
+)
+
+
+@TRIAGE.wrong("A bad view is called a bad line. It has bad lines, all of them: ask for the view first.")
+def _(residuals):
+    return min(triage(residuals), 2)
+
+
+@TRIAGE.wrong("Healthy or not is told right. The number should say *what* is off.")
+def _(residuals):
+    return int(triage(residuals) > 0)
+
 
 EXERCISES = (VIEW_RMS, ROBUST_SIGMA, LINES, ROTATION, TRIAGE)

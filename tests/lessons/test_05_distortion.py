@@ -1,0 +1,261 @@
+"""What lesson 05 says about lens distortion, recomputed with NumPy and OpenCV."""
+
+import cv2
+import numpy as np
+import pytest
+
+EXCEPTIONS: dict[str, str] = {}
+
+LEFT = ((534.80, 335.69, 240.66), (0.29589439552724328, -1.0354662043042675))
+RIGHT = ((534.80, 334.56, 242.05), (-0.16916358306948096, -0.11214173641213163))
+"""f, cx, cy and k1, k2 of OpenCV's sample file intrinsics.yml, as cell 52 prints them."""
+
+
+def g(r, k1, k2=0.0, k3=0.0):
+    return r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+
+
+def folds_at(k1, k2=0.0, k3=0.0):
+    """The smallest r > 0 with slope 0, from the roots of 1 + 3 k1 r² + 5 k2 r⁴ + 7 k3 r⁶; infinite without one."""
+    squares = np.roots(np.trim_zeros([7 * k3, 5 * k2, 3 * k1, 1.0], "f"))
+    real = [root.real for root in squares if abs(root.imag) < 1e-12 and root.real > 0]
+    return np.sqrt(min(real)) if real else np.inf
+
+
+def degrees(r):
+    return np.degrees(np.arctan(r))
+
+
+def bend(xy, *coefficients):
+    points = np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1).reshape(-1, 1, 3)
+    return cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.eye(3), np.array(coefficients))[0].reshape(xy.shape)
+
+
+def test_a_barrel_draws_corners_in_most(says):
+    (k1,) = says("You set k1 = −0.3.")
+    says("the corners are drawn in towards the centre")
+    says(
+        "points far out are drawn in most: the corners, being farthest, most of all, and the sides of the square bow outwards"
+    )
+    corner, middle, half = g(np.sqrt(2), k1.value), g(1.0, k1.value), np.linspace(0, 1, 9)
+    assert np.sqrt(2) - corner > 1 - middle > 0
+    side = bend(np.stack([np.full(9, 0.5), half / 2], axis=-1), k1.value, 0.0, 0.0, 0.0)
+    assert (np.diff(side[:, 0]) < 0).all()  # widest in the middle: the side bows outwards
+    r, strength, square, factor = says("at r = 0.5 the factor is 1 − 0.3 · 0.25 = 0.925, which brings the point in")
+    assert square == r.value**2
+    assert factor == 1 - strength.value * r.value**2
+    assert strength == -k1.value
+
+
+def test_a_point_moves_along_its_line_to_the_centre_by_what_r_alone_says(says):
+    says("a line through the centre stays straight whatever you do: points move along the line to the centre")
+    says("how far a point moves depends on its distance from the centre alone")
+    angle = np.linspace(0, 2 * np.pi, 12)
+    circle = 0.7 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    bent = bend(circle, -0.28, 0.07, 0.0, 0.0)
+    np.testing.assert_allclose(circle[:, 0] * bent[:, 1], circle[:, 1] * bent[:, 0], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(bent - circle, axis=-1), 0.7 - g(0.7, -0.28, 0.07), atol=1e-12)
+
+
+def test_where_k1_alone_folds(says):
+    (k1,) = says("Take the simplest barrel there is, k1 = −0.3 and nothing else.")
+    fold = folds_at(k1.value)
+    again, radicand, r, angle, at, reach = says(
+        "For k1 = −0.3 this is 1/√0.9 = **1.054**, a ray **46.5°** from the axis, and the largest radius that any ray can "
+        "reach in the picture is g(1.054) = 0.703."
+    )
+    assert again == k1.value
+    assert radicand == -3 * k1.value
+    assert r == fold
+    assert angle == degrees(fold)
+    assert at == fold
+    assert reach == g(fold, k1.value)
+
+
+def test_rays_past_the_fold_come_back(says):
+    k1, *angles = says("Keep k1 = −0.3 and look at rays farther and farther from the axis: 30°, 40°, 50°, 60°.")
+    landed = g(np.tan(np.radians([one.value for one in angles])), k1.value)
+    assert np.diff(landed)[0] > 0 > np.diff(landed)[-1]
+    fold = folds_at(k1.value)
+    strength, r, angle = says("r_d = r − 0.3 r³ is a cubic: it climbs to r = 1.054 (46.5°) and then falls")
+    assert strength == -k1.value
+    assert r == fold
+    assert angle == degrees(fold)
+    slope, r, angle = says(
+        "The slope 1 − 0.9 r² is zero at r = 1.054, 46.5° from the axis, and beyond it the curve comes back"
+    )
+    assert slope == -3 * k1.value
+    assert r == fold
+    assert angle == degrees(fold)
+    (r,) = says("A polynomial cannot stay level: after its highest point, at r = 1.054, it comes down again")
+    assert r == fold
+    again, reach = says("The largest r_d that k1 = −0.3 can reach is 0.703, however far you turn")
+    assert again == k1.value
+    inside = np.linspace(0, np.sqrt(-1 / k1.value), 10000)  # beyond this r_d is negative: the picture's other side
+    assert reach == g(inside, k1.value).max()
+    (angle,) = says("such as that of an orthographic fisheye at 90°")
+    assert np.cos(np.radians(angle.value)) == pytest.approx(0, abs=1e-12)  # the slope of sin θ
+    k1, angle = says("for k1 = −0.3 it lies 46.5° from the axis")
+    assert angle == degrees(folds_at(k1.value))
+
+
+def test_a_small_k2_takes_the_fold_away(says):
+    (k2,) = says("Give k2 a small positive value, about 0.05. The fold moves outwards, and then it is gone.")
+    assert folds_at(-0.3) < folds_at(-0.3, 0.02) < np.inf
+    assert folds_at(-0.3, k2.value) == np.inf
+
+
+def test_in_the_corners_the_mirror_image_lies_outside_the_dashed_circle(says):
+    says("mirror images of what lies inside it")
+    fold, beyond = folds_at(-0.3), np.array([1.1, 1.2])
+    inside = np.array([np.roots([-0.3, 0, 1, -g(r, -0.3)]).real.max() for r in beyond])
+    assert (beyond > fold).all()
+    assert np.abs(np.roots([-0.3, 0, 1, -g(1.2, -0.3)])).size == 3
+    assert (inside >= fold).all()
+
+
+def test_the_ways_to_straighten_the_photograph(says):
+    (f,) = says("which kept its focal length of 286 px: we have lost what was near the border")
+    assert f == 240 / np.tan(np.radians(40))
+    K = np.array([[f.value, 0, 239.5], [0, f.value, 179.5], [0, 0, 1]])
+    coefficients = np.array([-0.28, 0.07, 0, 0])
+    fx, fy = says("to fill the frame it scales columns and rows separately: fx = 219 px, fy = 250 px")
+    new, _ = cv2.getOptimalNewCameraMatrix(K, coefficients, (480, 360), 0.0)
+    assert fx == new[0, 0]
+    assert fy == new[1, 1]
+    (kept,) = says("it keeps every pixel of the photograph, f = 206 px, at the price of black borders")
+    new, _ = cv2.getOptimalNewCameraMatrix(K, coefficients, (480, 360), 1.0)
+    assert kept == new[0, 0]
+    assert kept == new[1, 1]
+    says("A barrel-shaped photograph reaches farther than the straight picture")
+    border = np.array([[[479.0, 179.5]]])
+    seen = cv2.undistortPoints(border, K, coefficients, criteria=(3, 100, 1e-12))[0, 0, 0]
+    assert seen > 239.5 / f.value
+
+
+def test_the_inverse_of_one_term_is_a_cubic_and_more_terms_are_of_degree_seven(says):
+    says("With k1 alone, r + k1 r³ = r_d is a cubic equation, and cubics have a formula.")
+    says("With k2 and k3 the equation has degree seven and there is none")
+    r = np.poly1d([1.0, 0.0])
+    assert (r + -0.3 * r**3).order == 3
+    assert (r + -0.3 * r**3 + 0.1 * r**5 + 0.02 * r**7).order == 7
+    (said,) = says("It should have said 2.00, and it did not say that it failed.")
+    assert said == max(root.real for root in np.roots([0.5, 0, 1, -6.0]) if abs(root.imag) < 1e-12)
+    five = cv2.undistortPoints(np.array([[[6.0, 0.0]]]), np.eye(3), np.array([0.5, 0, 0, 0]))[0, 0, 0]
+    assert abs(five - said.value) > 1
+
+
+def test_a_pole_of_the_rational_model(says):
+    (k4,) = says("Put **p1** back to 0 and take **k4** to −1 to see one.")
+    r = np.linspace(0, 1.2, 1201)
+    assert np.abs(1 + k4.value * r**2).min() < 1e-9
+
+
+def test_flipping_the_sign_of_k1_is_not_the_inverse(says):
+    k1, r, miss = says("For k1 = −0.3 and r = 0.8 it misses by 0.07 focal lengths: tens of pixels.")
+    r_d = g(r.value, k1.value)
+    assert miss == r.value - g(r_d, -k1.value)
+    assert 10 < miss.value * 286 < 100
+
+
+def test_the_published_stereo_calibration_folds_inside_its_images(says):
+    width, height = says("Look at both lenses out to the corners of their 640 × 480 images:")
+    folds, reaches, corners = {}, {}, {}
+    for name, ((f, cx, cy), coefficients) in (("left", LEFT), ("right", RIGHT)):
+        folds[name] = folds_at(*coefficients)
+        reaches[name] = g(folds[name], *coefficients)
+        ends = [np.hypot(u - cx, v - cy) / f for u in (-0.5, width.value - 0.5) for v in (-0.5, height.value - 0.5)]
+        corners[name] = max(ends)
+    (corner,) = says("that is after distortion, the corners of the left image are 0.77 from the centre")
+    assert corner == corners["left"]
+    fold, reach = says(
+        "The left polynomial turns back at r = 0.73 before distortion, and that ray lands at 0.63 in the photograph."
+    )
+    assert fold == folds["left"]
+    assert reach == reaches["left"]
+    fold, reach = says(
+        "The right polynomial turns back at r = 0.98, and none of its rays lands beyond 0.72: its corners are empty too."
+    )
+    assert fold == folds["right"]
+    assert reach == reaches["right"]
+    assert all(reaches[name] < corners[name] for name in corners)
+
+
+def test_one_of_the_two_goes_out_and_then_in(says):
+    outwards, inwards = says(
+        "The left one moves points outwards near the centre, by at most 4.5 px, and then inwards, by 53 px at the fold. "
+        "The right one moves every point inwards."
+    )
+    moved = {}
+    for name, ((f, _, _), coefficients) in (("left", LEFT), ("right", RIGHT)):
+        r = np.linspace(1e-3, folds_at(*coefficients), 20000)
+        moved[name] = f * (g(r, *coefficients) - r)
+    assert outwards == moved["left"].max()
+    assert inwards == -moved["left"][-1]
+    assert (moved["right"] < 0).all()
+
+
+def test_the_value_that_the_calibration_of_the_chessboard_published(says, samples):
+    pictures, k1 = says("with the value that a calibration of all 13 pictures published: k1 = −0.27")
+    file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
+    assert k1 == file.getNode("distortion_coefficients").mat()[0, 0]
+    assert pictures == file.getNode("nframes").real()
+
+
+def test_the_quiz_about_the_fold(says):
+    (k1,) = says("A calibration has k1 = −0.12 and no other coefficient.")
+    fold = folds_at(k1.value)
+    r, angle = says("At r = 1.667, about 59° from the axis.")
+    assert r == fold
+    assert angle == degrees(fold)
+    radicand, r, again, angle = says("gives r = 1/sqrt(0.36) = 1.667, and atan 1.667 = 59.0°")
+    assert radicand == -3 * k1.value
+    assert r == fold
+    assert again == fold
+    assert angle == degrees(fold)
+    r, angle = says("At r = 2.887, about 71° from the axis.")
+    zero = 1 / np.sqrt(-k1.value)  # where the factor, not the slope, vanishes
+    assert r == zero
+    assert angle == degrees(zero)
+
+
+def test_the_quiz_about_a_low_error(says):
+    says("Nothing: there the polynomial extrapolates.")
+    fitted, *again = (says("fits its corners to 0.2 pixels") + says("It is known to about 0.2 pixels there too.")
+                      + says("The 0.2 pixels were measured where there were corners."))  # fmt: skip
+    assert all(one == fitted.value for one in again)
+    k3, focal_lengths, pixels, f = says(
+        "At r = 1 even k3 = −0.2 moves a point by 0.2 focal lengths, 107 pixels for a lens of f = 536 px."
+    )
+    assert focal_lengths == 1 - g(1.0, 0, 0, k3.value)
+    assert pixels == focal_lengths.value * f.value
+
+
+def test_the_tangential_exercise_s_point_and_its_twos(says):
+    first, second = says("For x = y = 1 and p1 alone the equation gives the shift p1 (2, 4).")
+    shift = bend(np.ones((1, 2)), 0.0, 0.0, 1.0, 0.0)[0] - 1
+    assert first == shift[0]
+    assert second == shift[1]
+    at = np.array([[0.3, 0.7]])
+    mixed = (bend(at, 0.0, 0.0, 1.0, 0.0) - at)[0, 0] / (0.3 * 0.7)
+    (said,) = says("Both mixed terms carry a 2.")
+    (lost,) = says("has lost its 2 in both lines")
+    (belongs,) = says("The 2 belongs to the mixed terms only.")
+    assert said == mixed
+    assert lost == mixed
+    assert belongs == mixed
+
+
+def test_the_slope_in_the_replies(says):
+    says("differentiating r³ gives 3 r², yours has 2 r")
+    r, step = 0.4, 1e-6
+    slope = (g(r + step, -0.3) - g(r - step, -0.3)) / (2 * step)
+    assert slope == pytest.approx(1 + 3 * -0.3 * r**2)
+
+
+def test_the_map_has_two_numbers_a_pixel(says):
+    (two,) = says("an array (height, width, 2) of (u, v)")
+    (again,) = says("Write `distort` for any number of points `xy` of shape (..., 2).")
+    maps = cv2.initUndistortRectifyMap(np.eye(3), np.zeros(4), np.eye(3), np.eye(3), (4, 3), cv2.CV_32FC1)
+    assert two == np.stack(maps[:2], axis=-1).shape[-1]
+    assert again == two.value

@@ -1,0 +1,108 @@
+"""Every exercise against the wrong functions that students write and the right ways that are published.
+
+The counts are printed: python -m pytest -s tests/lessons/test_exercises.py
+"""
+
+import re
+
+import numpy as np
+import pytest
+from quoting import HERE, LESSONS
+
+from camviz import notebooks
+from camviz.checks import judge
+from camviz.exercises import exercises
+from camviz.trials import HINTS
+
+SEEDS = range(50)
+ADVERSARIES = 8
+HELD = [path.name.split("_")[1] for path in sorted(HERE.glob("test_[0-9][0-9]_*.py"))]
+ALL = [one for number in HELD for one in exercises(number).values()]
+EACH = pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+GAP = "___"
+
+
+def solution_of(one):
+    number = one.name.partition(".")[0]
+    (path,) = LESSONS.glob(f"{number}_*.ipynb")
+    return notebooks.solutions(notebooks.read(path))[one.name]
+
+
+def code_in(text):
+    return [found[0] or found[1] for found in re.findall(r"``(.+?)``|`([^`]+)`", text)]
+
+
+def squeezed(code):
+    return re.sub(r"\s+", "", code)
+
+
+@EACH
+def test_no_wrong_function_is_accepted_and_each_is_answered_by_its_own_reply(one):
+    assert len(one.misconceptions) >= ADVERSARIES
+    assert len({known.explanation for known in one.misconceptions}) == len(one.misconceptions)
+    for seed in SEEDS:
+        for known in one.misconceptions:
+            answer = judge(one, known.function, np.random.default_rng(seed))
+            assert answer.status == "wrong", f"{known.function.__name__} at seed {seed}: {answer!r}"
+            assert answer.message == known.explanation, f"{known.function.__name__} at seed {seed}: {answer!r}"
+    print(f"{one.name}: {len(one.misconceptions)} wrong functions × {len(SEEDS)} seeds, 0 accepted")
+
+
+@EACH
+def test_no_right_way_is_refused(one):
+    assert one.right_ways
+    ways = [one.reference, *one.right_ways]
+    for seed in SEEDS:
+        for way in ways:
+            answer = judge(one, way, np.random.default_rng(seed))
+            assert answer.correct, f"{way.__name__} at seed {seed}: {answer!r}"
+    print(f"{one.name}: {len(ways)} right ways × {len(SEEDS)} seeds, 0 refused")
+
+
+@EACH
+def test_the_function_given_to_be_mended_is_not_tried_yet_and_gives_nothing_away(one):
+    if one.as_given is None:
+        pytest.skip("nothing is given: its stub is empty")
+    for seed in SEEDS:
+        answer = judge(one, one.as_given, np.random.default_rng(seed))
+        assert answer.status == "unsolved"
+        assert answer.hint == ""
+
+
+@EACH
+def test_three_hints_lead_on_and_only_the_last_shows_the_solution_s_line_with_a_gap(one):
+    assert len(one.hints) == HINTS
+    lines = [line.strip() for line in solution_of(one).splitlines() if line.strip()]
+    for hint in one.hints[:-1]:
+        shown = [code for code in code_in(hint) if squeezed(code) in map(squeezed, lines)]
+        assert not shown, f"an early hint shows a whole line of the solution: {shown}"
+        assert GAP not in hint
+    gapped = [code for code in code_in(one.hints[-1]) if GAP in code]
+    assert gapped, "the last hint shows the line with a gap, written ___"
+    for code in gapped:
+        pattern = ".+".join(re.escape(squeezed(part)) for part in code.split(GAP))
+        found = [line for line in lines if re.fullmatch(pattern, squeezed(line))]
+        assert found, f"no line of the solution is {code!r} with the gap filled"
+        assert code.count(GAP) <= 3
+
+
+@EACH
+def test_the_notebook_gives_what_the_exercise_says_it_gives(one):
+    number = one.name.partition(".")[0]
+    (path,) = LESSONS.glob(f"{number}_*.ipynb")
+    stub, check, _ = notebooks.exercise_cells(notebooks.read(path))[one.name]
+    saved = "".join(str(output.get("data", {}).get("text/plain", "")) for output in check.outputs)
+    assert saved.startswith("○ Not tried yet.")
+    assert not any(known.explanation[:40] in saved for known in one.misconceptions)
+    if one.as_given is not None:
+        namespace = {"np": np}
+        exec(stub.source, namespace)
+        given = namespace[one.name.partition(".")[2]]
+        assert judge(one, given, np.random.default_rng(1)).status == "unsolved"
+
+
+def test_the_counts():
+    wrong = sum(len(one.misconceptions) for one in ALL)
+    right = sum(1 + len(one.right_ways) for one in ALL)
+    print(f"\n{len(ALL)} exercises, {wrong} wrong functions and {right} right ways, {len(SEEDS)} seeds each")
+    assert wrong >= ADVERSARIES * len(ALL)
