@@ -166,7 +166,9 @@ def run(exercise: Exercise, function: Function, arguments: Arguments) -> Trial:
     return _compared(exercise, trial, result)
 
 
-def _called(exercise: Exercise, function: Function, trial: Trial, given: Arguments, output: _Printed) -> tuple[Trial, Any]:
+def _called(
+    exercise: Exercise, function: Function, trial: Trial, given: Arguments, output: _Printed
+) -> tuple[Trial, Any]:
     """The trial so far and what the function returned."""
     try:
         with contained(output):

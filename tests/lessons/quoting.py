@@ -6,8 +6,8 @@ A test quotes a sentence and recomputes its numbers:
         k1, r = says("For k1 = −0.3 the fold is at r = 1.054")
         assert r == 1 / np.sqrt(-3 * k1.value)
 
-`says` (conftest.py) holds that the sentence stands in the lesson and that the test used each of its numbers; `==` compares
-to the digits that are printed. `test_numbers.py` holds that every number of a lesson stands in such a quotation.
+`says` (conftest.py) holds that the sentence stands in the lesson and that the test used each of its numbers; `==`
+compares to the digits that are printed. `test_numbers.py` holds that every number of a lesson stands in such a quotation.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -40,8 +40,8 @@ NOT_STATED = (
     (r"\[\d\d [^\]]*\]\([^)]*\)", "the name of a lesson"),
     (r"\]\([^)]*\)|</?[A-Za-z][^<>]*>|&\w+;", "an address"),
     (r"(?m)^#+ \d+ ·|^#+ .*?Exercise \d+|^\s*\d+\. ", "the number of a heading or of an item"),
-    (r"(?i)\b(?:lessons?|parts?|exercises?|sections?|chapters?|chap\.|sec\.|figures?|steps?|cells?|table|volume|vol\."
-     r"|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*", "a reference"),
+    (r"(?i)\b(?:lessons?|parts?|exercises?|sections?|chapters?|chap\.|sec\.|figures?|steps?|cells?|table|volume"
+     r"|vol\.|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*", "a reference"),
     (r"\b(?:EMVA(?: Standard)?|ISO(?:/IEC)?|CIE|ITU|IEC|IEEE|OpenCV|Python|NumPy|Nikon|Canon|Sony|Sigma|Kodak|Type"
      r"|illuminant|Apache|CC BY|BY) ?[A-Z]{0,3}-?\d[\d.:-]*", "a proper name"),
     (r"(?:(?<=[(A-Za-zé.,;] )|(?<=\())(?:1[5-9]|20)\d\d(?=[,;.:)\s]|$)(?! ?(?:K|px|mm|nm|µm|m|DN|e⁻|photons|electrons"
@@ -67,7 +67,7 @@ def plain(text: str) -> str:
     return " ".join(text.replace("*", "").split())
 
 
-@lru_cache(maxsize=None)
+@cache
 def passages(number: str) -> tuple[Passage, ...]:
     """All prose of the lesson: its cells, questions, replies, hints and explanations; the glossary's in lesson 00."""
     return tuple(Passage(where, plain(text)) for where, text in _texts(number))
@@ -111,7 +111,7 @@ def numbers_in(text: str) -> list[str]:
     return [match[1] for match in _NUMBER.finditer(text)]
 
 
-@lru_cache(maxsize=None)
+@cache
 def quotations(number: str) -> tuple[str, ...]:
     """What the lesson's test file quotes by `says("…")`, read from its source."""
     (path,) = HERE.glob(f"test_{number}_*.py")

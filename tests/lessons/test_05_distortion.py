@@ -35,7 +35,8 @@ def test_a_barrel_draws_corners_in_most(says):
     (k1,) = says("You set k1 = −0.3.")
     says("the corners are drawn in towards the centre")
     says(
-        "points far out are drawn in most: the corners, being farthest, most of all, and the sides of the square bow outwards"
+        "points far out are drawn in most: the corners, being farthest, most of all, and the sides of the square bow "
+        "outwards"
     )
     corner, middle, half = g(np.sqrt(2), k1.value), g(1.0, k1.value), np.linspace(0, 1, 9)
     assert np.sqrt(2) - corner > 1 - middle > 0
@@ -61,8 +62,8 @@ def test_where_k1_alone_folds(says):
     (k1,) = says("Take the simplest barrel there is, k1 = −0.3 and nothing else.")
     fold = folds_at(k1.value)
     again, radicand, r, angle, at, reach = says(
-        "For k1 = −0.3 this is 1/√0.9 = **1.054**, a ray **46.5°** from the axis, and the largest radius that any ray can "
-        "reach in the picture is g(1.054) = 0.703."
+        "For k1 = −0.3 this is 1/√0.9 = **1.054**, a ray **46.5°** from the axis, and the largest radius that any ray "
+        "can reach in the picture is g(1.054) = 0.703."
     )
     assert again == k1.value
     assert radicand == -3 * k1.value
@@ -174,7 +175,8 @@ def test_the_published_stereo_calibration_folds_inside_its_images(says):
     assert fold == folds["left"]
     assert reach == reaches["left"]
     fold, reach = says(
-        "The right polynomial turns back at r = 0.98, and none of its rays lands beyond 0.72: its corners are empty too."
+        "The right polynomial turns back at r = 0.98, and none of its rays lands beyond 0.72: its corners are empty "
+        "too."
     )
     assert fold == folds["right"]
     assert reach == reaches["right"]
@@ -183,8 +185,8 @@ def test_the_published_stereo_calibration_folds_inside_its_images(says):
 
 def test_one_of_the_two_goes_out_and_then_in(says):
     outwards, inwards = says(
-        "The left one moves points outwards near the centre, by at most 4.5 px, and then inwards, by 53 px at the fold. "
-        "The right one moves every point inwards."
+        "The left one moves points outwards near the centre, by at most 4.5 px, and then inwards, by 53 px at the "
+        "fold. The right one moves every point inwards."
     )
     moved = {}
     for name, ((f, _, _), coefficients) in (("left", LEFT), ("right", RIGHT)):

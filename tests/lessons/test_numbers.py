@@ -64,7 +64,7 @@ def test_a_number_outside_every_quotation_is_left():
 
 def test_a_number_is_compared_to_the_digits_it_is_printed_with():
     assert Said("1.054") == 1.05409
-    assert not Said("1.054") == 1.0546
+    assert Said("1.054") != 1.0546
     assert Said("60") == 59.6
     assert Said("−1.5e-3") == -0.00154
     assert Said("30,000") == 30000
