@@ -6,9 +6,8 @@ import pytest
 
 from camviz.calibration.difference import difference
 from camviz.cameras import Camera, Intrinsics
-from camviz.checks import judge
 from camviz.clinic.laboratory import ILLNESSES, VIEWS, experiment
-from camviz.exercises import exercises, lesson16
+from camviz.exercises import lesson16
 from camviz.exercises.ward import COMPLAINTS, HEALTHY, Ward
 from camviz.views.fault_lab import FaultLabView, grouped
 
@@ -21,6 +20,15 @@ def names(made):
 def test_every_fault_at_full_strength_is_named_by_the_inspection(fault):
     for seed in (1, 2):
         assert ILLNESSES[fault].finding in names(experiment(fault, 1.0, 0.15, seed))
+
+
+def test_a_blurred_view_is_not_blamed_on_the_tilts_of_the_boards():
+    """Its boards are tilted up to 75° apart; the one bad view makes the focal length uncertain."""
+    made = experiment("blurred view", 1.0, 0.15, 5)
+    normals = made.solved.first_from_board.rotation.as_matrix()[..., 2]
+    assert np.degrees(np.arccos((normals @ normals.T).min())) > 60
+    assert made.estimates["fx"][1] > 0.01 * made.truth.intrinsics.fx
+    assert "parallel-boards" not in {finding.id for finding in made.inspection.findings}
 
 
 @pytest.mark.parametrize("seed", [1, 5, 9])
@@ -168,29 +176,6 @@ def test_a_patient_who_is_not_there_is_named(ward, bad):
 
 
 # The exercises -------------------------------------------------------------------------------------------------------
-
-MISTAKES = [
-    pytest.param(one, known, id=f"{one.name}-{number}")
-    for one in exercises("16").values()
-    for number, known in enumerate(one.misconceptions)
-]
-
-
-@pytest.mark.parametrize(("exercise", "known"), MISTAKES)
-@pytest.mark.parametrize("seed", range(4))
-def test_every_known_mistake_is_answered_by_its_own_explanation(exercise, known, seed):
-    verdict = judge(exercise, known.reference, np.random.default_rng(seed))
-    assert verdict.status == "wrong"
-    assert verdict.message == known.explanation
-
-
-@pytest.mark.parametrize("exercise", exercises("16").values(), ids=lambda one: one.name)
-def test_the_reference_is_correct_and_a_constant_is_not(exercise):
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
-        assert judge(exercise, exercise.reference, rng).correct
-        assert not judge(exercise, lambda *given: 1.0, rng)
-        assert not judge(exercise, lambda *given: None, rng)
 
 
 def test_the_robust_sigma_is_that_of_a_rayleigh_distribution():

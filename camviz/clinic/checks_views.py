@@ -194,13 +194,22 @@ def parallel_boards(evidence: Evidence) -> Outcome:
         if spread < SAME_WAY_DEG:
             sentence = f"{name}: no two of the {len(pose)} boards differ by more than {spread:.1f}° in tilt{said}."
             findings.append(found("parallel-boards", sentence, spread, "°", name))
-        elif uncertain is not None and uncertain > UNCERTAIN:
+        elif uncertain is not None and uncertain * _share_of_noise(evidence, name) > UNCERTAIN:
             sentence = (
                 f"{name}: the tilts of the {len(pose)} boards (up to {spread:.0f}° apart) leave the focal length "
                 f"uncertain by {uncertain:.2%} (1σ)."
             )
             findings.append(found("parallel-boards", sentence, uncertain * 100, "%", name))
     return findings
+
+
+def _share_of_noise(evidence: Evidence, name: str) -> float:
+    """σ of the corners by their median over σ by their squares: 1, or less where a few are far out.
+
+    What those few do to the focal length is their own doing, not that of the boards' tilts.
+    """
+    observed = evidence.observed.get(name)
+    return 1.0 if observed is None else min(1.0, observed.scatter / observed.adjustment.sigma)
 
 
 def pose_absorbs_error(evidence: Evidence) -> Outcome:

@@ -156,20 +156,20 @@ class FaultLabView(View):
     def _estimates_panel(self) -> str:
         estimates = self.experiment.estimates
         values = np.array(list(estimates.values()))
-        reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + 2 * values[:, 1])), 3.0)
+        reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + values[:, 1])), 3.0)
         panel = Panel("estimates", 530, 116, 250, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
         content = svg.line(panel.place([(0, 0), (0, panel.bottom)]), "ink")
         beside = ""
         for i, (name, (error, sigma)) in enumerate(estimates.items()):
             y, far = i + 0.6, abs(error) > _FAR * sigma
             class_ = "red" if far else "green"
-            content += svg.line(panel.place([(error - 2 * sigma, y), (error + 2 * sigma, y)]), f"{class_} thick")
+            content += svg.line(panel.place([(error - sigma, y), (error + sigma, y)]), f"{class_} thick")
             content += svg.dots(panel.place([(error, y)]), class_, 8)
             level = panel.y + panel.place((0, y))[1] + 4
             beside += svg.text((panel.x - 10, level), name, "label end")
             words = f"{_signed(error, sigma)} px"
             beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
-        shown = panel.show(content, title="Estimate ± 2σ, less the truth")
+        shown = panel.show(content, title="Estimate ± 1σ, less the truth")
         ticks = [(float(t), f"{t:g}".replace("-", "−")) for t in plot.ticks(-reach, reach, 5)]
         below = "".join(
             svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")

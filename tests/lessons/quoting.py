@@ -7,7 +7,7 @@ A test quotes a sentence and recomputes its numbers:
         assert r == 1 / np.sqrt(-3 * k1.value)
 
 `says` (conftest.py) holds that the sentence stands in the lesson and that the test used each of its numbers; `==`
-compares to the digits that are printed. `test_numbers.py` holds that every number of a lesson stands in such a quotation.
+compares to the digits that are printed. `test_numbers.py` holds that every number of a lesson stands in a quotation.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ NOT_STATED = (
     (r"\]\([^)]*\)|</?[A-Za-z][^<>]*>|&\w+;", "an address"),
     (r"(?m)^#+ \d+ ·|^#+ .*?Exercise \d+|^\s*\d+\. ", "the number of a heading or of an item"),
     (r"(?i)\b(?:lessons?|parts?|exercises?|sections?|chapters?|chap\.|sec\.|figures?|steps?|cells?|table|volume"
-     r"|vol\.|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*", "a reference"),
+     r"|vol\.|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*",
+     "a reference"),
     (r"\b(?:EMVA(?: Standard)?|ISO(?:/IEC)?|CIE|ITU|IEC|IEEE|OpenCV|Python|NumPy|Nikon|Canon|Sony|Sigma|Kodak|Type"
      r"|illuminant|Apache|CC BY|BY) ?[A-Z]{0,3}-?\d[\d.:-]*", "a proper name"),
     (r"(?:(?<=[(A-Za-zé.,;] )|(?<=\())(?:1[5-9]|20)\d\d(?=[,;.:)\s]|$)(?! ?(?:K|px|mm|nm|µm|m|DN|e⁻|photons|electrons"

@@ -1,0 +1,357 @@
+"""What lesson 16 says about calibrations that are wrong, solved again by OpenCV from the same corners."""
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.calibration.difference import pixel_grid
+from camviz.clinic.laboratory import GRID, ILLNESSES
+from camviz.views.fault_lab import FaultLabView
+
+EXCEPTIONS: dict[str, str] = {
+    "is the answer sheet for patient 3": "it names a patient, not a quantity",
+    "column 4 points left in": "it is an example of a reason, of no patient in particular",
+}
+
+BLURRED, PARALLEL, WARPED, DRIFT = (
+    FaultLabView(fault=fault, strength=1.0, seed=5)
+    for fault in ("blurred view", "parallel boards", "warped board", "autofocus drift")
+)
+ANNA = FaultLabView(fault="parallel boards", strength=1.0, noise=0.14, seed=5)
+BEN = FaultLabView(fault="parallel boards", strength=0.0, noise=0.39, seed=5)
+PAPER = FaultLabView(fault="warped board", strength=0.5, seed=5)
+
+
+@cache
+def solved(view):
+    """OpenCV's own solution of the corners: RMS, fx, σ of fx, K and distortion."""
+    detections = view.experiment.solved.detections["camera"].astype(np.float32)
+    board = [view.experiment.solved.board.corners.astype(np.float32)] * len(detections)
+    rms, K, distortion, _, _, sigmas, *_ = cv2.calibrateCameraExtended(
+        board, list(detections), (640, 480), None, None, flags=cv2.CALIB_FIX_K3
+    )
+    return rms, K[0, 0], sigmas[0, 0], K, distortion
+
+
+def true_f(view):
+    return view.experiment.truth.intrinsics.fx
+
+
+def rays(K, distortion, uv):
+    xy = cv2.undistortPoints(uv.reshape(-1, 1, 2), K, distortion, criteria=(3, 100, 1e-12))[:, 0]
+    xyz = np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
+    return xyz / np.linalg.norm(xyz, axis=1, keepdims=True)
+
+
+def off(view):
+    """How far OpenCV's camera is from the true one: the median over the image, after the best rotation (Kabsch)."""
+    _, _, _, K, distortion = solved(view)
+    truth, lens = view.experiment.truth.intrinsics, view.experiment.truth.lens
+    true_distortion = np.array([lens.k1, lens.k2, lens.p1, lens.p2])
+    uv = pixel_grid(truth, GRID).reshape(-1, 2)
+    true, believed = rays(truth.K, true_distortion, uv), rays(K, distortion, uv)
+    U, _, Vt = np.linalg.svd(true.T @ believed)
+    turned = believed @ (U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt).T
+    back = cv2.projectPoints(turned, np.zeros(3), np.zeros(3), truth.K, true_distortion)[0][:, 0]
+    return np.median(np.linalg.norm(back - uv, axis=1))
+
+
+def test_eleven_faults_and_their_families(says):
+    says("put eleven faults into a camera, diagnose eight patients")
+    assert len(ILLNESSES) == 11
+    says("| some corners are wrong | outlier corner, blurred view, column off |")
+    says("| the corners leave something open | parallel boards, boards in the middle |")
+    says(
+        "| all corners mislead the same way | warped board, autofocus drift, rolling shutter, lens too rich, moved "
+        "centre, half pixel |"
+    )
+    listed = "outlier corner, blurred view, column off, parallel boards, boards in the middle, warped board, "
+    listed += "autofocus drift, rolling shutter, lens too rich, moved centre, half pixel"
+    assert set(listed.split(", ")) == set(ILLNESSES)
+
+
+def test_anna_and_ben(says):
+    anna, ben = says("Anna's error of the fit is 0.19 px, Ben's 0.52 px.")
+    assert anna == solved(ANNA)[0]
+    assert ben == solved(BEN)[0]
+    (f,) = says(
+        "Anna's error is less than half of Ben's. Her focal length is wrong by eighteen pixels of 522, and his by less "
+        "than one."
+    )
+    assert solved(ANNA)[0] < solved(BEN)[0] / 2
+    assert f == true_f(ANNA)
+    assert round(abs(solved(ANNA)[1] - f.value)) in (18, 19)
+    assert abs(solved(ANNA)[1] - true_f(ANNA)) == pytest.approx(18.3, abs=0.05)
+    assert abs(solved(BEN)[1] - true_f(BEN)) < 1
+    percent, other = says("Anna's f is off by 3.5 %, and Ben's by 0.15 %.")
+    assert percent == 100 * abs(solved(ANNA)[1] / true_f(ANNA) - 1)
+    assert other == 100 * abs(solved(BEN)[1] / true_f(BEN) - 1)
+    says("her corners are sharper than Ben's")
+    assert ANNA.noise < BEN.noise
+    says("The error bar of fx is five times as long as Ben's.")
+    assert round(solved(ANNA)[2] / solved(BEN)[2]) == 5
+
+
+def test_boards_parallel_to_the_picture_say_nothing_of_f(says):
+    says("Move such a board nearer, make f shorter, and the picture is the same")
+    says(
+        "If all boards are parallel to the picture, f can be ten percent too long and the error of the fit stays what "
+        "it is."
+    )
+    board = np.stack(np.meshgrid(np.arange(9), np.arange(6)), axis=-1).reshape(-1, 2) * 0.025
+    for distance in (0.3, 0.5, 0.8):
+        pictures = [
+            cv2.projectPoints(
+                np.concatenate([board, np.full((54, 1), scale * distance)], axis=1), np.zeros(3), np.zeros(3),
+                np.diag([scale * 522.0, scale * 522.0, 1.0]), None,
+            )[0]
+            for scale in (1.0, 1.1)
+        ]  # fmt: skip
+        np.testing.assert_allclose(*pictures, atol=1e-9)
+    (low,) = says("The error of the fit is 0.08 px. What do you know?")
+    (same,) = says("The intrinsics are known to about 0.08 px.")
+    assert low == same.value
+
+
+def test_a_board_of_paper(says):
+    f, sigma, bulge = says(
+        "A calibration program gives error bars: f = 538.7 ± 2.2 px. Its board was printed on paper that bulges by one "
+        "percent of its length, 2 mm."
+    )
+    assert f == solved(PAPER)[1]
+    assert sigma == solved(PAPER)[2]
+    corners = PAPER.experiment.solved.board.corners
+    assert bulge == 1000 * 0.01 * np.ptp(corners[:, 0])
+    assert ILLNESSES["warped board"].amount(0.5) == 1.0
+    (again,) = says("Exactly at 538.7: the bulge averages out over many views.")
+    assert again == f.value
+    says("in the lab f is off by seventeen pixels, and the bars know nothing of it")
+    assert round(solved(PAPER)[1] - true_f(PAPER)) == 17
+    (bar,) = says("The bars of fx and fy are short, ± 2.2 px, and the truth is almost eight of them away.")
+    assert bar == solved(PAPER)[2]
+    assert 7.5 < (solved(PAPER)[1] - true_f(PAPER)) / solved(PAPER)[2] < 8
+
+
+def test_what_the_bullets_of_the_lab_promise(says):
+    says("The only way to see this fault is to compare the first pictures with the last.")
+    assert {one.id for one in DRIFT.experiment.inspection.findings} == {"split-disagreement"}
+    assert DRIFT.experiment.errors.max() < 1.3 * np.median(DRIFT.experiment.errors)
+    says("the arrows of the good corners point the other way: the pose tries to please both")
+    column = FaultLabView(fault="column off", strength=1.0, seed=5)
+    worst = int(np.argmax(column.experiment.errors))
+    residuals = column.experiment.residuals[worst]
+    far = np.linalg.norm(residuals, axis=-1) > 0.5 * np.linalg.norm(residuals, axis=-1).max()
+    assert residuals[far].mean(axis=0) @ residuals[~far].mean(axis=0) < 0
+    says("One bar towers over the rest")
+    assert np.sort(column.experiment.errors)[-1] > 3 * np.sort(column.experiment.errors)[-2]
+    says("the corners of the image are guesswork, and the fit is as good as ever")
+    middle, healthy = (FaultLabView(fault="boards in the middle", strength=s, seed=5) for s in (1.0, 0.0))
+    assert solved(middle)[0] == pytest.approx(solved(healthy)[0], rel=0.05)
+    assert off(middle) > 5 * off(healthy)
+    (noise,) = says("Set **noise** to 0.5 and find out how strong a fault must be to be seen at all.")
+    assert noise.value in [0.5]
+    FaultLabView(noise=noise.value)
+
+
+def test_the_rows_read_across(says):
+    first, second, far, near = says(
+        "The two smallest errors of the fit, 0.20 and 0.21 px, belong to a camera that is 8.8 px off and to one that "
+        "is 0.23 px off."
+    )
+    assert first == solved(PARALLEL)[0]
+    assert second == solved(DRIFT)[0]
+    assert far.about(off(PARALLEL), 0.02)  # camviz weights the pixels by how well they are known
+    assert near.about(off(DRIFT), 0.05)
+    furthest, believed = says(
+        "The camera with the warped board is the furthest off, 17 px, and believes itself to be off by 2.3 px."
+    )
+    assert furthest.about(off(WARPED), 0.03)
+    assert off(WARPED) == max(off(view) for view in (BLURRED, PARALLEL, WARPED, DRIFT))
+    assert believed == np.median(
+        WARPED.experiment.believed
+    )  # that covariance is held against mrcal in test_uncertainty
+
+
+def test_poses_absorb_a_moved_principal_point(says):
+    shift, before, wrong, again = (
+        says("someone changes cx by 50 px and lets the board poses be fitted again")
+        + says("What happens to the error of the fit, 0.2 px before?")
+        + says("It becomes about 50 px: every corner is now projected 50 px away.")
+    )
+    assert wrong == again.value == shift.value
+    healthy, moved = (FaultLabView(fault="moved centre", strength=s, seed=5).experiment for s in (0.0, 1.0))
+    assert before.about(healthy.solved.rms, 0.05)
+    (pixels,) = says(
+        "The principal point is 51 pixels from where it belongs, and the error of the fit is half a pixel."
+    )
+    assert pixels == 0.08 * 640
+    least, most = says("every board was turned by about five degrees (4.5° to 5.4°)")
+    turns = np.degrees(
+        (moved.solved.first_from_board.rotation * healthy.solved.first_from_board.rotation.inv()).magnitude()
+    )
+    assert least == turns.min()
+    assert most == turns.max()
+    angle, cx, f = says("turn every board by 5.5° about the camera (50 px at f = 522 px)")
+    assert angle == np.degrees(np.arctan(cx.value / f.value))
+    assert f == true_f(ANNA)
+    says("a turn moves the corners of an image farther than its middle, and a shift does not")
+    x = np.array([0.0, 0.6])
+    moved_by = np.tan(np.arctan(x) + 0.1) - x
+    assert moved_by[1] > 1.2 * moved_by[0]
+
+
+def test_the_held_out_corners(says):
+    (times,) = says(
+        "The healthy camera's error grows by a quarter, as it does for any pose that has to reach beyond the corners "
+        "it knows. The sick camera's error becomes 2.8 times as large."
+    )
+    for strength, wanted in ((0.0, 1.25), (1.0, times.value)):
+        made = FaultLabView(fault="moved centre", strength=strength, seed=5).experiment
+        board, K, lens = made.solved.board.corners, made.camera.intrinsics.K, made.camera.lens
+        left, distortion = board[:, 0] < board[:, 0].mean() + 1e-9, np.array([lens.k1, lens.k2, lens.p1, lens.p2])
+        squares = []
+        for seen in made.solved.detections["camera"]:
+            _, turn, t = cv2.solvePnP(board[left], seen[left], K, distortion)
+            foretold = cv2.projectPoints(board[~left], turn, t, K, distortion)[0].reshape(-1, 2)
+            squares.append(np.sum((seen[~left] - foretold) ** 2, axis=-1))
+        ratio = np.sqrt(np.mean(squares)) / made.solved.rms
+        assert ratio == pytest.approx(wanted, abs=0.05)
+
+
+def test_the_median_length_of_gaussian_residuals(says):
+    lengths = np.linalg.norm(np.random.default_rng(1).normal(0, 1, (400_000, 2)), axis=1)
+    first, second = says("half of all residuals are shorter than σ√(2 ln 2)")
+    assert np.median(lengths) == pytest.approx(np.sqrt(first.value * np.log(second.value)), rel=0.005)
+    two, ln, factor = says("the median length is σ √(2 ln 2) = 1.177 σ")
+    assert factor == np.sqrt(two.value * np.log(ln.value))
+    factor, two, ln = says("This is the median length. It is 1.177 σ, not σ: divide by √(2 ln 2).")
+    assert factor == np.sqrt(two.value * np.log(ln.value))
+    one_number, two, ln = says(
+        "The factor 1.4826 belongs to the absolute value of one number. A length in the plane has √(2 ln 2)."
+    )
+    single = np.abs(np.random.default_rng(2).normal(0, 1, 4_000_000))
+    assert one_number.value == pytest.approx(1 / np.median(single), rel=0.002)
+    assert two.value * np.log(ln.value) == pytest.approx(np.median(lengths) ** 2, rel=0.01)
+    two, ln = says("You multiply by √(2 ln 2). The median length is longer than σ by that factor: divide.")
+    assert np.sqrt(two.value * np.log(ln.value)) > 1
+    two, ln, again, same = says("The factor is the root of 2 ln 2. You divide by 2 ln 2 itself.")
+    assert two.value * np.log(ln.value) == again.value * np.log(same.value)
+    root, two, ln = says("Two coordinates make √2 for an RMS. A median length is longer than σ by √(2 ln 2).")
+    assert np.sqrt(np.mean(lengths**2)) == pytest.approx(np.sqrt(root.value), rel=0.005)
+    assert np.sqrt(two.value * np.log(ln.value)) == pytest.approx(np.median(lengths), rel=0.005)
+    (root,) = says("This is the RMS of one coordinate: too small by √2.")
+    assert np.sqrt(np.mean(lengths**2)) == pytest.approx(np.sqrt(root.value), rel=0.005)
+    says("Beyond 3 σ lies one corner in ninety of a perfectly healthy camera")
+    assert np.mean(lengths > 3) == pytest.approx(1 / 90, rel=0.05)
+
+
+def test_shapes_and_answers_of_the_exercises(says):
+    (two,) = says("From residuals (views, corners, 2), NaN where a corner was not seen, the RMS of every view.")
+    (three,) = says("Unit rays (n, 3) of the same pixels, by two calibrations.")
+    (again,) = says("Residuals (views, rows, columns, 2), all corners seen.")
+    assert two.value == again.value == ANNA.experiment.residuals.shape[-1]
+    assert three.value == 3 == len(ANNA.experiment.truth.unproject(np.array([3.0, 4.0])))
+    says("A corner is off beyond 6 σ, with σ from exercise 2")
+    whole, line = says("Answer 3 if a whole view is off, else 2 if a line is")
+    from camviz.exercises import lesson16
+
+    bad = np.zeros((3, 4, 5, 2)) + np.random.default_rng(0).normal(0, 0.1, (3, 4, 5, 2))
+    bad[0, 1] += 50
+    assert lesson16.triage(bad) == line.value
+    bad[0] += 50
+    assert lesson16.triage(bad) == whole.value
+
+
+def test_the_hints_about_the_board_and_the_rotation(says):
+    last, rows, columns = says("Write the numbers 0 to 5 into a board of 2 rows and 3 columns, row by row")
+    assert rows.value * columns.value == last.value + 1
+    across, down = says("With a board of 9 × 6 the wrong reshape raises no error at all.")
+    wrong = np.arange(54.0).reshape(int(across.value), int(down.value))
+    assert np.median(wrong, axis=0).shape == (6,)
+    n, m = says("is a 3 × 3 matrix. The rotation closest to it is the answer.")
+    assert (n.value, m.value) == (np.ones((7, 3)).T @ np.ones((7, 3))).shape
+    n, m = says("This is the best 3 × 3 matrix, and no rotation")
+    assert n.value == m.value == 3
+    (mirror,) = says("Where what is left has determinant −1 it is a mirror")
+    (same,) = says("Rays in one plane may give you a mirror, det R = −1.")
+    (once_more,) = says("You saw that det R may be −1, and change the sign of all of R.")
+    assert mirror.value == same.value == once_more.value == np.linalg.det(np.diag([1, 1, -1]))
+    (axis,) = says("over the columns (axis 2) that in each row")
+    mask = np.zeros((3, 4, 5), bool)
+    mask[1, 2] = True
+    assert mask.mean(axis=int(axis.value))[1, 2] == 1
+
+
+def test_what_a_shift_and_a_turn_have_in_common(says):
+    apart, again = says("Two calibrations of one camera have cx 12 px apart.") + says("Yes, by 12 pixels.")
+    assert apart == again.value
+    f, angle = says("At f = 522 px a turn of 1.3° makes up for nearly all of it.")
+    assert f == true_f(ANNA)
+    assert angle == np.degrees(np.arctan(apart.value / f.value))
+    u, v = (
+        one.ravel() - centre
+        for one, centre in zip(np.meshgrid(np.arange(0, 640, 40), np.arange(0, 480, 40)), (320, 240), strict=True)
+    )
+    before = np.stack([u, v, np.full_like(u, f.value)], axis=-1)
+    turn = cv2.Rodrigues(np.array([0, np.arctan(apart.value / f.value), 0]))[0]
+    after = before @ turn.T
+    left = after[:, :2] / after[:, 2:] * f.value - before[:, :2] - [apart.value, 0]
+    assert np.median(np.linalg.norm(left, axis=1)) < 0.25 * apart.value
+
+
+def test_squares_count(says):
+    one, many, small = says("one corner that is 30 px off weighs as much as 10,000 corners that are 0.3 px off")
+    assert one.value**2 == pytest.approx(many.value * small.value**2)
+
+
+def test_the_published_left_camera(says, samples):
+    low, high, worst = says("Twelve views between 0.16 and 0.38 px, and one of 1.18.")
+    file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
+    errors = np.sort(file.getNode("per_view_reprojection_errors").mat().ravel())
+    assert low == errors[0]
+    assert high == errors[-2]
+    assert worst == errors[-1]
+    near, far, before, after = says(
+        "the first column of the second board is off by 1.7 to 6.3 px from where the other eight columns put it. "
+        "Without that picture the error of the fit falls from 0.41 to 0.23 px."
+    )
+    board = np.zeros((54, 3), np.float32)
+    board[:, :2] = np.mgrid[0:9, 0:6].T.reshape(-1, 2) * 0.025
+    corners = []
+    for path in sorted(samples.glob("left[01]*.jpg")):
+        grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        found, seen = cv2.findChessboardCorners(grey, (9, 6))
+        assert found
+        end = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.001)
+        corners.append(cv2.cornerSubPix(grey, seen.reshape(-1, 1, 2).astype(np.float32), (11, 11), (-1, -1), end))
+    assert len(corners) == 13
+    assert before == cv2.calibrateCamera([board] * 13, corners, (640, 480), None, None)[0]
+    rest = corners[:1] + corners[2:]
+    rms, K, distortion, _, _ = cv2.calibrateCamera([board] * 12, rest, (640, 480), None, None)
+    assert after == rms
+    others = np.tile(np.arange(9) > 0, 6)
+    _, turn, shift = cv2.solvePnP(board[others], corners[1][others], K, distortion)
+    foretold = cv2.projectPoints(board, turn, shift, K, distortion)[0]
+    lengths = np.linalg.norm((corners[1] - foretold)[:, 0], axis=1)
+    assert near == lengths[~others].min()
+    assert far == lengths[~others].max()
+    assert lengths[others].max() < 0.5
+
+
+def test_the_published_stereo_rig(says):
+    f, cx, cy = 534.80, 335.69, 240.66
+    k1, k2 = 0.29589439552724328, -1.0354662043042675
+    fold, lands, corner = says(
+        "The left one's polynomial turns back at r = 0.73 before distortion; that ray lands at 0.63 in the picture, "
+        "whose corners are at 0.77: seven percent of its pixels have no ray."
+    )
+    r = np.sqrt(min(root for root in np.roots([5 * k2, 3 * k1, 1]) if root > 0))
+    assert fold == r
+    reach = r * (1 + k1 * r**2 + k2 * r**4)
+    assert lands == reach
+    u, v = np.meshgrid(np.arange(640), np.arange(480))
+    radius = np.hypot(u - cx, v - cy) / f
+    assert corner == max(np.hypot(x - cx, y - cy) / f for x in (-0.5, 639.5) for y in (-0.5, 479.5))
+    assert round(100 * np.mean(radius > reach)) == 7
