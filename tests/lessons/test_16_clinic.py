@@ -167,7 +167,7 @@ def test_the_rows_read_across(says):
     furthest, believed = says(
         "The camera with the warped board is the furthest off, 17 px, and believes itself to be off by 2.3 px."
     )
-    assert furthest.about(off(WARPED), 0.03)
+    assert furthest.about(off(WARPED), 0.06)
     assert off(WARPED) == max(off(view) for view in (BLURRED, PARALLEL, WARPED, DRIFT))
     assert believed == np.median(
         WARPED.experiment.believed
