@@ -22,9 +22,27 @@ check = Tutor()"""
 LONGEST_CELL = 30
 """Lines of code a reader can take in at once."""
 
+WORDS_A_MINUTE, MINUTES_A_QUESTION, MINUTES_AN_EXERCISE = 200, 3, 8
+
 _DRAWING = re.compile(r"\bplt\.|\bmatplotlib\b|\bpyvista\b|\bset_xlabel\b")
+_WORD = re.compile(r"[^\W\d_]+(?:[’'][^\W\d_]+)?")
+_NOT_READ = re.compile(r"\]\([^)]*\)|\$\$.*?\$\$|\$[^$\n]*\$", re.DOTALL)  # addresses; formulas
+_PATIENT = re.compile(r"ward\[\d+\]")
 _LINK = re.compile(r"00_start_here\.ipynb#([^)\s]+)\)")
 _HEADER = ("minutes", "prerequisites", "what you'll do", "what you'll learn", "what you'll need", "mybinder.org")
+
+
+def minutes(notebook: Notebook, number: str) -> int:
+    """About how long a student alone needs, to five minutes: words, questions (a patient is one) and exercises."""
+    text = "\n".join(
+        cell.source
+        for cell in notebook.cells
+        if cell.cell_type == "markdown" and not {"glossary", "solution"} & set(cell.metadata.get("tags", []))
+    )
+    words = len(_WORD.findall(_NOT_READ.sub(" ", text)))
+    patients = sum(bool(_PATIENT.fullmatch(cell.source)) for cell in notebook.cells)
+    asked = MINUTES_A_QUESTION * (len(questions.questions(number)) + patients)
+    return 5 * round((words / WORDS_A_MINUTE + asked + MINUTES_AN_EXERCISE * len(exercises(number))) / 5)
 
 
 def complaints(notebook: Notebook, file_name: str) -> list[str]:
@@ -42,7 +60,11 @@ def _header(notebook: Notebook, number: str) -> list[str]:
         return ["the first cell must be the header: Markdown that begins with # and the title"]
     text = first.source.replace("’", "'").lower()
     wanted = ("?", *_HEADER) if number != "00" else _HEADER[:1]
-    return [f"the header does not mention {word!r}" for word in wanted if word not in text]
+    found = [f"the header does not mention {word!r}" for word in wanted if word not in text]
+    needed = minutes(notebook, number)
+    if f"about {needed} minutes" not in text:
+        found.append(f"the header must say how long the lesson takes, About {needed} minutes")
+    return found
 
 
 def _setup(notebook: Notebook) -> list[str]:

@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import re
 import textwrap
 from pathlib import Path
 
@@ -19,7 +20,7 @@ EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 HEADER = """# 05 Lens distortion
 *What does a polynomial do beyond its last data point?* [launch](https://mybinder.org/v2)
 
-**60 minutes.** **Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""
+About 55 minutes. **Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""
 
 ENDING = """## Recap
 A [fold](00_start_here.ipynb#fold), the [principal point](00_start_here.ipynb#principal-point) and
@@ -104,7 +105,8 @@ def drop_notes(notebook):
     ("change", "complaint"),
     [
         (drop_first, "header"),
-        (replace("minutes.**", "hours**"), "minutes"),
+        (replace("About 55 minutes", "About an hour"), "minutes"),
+        (replace("About 55", "About 50"), "About 55 minutes"),
         (replace("mybinder.org", "elsewhere.org"), "mybinder.org"),
         (drop("setup"), "tagged setup"),
         (replace("import numpy as np", "import numpy as np\nsize = 3"), "the same as everywhere"),
@@ -260,6 +262,20 @@ def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp
 def test_every_lesson_follows_the_pattern(path):
     """Told also by: python -m camviz.lessons check"""
     assert complaints(notebooks.read(path), path.name) == []
+
+
+@EACH
+def test_every_place_says_the_same_of_how_long_a_lesson_takes(path):
+    """Header, the map in lesson 00, README, and the teacher's note at the header."""
+    number, header = path.name[:2], notebooks.read(path).cells[0]
+    (minutes,) = re.findall(r"About (\d+) minutes", header.source)
+    assert re.match(rf"\*\*{minutes} minutes\b", header.metadata["camviz"]["teacher"])
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.findall(rf"^\| {number} .*\| (\d+) \|$", readme, re.MULTILINE) == [minutes]
+    if number != "00":
+        start = notebooks.read(path.parent / "00_start_here.ipynb")
+        text = "\n".join(cell.source for cell in start.cells)
+        assert re.findall(rf"^\| {number} .*\| (\d+) \|$", text, re.MULTILINE) == [minutes]
 
 
 @EACH

@@ -47,7 +47,9 @@ NOT_STATED = (
      r"|illuminant|Apache|CC BY|BY) ?[A-Z]{0,3}-?\d[\d.:-]*", "a proper name"),
     (r"(?:(?<=[(A-Za-zé.,;] )|(?<=\())(?:1[5-9]|20)\d\d(?=[,;.:)\s]|$)(?! ?(?:K|px|mm|nm|µm|m|DN|e⁻|photons|electrons"
      r"|pixels|[×x%°–]))", "a year"),
-    (r"\d+(?:–\d+)? minutes?", "a plan; test_lessons.py holds that the places agree"),
+    (r"\d+(?:–\d+)? minutes?|(?m:\| \d+ \|$)", "a plan; test_lessons.py holds that the places agree"),
+    (r"(?m)^\| \d\d \|", "the number of a lesson"),
+    (r"\(\d{4}–\d{4}\)", "the years of a life"),
     (rf"(?<![A-Za-z_\d.])\d(?= ?{_SYMBOL})|(?<=[/^])2(?!\d|\.\d)", "a coefficient in a formula"),
     (r"(?<![\w.,−-])[01](?![\d.,]\d|\d| ?[%°µ]| ?(?:px|mm|cm|m|km|s|ms|K|dB|DN|e⁻|bits?|pixels?|metres?)\b)",
      "nothing or one: a condition, an end of a range, a part of a formula"),
@@ -93,7 +95,7 @@ def _texts(number: str) -> Iterator[tuple[str, str]]:
             yield f"exercise {one.name}", _stated(text)
     if number == "00":
         for term in glossary.glossary().terms:
-            yield f"glossary: {term.name}", _stated(term.text)
+            yield f"glossary: {term.name}", _stated(term.sentence)
 
 
 def _stated(text: str) -> str:
