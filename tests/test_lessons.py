@@ -20,7 +20,8 @@ EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 HEADER = """# 05 Lens distortion
 *What does a polynomial do beyond its last data point?* [launch](https://mybinder.org/v2)
 
-About 55 minutes. **Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""
+About 60 minutes.
+**Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""
 
 ENDING = """## Recap
 A [fold](00_start_here.ipynb#fold), the [principal point](00_start_here.ipynb#principal-point) and
@@ -105,8 +106,8 @@ def drop_notes(notebook):
     ("change", "complaint"),
     [
         (drop_first, "header"),
-        (replace("About 55 minutes", "About an hour"), "minutes"),
-        (replace("About 55", "About 50"), "About 55 minutes"),
+        (replace("About 60 minutes", "About an hour"), "minutes"),
+        (replace("About 60", "About 50"), "About 60 minutes"),
         (replace("mybinder.org", "elsewhere.org"), "mybinder.org"),
         (drop("setup"), "tagged setup"),
         (replace("import numpy as np", "import numpy as np\nsize = 3"), "the same as everywhere"),
