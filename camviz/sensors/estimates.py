@@ -254,7 +254,8 @@ class Estimates:
         spread = sqrt(seen.variance + max(seen.pattern, 0))
         beyond = next((i for i in range(peak + 1, len(found.levels)) if self._beyond_peak(i)), len(found.levels) - 1)
         low = max(float(found.signal.max()) - 4 * spread, self._photons_alone(peak))
-        high = max(float(found.signal[beyond]), value) + 0.1 * spread
+        lost = max(0.1 * spread, 4 * spread**2 / value) if value > 0 else inf  # of the signal at the peak, by clipping
+        high = max(float(found.signal[beyond]), value) + lost
         hidden = self.dark_means[peak]
         low, high = min(low, value) - (hidden.high - hidden.value), high + hidden.value - hidden.low
         level, middle = (Estimate(one, error, low, high) for one in (value, (low + high) / 2))

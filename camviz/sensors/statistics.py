@@ -266,6 +266,8 @@ def _parts(picture: NDArray[np.float64], left: _Left) -> dict[str, Part]:
     pixel = (pattern - of_columns - of_rows) / (1 - 1 / rows - 1 / columns)
     freedom = left.freedom * max(rows - 1, 1)
     pixel_error = _error(left.pixel, pixel, rows * columns, left.freedom * rows * columns)
+    # What the mean of all rows' noise adds to each pixel's temporal variance, known from so many frames.
+    pixel_error = hypot(pixel_error, _error(left.rows / rows, 0.0, left.freedom, left.freedom))
     row_error = _error(left.rows, of_rows, rows - 1, freedom)
     column_error = _error(left.pixel / rows, of_columns, columns - 1, freedom * columns)
     return {
