@@ -30,6 +30,7 @@ def before_rounding(variance: float, error: float = 0.0) -> tuple[float, float]:
     Rounded noise has the least variance where the mean is a whole number, and the most where it is half way.
     """
     least, most = _rounded()
+    error = max(error, 1e-4)  # of frames in which no number differs, which some thousand pixels do not exclude
     low, high = variance - 4 * error, variance + 4 * error
     if low > least[-1]:
         return variance, variance
