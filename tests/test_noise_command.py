@@ -3,12 +3,14 @@
 import json
 import re
 import shutil
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from camviz.command import main
+from camviz.commands.noise import NOISE
 from camviz.sensors import Sensor
 
 SENSOR = Sensor(
@@ -17,13 +19,13 @@ SENSOR = Sensor(
     read_noise_e=8.0,
     gain_dn_per_e=0.4,
     offset_dn=80,
-    dark_current_e_per_s=2_000,
+    dark_current_e_per_s=300,
     dsnu_e=6,
     prnu=0.02,
 )
 PHOTONS_PER_MS = 60.0
 EXPOSURES_MS = (20, 60, 100.5, 140, 180, 220, 260, 300, 340)
-KEYS = [
+FIGURES = {
     "gain_dn_per_e",
     "quantum_efficiency",
     "read_noise_e",
@@ -33,10 +35,17 @@ KEYS = [
     "prnu",
     "dsnu_e",
     "dark_current_e_per_s",
-]
+    "threshold_e",
+    "threshold_photons",
+    "linearity_error",
+    "linearity_error_min",
+    "linearity_error_max",
+    *(f"dsnu_{part}_e" for part in ("row", "column", "pixel")),
+    *(f"prnu_{part}" for part in ("row", "column", "pixel")),
+}
 
 
-def expose(photons, exposure_ms, rng, sensor=SENSOR, size=(120, 160)):
+def expose(photons, exposure_ms, rng, sensor=SENSOR, size=(240, 320)):
     return sensor.expose(np.full(size, photons, np.float32), exposure_ms / 1000, 20.0, rng).dn
 
 
@@ -79,24 +88,41 @@ def refused(capsys, folder, *words):
 
 
 def test_the_figures_of_the_sensor_come_out_of_its_files(frames, capsys):
-    """19k pixels and 9 levels: 1 % on a variance, 0.5 % on the gain. False failure: below 1e-5 (limits of 5σ)."""
+    """77k pixels and 9 levels: 0.5 % on a variance, 0.3 % on the gain. False failure: below 1e-5 (limits of 5σ)."""
     found = figures(capsys, frames, "--photons-per-ms", PHOTONS_PER_MS)
-    assert sorted(found) == sorted(KEYS)
+    assert set(found) == FIGURES | {"why", "bounds"}
     assert found["gain_dn_per_e"] == pytest.approx(0.4, rel=0.03)
     assert found["quantum_efficiency"] == pytest.approx(0.5, rel=0.03)
-    assert found["read_noise_e"] == pytest.approx(8, rel=0.05)
+    assert found["read_noise_e"] == pytest.approx(8, rel=0.03)
     assert found["prnu"] == pytest.approx(0.02, rel=0.05)
-    assert found["dsnu_e"] == pytest.approx(6, rel=0.15)
-    assert found["dark_current_e_per_s"] == pytest.approx(2_000, rel=0.03)
-    assert found["full_well_e"] == pytest.approx(8_500, rel=0.15)  # the level before the well is full
-    assert found["snr_max_db"] == pytest.approx(10 * np.log10(found["full_well_e"]))
-    threshold = np.hypot(found["read_noise_e"], np.sqrt(1 / 12) / found["gain_dn_per_e"]) + 0.5
-    assert found["dynamic_range_db"] == pytest.approx(20 * np.log10(found["full_well_e"] / threshold), abs=1e-6)
+    assert found["dsnu_e"] == pytest.approx(6, rel=0.05)
+    assert found["dark_current_e_per_s"] == pytest.approx(300, rel=0.03)
+    sigma = np.hypot(8, np.sqrt(1 / 12) / 0.4)
+    assert found["threshold_e"] == pytest.approx(0.5 + np.sqrt(sigma**2 + 0.25), rel=0.03)
+    assert found["threshold_photons"] == pytest.approx(found["threshold_e"] / 0.5, rel=0.06)
 
 
-def test_without_photons_the_quantum_efficiency_alone_is_null_and_the_reason_given(frames, capsys):
+def test_what_the_frames_cannot_tell_is_null_with_its_bounds_and_the_reason(frames, tmp_path, capsys):
+    """Exposures 13 % apart: the well of 9 000 electrons is seen full between 7 700 and 9 000."""
+    found = figures(capsys, frames, "--photons-per-ms", PHOTONS_PER_MS)
+    assert found["full_well_e"] is None
+    low, high = found["bounds"]["full_well_e"]
+    assert 7_500 < low < 8_500 < high < 9_100
+    assert "too far apart" in found["why"]["full_well_e"]
+    assert {name for name in FIGURES if found[name] is None} == set(found["why"])
+    page = tmp_path / "noise.html"
+    assert main(["noise", str(frames), "--report", str(page)]) == 0
+    for text in (capsys.readouterr().out, page.read_text(encoding="utf-8")):
+        assert "too far apart" in text
+        assert re.search(r"not known, from \d+ e⁻ to \d+ e⁻", text)
+        assert "σ + ½" in text
+
+
+def test_without_photons_the_quantum_efficiency_is_null_and_the_reason_given(frames, capsys):
+    lit = figures(capsys, frames, "--photons-per-ms", PHOTONS_PER_MS)
     found = figures(capsys, frames)
-    assert [name for name, value in found.items() if value is None] == ["quantum_efficiency"]
+    missing = {name for name in FIGURES if found[name] is None and lit[name] is not None}
+    assert missing == {"quantum_efficiency", "threshold_photons"}
     assert main(["noise", str(frames)]) == 0
     assert "not known: the photons per pixel are not known" in capsys.readouterr().out
 
@@ -110,15 +136,38 @@ def test_tiff_gives_the_same_as_png(frames, tmp_path, capsys, suffix):
     assert figures(capsys, tmp_path / "tiff") == figures(capsys, frames)
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.int32, np.uint32])
+def test_whole_numbers_of_32_bits_give_the_same_as_16(frames, tmp_path, capsys, kind):
+    for path in frames.glob("*.png"):
+        cv2.imwrite(str(tmp_path / f"{path.stem}.tif"), cv2.imread(str(path), cv2.IMREAD_UNCHANGED).astype(kind))
+    assert figures(capsys, tmp_path) == figures(capsys, frames)
+
+
 def test_eight_bits_are_read_as_they_are(tmp_path, capsys):
+    """K = 0.05 DN/e⁻: a read noise of 10 e⁻ is half a step, and rounding hides most of it."""
     rng = np.random.default_rng(3)
-    sensor = Sensor(full_well_e=4_000, read_noise_e=20, gain_dn_per_e=0.05, offset_dn=16, bits=8)
-    for t in EXPOSURES_MS:
+    sensor = Sensor(full_well_e=4_000, read_noise_e=10, gain_dn_per_e=0.05, offset_dn=16, bits=8)
+    for t in np.linspace(10, 340, 25).round():
         for number in range(2):
             for kind, light in (("bright", 25.0 * t), ("dark", 0.0)):
                 frame = expose(light, t, rng, sensor).astype(np.uint8)
-                cv2.imwrite(str(tmp_path / f"{kind}_{t}_{number}.png"), frame)
-    assert figures(capsys, tmp_path)["gain_dn_per_e"] == pytest.approx(0.05, rel=0.05)
+                cv2.imwrite(str(tmp_path / f"{kind}_{t:.0f}_{number}.png"), frame)
+    assert figures(capsys, tmp_path)["gain_dn_per_e"] == pytest.approx(0.05, rel=0.03)
+
+
+def test_the_docs_and_the_help_name_the_frames_alike():
+    """Every name of a frame and every line of a descriptor stands in both."""
+    formats = (Path(__file__).parent.parent / "docs" / "formats.md").read_text(encoding="utf-8")
+    section = formats.split("## Frames for `camviz noise`")[1].split("\n## ")[0]
+    in_docs = set(re.findall(r"`((?:bright|dark)_<[^`]+|[vnbdi] <[^`]+)`", section))
+    in_help = set(re.findall(r"(?:bright|dark)_<exposure ms>_\d\.png|\b[vnbdi] <[^>]+>(?: <[^>]+>)*", NOISE))
+    assert len(in_docs) == 9
+    assert in_docs == in_help
+    keys = {key for line in section.splitlines() if line.startswith("| `") for key in re.findall(r"`(\w+)`", line)}
+    assert keys >= FIGURES | {"why", "bounds"}
+    for words in ("65535", "steady, even light", "lens covered"):
+        assert words in section
+        assert words in NOISE
 
 
 def test_twelve_bits_in_the_upper_bits_of_sixteen_have_sixteen_times_the_gain(frames, tmp_path, capsys):
@@ -127,11 +176,12 @@ def test_twelve_bits_in_the_upper_bits_of_sixteen_have_sixteen_times_the_gain(fr
     upper, plain = figures(capsys, tmp_path), figures(capsys, frames)
     assert upper["gain_dn_per_e"] == pytest.approx(16 * plain["gain_dn_per_e"])
     assert upper["read_noise_e"] == pytest.approx(plain["read_noise_e"])
+    assert upper["threshold_e"] == pytest.approx(plain["threshold_e"])
 
 
 def test_a_descriptor_gives_the_same_as_the_folder(frames, tmp_path, capsys):
     """With the photons in it; Windows' separators and a decimal comma, as the published ones have."""
-    lines = ["# a camera", "v 4.0", "n 12 160 120"]
+    lines = ["# a camera", "v 4.0", "n 12 320 240"]
     for t in EXPOSURES_MS:
         lines += [f"b {t * 1e6:.0f} {PHOTONS_PER_MS * t:g}".replace(".", ",")]
         lines += [rf"i shots\bright_{t}_{number}.png" for number in range(2)]
@@ -140,7 +190,9 @@ def test_a_descriptor_gives_the_same_as_the_folder(frames, tmp_path, capsys):
     shutil.copytree(frames, tmp_path / "shots")
     expected = figures(capsys, frames, "--photons-per-ms", PHOTONS_PER_MS)
     for given in (tmp_path / "data.txt", tmp_path):
-        assert figures(capsys, given) == pytest.approx(expected)
+        found = figures(capsys, given)
+        assert found["why"] == expected["why"]
+        assert {name: found[name] for name in FIGURES} == pytest.approx({name: expected[name] for name in FIGURES})
 
 
 def test_more_frames_of_one_exposure_are_its_stack(shots, capsys):
@@ -150,7 +202,8 @@ def test_more_frames_of_one_exposure_are_its_stack(shots, capsys):
         cv2.imwrite(str(shots / f"dark_140_{number}.png"), expose(0, 140, rng))
     assert main(["noise", str(shots)]) == 0
     said = capsys.readouterr().out
-    assert "PRNU by its parts: rows" in said
+    assert "PRNU of rows" in said
+    assert "DSNU of pixels" in said
     assert figures(capsys, shots)["prnu"] == pytest.approx(0.02, rel=0.05)
 
 
@@ -183,7 +236,7 @@ def another_size(folder):
 
 
 def another_depth(folder):
-    spoil(folder / "dark_60_1.png", np.full((120, 160), 80, np.uint8))
+    spoil(folder / "dark_60_1.png", np.full((240, 320), 80, np.uint8))
 
 
 def in_colour(folder):
@@ -197,13 +250,13 @@ def jpeg(folder):
 
 
 def jpeg_called_png(folder):
-    _, data = cv2.imencode(".jpg", np.full((120, 160), 80, np.uint8))
+    _, data = cv2.imencode(".jpg", np.full((240, 320), 80, np.uint8))
     (folder / "bright_60_0.png").write_bytes(data.tobytes())
 
 
 def saturated_throughout(folder):
     for path in folder.glob("bright_*"):
-        spoil(path, np.full((120, 160), 4095, np.uint16))
+        spoil(path, np.full((240, 320), 4095, np.uint16))
 
 
 def changed_places(folder):
@@ -244,7 +297,17 @@ def twice(folder):
 
 
 def floating(folder):
-    spoil(folder / "bright_60_0.tif", np.ones((120, 160), np.float32))
+    spoil(folder / "bright_60_0.tif", np.full((240, 320), 80.5, np.float32))
+    (folder / "bright_60_0.png").unlink()
+
+
+def too_large(folder):
+    spoil(folder / "bright_60_0.tif", np.full((240, 320), 70_000, np.int32))
+    (folder / "bright_60_0.png").unlink()
+
+
+def of_64_bits(folder):
+    spoil(folder / "bright_60_0.tif", np.full((240, 320), 80.0))
     (folder / "bright_60_0.png").unlink()
 
 
@@ -266,7 +329,9 @@ def floating(folder):
         (dark_only, "holds dark frames only"),
         (other_names, "expected frames named bright_<exposure ms>_0.png"),
         (twice, "is frame 0 of 60 ms, and so is"),
-        (floating, "expected 8 or 16 bits"),
+        (floating, "has the value 80.5; expected whole numbers from 0 to 65535"),
+        (too_large, "has the value 70000; expected whole numbers"),
+        (of_64_bits, "values of type float64; expected 8, 16 or 32 bits"),
     ],
 )
 def test_bad_frames_are_refused_in_one_sentence(harm, said, shots, capsys):

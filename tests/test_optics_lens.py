@@ -56,6 +56,39 @@ def test_the_blur_of_a_point_is_where_the_sensor_cuts_the_cone_of_its_rays():
     assert optics.circle_of_confusion_mm(f, N, s, np.inf) == pytest.approx(f**2 / (N * (s - f)))
 
 
+def test_a_lens_focused_at_infinity_is_the_limit_of_one_focused_ever_farther():
+    """Near limit H - f, no far limit, and blur f² / (N u), without a warning; against a focus of 1000 km."""
+    f, N, c, far = 50.0, 8.0, 0.03, 1e9
+    H = optics.hyperfocal_mm(f, N, c)
+    assert optics.near_limit_mm(f, N, np.inf, c) == H - f
+    assert optics.near_limit_mm(f, N, far, c) == pytest.approx(H - f, rel=1e-4)
+    assert optics.far_limit_mm(f, N, np.inf, c) == np.inf
+    u = np.array([500.0, 4000.0, np.inf])
+    blur = optics.circle_of_confusion_mm(f, N, np.inf, u)
+    np.testing.assert_allclose(blur, [f**2 / (N * 500), f**2 / (N * 4000), 0], rtol=1e-12)
+    np.testing.assert_allclose(optics.circle_of_confusion_mm(f, N, far, u[:2]), blur[:2], rtol=1e-4)
+    limits = optics.far_limit_mm(f, N, [H / 2, H, np.inf], c)  # finite and infinite in one array
+    np.testing.assert_allclose(limits, [optics.far_limit_mm(f, N, H / 2, c), np.inf, np.inf])
+
+
+@pytest.mark.parametrize("focus", [30.0, 50.0, 0.0, -900.0, [900.0, 40.0, np.inf]])
+def test_a_focus_inside_the_focal_length_is_refused_by_name(focus):
+    """There the lens makes no real image, wherever the sensor stands."""
+    got = 40 if isinstance(focus, list) else focus
+    said = f"focus_mm must be greater than the focal length, 50 mm, for a real image; got {got:g}"
+    for call in (optics.circle_of_confusion_mm, optics.near_limit_mm, optics.far_limit_mm):
+        with pytest.raises(ValueError, match=said):
+            call(50.0, 8.0, focus, 0.03)
+
+
+def test_the_airy_disc_of_a_lens_focused_near_is_that_of_its_working_f_number():
+    """Diffraction at the aperture, f/N wide, seen at the image's distance v: sin θ = 1.22 λ N / f, radius v sin θ."""
+    f, N, u, wavelength_mm = 50.0, 8.0, 120.0, 550e-6
+    radius_mm = optics.image_distance_mm(f, u) * 1.22 * wavelength_mm * N / f
+    working = optics.working_f_number(N, optics.magnification(f, u))
+    assert optics.airy_radius_um(working, 550) == pytest.approx(1e3 * radius_mm, rel=1e-12)
+
+
 def test_airy_discs_have_their_published_radii():
     np.testing.assert_allclose(optics.airy_radius_um([4, 16], 550), [2.684, 10.736], atol=5e-4)
     lens = 500 * optics.diffraction_blur_mm(50 / 8, 50)  # the hole's formula, for a lens focused far away

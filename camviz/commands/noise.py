@@ -19,11 +19,17 @@ NOISE = """\
 Measures a sensor from its frames, by EMVA Standard 1288 (release 4.0, linear): gain, read noise, quantum efficiency,
 signal to noise, dynamic range, full well, fixed patterns and dark current.
 
+A figure is printed where the frames tell it within 3 % (DSNU and PRNU 5 %, decibels 0.26 dB) even if chance is at four
+standard errors. Otherwise it is withheld, with its bounds and the reason.
+
 FOLDER holds, for each of several exposures, two frames of the same steady, even light and two with the lens covered,
-8- or 16-bit grey PNG or TIFF straight from the sensor:
+grey PNG or TIFF straight from the sensor, of 8 or 16 bits, or of 32 with whole numbers up to 65535:
   bright_<exposure ms>_0.png   bright_<exposure ms>_1.png   dark_<exposure ms>_0.png   dark_<exposure ms>_1.png
 The exposures should reach beyond saturation. Further frames of one exposure (_2, _3, ...), of both kinds, make a stack,
-which splits the patterns into rows, columns and pixels. FOLDER may also be, or hold, an EMVA 1288 descriptor file.
+which splits the patterns into rows, columns and pixels. FOLDER may also be, or hold, an EMVA 1288 descriptor file, a
+text of lines
+  v <release>   n <bits> <width> <height>   b <exposure ns> <photons>   d <exposure ns>   i <frame>
+where the frames (i) of a bright (b) or dark (d) exposure follow it: two are a pair, more a stack.
 """
 EPILOG = """\
 examples:
@@ -44,7 +50,7 @@ def add(commands: Any) -> None:
     command.add_argument(
         "--photons-per-ms", metavar="N", type=_photons, help="photons that reach a pixel in a millisecond of exposure"
     )
-    command.add_argument("--json", action="store_true", help="the figures for programs; null if unknown")
+    command.add_argument("--json", action="store_true", help="the figures for programs; null if withheld, and why")
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with the curves as well")
 
 
@@ -90,33 +96,43 @@ def _refuse_frame(output: Path, recording: Recording) -> None:
 
 
 def as_json(found: Measurement) -> str:
-    """The figures as one JSON object; null for those that the frames cannot give."""
-    figures = {name: float(value) if isfinite(value) else None for name, value in found.figures().items()}
+    """All figures as one JSON object: null for those withheld, with the reason under "why"; bounds under "bounds"."""
+    judged = found.judged
+    figures: dict[str, Any] = {name: one.value if isfinite(one.value) else None for name, one in judged.items()}
+    figures["bounds"] = {name: [one.low, one.high] for name, one in judged.items() if one.bounded}
+    figures["why"] = {name: one.why for name, one in judged.items() if one.why}
     return json.dumps(figures, indent=2)
 
 
 def as_text(found: Measurement, recording: Recording) -> str:
-    """The figures in words, with the reason where one is not known."""
-    from camviz.views.measured_noise import FIGURES, written
-
+    """The figures in words, with the reason where one is withheld."""
     lines = [f"{recording.source}: {len(found.levels)} levels of exposure, {found.levels[0].bright.pixels} pixels."]
-    figures = found.figures()
-    for name, (words, _, _) in FIGURES.items():
-        why = found.why(name)
-        lines.append(f"  {words:24} {written(name, figures[name])}" + (f": {why}" if why else ""))
+    lines += [f"  {words:24} {value}" + (f": {why}" if why else "") for words, value, why in rows(found)]
     return "\n".join([*lines, *remarks(found)])
+
+
+def rows(found: Measurement) -> list[tuple[str, str, str]]:
+    """Each figure's words, its value or bounds, and why it is withheld; the patterns' parts where there are stacks."""
+    from camviz.views.measured_noise import FIGURES, PARTS, told
+
+    shown = FIGURES | PARTS if found.bright and found.dark else FIGURES
+    judged = found.judged
+    return [(words, told(name, judged[name]), judged[name].why) for name, (words, _, _) in shown.items()]
 
 
 def remarks(found: Measurement) -> list[str]:
     """What else a reader should know, one sentence each."""
-    said = []
-    smallest, largest, mean = found.linearity
+    smallest, largest, mean = (found.judged[f"linearity_error{end}"].value for end in ("_min", "_max", ""))
     if isfinite(mean):
-        said.append(f"Off a straight line by {mean:.2%} on average, from {smallest:+.2%} to {largest:+.2%}.")
-    for name, parts in found.pattern_split().items():
-        words, factor, unit = ("DSNU", 1.0, "e⁻") if name == "dsnu_e" else ("PRNU", 100.0, "%")
-        listed = ", ".join(f"{part}s {factor * value:.3g} {unit}" for part, value in parts.items())
-        said.append(f"{words} by its parts: {listed}.")
+        said = [f"Off a straight line by {mean:.2%} on average, from {smallest:+.2%} to {largest:+.2%}."]
+    else:
+        said = [f"How far the response is off a straight line is not known: {found.why('linearity_error')}."]
+    said.append("At the threshold, ½ + √(σ² + ¼), signal and noise are equal; the standard's σ + ½ approximates it.")
+    if found.noisy_rows:
+        said.append(
+            "Rows have noise of their own in every frame: it is part of the dark noise, and taken out of the gain and "
+            "of the patterns."
+        )
     if not (found.bright and found.dark):
         said.append("The patterns come from pairs of frames; a stack of 16 or more of one exposure tells them better.")
     if found.flicker_counts:
@@ -129,19 +145,17 @@ def remarks(found: Measurement) -> list[str]:
 def page(found: Measurement, recording: Recording) -> str:
     """The measurement as one page of HTML that needs no network: the figures, then the curves."""
     from camviz.page import document, figure
-    from camviz.views.measured_noise import FIGURES, MeasuredNoiseView, written
+    from camviz.views.measured_noise import MeasuredNoiseView
 
-    figures = found.figures()
-    rows = "".join(
-        f"<tr><th>{escape(words)}</th><td>{escape(written(name, figures[name]))}</td>"
-        f"<td>{escape(found.why(name))}</td></tr>"
-        for name, (words, _, _) in FIGURES.items()
+    table = "".join(
+        f"<tr><th>{escape(words)}</th><td>{escape(value)}</td><td>{escape(why)}</td></tr>"
+        for words, value, why in rows(found)
     )
     notes = "".join(f"<p>{escape(sentence)}</p>" for sentence in remarks(found))
     body = (
         f"<p>{len(found.levels)} levels of exposure, {found.levels[0].bright.pixels} pixels. "
         "EMVA Standard 1288, linear model.</p>"
-        f'<div class="scroll"><table>{rows}</table></div>{notes}'
+        f'<div class="scroll"><table>{table}</table></div>{notes}'
         + figure("", MeasuredNoiseView(measurement=found, name=recording.source.name).figure())
     )
     return document(recording.source.name, body)

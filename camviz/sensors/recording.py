@@ -1,7 +1,8 @@
 """Frames on disk for a photon transfer: a folder of pictures named by exposure, or an EMVA 1288 descriptor file.
 
 In a folder: `bright_<exposure ms>_0.png`, `bright_<exposure ms>_1.png`, `dark_<exposure ms>_0.png` and `…_1.png`, of 8
-or 16 bits, PNG or TIFF; where an exposure has more than two frames of a kind, these are also its stack. The descriptor
+or 16 bits, PNG or TIFF (or of 32 where the values are whole numbers of 16); where an exposure has more than two frames
+of a kind, these are also its stack. The descriptor
 is that of the emva1288 project (github.com/EMVA1288/emva1288): lines `v RELEASE`, `n BITS WIDTH HEIGHT`,
 `b EXPOSURE_NS PHOTONS`, `d EXPOSURE_NS`, each of the last two followed by lines `i FRAME`; two frames are a level's
 pair, more a stack.
@@ -268,7 +269,7 @@ class _Reader:
 
 
 def _grey(path: Path) -> Frame:
-    """A frame (height, width) of 8 or 16 bits."""
+    """A frame (height, width) of 8 or 16 bits, or one of 32 bits whose values are whole numbers of 16."""
     import cv2
 
     try:
@@ -285,9 +286,21 @@ def _grey(path: Path) -> Frame:
             f"{path}: is in colour ({frame.shape[2]} channels); expected grey values straight from the sensor, "
             "of one colour of its filters."
         )
-    if frame.dtype not in (np.uint8, np.uint16):
-        raise RecordingError(f"{path}: has values of type {frame.dtype}; expected 8 or 16 bits.")
-    return frame
+    if frame.dtype in (np.uint8, np.uint16):
+        return frame
+    return _narrowed(path, frame)
+
+
+def _narrowed(path: Path, frame: Frame) -> Frame:
+    """A frame of 32 bits as 16 bits; RecordingError where a value would become another one."""
+    if frame.dtype not in (np.uint32, np.int32, np.float32):
+        raise RecordingError(f"{path}: has values of type {frame.dtype}; expected 8, 16 or 32 bits.")
+    other = ~((frame >= 0) & (frame <= 65535) & (frame == np.floor(frame)))
+    if other.any():
+        raise RecordingError(
+            f"{path}: has the value {frame[other][0]:g}; expected whole numbers from 0 to 65535, as of a sensor."
+        )
+    return frame.astype(np.uint16)
 
 
 def _pair(shot: Shot, reader: _Reader) -> Pair:

@@ -12,6 +12,7 @@ from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.sensors.measurement import LINEAR, Measurement
+from camviz.sensors.trust import Figure
 from camviz.views.base import View
 
 _WIDTH, _HEIGHT = 370, 210
@@ -38,9 +39,9 @@ class MeasuredNoiseView(View):
         return f"{self.name}, {len(self.measurement.levels)} levels of exposure: {known}."
 
     def numbers(self) -> dict[str, str]:
-        """The EMVA figures with their units, as text; "not known" for those that the frames cannot give."""
-        figures = self.measurement.figures()
-        return {words: written(name, figures[name]) for name, (words, _, _) in FIGURES.items()}
+        """The EMVA figures with their units, as text; "not known" and the bounds for those that are withheld."""
+        judged = self.measurement.judged
+        return {words: told(name, judged[name]) for name, (words, _, _) in FIGURES.items()}
 
     def transfer_panel(self, x: float, y: float) -> str:
         """Temporal noise over signal on logarithmic axes: the ½ slope is the photons', its height the gain."""
@@ -69,7 +70,7 @@ class MeasuredNoiseView(View):
         slope = float(np.sum(light[used] * found.signal[used]) / max(np.sum(light[used] ** 2), 1e-30))
         marks = plot.curve(panel, np.array([0, panel.right]), slope * np.array([0, panel.right]), "orange")
         marks += svg.dots(panel.place(np.stack([light, found.signal], axis=-1)), "blue", 4)
-        error = found.linearity[2]
+        error = found.judged["linearity_error"].value
         note = f"off the line by {100 * error:.2g} % on average" if isfinite(error) else ""
         xlabel = "photons per pixel" if lit else "exposure (ms)"
         heading = panel.show(plot.grid(panel) + marks, title="Response", note=note)
@@ -110,6 +111,8 @@ FIGURES: dict[str, tuple[str, float, str]] = {
     "gain_dn_per_e": ("system gain K", 1, "DN/e⁻"),
     "quantum_efficiency": ("quantum efficiency η", 100, "%"),
     "read_noise_e": ("temporal dark noise σ_d", 1, "e⁻"),
+    "threshold_e": ("threshold μ_e.min", 1, "e⁻"),
+    "threshold_photons": ("threshold μ_p.min", 1, "photons"),
     "full_well_e": ("saturation capacity", 1, "e⁻"),
     "snr_max_db": ("largest signal to noise", 1, "dB"),
     "dynamic_range_db": ("dynamic range", 1, "dB"),
@@ -120,12 +123,32 @@ FIGURES: dict[str, tuple[str, float, str]] = {
 """The EMVA figures in the order of a datasheet: their words, and the factor and unit that they are written in."""
 
 
+PARTS: dict[str, tuple[str, float, str]] = {
+    "dsnu_row_e": ("DSNU of rows", 1, "e⁻"),
+    "dsnu_column_e": ("DSNU of columns", 1, "e⁻"),
+    "dsnu_pixel_e": ("DSNU of pixels", 1, "e⁻"),
+    "prnu_row": ("PRNU of rows", 100, "%"),
+    "prnu_column": ("PRNU of columns", 100, "%"),
+    "prnu_pixel": ("PRNU of pixels", 100, "%"),
+}
+"""The row, column and pixel parts of the patterns, which a stack of frames tells."""
+
+
 def written(name: str, value: float) -> str:
     """A figure of that name as a datasheet writes it."""
-    _, factor, unit = FIGURES[name]
+    _, factor, unit = (FIGURES | PARTS)[name]
     if not isfinite(value):
         return "not known"
     return f"{factor * value:.0f} {unit}" if abs(factor * value) >= 10_000 else f"{factor * value:.4g} {unit}"
+
+
+def told(name: str, figure: Figure) -> str:
+    """A figure as a datasheet writes it; where it is withheld, "not known" and between which values it lies."""
+    if isfinite(figure.value) or not figure.bounded:
+        return written(name, figure.value)
+    if figure.low <= 0 and not name.endswith("_db"):
+        return f"not known, at most {written(name, figure.high)}"
+    return f"not known, from {written(name, figure.low)} to {written(name, figure.high)}"
 
 
 def _positive(values: np.ndarray) -> np.ndarray:
