@@ -409,6 +409,13 @@ def all_of_it_scaled(K, s):
     return s * K
 
 
+@RESIZED.wrong(
+    "This is K as it came. K belongs to a picture and its pixels, not to the camera: fewer pixels, another K."
+)
+def unchanged(K, s):
+    return K
+
+
 @RESIZED.wrong("This is the way back: you divide by s. A picture with half as many columns has half the focal length.")
 def divided_by_the_factor(K, s):
     return resized(K, 1 / s)
@@ -511,6 +518,13 @@ def binned_first(K, x0, y0, n):
 )
 def binned_without_the_half_pixel(K, x0, y0, n):
     return np.diag([1 / n, 1 / n, 1]) @ _cropped(K, x0, y0)
+
+
+@CROPPED_THEN_BINNED.wrong(
+    "This is K of the whole sensor. The pictures that are sent have other pixels, and so another K."
+)
+def whole_sensor(K, x0, y0, n):
+    return K
 
 
 @CROPPED_THEN_BINNED.wrong("Only the binning is there: the crop moves the principal point.")

@@ -178,7 +178,7 @@ CHAIN = Exercise(
         "Write down the name of each factor in the product, from left to right. Which two names stand side by side?",
         "Neighbours must cancel, and what is left over must read *cam … board*. To turn a transform round, invert its "
         "matrix and swap its names.",
-        "`return cam_from_world @ ___`",
+        "`cam_from_world = np.linalg.inv(___)`, then `return cam_from_world @ ___`",
     ),
     praise="cam_from_world · world_from_board: the worlds cancel. With names like these the order cannot go wrong.",
 )
@@ -309,12 +309,13 @@ def _rotations_and_others(rng: np.random.Generator) -> list[Array]:
         np.eye(3)[rng.permutation([[2, 0, 1], [1, 2, 0]])[0]],  # axes renamed, without any rounding
         _rotation(rng) @ np.diag([1.0, -1.0, 1.0]),  # a mirror
         stretch * _rotation(rng),
-        (1 + float(rng.uniform(4e-4, 6e-4))) * _rotation(rng),
         _rotation(rng) @ np.diag([stretch, 1 / stretch, 1.0]),  # keeps volumes, not lengths
         _leaning(rng, float(rng.uniform(2e-7, 4e-7))),  # as single precision leaves a rotation
         _leaning(rng, float(rng.uniform(6e-6, 9e-6))),
         _leaning(rng, float(rng.uniform(4e-4, 6e-4))),
+        _leaning(rng, float(rng.uniform(4e-4, 6e-4))).T,  # rows that lean
         _leaning(rng, float(rng.uniform(0.3, 0.6))),
+        _leaning(rng, float(rng.uniform(0.3, 0.6))).T,
     ]
 
 
@@ -404,6 +405,14 @@ def is_not(M):
 )
 def unit_columns(M):
     return bool(np.abs(np.linalg.norm(M, axis=0) - 1).max() < ROUNDING and np.linalg.det(M) > 0)
+
+
+@IS_ROTATION.wrong(
+    "Rows of length 1 and a positive determinant are not enough: a matrix whose rows *lean* towards each other passes. "
+    "They must be perpendicular as well."
+)
+def unit_rows(M):
+    return bool(np.abs(np.linalg.norm(M, axis=1) - 1).max() < ROUNDING and np.linalg.det(M) > 0)
 
 
 @IS_ROTATION.wrong(
