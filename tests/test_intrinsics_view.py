@@ -1,5 +1,7 @@
 """The intrinsics visualizer shows true numbers, true pictures, and what no K can reveal."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -134,6 +136,30 @@ def test_aspect_and_focal_length_in_millimetres_are_read_from_fx_fy_and_pitch_an
     assert view.but(focal_mm=5.4).fy == pytest.approx(1350)
     wider = view.but(pitch_um=12.0)
     assert (wider.fx, wider.focal_mm) == (450, 5.4)
+
+
+def test_the_matrices_in_the_picture_are_k_and_a_thousand_times_its_inverse():
+    """By hand: K⁻¹ = [[1/fx, -s/(fx fy), (s cy - fy cx)/(fx fy)], [0, 1/fy, -cy/fy], [0, 0, 1]]."""
+    fx, fy, s, cx, cy = 450.0, 400.0, 40.0, 319.5, 239.5
+    inverse = [[1 / fx, -s / (fx * fy), (s * cy - fy * cx) / (fx * fy)], [0, 1 / fy, -cy / fy], [0, 0, 1]]
+    drawn = IntrinsicsView(fx=fx, fy=fy, skew=s, cx=cx, cy=cy).figure(draft=True).svg()
+    numbers = re.findall(r'<text[^>]*class="number end[^"]*"[^>]*>([^<]*)</text>', drawn)
+    values = np.array([float(number.replace("−", "-")) for number in numbers])
+    np.testing.assert_allclose(values[:9], [fx, s, cx, 0, fy, cy, 0, 0, 1], atol=0.005)
+    np.testing.assert_allclose(values[9:], 1000 * np.ravel(inverse), atol=0.0051)
+
+
+def test_a_focal_length_in_pixels_changes_fx_and_fy_together():
+    view = IntrinsicsView(fx=500, fy=400).but(focal_px=1000.0)
+    assert (view.fx, view.fy) == (1000, 800)
+    assert IntrinsicsView(dolly_zoom=True).but(focal_px=900.0).distance == pytest.approx(6)
+
+
+def test_without_millimetres_no_reading_knows_them():
+    view = IntrinsicsView(millimetres=False)
+    assert not re.search(r"[mµ]m\b", view.description())
+    assert not re.search(r"[mµ]m\b", view.figure(draft=True).svg())
+    assert re.search(r"\bmm\b", IntrinsicsView().description())
 
 
 def test_the_axes_lean_by_the_arctangent_of_skew_over_fx():

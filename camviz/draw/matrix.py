@@ -10,7 +10,7 @@ _STEP, _ROW = 66, 26
 def matrix(x: float, y: float, title: str, values: np.ndarray, changed: np.ndarray | None = None) -> str:
     """A matrix (m, n) to two decimals, its first row's middle at `y`; entries that are `changed` (m, n) stand out.
 
-    Zeros below the diagonal, and the last number, are what every such matrix has: they are written short and faintly.
+    What lies below the diagonal, and the last number, say nothing new of a camera: they are written short and faintly.
     """
     rows, columns = values.shape
     changed = np.zeros(values.shape, dtype=bool) if changed is None else changed
@@ -28,7 +28,11 @@ def matrix(x: float, y: float, title: str, values: np.ndarray, changed: np.ndarr
 def _entry(x: float, y: float, row: int, column: int, values: np.ndarray, changed: bool) -> str:
     right, base = x + _STEP * (column + 1), y + _ROW * row + 10
     if row > column or (row, column) == (values.shape[0] - 1, values.shape[1] - 1):
-        return svg.text((right, base), "1" if row == column else "0", "number end half")
+        return svg.text((right, base), _signed(f"{values[row, column] + 0.0:g}"), "number end half")
     back = svg.rectangle(right - 58, base - 16, 62, 23, "wash fill-orange", rx=3) if changed else ""
-    words = f"{values[row, column] + 0.0:.2f}".replace("-", "−")
+    words = _signed(f"{values[row, column] + 0.0:.2f}")
     return back + svg.text((right, base), words, "number end orange" if changed else "number end")
+
+
+def _signed(number: str) -> str:
+    return number.replace("-", "−")

@@ -91,7 +91,7 @@ class FrustumView(View):
 
     @property
     def _pivot(self) -> Array:
-        """The point that stays at (x, y, z) before the camera: the world's origin, for t is where the camera has it."""
+        """The point that stays at (x, y, z) in the camera's frame: the world's origin, whose place there is t."""
         return np.array(SUBJECT if self.mode == "orbit" else (0.0, 0.0, 0.0))
 
     def _zoomed(self) -> Intrinsics:
@@ -206,7 +206,7 @@ class FrustumView(View):
         pixel = f"{_row(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
         rows = [
             ("X, first corner of the board [m]", _row(point)),
-            ("R X + t, before the camera [m]", _row(transform(self.camera.cam_from_world, point))),
+            ("R X + t, in the camera's frame [m]", _row(transform(self.camera.cam_from_world, point))),
             ("through lens and K", pixel),
         ]
         return "".join(

@@ -31,8 +31,9 @@ _LEAN_DRAWN = 3  # times
 class IntrinsicsView(View):
     """Nine numbers, the picture they make of the garden and the rays they choose.
 
-    The camera looks along z, `distance` metres from the globe. `focal_mm` and `aspect` are no state of their own: they
-    are read from fx, fy and the pixel pitch, and setting them with `but` sets fx and fy.
+    The camera looks along z, `distance` metres in front of the globe. `focal_px`, `focal_mm` and `aspect` are no state
+    of their own: they are read from fx, fy and the pixel pitch, and setting them with `but` sets fx and fy. Without
+    `millimetres` the readings leave out what K alone cannot know.
     """
 
     title: ClassVar[str] = "Intrinsics"
@@ -51,6 +52,7 @@ class IntrinsicsView(View):
     pitch_um: float = slider(6.0, 1.0, 12.0, 0.1, label="pixel width", unit="µm", help="K does not know it")
     width: int = 640
     height: int = 480
+    millimetres: bool = True
     eye: Eye = Eye(distance=20.5, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
 
     @classmethod
@@ -61,10 +63,16 @@ class IntrinsicsView(View):
 
     @classmethod
     def controls(cls) -> dict[str, Control]:
-        """The fields' controls, and those of the two readings that can be set."""
+        """The fields' controls, and those of the three readings that can be set."""
+        zoom = Control("focal length", "px", _FOCAL["low"], _FOCAL["high"], 1.0, help="fx and fy together")
         lens = Control("focal length", "mm", 0.9, 12.0, 0.01, help="the lens: fx and fy together")
         shape = Control("pixel aspect", "", 0.5, 2.0, 0.01, help="width of a pixel / its height = fy / fx")
-        return {**super().controls(), "focal_mm": lens, "aspect": shape}
+        return {**super().controls(), "focal_px": zoom, "focal_mm": lens, "aspect": shape}
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length in widths of a pixel, by which one zooms."""
+        return self.fx
 
     @property
     def focal_mm(self) -> float:
@@ -77,11 +85,11 @@ class IntrinsicsView(View):
         return self.fy / self.fx
 
     def but(self, **changes: Any) -> Self:
-        """The same view with some fields changed; `focal_mm` and `aspect` change fx and fy, the lock the rest."""
+        """The same view with some fields changed; a focal length and `aspect` change fx and fy, the lock the rest."""
         controls = self.controls()
-        for name in changes.keys() & {"focal_mm", "aspect"}:
+        for name in changes.keys() & {"focal_px", "focal_mm", "aspect"}:
             controls[name].checked(name, changes[name])
-        zoom = changes.pop("focal_mm", self.focal_mm) / self.focal_mm
+        zoom = changes.pop("focal_mm", self.focal_mm) / self.focal_mm * changes.pop("focal_px", self.fx) / self.fx
         aspect = changes.pop("aspect", None)
         changes = {"fx": zoom * self.fx, "fy": zoom * self.fy, **changes} if zoom != 1 else changes
         if aspect is not None:
@@ -154,9 +162,10 @@ class IntrinsicsView(View):
         """The state's key figures, as text."""
         across, down = self.field_of_view_deg()
         pitch = self.pitch_um * self.taken.fx / self.intrinsics.fx
+        lens = {"focal length": f"{self.focal_mm:.2f} mm, if a pixel is {pitch:.3g} µm wide"}
         return {
             "field of view": f"{across:.1f}° × {down:.1f}°",
-            "focal length": f"{self.focal_mm:.2f} mm, if a pixel is {pitch:.3g} µm wide",
+            **(lens if self.millimetres else {}),
             "pixel width / height": f"{self.aspect:.3f}, axes at {self.axes_angle_deg():.1f}°",
             "camera to globe": f"{self.distance:.2f} m; there, 1 m is {self.intrinsics.fx / self.distance:.0f} px",
             "red balloon": f"{100 * self.in_sight():.0f} % in sight",

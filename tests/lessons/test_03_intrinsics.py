@@ -1,0 +1,383 @@
+"""What lesson 03 says about intrinsics, recomputed with NumPy and OpenCV."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camviz.scenes.balloon import BALLOON, balloon_in_sight, towards_balloon
+from camviz.scenes.standard import textured_scene
+from camviz.views.intrinsics import GLOBE, GLOBE_RADIUS, IntrinsicsView
+
+EXCEPTIONS: dict[str, str] = {}
+
+KITTI = {"fx": 984.2439, "fy": 980.8141, "cx": 690.0, "cy": 233.1966, "width": 1392, "height": 512}
+"""K_00 and S_00 of calib_cam_to_cam.txt, 2011_09_26."""
+
+
+def matrix(fx=450.0, fy=450.0, cx=319.5, cy=239.5, skew=0.0):
+    return np.array([[fx, skew, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def pixels(points, K):
+    """By cv2.projectPoints, from the camera's own frame; it knows no skew."""
+    return cv2.projectPoints(np.atleast_2d(points), np.zeros(3), np.zeros(3), K, None)[0].reshape(-1, 2)
+
+
+def sensor_at(f, s):
+    """v of the thin lens, from 1/f = 1/s + 1/v."""
+    return 1 / (1 / f - 1 / s)
+
+
+def resized(c, s):
+    """Edges stay: the distance from -0.5 scales."""
+    return s * (c + 0.5) - 0.5
+
+
+# The balloon and the dolly zoom --------------------------------------------------------------------------------------
+
+
+def test_a_globe_at_three_metres_a_wall_behind_it_and_a_balloon_behind_the_wall(says):
+    says("A globe is three metres in front of it, a brick wall stands farther back, and a red balloon hangs behind")
+    view = IntrinsicsView()
+    camera = view.camera.centre
+    (wall,) = {tuple(towards_balloon(camera))}
+    assert GLOBE[2] - camera[2] == pytest.approx(3)
+    assert GLOBE[2] < wall[2] < BALLOON[2]
+    says("the red line of sight ends at the wall")
+
+
+def test_no_lens_shows_the_balloon_and_the_ring_lies_on_bricks(says):
+    (share,) = says(
+        "Wide or narrow, left or right: wherever the ring is in the picture, it lies on bricks, and red balloon "
+        "stays at 0 % in sight."
+    )  # fmt: skip
+    says("zooming does not move the camera")
+    controls = IntrinsicsView.controls()
+    for name in ("focal_px", "cx"):
+        for value in np.linspace(controls[name].low, controls[name].high, 7):
+            view = IntrinsicsView().but(**{name: float(value)})
+            assert share == 100 * view.in_sight()
+            assert (view.camera.centre == IntrinsicsView().camera.centre).all()
+    assert np.isfinite(towards_balloon(IntrinsicsView().camera.centre)).all()
+
+
+def test_the_lock_keeps_the_globe_and_lets_what_is_behind_it_grow(says):
+    wide, near, far = says(
+        "The lock moves the camera so that the globe keeps its 81 pixels while the focal length changes. "
+        "Pull distance slowly from 3 m to 12 m."
+    )
+    (slow, quick) = says("run it slowly from 3 m to 12 m")
+    assert (slow.value, quick.value) == (near.value, far.value)
+    says("the globe keeps its size and everything behind it grows")
+    behind, added = says("For the cat on the wall, 3.17 m behind it, the depth is Z + 3.17:")
+    (cat,) = [surface for surface in textured_scene().surfaces if surface.name == "picture"]
+    assert behind == cat.corner[2] - GLOBE[2]
+    assert added == behind.value
+    sizes = {}
+    for distance in (near.value, far.value):
+        f = 450 * distance / near.value
+        globe, behind_it = (
+            np.array([[-GLOBE_RADIUS, 0, distance], [GLOBE_RADIUS, 0, distance]]),
+            distance + behind.value,
+        )
+        left, right = pixels(globe, matrix(f, f))
+        assert wide == right[0] - left[0]
+        left, right = pixels([[-0.6, 0, behind_it], [0.75, 0, behind_it]], matrix(f, f))
+        sizes[distance] = right[0] - left[0]
+    assert sizes[far.value] > sizes[near.value]
+
+
+def test_the_balloon_comes_out_at_the_same_distance_whatever_the_lens(says):
+    says("that it does so at the same distance with the lock on or off")
+    for distance in (3.0, 6.0, 12.0):
+        locked = IntrinsicsView(dolly_zoom=True).but(distance=distance)
+        free = IntrinsicsView().but(distance=distance)
+        assert locked.fx == pytest.approx(150 * distance)
+        assert free.fx == 450
+        assert locked.in_sight() == free.in_sight() == balloon_in_sight(np.array([0, 0, GLOBE[2] - distance]))
+    assert locked.in_sight() == 1
+
+
+def test_the_middle_of_a_wide_picture_is_the_long_lens_s(says):
+    says("Cut the middle out of a wide picture and enlarge it: it has the perspective of the long lens's picture")
+    points = np.random.default_rng(1).uniform((-0.1, -0.1, 2), (0.1, 0.1, 9), (50, 3))
+    wide, long = pixels(points, matrix(450, 450)), pixels(points, matrix(1800, 1800))
+    centre = np.array([319.5, 239.5])
+    np.testing.assert_allclose(long - centre, 4 * (wide - centre), atol=1e-9)
+
+
+# The nine numbers ----------------------------------------------------------------------------------------------------
+
+
+def test_four_entries_are_fixed_and_a_fifth_is_nearly_always_zero(says):
+    says("of which four are always 0, 0, 0 and 1")
+    K = IntrinsicsView(fx=500, fy=400, cx=300, cy=200, skew=30).taken.K
+    assert K[[1, 2, 2, 2], [0, 0, 1, 2]].tolist() == [0, 0, 0, 1]
+    says("reads four entries of K and never looks at the skew")
+    point, K = [[0.3, 0.2, 2.0]], matrix(500, 400, 300, 200)
+    for row, column in ((0, 0), (1, 1), (0, 2), (1, 2)):
+        changed = K.copy()
+        changed[row, column] += 10
+        assert np.abs(pixels(point, changed) - pixels(point, K)).max() > 0.5
+    np.testing.assert_array_equal(pixels(point, matrix(500, 400, 300, 200, 30)), pixels(point, K))
+
+
+def test_cx_shifts_and_fx_stretches_sideways_only(says):
+    says("cx and cy shift the picture")
+    says("fx stretches the picture sideways only")
+    points = np.random.default_rng(2).uniform((-1, -1, 1), (1, 1, 5), (20, 3))
+    before = pixels(points, matrix())
+    np.testing.assert_allclose(pixels(points, matrix(cx=300, cy=200)) - before, np.tile([-19.5, -39.5], (20, 1)))
+    stretched = pixels(points, matrix(fx=900))
+    np.testing.assert_allclose(stretched - [319.5, 0], (before - [319.5, 0]) * [2, 1])
+
+
+def test_skew_moves_a_pixel_in_proportion_to_its_row_and_leans_by_its_arctangent(says):
+    says("moves every pixel sideways in proportion to its row: uprights lean, levels stay level")
+    K, upright = matrix(600, 600, skew=3), np.array([[0.2, y, 1.0] for y in (-0.2, 0, 0.4)])
+    moved = (upright @ K.T)[:, :2] - (upright @ matrix(600, 600).T)[:, :2]
+    np.testing.assert_allclose(moved[:, 0], 3 * upright[:, 1])
+    np.testing.assert_array_equal(moved[:, 1], 0)
+    says("rows and columns that are not perpendicular, by atan(s/fx)")
+    fx, s, lean = says("With fx = 600 px, s = 3 px would already be a lean of 0.29°")
+    along_row, along_column = np.linalg.inv(matrix(fx.value, 500, skew=s.value))[:, :2].T
+    cosine = along_row @ along_column / np.linalg.norm(along_row) / np.linalg.norm(along_column)
+    assert lean == np.degrees(np.arccos(cosine)) - 90
+
+
+def test_pixel_width_over_height_is_fy_over_fx(says):
+    fx, fy = says("fx = 800 and fy = 1000, one lens. What shape are the pixels?")
+    (wide,) = says("Wider than high: width / height = 1.25.")
+    (high,) = says("Higher than wide: width / height = 0.8.")
+    f_mm = 5.0
+    assert wide == (f_mm / fx.value) / (f_mm / fy.value)
+    assert high == fx.value / fy.value
+    *_, aspect = cv2.calibrationMatrixValues(matrix(fx.value, fy.value), (640, 480), 1.0, 1.0)
+    assert aspect == fy.value / fx.value
+
+
+def test_the_focal_length_in_pixels_takes_a_pixel_s_width_to_be_millimetres(says):
+    (f,) = says("A calibration says fx = fy = 1000.")
+    (not_mm,) = says("1000 mm.")
+    assert not_mm.value == f.value
+    pitch, mm, small, less = says("With pixels of 5 µm this is 5 mm, with pixels of 2 µm it is 2 mm")
+    again, same = says("One needs the pixel size for that; with 5 µm it is 5 mm.")
+    assert mm == f.value * pitch.value / 1000
+    assert less == f.value * small.value / 1000
+    assert same == f.value * again.value / 1000
+
+
+def test_k_holds_the_place_of_the_sensor_at_the_focus_setting(says):
+    says("K holds the distance from lens to sensor, in pixels, for the focus setting at which it was calibrated")
+    f, v = says("a thin 50 mm lens focused at one metre has its sensor 52.6 mm behind it")
+    assert v == sensor_at(f.value, 1000)
+    per_cent, f = says("f in pixels grows: by 5 % for a thin 50 mm lens focused at one metre")
+    assert per_cent == 100 * (sensor_at(f.value, 1000) / f.value - 1)
+    says("Only when it is focused at infinity.")
+    assert sensor_at(50, 1e12) == pytest.approx(50)
+    assert sensor_at(50, 2000) > 50
+
+
+def test_the_field_of_view_of_a_centred_camera_and_the_half_pixel_at_its_edges(says):
+    (two,) = says(
+        "With the principal point in the middle it is 2 atan(width / 2f). Otherwise it is the sum of two unequal angles"
+    )
+    (again,) = says("This is 2 atan(width / 2f), which holds when the principal point is in the middle.")
+    low, high = says("With centres at integers the edges lie at −0.5 and width − 0.5.")
+    (begins,) = says("the picture begins at −0.5, half a pixel before column 0")
+    assert low.value == begins.value == -0.5
+    assert high.value == 0.5
+    for cx, centred in ((319.5, True), (250.0, False)):
+        edges = np.linalg.inv(matrix(500, 500, cx)) @ [[low.value, 640 - high.value], [239.5, 239.5], [1, 1]]
+        (a, b), lengths = edges.T, np.linalg.norm(edges, axis=0)
+        angle = np.arccos(a @ b / lengths.prod())
+        assert (angle == pytest.approx(two.value * np.arctan(640 / (2 * 500)))) == centred
+        from_corner = matrix(500, 500, cx + 0.5, 240)
+        assert np.degrees(angle) == pytest.approx(cv2.calibrationMatrixValues(from_corner, (640, 480), 1, 1)[0])
+    assert again.value == two.value
+
+
+# What is done to the picture -----------------------------------------------------------------------------------------
+
+
+def test_a_crop_renumbers_pixels_and_leaves_rays(says):
+    width, height, whole, high, column, row = says(
+        "You cut a window of 320 × 240 pixels out of a photograph of 640 × 480, beginning at column 256 and row 96."
+    )
+    photo = np.arange(whole.value * high.value).reshape(int(high.value), int(whole.value))
+    x0, y0 = int(column.value), int(row.value)
+    window = photo[y0 : y0 + int(height.value), x0 : x0 + int(width.value)]
+    assert window.shape == (height.value, width.value)
+    old, new = says("The ray that arrived at column 300 arrives at column 44 now.")
+    assert new == np.flatnonzero(window[0] == photo[y0, int(old.value)])[0]
+    (farther,) = says("you would believe that every ray came from 256 columns farther left")
+    assert farther == old.value - new.value
+    right, down = says("Only the principal point moves: cx − 256 and cy − 96.")
+    assert right.value == column.value
+    assert down.value == row.value
+    says("f stays, the width is halved")
+    assert width.value == whole.value / 2
+
+
+def test_resizing_keeps_edges_and_moves_centres(says):
+    width, cx, half = says("A picture 640 pixels wide, with cx = 319.5 in its very middle, is resized to 320 pixels.")
+    assert cx == np.arange(width.value).mean()
+    middle = np.arange(half.value).mean()
+    (answer,) = says("159.5.")
+    assert answer == middle == resized(cx.value, half.value / width.value)
+    wrong, of = says("159.75, half of 319.5.")
+    assert wrong == of.value / 2
+    count, last, at = says("But the middle of 320 pixels, numbered 0 … 319, is 159.5.")
+    assert last == np.arange(count.value)[-1]
+    assert at == middle
+    edge, s, from_edge, back, same = says("at −0.5. So c + ½ scales, and c′ = s (c + ½) − ½ = 0.5 · 320 − 0.5 = 159.5.")
+    assert edge == resized(-0.5, s.value)
+    assert from_edge == cx.value + 0.5
+    assert back == -edge.value
+    assert same == s.value * from_edge.value - back.value
+    says("A quarter of a pixel sounds little")
+    assert wrong.value - answer.value == 0.25
+    (corner,) = says("160.")
+    (before,) = says("Counted so, cx was 320 before. With centres at integers both numbers are half a pixel less.")
+    assert corner == answer.value + 0.5
+    assert before == cx.value + 0.5
+
+
+def test_what_the_exercise_about_resizing_says_of_a_row_of_640(says):
+    width, middle, wrong, half, right = says(
+        "The middle of a 640-pixel row, 319.5, becomes 159.75 when halved, but the middle of 320 pixels is 159.5"
+    )
+    assert middle == np.arange(width.value).mean()
+    assert wrong == middle.value / 2
+    assert half == width.value / 2
+    assert right == np.arange(half.value).mean()
+    cx, halved = says("Halving a picture with cx = 319.5 gives 159.5, as it must.")
+    assert halved == resized(cx.value, 0.5)
+    stays, to = says("Resizing keeps the image's edges where they are: −0.5 must go to −0.5.")
+    assert to == resized(stays.value, 0.37)
+
+
+def test_binning_is_resizing(says):
+    n, s = says("Notice that binned by 4 and resized by 0.25 leave the same K.")
+    first_block = np.arange(n.value).mean()  # the middle of the first n pixels becomes pixel 0
+    assert resized(first_block, s.value) == pytest.approx(0)
+    assert s == 1 / n.value
+    low, high = says("With pixel centres at integers (the picture spans −0.5 … width − 0.5):")
+    assert low == resized(low.value, s.value)
+    assert resized(640 - high.value, s.value) == 160 - high.value
+
+
+def test_cv2_resize_follows_the_half_pixel_rule(says):
+    says("the last one is shifted by a quarter of a pixel in both directions")
+    s, ramp = 0.5, np.tile(np.arange(16, dtype=np.float32), (16, 1))
+    small = cv2.resize(ramp, (8, 8), interpolation=cv2.INTER_LINEAR)
+    columns = np.arange(8)
+    np.testing.assert_allclose(resized(small[0], s), columns, atol=1e-6)  # value = column of the large picture
+    np.testing.assert_allclose(s * small[0] - columns, 0.25, atol=1e-6)
+
+
+def test_other_programs_count_from_the_corner_or_from_one(says):
+    column, row = says("| COLMAP, nerfstudio | (0.5, 0.5) | subtract ½ from cx and cy |")
+    assert column.value == row.value == 0.5  # half a pixel from the corner of the first pixel to its centre
+    (theirs,) = says("COLMAP says cx = 320.0 for a picture.")
+    (ours,) = says("319.5.")
+    (not_converted,) = says("320.0: a principal point is a principal point.")
+    (added,) = says("320.5.")
+    (centre,) = says("COLMAP puts the centre of the first pixel at 0.5, OpenCV at 0: subtract one half.")
+    (again,) = says("COLMAP calls it 0.5, OpenCV 0.")
+    assert ours == theirs.value - centre.value
+    assert not_converted.value == theirs.value
+    assert added == theirs.value + again.value
+
+
+def test_the_teacher_s_four_squares(says):
+    third, fourth, middle, merged = says(
+        "Draw four squares in a row, number their centres 0 1 2 3, and ask where the middle is (1.5). "
+        "Merge them two by two: centres 0 and 1, middle 0.5."
+    )
+    assert (third.value, fourth.value) == (2, 3)
+    assert middle == np.arange(4).mean()
+    assert merged == np.arange(2).mean()
+    start, end, edge, stays = says("ask for the rule that takes 1.5 to 0.5 and the left edge −0.5 to −0.5")
+    assert end == resized(start.value, 0.5)
+    assert stays == resized(edge.value, 0.5)
+
+
+def test_the_shape_of_any_number_of_pixels(says):
+    (two,) = says("For pixels of any shape (..., 2) and any K, skew included.")
+    rows, columns = says("Write each as a 3×3 matrix: what is done first stands nearest to K.")
+    assert two.value == len(["u", "v"])
+    assert (rows.value, columns.value) == matrix().shape
+
+
+# Published cameras ---------------------------------------------------------------------------------------------------
+
+
+def test_opencv_s_left_camera(says, samples):
+    file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
+    K = file.getNode("camera_matrix").mat()
+    (view,) = says("K alone gives the field of view, 62°, and no lens.")
+    from_corner = K + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+    assert view == cv2.calibrationMatrixValues(from_corner, (640, 480), 1, 1)[0]
+    third, wide, mm, on_sale = says(
+        'If this is a "1/3 inch" sensor, 4.8 mm wide, the lens is a 4.02 mm one, and 4 mm is'
+    )
+    assert 18 / third.value == pytest.approx(
+        np.hypot(wide.value, 0.75 * wide.value)
+    )  # an "inch" of a small sensor: 18 mm
+    assert mm == K[0, 0] * wide.value / 640
+    assert on_sale == mm.value
+    (pitch,) = says("Turn pixel width to 7.5 µm and look.")
+    assert pitch == 1000 * wide.value / 640
+    off, off_mm = says("Its principal point is 23 pixels off the middle, which would be 0.17 mm on that sensor.")
+    distance = np.hypot(K[0, 2] - 319.5, K[1, 2] - 239.5)
+    assert off == distance
+    assert off_mm == distance * pitch.value / 1000
+
+
+def test_a_small_turn_moves_the_picture_as_cx_does(says):
+    says("a small turn of the camera moves the picture in nearly the same way")
+    K = matrix(536, 536)
+    board = np.array([[x, y, 1.0] for x in np.linspace(-0.2, 0.2, 9) for y in np.linspace(-0.15, 0.15, 6)])
+    turn = cv2.Rodrigues(np.array([0, -23 / 536, 0]))[0]
+    moved = pixels(board @ turn.T, K) - pixels(board, K)
+    shift = moved.mean(axis=0)
+    assert abs(shift[0]) > 20
+    assert np.abs(moved - shift).max() < 0.1 * abs(shift[0])
+
+
+def test_kitti_s_lens_is_longer_than_its_label_and_focus_does_not_explain_it(says):
+    pitch, label = says("a … (square pixels, 4.65 µm apart), and a 4 mm lens")
+    k, paper = says("K says 4.58 mm, the paper says 4 mm.")
+    f_mm = KITTI["fx"] * pitch.value / 1000
+    assert k == f_mm
+    assert paper.value == label.value
+    thin, v, subject = says(
+        "a thin 4 mm lens has its sensor at 4.58 mm only when it is focused on something 32 mm away"
+    )
+    assert subject == 1 / (1 / thin.value - 1 / f_mm)
+    assert v == sensor_at(thin.value, 1 / (1 / thin.value - 1 / f_mm))
+    low, high = says("lists varifocal lenses, 4–8 mm")
+    assert low.value < f_mm < high.value
+    assert f_mm - label.value > 0.5  # more than rounding to a millimetre does
+    f, again, rectified = says("Their fx = fy = 721.5377. Times 4.65 µm that is 3.36 mm")
+    assert rectified == f.value * again.value / 1000
+    says("no lens on the car goes down to that")
+    assert rectified.value < low.value
+
+
+def test_kitti_s_pixels_and_principal_point(says):
+    (per_cent,) = says("KITTI's fx and fy differ by 0.35 %")
+    assert per_cent == 100 * (KITTI["fx"] / KITTI["fy"] - 1)
+    above, rows = says(
+        "KITTI's cy is 22 rows above the middle of these pictures, but these 512 rows were cut from a taller"
+    )
+    assert above == (rows.value - 1) / 2 - KITTI["cy"]
+    assert rows.value == KITTI["height"]
+
+
+def test_a_frame_of_film(says):
+    width, height, diagonal = says("The frame is 36 × 24 mm, 43.27 mm across the diagonal.")
+    assert diagonal == np.hypot(width.value, height.value)
+    says("good to some per cent")
+    assert np.isclose(0.5 / 26, 0.02, atol=0.001)  # EXIF keeps whole millimetres
