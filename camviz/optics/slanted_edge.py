@@ -163,7 +163,7 @@ class SlantedEdge:
         frequency = np.fft.rfftfreq(PADDED, 1 / OVERSAMPLING)
         kept = frequency <= 1
         dimmed = np.sinc(frequency[kept] / OVERSAMPLING) ** 2
-        return frequency[kept], np.asarray(spectrum[kept] / spectrum[0] / dimmed, dtype=np.float64)
+        return frequency[kept].astype(np.float64), (spectrum[kept] / spectrum[0] / dimmed).astype(np.float64)
 
     def mtf(self, frequency: ArrayLike) -> Array:
         """The MTF at these frequencies (...), cycles per pixel, 0 to 1."""
