@@ -63,7 +63,7 @@ class SlantedEdge:
                 f"the edge leans by {abs(self.angle_deg):.1f}°: expected {LEAST_ANGLE_DEG:g}° to {MOST_ANGLE_DEG:g}° "
                 "against the pixels' columns or rows (about 5° is best)"
             )
-        if abs(self._line[0]) * (rows - 1) < 1:
+        if abs(self.line[0]) * (rows - 1) < 1:
             raise ValueError(
                 f"the edge crosses less than one pixel within {rows} rows: take more of it, or lean it more"
             )
@@ -84,7 +84,7 @@ class SlantedEdge:
         return float(np.median(np.abs(steps)) * 1.4826 / np.sqrt(2))
 
     @cached_property
-    def _line(self) -> tuple[float, float]:
+    def line(self) -> tuple[float, float]:
         """Slope and intercept of the edge, u = slope · v + intercept, from where each row has its centre of change."""
         rows, columns = self.image.shape
         change = np.gradient(self.image, axis=1)
@@ -107,14 +107,14 @@ class SlantedEdge:
     @cached_property
     def angle_deg(self) -> float:
         """How far the edge leans against the columns, degrees."""
-        return float(np.degrees(np.arctan(self._line[0])))
+        return float(np.degrees(np.arctan(self.line[0])))
 
     # Across the edge -------------------------------------------------------------------------------------------------
 
     @cached_property
     def distance(self) -> Array:
         """How far each pixel's centre (height, width) is from the edge, in pixels along its normal."""
-        slope, intercept = self._line
+        slope, intercept = self.line
         v, u = np.indices(self.image.shape)
         return np.asarray((u - slope * v - intercept) * np.cos(np.arctan(slope)))
 
