@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 
 import camviz
-from camviz.commands import board, calibrate, convert, doctor, inspect, lab, noise, reproject, show, teacher
+from camviz.commands import board, calibrate, convert, doctor, inspect, lab, mtf, noise, reproject, show, teacher
 from camviz.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, say
 
 DESCRIPTION = """\
@@ -29,6 +29,7 @@ examples:
   camviz reproject earth.jpg -o front.png --from equirectangular --to cube:front
                                              take a picture through another lens
   camviz noise shots/                        measure a sensor from its frames: gain, noise, patterns, dark current
+  camviz mtf photo.png --roi 300,200,80,120  measure sharpness from a slanted edge
   camviz teacher for-me                      write the lessons with solutions and timings into ./for-me
 
 exit status:
@@ -66,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
     )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
     commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    for subcommand in (lab, doctor, board, calibrate, inspect, show, convert, reproject, noise, teacher):
+    for subcommand in (lab, doctor, board, calibrate, inspect, show, convert, reproject, noise, mtf, teacher):
         subcommand.add(commands)
     return everything
 

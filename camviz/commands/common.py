@@ -13,6 +13,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from camviz.files.calibration import Board, Calibration
 
 OK, LACKING, REFUSED, INTERRUPTED = 0, 1, 2, 130
@@ -87,6 +89,31 @@ def refuse_output(output: Path, what: str, *sources: Path) -> None:
     for source in sources:
         if output.exists() and source.exists() and output.samefile(source):
             raise Refusal(f"{output}: this would overwrite {source}; choose another name with -o.")
+
+
+def read_picture(path: Path) -> np.ndarray:
+    """The picture as it is in the file: grey, BGR or BGRA."""
+    import cv2
+    import numpy as np
+
+    from camviz.reprojection import LONGEST
+
+    if not path.is_file():
+        raise Refusal(f"{path}: there is no such picture." if not path.exists() else f"{path}: this is not a file.")
+    data = np.frombuffer(path.read_bytes(), np.uint8)
+    log = cv2.utils.logging
+    level = log.setLogLevel(log.LOG_LEVEL_SILENT)  # what is wrong with a picture is said here, once
+    try:
+        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    except cv2.error:
+        picture = None
+    finally:
+        log.setLogLevel(level)
+    if picture is None:
+        raise Refusal(f"{path}: expected a picture (PNG, JPEG, TIFF, WebP …), this cannot be read as one.")
+    if max(picture.shape[:2]) > LONGEST:
+        raise Refusal(f"{path}: expected at most {LONGEST} pixels a side, got {picture.shape[1]} × {picture.shape[0]}.")
+    return np.asarray(picture)
 
 
 def numbers(text: str) -> tuple[int, int]:

@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camviz.commands.common import OK, Refusal, add_command, loaded, refuse_output, size, write_whole
+from camviz.commands.common import OK, Refusal, add_command, loaded, read_picture, refuse_output, size, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -85,7 +85,7 @@ def reproject(options: argparse.Namespace) -> int:
 
     refuse_output(options.output, "picture", options.file)
     _require_writer(options.output)
-    picture = _read(options.file)
+    picture = read_picture(options.file)
     source = _source(options, picture.shape[1], picture.shape[0])
     target = _target(options, source)
     target = target.at(turned(options.yaw, options.pitch, options.roll) * target.world_from_cam)
@@ -191,31 +191,6 @@ def _calibrated(model: str, name: str | None, option: str, size: tuple[int, int]
 
 
 # Pictures ------------------------------------------------------------------------------------------------------------
-
-
-def _read(path: Path) -> np.ndarray:
-    """The picture as it is in the file: grey, BGR or BGRA."""
-    import cv2
-    import numpy as np
-
-    from camviz.reprojection import LONGEST
-
-    if not path.is_file():
-        raise Refusal(f"{path}: there is no such picture." if not path.exists() else f"{path}: this is not a file.")
-    data = np.frombuffer(path.read_bytes(), np.uint8)
-    log = cv2.utils.logging
-    level = log.setLogLevel(log.LOG_LEVEL_SILENT)  # what is wrong with a picture is said here, once
-    try:
-        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-    except cv2.error:
-        picture = None
-    finally:
-        log.setLogLevel(level)
-    if picture is None:
-        raise Refusal(f"{path}: expected a picture (PNG, JPEG, TIFF, WebP …), this cannot be read as one.")
-    if max(picture.shape[:2]) > LONGEST:
-        raise Refusal(f"{path}: expected at most {LONGEST} pixels a side, got {picture.shape[1]} × {picture.shape[0]}.")
-    return np.asarray(picture)
 
 
 def _finished(seen: np.ndarray, picture: np.ndarray, output: Path) -> np.ndarray:

@@ -18,6 +18,7 @@ from camviz.optics.pinhole import (
     pinhole_spread,
     sunny_exposure,
 )
+from camviz.optics.slanted_edge import SlantedEdge
 from camviz.optics.thin_lens import (
     airy_radius_um,
     circle_of_confusion_mm,
@@ -40,6 +41,7 @@ __all__ = [
     "TELEPHOTO",
     "YOUNG",
     "Prescription",
+    "SlantedEdge",
     "airy_radius_um",
     "best_hole_mm",
     "circle_of_confusion_mm",

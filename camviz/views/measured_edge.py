@@ -1,0 +1,92 @@
+"""What one slanted edge says of a camera's sharpness, drawn: the edge, its profile, and its MTF."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import ClassVar
+
+import numpy as np
+
+from camviz.draw import panel as panels
+from camviz.draw import plot, svg
+from camviz.draw.picture import Picture, jpeg
+from camviz.optics import SlantedEdge
+from camviz.scenes import to_display
+from camviz.views.base import View
+
+_WORDS = {
+    "mtf50_cycles_per_pixel": ("MTF50", "{:.3f} cycles/pixel"),
+    "mtf10_cycles_per_pixel": ("MTF10", "{:.3f} cycles/pixel"),
+    "mtf_at_quarter_cycle": ("MTF at 0.25 cycles/pixel", "{:.3f}"),
+    "mtf_at_half_cycle": ("MTF at 0.5 cycles/pixel", "{:.3f}"),
+    "rise_10_90_pixels": ("rise from 10 to 90 %", "{:.2f} px"),
+    "angle_deg": ("angle", "{:.1f}°"),
+    "contrast_over_noise": ("contrast over noise", "{:.0f}"),
+}
+
+
+def written(figures: Mapping[str, float]) -> dict[str, str]:
+    """Figures by name as text with their units, by the words for them."""
+    pairs = {_WORDS[name]: value for name, value in figures.items()}
+    return {words: form.format(value) if isfinite(value) else "not known" for (words, form), value in pairs.items()}
+
+
+@dataclass(frozen=True)
+class MeasuredEdgeView(View):
+    """An edge as photographed, its profile across, and how much of a grating's contrast is left."""
+
+    title: ClassVar[str] = "Sharpness of an edge"
+
+    edge: SlantedEdge = field(repr=False, compare=False, kw_only=True)
+    name: str = "this edge"
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        body = svg.rectangle(0, 0, 960, 330, "paper") + self._photograph() + self._profile() + self._curve()
+        light = self.edge.image / max(float(np.percentile(self.edge.image, 99)), 1e-12)
+        return Picture(body, 960, 330, self.title, self.description(), {"edge": jpeg(to_display(light))})
+
+    def description(self) -> str:
+        """The figures in words and numbers."""
+        edge = self.edge
+        figures = {
+            "mtf50_cycles_per_pixel": edge.mtf50,
+            "rise_10_90_pixels": edge.rise,
+            "angle_deg": abs(edge.angle_deg),
+        }
+        return f"{self.name}: " + "; ".join(f"{words} {value}" for words, value in written(figures).items()) + "."
+
+    def _photograph(self) -> str:
+        height, width = self.edge.image.shape
+        panel = panels.image_panel("photograph", 20, 40, 240, width, height, tallest=236)
+        v = np.array([-0.5, height - 0.5])
+        slope, intercept = self.edge.line
+        content = panels.photograph(panel, "edge", width, height)
+        content += svg.line(panel.place(np.stack([slope * v + intercept, v], axis=-1)), "orange")
+        return panel.show(content, title="The edge", note=f"{abs(self.edge.angle_deg):.1f}°")
+
+    def _profile(self) -> str:
+        reach = max(4.0, 2 * self.edge.rise)
+        panel = plot.plot_panel("profile", 330, 40, 250, 236, (-reach, reach), (-0.15, 1.15))
+        places, values = self.edge.edge_spread
+        near = np.abs(places) <= reach
+        content = plot.grid(panel) + plot.curve(panel, places[near], values[near], "blue")
+        shown = panel.show(content, title="Across the edge", note=f"10–90 %: {self.edge.rise:.2f} px")
+        return shown + plot.axes(panel, "distance (px)", "light")
+
+    def _curve(self) -> str:
+        edge = self.edge
+        panel = plot.plot_panel("curve", 650, 40, 290, 236, (0, 1), (0, 1.1))
+        frequency, values = edge.curve
+        content = (
+            plot.grid(panel) + plot.upright(panel, 0.5, "muted dotted") + plot.curve(panel, frequency, values, "blue")
+        )
+        if isfinite(edge.mtf50):
+            at = panel.place([(0, 0.5), (edge.mtf50, 0.5), (edge.mtf50, 0)])
+            content += svg.line(at, "orange dashed") + svg.dots(at[1:2], "orange", 6)
+        nyquist = panel.place((0.5, 1.1))
+        content += svg.text((nyquist[0] + 5, 14), "Nyquist", "note halo")
+        note = f"MTF50: {edge.mtf50:.3f}" if isfinite(edge.mtf50) else ""
+        shown = panel.show(content, title="Contrast that is left", note=note)
+        return shown + plot.axes(panel, "cycles per pixel", "MTF")
