@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterable, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -35,6 +34,9 @@ __all__ = ["SHAPES", "Arguments", "Array", "Exercise", "Misconception", "Verdict
 
 SHAPES: tuple[tuple[int, ...], ...] = ((), (1,), (6,), (3, 4))
 """The leading axes an exercise's cases should run through: one point, a list of one, a list, a grid."""
+
+NEAR = 1e-4
+"""Of 1 + |answer|: closer than this is a matter of rounding, not of understanding."""
 
 _TITLES = {"correct": "✓ *Correct.*", "wrong": "✗ *Not yet.*", "unsolved": "○ *Not tried yet.*", "hint": "*Hint.*"}
 _COLOURS = {
@@ -124,7 +126,8 @@ def _unsolved(exercise: Exercise) -> Verdict:
         if exercise.bug
         else "Replace the stub by your own lines,"
     )
-    test = f"It is tried on fresh random numbers, and must be right to {exercise.tolerance:g} of 1 + |answer|."
+    demand = "True or False" if exercise.yes_or_no else f"right to {exercise.tolerance:g} of 1 + |answer|"
+    test = f"It is tried on fresh random numbers, and its answers must be {demand}."
     hint = f"""Stuck? `check.hint("{exercise.name}")` gives the first of three hints."""
     return Verdict(exercise.name, "unsolved", f"{begin} then run this cell again. {test} {hint}")
 
@@ -153,6 +156,7 @@ def _complaint(exercise: Exercise, function: Function, trials: Sequence[Trial], 
         or _factor(exercise, trials)
         or _misplaced_nan(exercise, wrong)
         or _in_some_shapes(exercise, trials, wrong[0])
+        or _nearly(exercise, trials)
         or _fits_only_shown(exercise, function, trials)
         or _difference(exercise, wrong[0])
     )
@@ -244,6 +248,15 @@ def _misplaced_nan(exercise: Exercise, wrong: Sequence[Trial]) -> str:
     return ""
 
 
+def _nearly(exercise: Exercise, trials: Sequence[Trial]) -> str:
+    """Speaks when every answer is right to four digits or so, and none is to the tolerance asked for."""
+    actual, expected = _joined(t.actual for t in trials), _joined(t.expected for t in trials)
+    near = np.isclose(actual, expected, rtol=NEAR, atol=NEAR, equal_nan=True)
+    if exercise.yes_or_no or exercise.tolerance >= NEAR or not near.all():
+        return ""
+    return f"Close, but not to {exercise.tolerance:g}: is something rounded, or an iteration stopped too early?"
+
+
 def _fits_only_shown(exercise: Exercise, function: Function, trials: Sequence[Trial]) -> str:
     if any(trial.fits for trial in trials) or not exercise.shown:
         return ""
@@ -273,13 +286,8 @@ def _difference(exercise: Exercise, trial: Trial) -> str:
     )
     index = tuple(int(i) for i in np.argwhere(~exercise.close(actual, expected))[0])
     where = f" at index {list(index)}" if index else ""
-    got, right = _told_apart(float(actual[index]), float(expected[index]), _answers_yes_or_no(exercise, trial))
+    got, right = _told_apart(float(actual[index]), float(expected[index]), exercise.yes_or_no)
     return f"{exercise.call(trial.arguments)} gave {got}{where}, where {right} is right."
-
-
-def _answers_yes_or_no(exercise: Exercise, trial: Trial) -> bool:
-    answer = exercise.reference(*deepcopy(trial.arguments))
-    return isinstance(answer, bool) or getattr(answer, "dtype", None) == np.bool_
 
 
 def _told_apart(one: float, other: float, yes_or_no: bool) -> tuple[str, str]:

@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
@@ -101,6 +102,12 @@ class Exercise:
     def parameters(self) -> list[str]:
         """The names of the arguments."""
         return list(inspect.signature(self.reference).parameters)
+
+    @cached_property
+    def yes_or_no(self) -> bool:
+        """True where the answer is True or False, or an array of them."""
+        answer = self.reference(*next(iter(self.cases(np.random.default_rng(0)))))
+        return isinstance(answer, bool) or getattr(answer, "dtype", None) == np.bool_
 
     def answer(self, arguments: Arguments, reference: Function | None = None) -> tuple[Array, ...]:
         """The right answer, or that of another reference, in canonical form."""

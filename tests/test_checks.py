@@ -417,7 +417,19 @@ def test_zeros_have_a_say_in_what_is_close_and_digits_are_shown_until_two_number
     assert "rounded" not in verdict(lambda m: m * [1, 1, 1], of=turn).message
     assert "rounded" in verdict(lambda m: m * [1 + 1e-7, 1 + 1e-7, 0], of=turn).message
     near = Exercise("00.near", lambda x: np.ones(2), lambda rng: [(rng.normal(),)], "abc", "-")
-    answer = verdict(lambda x: np.array([1.0, 1.0000002]), of=near)
-    assert "gave 1.0000002 at index [1], where 1 is right" in answer.message
+    answer = verdict(lambda x: np.array([1.0000002, 5.0]), of=near)
+    assert "gave 1.0000002 at index [0], where 1 is right" in answer.message
     yes = Exercise("00.yes", lambda x: x > 0, lambda rng: [(1.0,), (-1.0,), (-2.0,)], "abc", "-")
     assert "gave True, where False is right" in verdict(lambda x: bool(x > -2), of=yes).message
+
+
+def test_a_rounded_answer_is_told_so_even_where_the_shown_numbers_are_round():
+    answer = verdict(lambda points: np.round(distance(points), 6))
+    assert "is something rounded" in answer.message
+    assert "shown in the lesson" not in answer.message
+
+
+def test_an_exercise_of_yes_and_no_does_not_speak_of_digits():
+    yes = Exercise("00.yes", lambda x: x > 0, lambda rng: [(rng.normal(),) for _ in range(4)], "abc", "-")
+    assert "must be True or False" in verdict(None, of=yes).message
+    assert "1e-09" in verdict(None).message

@@ -51,7 +51,7 @@ NOT_STATED = (
     (r"(?m)^\| \d\d \|", "the number of a lesson"),
     (r"\(\d{4}–\d{4}\)", "the years of a life"),
     (rf"(?<![A-Za-z_\d.])\d(?= ?{_SYMBOL})|(?<=[/^])2(?!\d|\.\d)", "a coefficient in a formula"),
-    (r"(?<![\w.,−-])[01](?![\d.,]\d|\d| ?[%°µ]| ?(?:px|mm|cm|m|km|s|ms|K|dB|DN|e⁻|bits?|pixels?|metres?)\b)",
+    (r"(?<![\w.,−-])[01](?!e[−-]?\d|[\d.,]\d|\d| ?[%°µ]| ?(?:px|mm|cm|m|km|s|ms|K|dB|DN|e⁻|bits?|pixels?|metres?)\b)",
      "nothing or one: a condition, an end of a range, a part of a formula"),
 )  # fmt: skip
 """What is not a statement about the world, as a pattern, and why."""
