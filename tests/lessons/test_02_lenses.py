@@ -172,10 +172,12 @@ def test_the_depth_of_field_in_one_formula(says):
     assert depth(50, 5.6, 1500) == pytest.approx(2 * base, rel=0.03)
     assert depth(100, 2.8, 1500) == pytest.approx(base / 4, rel=0.05)
     assert depth(50, 2.8, 3000) == pytest.approx(4 * base, rel=0.05)
-    over, tenth, under = says("For the lens above this is 4 % too large at s = H/10; at s = H/2 it is 24 % too small.")
-    rule = [2 * 8 * 0.03 * s**2 / 50**2 for s in (H / tenth.value, H / 2)]
-    assert over == 100 * (rule[0] / depth(50, 8, H / tenth.value) - 1)
-    assert under == 100 * (1 - rule[1] / depth(50, 8, H / 2))
+    f, N, over, tenth, under = says(
+        "For 50 mm at f/8 the formula is 4 % too large at s = H/10, and 24 % too small at s = H/2."
+    )
+    rule = [2 * N.value * 0.03 * s**2 / f.value**2 for s in (H / tenth.value, H / 2)]
+    assert over == 100 * (rule[0] / depth(f.value, N.value, H / tenth.value) - 1)
+    assert under == 100 * (1 - rule[1] / depth(f.value, N.value, H / 2))
 
 
 def test_the_airy_disc_on_the_sensor(says):
@@ -287,10 +289,14 @@ def test_a_change_of_lens_enlarges_all_alike(says):
 
 def test_with_the_diameter_held_the_blur_on_the_scene_stays(says):
     says("with D held, the blur relative to the scene does not change")
+    says("The bush grows on the sensor, and so does its blur.")
     says("measured on the scene, the disc is D |u − s|/u wide")
     for f in (20, 35, 70, 100):
         m = image(f, 1600) / 1600
         assert blur(f, f / 6.25, 1600, 3000) / m == pytest.approx(6.25 * (3000 - 1600) / 3000)
+    blurs, bushes = np.array([(blur(f, f / 6.25, 1600, 3000), image(f, 1600) * 0.66 / 3.0) for f in (35, 70)]).T
+    assert bushes[1] > bushes[0]
+    assert blurs[1] / blurs[0] == pytest.approx(bushes[1] / bushes[0])
     view = DepthOfFieldView(focal_mm=35, f_number=5.6, distance_m=1.6, focus_m=1.6, hold="diameter")
     for f in (20.0, 100.0):  # the controls' ends: the opening is really held there
         assert view.but(focal_mm=f).lens.aperture_mm == pytest.approx(view.lens.aperture_mm)
@@ -298,6 +304,9 @@ def test_with_the_diameter_held_the_blur_on_the_scene_stays(says):
 
 def test_with_the_framing_held_the_depth_of_field_hardly_changes(says):
     says("At equal framing and the same f-number the depth of field is nearly the same with every lens")
+    says("Notice that the bush and the picture of the cat grow behind it.")
+    walked = [image(f, f * (1 + 45)) / (f * (1 + 45) + 1400) for f in (35, 100)]  # of what is 1.4 m behind the globe
+    assert walked[1] > 1.2 * walked[0]
     c, m = 0.03, 1 / 45
     rule = 2 * 5.6 * c * (1 + m) ** 2 / m**2
     depths = [np.diff(limits(f, 5.6, f * (1 + 1 / m), c))[0] for f in (35, 50, 100)]
