@@ -42,7 +42,7 @@ def test_its_numbers_are_those_of_the_optics():
 
 
 def test_the_airy_disc_spreads_on_its_way_to_the_sensor():
-    """2.44 λ v / D: at f = 100 mm, f/4 it is 5.4 µm for distant subjects, and a quarter more with the sensor at 125 mm."""
+    """2.44 λ v / D: at f = 100 mm, f/4 it is 5.4 µm for distant subjects, a quarter more with the sensor at 125 mm."""
     near = DepthOfFieldView(focal_mm=100, f_number=4, focus_m=0.5)
     assert near.lens.image_mm == pytest.approx(125)
     assert near.airy_mm == pytest.approx(2.44 * 550e-6 * 125 / 25)

@@ -250,17 +250,21 @@ class DepthOfFieldView(View):
         return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks) + shown
 
     def _levels(self, panel: Panel) -> tuple[str, str]:
-        """The lines of the blur that is allowed and of the Airy disc, and their names, at opposite ends."""
+        """The lines of the blur that is allowed and of the Airy disc, and their names, at opposite ends.
+
+        Outside the depth of field the curve runs above the blur that is allowed: there its name stands below the line.
+        """
         near, far = self.limits_m
-        curve_on_the_left = near < 2.4 and far < 14  # where the longer name would stand
-        levels = [(self.circle_mm, f"allowed: c = {1000 * self.circle_mm:.0f} µm", "green", "", curve_on_the_left)]
+        right_is_free = near < 1.8 and far < 14  # of the depth of field; the left is not
+        allowed = f"allowed: c = {1000 * self.circle_mm:.0f} µm"
+        levels = [(self.circle_mm, allowed, "green", "dashed", 14, right_is_free)]
         if self.diffraction:
-            levels.append((self.airy_mm, "Airy disc", "purple", " thin", not curve_on_the_left))
+            levels.append((self.airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free))
         lines = names = ""
-        for blur, name, colour, thin, at_right in levels:
+        for blur, name, colour, stroke, below, at_right in levels:
             left, right = panel.place([(panel.left, np.log10(blur)), (panel.right, np.log10(blur))])
-            lines += svg.line([left, right], f"{colour} dashed{thin}")
-            place, end = (right - (8, 5), " end") if at_right else (left + (8, -5), "")
+            lines += svg.line([left, right], f"{colour} {stroke}")
+            place, end = (right + (-8, below), " end") if at_right else (left + (8, below), "")
             names += svg.text(place, name, f"{colour} halo{end}")
         return lines, names
 
