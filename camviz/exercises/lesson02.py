@@ -39,7 +39,7 @@ IMAGE = Exercise(
         "then u = ∞ and u < f need no case of their own.",
         "`return 1 / (___ - ___)`",
     ),
-    praise="An object at infinity has its image at f, one at 2f at 2f, and one inside f a virtual one before the lens.",
+    praise="An object at infinity has its image at f, and one at 2f has it at 2f. One inside f has a virtual image.",
 )
 
 

@@ -392,7 +392,7 @@ def test_the_small_numbers_of_the_exercises(says):
     )
     (columns,) = says("an array (n, 3) whose rows are radius, distance to the next surface, and refractive index")
     assert columns == np.shape(optics.TELEPHOTO.surfaces)[1]
-    says("An object at infinity has its image at f, one at 2f at 2f, and one inside f a virtual one before the lens.")
+    says("An object at infinity has its image at f, and one at 2f has it at 2f. One inside f has a virtual image.")
     assert image(50, np.inf) == 50
     assert image(50, 100) == pytest.approx(100)
     assert image(50, 30) < 0
