@@ -36,9 +36,26 @@ def test_its_numbers_are_those_of_the_optics():
     assert view.limits_m == pytest.approx((3.49448, 10.41667), abs=2e-5)
     assert numbers["depth of field"].startswith("3.49 m to 10.42 m")
     assert numbers["hyperfocal distance"] == "10.47 m"
-    assert numbers["Airy disc"] == "10.7 µm across"
+    assert numbers["Airy disc"] == "10.8 µm across"  # 10.7 at infinity
     assert DepthOfFieldView(focal_mm=50, focus_m=1.0).numbers()["sensor at v"].startswith("52.63 mm")
     assert DepthOfFieldView(focal_mm=20, f_number=22, focus_m=10).numbers()["depth of field"].count("infinity") == 1
+
+
+def test_the_airy_disc_spreads_on_its_way_to_the_sensor():
+    """2.44 λ v / D: at f = 100 mm, f/4 it is 5.4 µm for distant subjects, a quarter more with the sensor at 125 mm."""
+    near = DepthOfFieldView(focal_mm=100, f_number=4, focus_m=0.5)
+    assert near.lens.image_mm == pytest.approx(125)
+    assert near.airy_mm == pytest.approx(2.44 * 550e-6 * 125 / 25)
+    assert near.numbers()["Airy disc"] == "6.7 µm across"
+    far = DepthOfFieldView(focal_mm=100, f_number=4, focus_m=1e6)
+    assert far.airy_mm == pytest.approx(2.44 * 550e-6 * 4, rel=1e-3)
+
+
+def test_a_reader_who_is_to_predict_diffraction_is_shown_none():
+    quiet = DepthOfFieldView(diffraction=False)
+    assert "Airy" not in quiet.description()
+    assert "Airy" not in quiet.figure(draft=True).body
+    assert "Airy" in DepthOfFieldView().figure(draft=True).body
 
 
 def test_the_description_states_the_state():

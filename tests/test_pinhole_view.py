@@ -53,6 +53,15 @@ def test_the_numbers_are_those_of_the_optics():
     assert numbers["brightness"] == f"{optics.sunny_exposure(0.4, 60, 2):.1f} × correct"
 
 
+def test_a_reader_who_is_to_predict_the_blur_is_shown_none():
+    quiet = PinholeView(sharpness=False)
+    for word in ("blur", "Airy", "shadow"):
+        assert word not in quiet.description()
+        assert word not in quiet.figure(draft=True).body
+        assert word in PinholeView().description()
+    assert quiet.dragged("orbit", 0, 0, 30, 10).eye != quiet.eye
+
+
 def test_the_description_states_the_state():
     words = PinholeView(hole_mm=0.25, depth_mm=70, object_m=4.0).description()
     for part in ("hole of 0.25 mm", "70 mm before the wall", "4 m from the globe", "f/280", "upside down"):

@@ -36,7 +36,8 @@ class DepthOfFieldView(View):
     When the focal length changes, `hold` says what stays: the f-number, the diameter of the aperture, or the framing,
     for which the camera steps back or forth until the globe is as large as before, and the focus with it. The picture
     is traced through the aperture's shape, of which a half may be covered. `match_exposure` exposes for as long as the
-    f-number needs; otherwise as f/4 needs. A covered half is never made up for.
+    f-number needs; otherwise as f/4 needs. A covered half is never made up for. Without `diffraction` the view says
+    nothing of the Airy disc, for readers who are to predict what it does.
     """
 
     title: ClassVar[str] = "Lens and depth of field"
@@ -50,6 +51,7 @@ class DepthOfFieldView(View):
     aperture: str = choice("disc", "hexagon", "ring", "heart", label="aperture", help="the shape of the stop")
     covered: str = choice("nothing", "left half", "upper half", label="cover", help="black card before the lens")
     match_exposure: bool = switch(True, label="match exposure", help="expose as long as the f-number needs")
+    diffraction: bool = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -115,10 +117,20 @@ class DepthOfFieldView(View):
         return float(self.lens.points(4096)[1].mean())
 
     @property
+    def working_f_number(self) -> float:
+        """N (1 + m) = v / D: how wide the cones are that meet on the sensor, m belonging to the distance in focus."""
+        m = optics.magnification(self.focal_mm, 1000 * self.focus_m)
+        return float(optics.working_f_number(self.f_number, m))
+
+    @property
+    def airy_mm(self) -> float:
+        """Diameter of the Airy disc on the sensor, 2.44 λ v / D."""
+        return 2e-3 * float(optics.airy_radius_um(self.working_f_number))
+
+    @property
     def brightness(self) -> float:
         """Exposure of the sensor, 1 being correct: open area over image distance squared, ∝ share / (N (1 + m))²."""
-        m = float(optics.magnification(self.focal_mm, 1000 * self.focus_m))
-        fixed = (LIGHT_N / float(optics.working_f_number(self.f_number, m))) ** 2
+        fixed = (LIGHT_N / self.working_f_number) ** 2
         return self.open_share * (1.0 if self.match_exposure else fixed)
 
     def numbers(self) -> dict[str, str]:
@@ -136,7 +148,7 @@ class DepthOfFieldView(View):
             "blur of the globe": f"{1000 * blur:.0f} µm = {blur * 320 / self.lens.sensor_mm:.1f} px",
             "depth of field": f"{_range_m(near, far)}",
             "hyperfocal distance": f"{hyperfocal:.2f} m",
-            "Airy disc": f"{2 * float(optics.airy_radius_um(self.f_number)):.1f} µm across",
+            **({"Airy disc": f"{1000 * self.airy_mm:.1f} µm across"} if self.diffraction else {}),
             "light": f"{_percent(self.brightness)} of a correct exposure",
         }
 
@@ -219,26 +231,42 @@ class DepthOfFieldView(View):
         around = 1 + np.outer((-1, 1), np.geomspace(1e-4, 0.1, 9)).ravel()  # the curve comes down steeply to the focus
         depth = np.sort(np.concatenate([np.geomspace(*_DEPTHS, 161), self.focus_m * around]))
         blur = np.maximum(self.blur_mm(depth), 1e-6)
-        airy = 2e-3 * float(optics.airy_radius_um(self.f_number))
         far_x = min(np.log10(far), panel.right)
-        level = [[(panel.left, np.log10(y)), (panel.right, np.log10(y))] for y in (self.circle_mm, airy)]
+        lines, names = self._levels(panel)
         here = panel.place(_logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), _BLURS[0]))))
         xticks, yticks = logarithmic(*_logs(_DEPTHS)), _micrometres()
         content = (
             _grid(panel, xticks, yticks)
             + band(panel, np.log10(near), far_x, "fill-green")
-            + svg.line(panel.place(level[0]), "green dashed")
-            + svg.line(panel.place(level[1]), "purple dashed thin")
+            + lines
             + curve(panel, np.log10(depth), np.log10(blur), "blue thick")
             + upright(panel, np.log10(self.focus_m), "red thin")
-            + svg.text(panel.place(level[0][0]) + (8, -5), f"allowed: c = {1000 * self.circle_mm:.0f} µm", "green halo")
-            + svg.text(panel.place(level[1][1]) + (-8, -5), "Airy disc", "purple halo end")
+            + names
             + svg.dots([here], "orange", 10)
             + svg.text(here + (8, -8), "globe", "orange halo")
         )
         label = "Blur against distance; drag or press the arrow keys to change the focus"
         shown = panel.show(content, title="Blur against distance", hint="drag to focus", drag="focus", label=label)
         return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks) + shown
+
+    def _levels(self, panel: Panel) -> tuple[str, str]:
+        """The lines of the blur that is allowed and of the Airy disc, and their names, at opposite ends.
+
+        Outside the depth of field the curve runs above the blur that is allowed: there its name stands below the line.
+        """
+        near, far = self.limits_m
+        right_is_free = near < 1.8 and far < 14  # of the depth of field; the left is not
+        allowed = f"allowed: c = {1000 * self.circle_mm:.0f} µm"
+        levels = [(self.circle_mm, allowed, "green", "dashed", 14, right_is_free)]
+        if self.diffraction:
+            levels.append((self.airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free))
+        lines = names = ""
+        for blur, name, colour, stroke, below, at_right in levels:
+            left, right = panel.place([(panel.left, np.log10(blur)), (panel.right, np.log10(blur))])
+            lines += svg.line([left, right], f"{colour} {stroke}")
+            place, end = (right + (-8, below), " end") if at_right else (left + (8, below), "")
+            names += svg.text(place, name, f"{colour} halo{end}")
+        return lines, names
 
     def _numbers(self) -> str:
         rows = [svg.text((606, 326), "This lens", "title")]

@@ -42,7 +42,8 @@ class PinholeView(View):
 
     The picture is ray-traced, blurred by what waves make of the hole in green light, dimmed by the exposure and, with
     `noise`, counted in photons. `match_exposure` exposes for as long as it takes instead of `exposure_s`. On the wall
-    the picture is turned by 180°, seen from behind; `turn_picture` puts it upright.
+    the picture is turned by 180°, seen from behind; `turn_picture` puts it upright. Without `sharpness` the view says
+    nothing of blur in curves and numbers, for readers who are to predict it.
     """
 
     title: ClassVar[str] = "Pinhole camera"
@@ -55,6 +56,7 @@ class PinholeView(View):
     turn_picture: bool = switch(False, label="turn the picture", help="as it hangs on the wall, or upright")
     noise: bool = switch(True, label="photon noise", help="light arrives in photons: dim pictures are grainy")
     eye: Eye = Eye(distance=0.8, yaw_deg=46, pitch_deg=18)  # its distance counts in lengths of what there is to see
+    sharpness: bool = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -102,12 +104,15 @@ class PinholeView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         pitch_mm = WALL_MM[0] / PIXELS
-        return {
-            "f-number": f"f/{float(optics.f_number(self.hole_mm, self.depth_mm)):.0f}",
-            "field of view": f"{optics.field_of_view_deg(WALL_MM[0], self.depth_mm):.1f}° across",
+        blur = {
             "hole's shadow": f"{1000 * self.shadow_mm:.0f} µm",
             "Airy disc": f"{1000 * self.airy_mm:.0f} µm",
             "blur on the wall": f"{1000 * self.blur_mm:.0f} µm = {self.blur_mm / pitch_mm:.1f} px",
+        }
+        return {
+            "f-number": f"f/{float(optics.f_number(self.hole_mm, self.depth_mm)):.0f}",
+            "field of view": f"{optics.field_of_view_deg(WALL_MM[0], self.depth_mm):.1f}° across",
+            **(blur if self.sharpness else {}),
             "exposure": _seconds(self.exposed_s),
             "brightness": f"{_times(self.brightness)} correct",
         }
@@ -130,11 +135,10 @@ class PinholeView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         upright = self.image(320 if draft else PIXELS)
         box, photographs = self._box_panel(upright, draft)
-        body = "".join(
-            [svg.rectangle(0, 0, 960, 590, "paper"), box, self._picture_panel(), self._blur_panel(), self._numbers()]
-        )
+        blur, height = (self._blur_panel(), 590) if self.sharpness else ("", 470)
+        body = "".join([svg.rectangle(0, 0, 960, height, "paper"), box, self._picture_panel(), blur, self._numbers()])
         photographs["wall"] = jpeg(upright if self.turn_picture else upright[::-1, ::-1].copy())
-        return Picture(body, 960, 590, self.title, self.description(), photographs)
+        return Picture(body, 960, height, self.title, self.description(), photographs)
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -257,12 +261,13 @@ class PinholeView(View):
     # The numbers -----------------------------------------------------------------------------------------------------
 
     def _numbers(self) -> str:
-        rows = [svg.text((580, 360), "This box", "title")]
+        left, below = (580, 546) if self.sharpness else (20, 386)  # of the blur's curve, or in its place
+        rows = [svg.text((left, 360), "This box", "title")]
         for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((580, 386 + 21 * i), name, "note"))
-            rows.append(svg.text((700, 386 + 21 * i), value, "label"))
-        rows.append(svg.text((580, 546), "crate and globe, by similar triangles:", "note"))
-        rows.append(svg.text((580, 567), self.equation(), "label"))
+            rows.append(svg.text((left, 386 + 21 * i), name, "note"))
+            rows.append(svg.text((left + 120, 386 + 21 * i), value, "label"))
+        rows.append(svg.text((580, below), "crate and globe, by similar triangles:", "note"))
+        rows.append(svg.text((580, below + 21), self.equation(), "label"))
         return "".join(rows)
 
 
