@@ -163,6 +163,14 @@ def in_baselines(d, f, B, doffs):
     return depth(d, f, 1.0, doffs)
 
 
+@DEPTH.wrong(
+    "You divide by 16. OpenCV's matchers count in sixteenths of a pixel, but the disparities of this exercise are in "
+    "pixels."
+)
+def sixteenths_that_are_none(d, f, B, doffs):
+    return depth(d, f / 16, B, doffs)
+
+
 # 2: which baseline? --------------------------------------------------------------------------------------------------
 
 
@@ -431,6 +439,16 @@ def rotation_left_out(uv, K, R, K_new):
     return _turned(uv, K_new @ np.linalg.inv(K))
 
 
+@RECTIFIED.wrong("These are the pixels that came in: nothing has happened to them yet.")
+def left_where_they_were(uv, K, R, K_new):
+    return uv
+
+
+@RECTIFIED.wrong("You read (row, column). A pixel is (u, v): the column first, then the row.")
+def rows_first(uv, K, R, K_new):
+    return rectified(uv[..., ::-1], K, R, K_new)
+
+
 # 4: find the bugs ----------------------------------------------------------------------------------------------------
 
 
@@ -576,7 +594,7 @@ def multiplied_by_sixteen(found, K, P_left, P_right):
 
 
 @METRIC_DEPTH.wrong(
-    "What stands in P_right[0, 3] is −f B, in pixels times metres. You took it for the baseline and multiplied by f "
+    "What stands in `P_right[0, 3]` is −f B, in pixels times metres. You took it for the baseline and multiplied by f "
     "once more."
 )
 def focal_length_counted_twice(found, K, P_left, P_right):
@@ -588,6 +606,18 @@ def focal_length_counted_twice(found, K, P_left, P_right):
 )
 def no_match_kept(found, K, P_left, P_right):
     return -P_right[0, 3] / (found / 16 + P_right[0, 2] - P_left[0, 2])
+
+
+@METRIC_DEPTH.wrong(
+    "The baseline stands in the *right* camera's P. The left one stands at the origin, and its entry is 0."
+)
+def baseline_of_the_left_camera(found, K, P_left, P_right):
+    return np.where(found < 0, np.nan, 0.0)
+
+
+@METRIC_DEPTH.wrong("The baseline has gone. f / d alone is a depth in baselines, not in metres.")
+def baseline_left_out(found, K, P_left, P_right):
+    return K[0, 0] / found
 
 
 # 5: the left–right check ---------------------------------------------------------------------------------------------
@@ -768,6 +798,13 @@ def disparities_added(d_left, d_right, tolerance):
 @LEFT_RIGHT.wrong("These are yes and no. Wanted are the disparities themselves, with NaN for every no.")
 def yes_and_no(d_left, d_right, tolerance):
     return np.isfinite(left_right(d_left, d_right, tolerance))
+
+
+@LEFT_RIGHT.wrong(
+    "Nothing is dropped: the left row comes out as it went in. Where the right row disagrees, NaN is wanted."
+)
+def nothing_dropped(d_left, d_right, tolerance):
+    return d_left
 
 
 EXERCISES = (DEPTH, BASELINE, RECTIFIED, METRIC_DEPTH, LEFT_RIGHT)

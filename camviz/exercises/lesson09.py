@@ -134,8 +134,8 @@ def not_a_unit_direction(points, f, cx, cy):
 
 
 @EQUIDISTANT.wrong(
-    "You divide x and y by the length of the whole ray. Their direction *in the image* is (x, y) / √(x² + y²): z has no "
-    "part in it."
+    "You divide x and y by the length of the whole ray. Their direction *in the image* is (x, y) / √(x² + y²): z has "
+    "no part in it."
 )
 def divided_by_the_whole_length(points, f, cx, cy):
     return f * points[..., :2] * (_theta(points) / np.linalg.norm(points, axis=-1))[..., None] + (cx, cy)
@@ -404,7 +404,8 @@ def beyond_half_a_turn(radius, k1, k2):
 
 
 @ANGLE.wrong(
-    "Radii that no ray has are answered by π, straight behind. A clamped angle looks like a real one: NaN is the answer."
+    "Radii that no ray has are answered by π, straight behind. A clamped angle looks like a real one: the answer is "
+    "NaN."
 )
 def clamped_at_half_a_turn(radius, k1, k2):
     return np.minimum(_newton(radius, k1, k2, 12), np.pi)
@@ -443,8 +444,8 @@ def in_degrees(radius, k1, k2):
 
 
 @ANGLE.wrong(
-    "The slope of θ + k1 θ³ + k2 θ⁵ is 1 + *3* k1 θ² + *5* k2 θ⁴. Without the 3 and the 5 the steps are too long. Where "
-    "they miss, you answer NaN, though there is a ray."
+    "The slope of θ + k1 θ³ + k2 θ⁵ is 1 + *3* k1 θ² + *5* k2 θ⁴. Without the 3 and the 5 the steps are too long. "
+    "Where they miss, you answer NaN, though there is a ray."
 )
 def wrong_slope(radius, k1, k2):
     theta = np.array(radius, dtype=float)
