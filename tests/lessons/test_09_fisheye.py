@@ -128,9 +128,9 @@ def test_a_perspective_picture_ends_below_90_degrees(says):
     (side,) = says("comes in exactly from the side, 90° from the axis?")
     (nowhere,) = says("Nowhere: tan 90° is infinite.")
     infinite, beyond = says(
-        "At exactly 90° the tangent is infinite: no place in any picture, on neither side. (tan θ does "
-        "turn negative beyond 90°."
-    )  # fmt: skip
+        "At exactly 90° the tangent is infinite: no place in any picture, on neither side. tan θ does "
+        "turn negative beyond 90°"
+    )
     for said in (side, nowhere, infinite, beyond):
         assert ray(np.radians(said.value))[2] == pytest.approx(0, abs=1e-12)  # parallel to the picture
     assert np.tan(np.radians(beyond.value + 1)) < 0
