@@ -256,7 +256,8 @@ def test_the_description_states_the_state():
 @pytest.mark.parametrize("name", CONTROLS)
 def test_every_control_changes_the_picture_at_both_ends_and_draws_no_stray_nan(name):
     control = CONTROLS[name]
-    drawn = [VIEW.but(**{name: end}).figure(draft=True) for end in control.choices or (control.low, control.high)]
+    ends = control.choices or ((False, True) if control.low is None else (control.low, control.high))
+    drawn = [VIEW.but(**{name: end}).figure(draft=True) for end in ends]
     assert len({picture.body + str(picture.photographs) for picture in drawn}) == len(drawn)
     for picture in drawn:
         assert not re.search(r"\b(nan|inf)\b", picture.body)
@@ -285,3 +286,13 @@ def test_a_pair_that_does_not_fit_is_refused_in_words(change, words):
     given = {"left": rig()[0], "right": rig()[1], **change}
     with pytest.raises(ValueError, match=words):
         RectificationView.of(**given)
+
+
+def test_without_worth_nothing_is_said_about_the_error_of_a_depth():
+    """So that the lesson can ask about it first."""
+    silent = VIEW.but(worth=False).figure(draft=True)
+    for words in (VIEW.interval(), "tooth", "What a disparity is worth"):
+        assert words in VIEW.figure(draft=True).body
+        assert words not in silent.body
+    assert VIEW.equation() in silent.body
+    assert VIEW.interval() not in silent.description

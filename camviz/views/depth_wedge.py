@@ -17,11 +17,14 @@ def wedge_panel(
     plus_minus: float,
     farthest: float,
     notes: tuple[str, str],
+    *,
+    worth: bool = True,
 ) -> str:
     """The panel at `place` (x, y, width, height), along the left camera's ray of the point, out to `farthest` metres.
 
     The right camera's pixel is a wedge, `plus_minus` pixels to either side, that meets the left ray between the
-    nearest and the farthest depth. The comb has a tooth for each whole disparity. `notes` are a line each.
+    nearest and the farthest depth. The comb has a tooth for each whole disparity. `notes` are a line each. Without
+    `worth` only the two rays are drawn, to where they meet: neither the wedge nor the comb.
     """
     B, f, Z = pair.baseline, pair.focal_length, float(pair.depth(disparity))
     near, far = (float(depth) for depth in twoview.depth_interval(Z, f, B, plus_minus))
@@ -30,23 +33,37 @@ def wedge_panel(
     # The ray of the disparity's lower end runs from the right camera at (0, B) by (d - e) / f across for each metre.
     end = min(far, 2 * right)
     edge = (end, B - end * (disparity - plus_minus) / f)
+    wedge = svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange") if worth else ""
+    sides = svg.path([panel.place([(0, B), tip]) for tip in ((near, 0), edge)], "orange thin") if worth else ""
+    error = _error(panel, f * B, right, B, (near, min(far, right)), notes[1]) if worth else ""
     content = (
         plot.grid(panel)
-        + svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange")
+        + wedge
         + svg.line(panel.place([(0, 0), (right, 0)]), "blue")
-        + svg.path([panel.place([(0, B), tip]) for tip in ((near, 0), edge)], "orange thin")
+        + sides
         + svg.line(panel.place([(0, B), (Z, 0)]), "orange")
-        + _comb(panel, f * B, right, B)
-        + svg.line(panel.place([(near, 0), (min(far, right), 0)]), "red thick")
+        + error
         + svg.dots(panel.place([(Z, 0)]), "red", 8)
         + svg.dots(panel.place([(0, 0), (0, B)]), "ink", 9)
         + svg.text(panel.place((0, B)) + (9, -6), "right camera", "orange halo")
-        + svg.text((panel.width - 8, panel.place((0, 0))[1] - 7), "the left camera’s ray", "blue halo end")
+        + svg.text(
+            (panel.width - 8, panel.place((0, 0))[1] + (-7 if worth else 18)), "the left camera’s ray", "blue halo end"
+        )
         + svg.text((panel.width - 8, 16), notes[0], "note end halo")
-        + svg.text((panel.width - 8, 33), notes[1], "red end halo")
+    )
+    title = "What a disparity is worth" if worth else "Where the two rays meet"
+    return plot.axes(panel, "Z in metres", "x in metres") + panel.show(content, title=title)
+
+
+def _error(panel: Panel, focal_baseline: float, right: float, B: float, between: tuple[float, float], note: str) -> str:
+    """The comb, the piece of the left ray that the error leaves, and what that is in numbers."""
+    near, far = between
+    return (
+        _comb(panel, focal_baseline, right, B)
+        + svg.line(panel.place([(near, 0), (far, 0)]), "red thick")
+        + svg.text((panel.width - 8, 33), note, "red end halo")
         + svg.text((panel.width - 8, panel.height - 6), "a tooth for each pixel of disparity", "note end halo")
     )
-    return plot.axes(panel, "Z in metres", "x in metres") + panel.show(content, title="What a disparity is worth")
 
 
 def _comb(panel: Panel, focal_baseline: float, right: float, B: float) -> str:

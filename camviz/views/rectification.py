@@ -18,7 +18,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.views import stereo_pair
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
@@ -46,7 +46,7 @@ class RectificationView(View):
 
     title: ClassVar[str] = "Rectification, disparity and depth"
 
-    rectify: float = slider(1.0, 0, 1, 0.01, help="0: the pictures as taken; 1: both turned into rows")
+    rectify: float = slider(1.0, 0, 1, 0.01, help="0: the pictures as taken; 1: rectified")
     row: float = slider(168.0, 0, 359, 1, unit="px", help="of the mark in the rectified left picture")
     column: float = slider(294.0, 0, 479, 1, unit="px", help="of the mark in the rectified left picture")
     disparity: float = slider(16.0, 1, 128, 0.25, unit="px", help="from the left mark to the right one")
@@ -56,6 +56,7 @@ class RectificationView(View):
     disparities: int = slider(64, 16, 128, 16, label="number of disparities", help="how far along the row to look")
     baseline: float = slider(0.25, 0.05, 0.6, 0.01, unit="m", help="distance between the cameras")
     show: str = choice("depth", "true depth", "error", label="second map", help="what the second map shows")
+    worth: bool = switch(True, label="show the error", help="what an error of the disparity makes of the depth")
     source: Source = _GARDEN
 
     @classmethod
@@ -210,7 +211,8 @@ class RectificationView(View):
         way = way if self.rectify else "as taken"
         figures = "; ".join(f"{name} {value}" for name, value in numbers.items())
         matched = f"{self.method}, blocks of {self.block_size:g} px, {self.disparities:g} disparities"
-        return f"The pair {way}. {figures}. Matched by {matched}. {self.equation()}; {self.interval()}."
+        depth = f"{self.equation()}; {self.interval()}" if self.worth else self.equation()
+        return f"The pair {way}. {figures}. Matched by {matched}. {depth}."
 
     # Hands -----------------------------------------------------------------------------------------------------------
 
@@ -329,7 +331,7 @@ class RectificationView(View):
         farthest = stereo_pair.depth_limits(self.source)[1]
         notes = (self.equation(), self.interval())
         place = (672, 374, 270, 177)
-        return wedge_panel(place, self.stage.pair, self.disparity, self.plus_minus, farthest, notes)
+        return wedge_panel(place, self.stage.pair, self.disparity, self.plus_minus, farthest, notes, worth=self.worth)
 
 
 def _column(numbers: dict[str, str]) -> str:

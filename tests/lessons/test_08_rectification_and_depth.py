@@ -1,0 +1,509 @@
+"""What lesson 08 says about rectification, disparity and depth, recomputed with NumPy, SciPy and OpenCV."""
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz import twoview
+from camviz.checks import judge
+from camviz.exercises import exercise, lesson08
+from camviz.scenes import snapshot, textured_scene
+from camviz.views.rectification import RectificationView
+
+EXCEPTIONS: dict[str, str] = {}
+
+SIDES = ("left", "right")
+K = np.array([[180 / np.tan(np.radians(31)), 0, 239.5], [0, 180 / np.tan(np.radians(31)), 179.5], [0, 0, 1]])
+K[0, 0] = K[1, 1] = 240 / np.tan(np.radians(31))  # 62° across 480 pixels
+WORLD_FROM = {
+    "left": RigidTransform.from_components([-0.3, 0, 0.3], Rotation.from_euler("YXZ", [3, -3, -2], True)),
+    "right": RigidTransform.from_components([-0.05, 0.012, 0.31], Rotation.from_euler("YXZ", [-3, -1, 4], True)),
+}
+"""The garden's two cameras as the view places them: 480 × 360 pixels, 62° wide."""
+THINGS = {"ball": (310.0, 326.0), "globe": (373.0, 208.0), "cat": (255.0, 152.0)}
+"""Pixels of the rectified left picture, as the lesson has them."""
+
+
+@pytest.fixture(scope="module")
+def garden():
+    """The pair as OpenCV rectifies it: the turns, B, and the frame of the lesson's pixels."""
+    right_from_left = WORLD_FROM["right"].inv() * WORLD_FROM["left"]
+    R, t = right_from_left.rotation.as_matrix(), right_from_left.translation
+    R1, R2, *_ = cv2.stereoRectify(K, None, K, None, (480, 360), R, t.reshape(3, 1))
+    pair = RectificationView().stage.pair
+    f, c = pair.left.intrinsics.fx, (pair.left.intrinsics.cx, pair.left.intrinsics.cy)  # where the lesson's pixels are
+    return {"R": {"left": R1, "right": R2}, "B": np.linalg.norm(t), "f": f, "c": np.array(c)}
+
+
+def looked_at(garden, uv, side="left"):
+    """Z of what the rectified camera sees at pixels (n, 2), by tracing the garden."""
+    x = np.concatenate([(np.asarray(uv) - garden["c"]) / garden["f"], np.ones((len(uv), 1))], axis=-1)
+    world_from_rectified = WORLD_FROM[side].rotation.as_matrix() @ garden["R"][side].T
+    rays = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    _, distance = textured_scene().trace(WORLD_FROM[side].translation, rays @ world_from_rectified.T)
+    return distance * rays[:, 2]
+
+
+def rows_as_taken(garden, uv, Z):
+    """Where points of the rectified left picture at the depths Z lie in the two pictures as they were taken."""
+    x = np.concatenate([(np.asarray(uv) - garden["c"]) / garden["f"], np.ones((len(uv), 1))], axis=-1) * Z[:, None]
+    rays = {"left": x, "right": x - [garden["B"], 0, 0]}
+    pixels = {}
+    for side in SIDES:
+        seen = rays[side] @ garden["R"][side] @ K.T
+        pixels[side] = seen[:, :2] / seen[:, 2:]
+    return pixels
+
+
+def test_the_two_cameras(says, garden):
+    (apart,) = says("Two cameras stand side by side in the garden, 25 cm apart.")
+    assert apart == 100 * garden["B"]
+    says("each looks a little elsewhere, and one of them is tilted")
+    lean = {side: Rotation.as_euler(WORLD_FROM[side].rotation, "YXZ", degrees=True)[2] for side in SIDES}
+    assert abs(lean["right"] - lean["left"]) > 5
+
+
+def test_no_row_by_row_search_can_find_the_partners_of_the_pair_as_taken(says, garden):
+    says("for more than half of the pixels nothing (hatched), and the rest is wrong")
+    score = RectificationView(rectify=0.0).score()
+    assert score.missing > 0.5
+    assert score.bad > 0.99
+    u, v = np.meshgrid(np.linspace(0, 480, 9), np.linspace(0, 360, 7))
+    uv = np.stack([u.ravel(), v.ravel()], axis=-1)
+    seen = rows_as_taken(garden, uv, np.full(len(uv), garden["f"] * garden["B"] / 16))
+    inside = np.all([(seen[side] > -0.5).all(axis=1) & (seen[side] < (479.5, 359.5)).all(axis=1) for side in SIDES], 0)
+    apart = (seen["right"] - seen["left"])[inside, 1]
+    (average,) = says("partners lie 15 rows apart on average, here more, there less, and in places the other way round")
+    assert average == np.abs(apart).mean()
+    assert apart.min() < 0 < average.value < apart.max()
+    says("The yellow lines run at different slopes in the two pictures")
+    columns = np.array([(50.0, 168.0), (430.0, 168.0)])
+    ends = rows_as_taken(garden, columns, np.array([6.0, 6.0]))
+    slopes = {side: np.diff(ends[side][:, 1]) / np.diff(ends[side][:, 0]) for side in SIDES}
+    assert abs(slopes["left"] - slopes["right"]) > 0.05
+
+
+def test_turning_a_camera_is_a_map_by_a_3_by_3_matrix_whatever_the_depth(says):
+    rows, columns = says("Such a map of pixels by a 3 × 3 matrix is a")
+    R = Rotation.from_euler("YXZ", [5, -3, 2], degrees=True).as_matrix()
+    H = K @ R @ np.linalg.inv(K)
+    assert (rows, columns) == H.shape
+    points = np.random.default_rng(8).uniform((-1, -1, 2), (1, 1, 9), (50, 3))
+    before, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), K, None)
+    after, _ = cv2.projectPoints(points, cv2.Rodrigues(R)[0], np.zeros(3), K, None)
+    np.testing.assert_allclose(cv2.perspectiveTransform(before, H), after, atol=1e-9)
+
+
+def test_the_rectified_cameras_are_not_parallel_to_the_wall(says, garden):
+    says("The wall in front of these cameras is not, rectified or not.")
+    axes = {side: WORLD_FROM[side].rotation.as_matrix() for side in SIDES}
+    for matrix in (*axes.values(), axes["left"] @ garden["R"]["left"].T):
+        assert np.degrees(np.arccos(matrix[2, 2])) > 1  # the wall's normal is the world's z axis
+    np.testing.assert_allclose(axes["left"] @ garden["R"]["left"].T, axes["right"] @ garden["R"]["right"].T, atol=1e-9)
+
+
+def test_the_ball_jumps_more_than_twice_as_far_as_the_cat(says, garden):
+    Z = dict(zip(THINGS, looked_at(garden, list(THINGS.values())), strict=True))
+    d = {name: garden["f"] * garden["B"] / depth for name, depth in Z.items()}
+    ball, cat = says("A beach ball lies 2.6 m in front of the two cameras, and a picture of a cat hangs 6.1 m away.")
+    assert ball == Z["ball"]
+    assert cat == Z["cat"]
+    ball, cat = says("Yes: 39 pixels against 16.")
+    assert ball == d["ball"]
+    assert cat == d["cat"]
+    says("more than twice as far as the cat")
+    assert d["ball"] > 2 * d["cat"]
+    ball, cat = says("The ball has 39 px of disparity, the cat 16 px.")
+    assert ball == d["ball"]
+    assert cat == d["cat"]
+
+
+def best_shift(left, right, row, block, count):
+    """The disparity (width,) of the least sum of absolute differences, block by block; −1 where none is complete."""
+    half, width = block // 2, left.shape[1]
+    best, found = np.full(width, np.inf), np.full(width, -1)
+    for d in range(count):
+        for u in range(d + half, width - half):
+            window = (slice(row - half, row + half + 1), slice(u - half, u + half + 1))
+            shifted = (window[0], slice(u - d - half, u - d + half + 1))
+            cost = np.abs(left[window] - right[shifted]).sum()
+            if cost < best[u]:
+                best[u], found[u] = cost, d
+    return found
+
+
+def test_half_of_the_mistakes_are_in_a_strip_that_only_the_left_camera_sees(says, garden):
+    (wide,) = says(
+        "Half of our mistakes are in one place: to the left of the globe is a strip, 17 pixels wide, that only the "
+        "left camera sees."
+    )
+    row = 206
+    uv = np.stack([np.arange(480.0), np.full(480, float(row))], axis=-1)
+    d = garden["f"] * garden["B"] / looked_at(garden, uv)
+    d_right = garden["f"] * garden["B"] / looked_at(garden, uv, "right")
+    there = np.interp(uv[:, 0] - d, uv[:, 0], d_right)  # what the right camera sees where the partner should be
+    hidden = there - d > 5
+    beside_the_globe = [u for u in np.flatnonzero(hidden) if 300 < u < 345]
+    assert wide == len(beside_the_globe)
+    assert wide == beside_the_globe[-1] - beside_the_globe[0] + 1
+    assert d[beside_the_globe[-1] + 1] > 30  # the globe begins there
+    says("as wide in pixels as the two disparities differ")
+    assert wide.value == pytest.approx(d[beside_the_globe[-1] + 1] - d[beside_the_globe[0] - 1], abs=1)
+    pair = RectificationView().stage.pair
+    grey = [cv2.cvtColor(snapshot(textured_scene(), one), cv2.COLOR_RGB2GRAY) for one in (pair.left, pair.right)]
+    found = best_shift(*(one.astype(float) for one in grey), row, 15, 64)
+    wrong = [u for u in range(64, 473) if np.isfinite(d[u]) and abs(found[u] - d[u]) > 1]
+    assert sum(u in beside_the_globe for u in wrong) == pytest.approx(len(wrong) / 2, abs=1)
+    says("two squares farther on (lesson 07 had four such places)")
+    board = best_shift(*(one.astype(float) for one in grey), row, 15, 20)[100:180]
+    two_squares = 0.2 * garden["f"] / looked_at(garden, uv)[100:180]
+    assert np.median(np.abs(board - (d[100:180] - two_squares))) < 2
+
+
+def test_what_the_block_and_the_range_do(says):
+    small, large = says("With method BM, move block size from 5 to 25, and choose error under second map.")
+    first, second, third, fourth = says("larger and larger squares: 5, 9, 15, 25 pixels")
+    sizes = [int(one.value) for one in (first, second, third, fourth)]
+    assert small == sizes[0]
+    assert large == sizes[-1]
+    scores = [RectificationView(method="BM", block_size=size).score() for size in sizes]
+    missing = [score.missing for score in scores]
+    assert missing[0] > missing[1] > missing[2]
+    assert missing[3] < missing[0] / 2
+    wrong = [score.bad - score.missing for score in scores]
+    assert wrong == sorted(wrong)
+    count, last, again = says(
+        "Set number of disparities to 16: disparities are then sought from 0 to 15 px, everything nearer than f B / 15 "
+        "is lost, and what is found there is nonsense."
+    )
+    found = RectificationView(disparities=int(count.value)).disparity_map()
+    assert last == np.nanmax(found)
+    assert again == count.value - 1
+    truth = RectificationView().true_disparity_map()
+    nearer = np.isfinite(found) & (truth > last.value + 2)
+    assert (np.abs(found - truth)[nearer] > 1).mean() > 0.99
+    (more,) = says("Set it to 128: the band on the left grows, in which no full search is possible.")
+    wide = RectificationView(disparities=int(more.value)).disparity_map()
+    assert np.isnan(wide[:, : int(more.value) - 1]).all()
+    assert np.isfinite(RectificationView().disparity_map()[:, 65:127]).any()
+
+
+def test_the_filter_leaves_fewer_holes_and_more_that_is_wrong(says):
+    says("it leaves fewer holes, and more pixels are wrong")
+    plain, filtered = (RectificationView(method=name, block_size=5).score() for name in ("SGM", "SGM + WLS"))
+    assert filtered.missing < plain.missing
+    assert filtered.bad - filtered.missing > plain.bad - plain.missing
+
+
+def interval(Z, fB, error=0.5):
+    return fB / (fB / Z + error), fB / (fB / Z - error)
+
+
+def test_what_half_a_pixel_is_worth(says):
+    f, B, near, error, far = says(
+        "A stereo camera has f = 800 px and B = 0.1 m and finds disparities to half a pixel. At 1 m from it that makes "
+        "6 mm of depth. What does it make at 10 m?"
+    )
+    fB = f.value * B.value
+    first_order = {Z: Z**2 / fB * 0.5 for Z in (near.value, far.value, 20.0)}
+    assert error == 1000 * first_order[near.value]
+    (answer,) = says("63 cm: ten times as far, a hundred times the error.")
+    assert answer == 100 * first_order[far.value]
+    (constant,) = says("6 mm: half a pixel is half a pixel.")
+    (proportional,) = says("6 cm: ten times as far, ten times the error.")
+    (cube,) = says("6.3 m: it grows with the cube, as a volume does.")
+    assert constant == error.value
+    assert proportional == 100 * 10 * first_order[near.value]
+    assert cube == 1000 * first_order[near.value]
+    mm, one, cm, ten, twenty, half, nearer, farther = says(
+        "6 mm at 1 m, 63 cm at 10 m: ten times as far, a hundred times the error. At 20 m the formula of first order "
+        "is no longer enough: it says 2.5 m to either side, and the exact interval reaches 2.2 m nearer and 2.9 m "
+        "farther."
+    )
+    assert mm == 1000 * first_order[one.value]
+    assert cm == 100 * first_order[ten.value]
+    assert half == first_order[twenty.value]
+    low, high = interval(twenty.value, fB)
+    assert nearer == twenty.value - low
+    assert farther == high - twenty.value
+    again, length, product = says("With f = 800 px and B = 0.1 m, fB is 80 m·px:")
+    assert again == f.value
+    assert length == B.value
+    assert product == fB
+
+
+def test_the_sliders_of_part_5(says):
+    fB = 80
+    two, three = says("The teeth below the ray stand at the depths of 1, 2, 3 … pixels of disparity.")
+    near, metres, middle, four, ten, *further = says(
+        "Move disparity to 80 (1 m): the red piece is a dot. To 20 (4 m). To 8 (10 m), 4, 2."
+    )
+    assert metres == fB / near.value
+    assert four == fB / middle.value
+    assert ten == fB / 8
+    lengths = [np.ptp(interval(fB / d, fB)) for d in (near.value, middle.value, 8, *(one.value for one in further))]
+    assert lengths == sorted(lengths)
+    assert lengths[0] < 0.02
+    gaps = fB / np.array([1.0, two.value]) - fB / np.array([two.value, three.value])
+    says("near the camera they stand close together, and farther away the gaps grow")
+    assert gaps[0] > gaps[1]
+    says("the far side of the wedge never meets the ray. The point may be infinitely far away.")
+    assert twoview.depth_interval(fB / 1, 800, 0.1, 1.0)[1] == np.inf
+    says("Double the baseline, and the disparity with it, so that the depth stays the same: half the error.")
+    assert 10**2 / (2 * fB) == 10**2 / fB / 2
+
+
+def test_the_replies_about_the_error(says):
+    fB = 80
+    eight, seven, eighty, below = says("from 8 px to 7.5 px is a longer way than from 80 px to 79.5 px")
+    assert fB / seven.value - fB / eight.value > 10 * (fB / below.value - fB / eighty.value)
+    whole, small, little, large = says("half a pixel of 80 is 0.6 %, half a pixel of 8 is 6 %")
+    assert small == 100 * 0.5 / whole.value
+    assert large == 100 * 0.5 / little.value
+    (slope,) = says("The derivative of 1/d is −1/d², and 1/d is Z up to a factor.")
+    d, step = 3.0, 1e-5
+    assert slope == (1 / (d + step) - 1 / (d - step)) / (2 * step) * d**2
+
+
+def test_a_phone_and_a_car(says):
+    cm, phone, wide, car, near, far, *errors = says(
+        "the stereo camera of a phone (B = 1 cm, f about 3000 px) and of a car (B = 30 cm, f = 1500 px), at 2 m and at "
+        "50 m, for half a pixel: 67 mm and 42 m for the phone, 4 mm and 2.8 m for the car."
+    )
+    fB = {"phone": cm.value / 100 * phone.value, "car": wide.value / 100 * car.value}
+    mm, m, mm_too, m_too = errors
+    assert mm == 1000 * near.value**2 / fB["phone"] / 2
+    assert m == far.value**2 / fB["phone"] / 2
+    assert mm_too == 1000 * near.value**2 / fB["car"] / 2
+    assert m_too == far.value**2 / fB["car"] / 2
+    Z, cm, f, wide = says(
+        "To know 50 m to 10 cm, with f = 1500 px and a quarter of a pixel, `…` gives 4.2 m: wider than a car."
+    )
+    assert wide == Z.value**2 * 0.25 / (f.value * cm.value / 100)
+
+
+def test_twice_as_far_takes_four_times_the_baseline(says):
+    (two,) = says("By 2.")
+    (four,) = says("By 4.")
+    (also,) = says("Or by 2, with twice the focal length.")
+
+    def error(Z, f, B):
+        return Z**2 / (f * B)
+
+    assert error(2, 1, four.value) == error(1, 1, 1)
+    assert error(2, 2, also.value) == error(1, 1, 1)
+    assert error(2, 1, two.value) / 2 == error(1, 1, 1)  # the same percentage, not the same length
+    says("an error of half a pixel would have to become an eighth")
+    assert error(2, 1, 1) / 8 == error(1, 1, 1) / 2
+
+
+def test_the_pair_as_taken_puts_everything_behind_the_cameras(says, garden):
+    angle, shift = says(
+        "These two cameras are turned towards each other by 6°, which shifts everything by about 42 px. All three "
+        "disparities become negative, and the formula puts all three things behind the cameras."
+    )
+    yaws = {side: WORLD_FROM[side].rotation.as_euler("YXZ", degrees=True)[0] for side in SIDES}
+    assert angle == yaws["left"] - yaws["right"]
+    assert shift == 2 * K[0, 0] * np.tan(np.radians(angle.value / 2))
+    seen = rows_as_taken(garden, list(THINGS.values()), looked_at(garden, list(THINGS.values())))
+    assert ((seen["left"] - seen["right"])[:, 0] < 0).all()
+
+
+def test_the_strip_that_the_left_right_check_removes(says):
+    near, far, strip = says(
+        "how wide is the strip that the check removes beside a thing at disparity 12 before a wall at 4? (8 px: the "
+        "difference of the disparities.)"
+    )
+    n, left, right = 60, int(near.value), int(far.value)
+    d_left, d_right = np.full(n, float(right)), np.full(n, float(right))
+    d_left[30:40], d_right[30 - left : 40 - left] = left, left
+    kept = lesson08.left_right(d_left, d_right, 0.5)
+    assert strip == np.isnan(kept[right:]).sum()
+    assert np.isnan(kept[30 - int(strip.value) : 30]).all()  # on its left
+
+
+# The photographs -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rig():
+    """The thirteen pairs of OpenCV's samples, calibrated with OpenCV alone: corners, K, lenses, R and t."""
+    if not os.environ.get("CAMVIZ_SAMPLES"):
+        pytest.skip("CAMVIZ_SAMPLES does not name a folder with OpenCV's samples")
+    folder = Path(os.environ["CAMVIZ_SAMPLES"]) / "opencv-samples"
+    uv = {side: np.array([corners(path) for path in sorted(folder.glob(f"{side}??.jpg"))]) for side in SIDES}
+    K, lens = {}, {}
+    for side in SIDES:
+        _, K[side], lens[side], _, _ = cv2.calibrateCamera([BOARD] * 13, list(uv[side]), (640, 480), None, None)
+    rms, R, t = together(uv, K, lens)
+    return {"uv": uv, "K": K, "lens": lens, "rms": rms, "R": R, "t": t}
+
+
+BOARD = np.float32([(0.025 * column, 0.025 * row, 0) for row in range(6) for column in range(9)])
+
+
+def corners(path):
+    grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    _, found = cv2.findChessboardCorners(grey, (9, 6))
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 1e-3)
+    return cv2.cornerSubPix(grey, np.float32(found).reshape(-1, 1, 2), (5, 5), (-1, -1), stop).reshape(54, 2)
+
+
+def together(uv, K, lens):
+    """RMS, R and t of the pair with the intrinsics as they are."""
+    arguments = ([BOARD] * 13, list(uv["left"]), list(uv["right"]), K["left"], lens["left"], K["right"], lens["right"])
+    rms, _, _, _, _, R, t, _, _ = cv2.stereoCalibrate(*arguments, (640, 480), flags=cv2.CALIB_FIX_INTRINSIC)
+    return rms, R, t.ravel()
+
+
+def straightened(rig, side):
+    """x, y of the corners (13, 54, 2) without the lens."""
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-12)
+    points = rig["uv"][side].reshape(-1, 1, 2).astype(float)
+    return cv2.undistortPoints(points, rig["K"][side], rig["lens"][side], criteria=stop).reshape(13, 54, 2)
+
+
+def test_how_the_two_real_cameras_stand(says, rig):
+    beside, across = says(
+        "The right camera is turned by half a degree against the left one. It stands 83 mm to its right, and t says "
+        "that less than 1 mm of the way is across the rows."
+    )
+    assert np.degrees(np.linalg.norm(cv2.Rodrigues(rig["R"])[0])) == pytest.approx(0.5, abs=0.02)
+    assert beside == -1000 * rig["t"][0]
+    assert 1000 * abs(rig["t"][1]) < across.value
+
+
+def test_rectification_leaves_a_seventh_of_a_pixel(says, rig):
+    (before,) = says("the rows differ by 13 px before and by a seventh of a pixel after")
+    assert before == np.abs(rig["uv"]["right"] - rig["uv"]["left"])[..., 1].mean()
+    K, lens = rig["K"], rig["lens"]
+    R1, R2, P1, P2, *_ = cv2.stereoRectify(
+        K["left"], lens["left"], K["right"], lens["right"], (640, 480), rig["R"], rig["t"].reshape(3, 1)
+    )
+    v = [
+        P[1, 1] * turned[..., 1] / turned[..., 2] + P[1, 2]
+        for side, R, P in (("left", R1, P1), ("right", R2, P2))
+        for turned in [cv2.convertPointsToHomogeneous(straightened(rig, side).reshape(-1, 2)).reshape(13, 54, 3) @ R.T]
+    ]
+    assert np.abs(v[0] - v[1]).mean() == pytest.approx(1 / 7, abs=0.02)
+
+
+def test_the_principal_points_make_the_thirteen_pixels(says, rig):
+    (again,) = says("Where do the 13 px come from?")
+    K, t = rig["K"], rig["t"]
+    v = {side: rig["uv"][side][..., 1] for side in SIDES}
+    straight = {side: straightened(rig, side) for side in SIDES}
+    rays = np.concatenate([straight["left"], np.ones((13, 54, 1))], axis=-1)
+    turned = rays @ rig["R"].T
+    f = {side: K[side][1, 1] for side in SIDES}
+    parts = {
+        "principal points": K["right"][1, 2] - K["left"][1, 2],
+        "turn": f["left"] * (turned[..., 1] / turned[..., 2] - rays[..., 1]).mean(),
+        "height": (f["right"] * straight["right"][..., 1] - f["left"] * turned[..., 1] / turned[..., 2]).mean(),
+    }
+    bend = {side: v[side] - K[side][1, 2] - f[side] * straight[side][..., 1] for side in SIDES}
+    assert again == (v["right"] - v["left"]).mean()
+    assert sum(parts.values()) + (bend["right"] - bend["left"]).mean() == pytest.approx((v["right"] - v["left"]).mean())
+    turn, px = says("Half a degree, all of it about the x axis, would be only f · tan 0.5° = 4.7 px.")
+    assert px == f["left"] * np.tan(np.radians(turn.value))
+    left, right, apart, off, mm, back = says(
+        "The axis of the left lens meets its sensor in row 234, that of the right one in row 249: a difference of "
+        "15 px. The turn takes 4 px off, and 0.9 mm of height, at boards a third of a metre away, gives nearly 2 px "
+        "back."
+    )
+    assert left == K["left"][1, 2]
+    assert right == K["right"][1, 2]
+    assert apart == parts["principal points"]
+    assert off == -parts["turn"]
+    assert mm == 1000 * t[1]
+    assert back == parts["height"]
+    B, f_mean = np.linalg.norm(t), (f["left"] + f["right"]) / 2
+    Z = f_mean * B / (f_mean * (straight["left"] - straight["right"])[..., 0])
+    assert Z.mean() == pytest.approx(1 / 3, abs=0.03)
+    assert f_mean * t[1] / Z.mean() == pytest.approx(parts["height"], abs=0.2)
+    says("On average the bent lenses add nothing.")
+    assert abs((bend["right"] - bend["left"]).mean()) < 0.2
+    least, most, disparity = says(
+        "But they spread the differences from 3 px to 23 px: partners are 100 px and more apart"
+    )
+    assert least == (v["right"] - v["left"]).min()
+    assert most == (v["right"] - v["left"]).max()
+    assert (rig["uv"]["left"] - rig["uv"]["right"])[..., 0].min() > disparity.value
+    assert (v["right"] - v["left"] - (bend["right"] - bend["left"])).std() < 1 < (bend["right"] - bend["left"]).std()
+
+
+def test_a_turn_about_x_can_nearly_stand_in_for_a_principal_point(says, rig):
+    lower, tilt = says("A principal point 15 px lower looks much like a camera turned by 1.6°.")
+    assert tilt == np.degrees(np.arctan(lower.value / rig["K"]["right"][1, 1]))
+    row, turn, forced, free = says(
+        "If one insists on row 234 for the right camera too, the calibration answers with a turn of 1.2° the other way "
+        "about x, and the corners fit worse: 0.27 px RMS instead of 0.22 px."
+    )
+    K_right = rig["K"]["right"].copy()
+    K_right[1, 2] = row.value
+    flags = cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_PRINCIPAL_POINT
+    _, K_right, lens, _, _ = cv2.calibrateCamera(
+        [BOARD] * 13, list(rig["uv"]["right"]), (640, 480), K_right, None, flags=flags
+    )
+    rms, R, _ = together(rig["uv"], {**rig["K"], "right": K_right}, {**rig["lens"], "right": lens})
+    about_x, about_x_before = (np.degrees(cv2.Rodrigues(one)[0].ravel()[0]) for one in (R, rig["R"]))
+    assert turn == -about_x
+    assert about_x_before > 0
+    assert forced == rms
+    assert free == rig["rms"]
+
+
+# What the motorcycle's numbers are -----------------------------------------------------------------------------------
+
+
+def test_the_motorcycle_without_doffs_is_nearly_twice_as_far():
+    f, B, doffs = 994.978, 193.001, 31.086  # as the data set publishes them, in pixels and millimetres
+    d = 2 * 19.3
+    assert f * B / (d + doffs) / 1000 == pytest.approx(2.75, abs=0.01)
+    assert f * B / d / 1000 == pytest.approx(4.96, abs=0.02)
+
+
+# The exercises against other programs --------------------------------------------------------------------------------
+
+
+def test_depth_and_baseline_are_those_of_camviz():
+    rng = np.random.default_rng(5)
+    for d, f, B, doffs in exercise("08.depth").cases(rng):
+        np.testing.assert_allclose(lesson08.depth(d, f, B, doffs), twoview.depth_from_disparity(d, f, B, doffs))
+    for Z, error, f, disparity_error in exercise("08.baseline_for").cases(rng):
+        B = lesson08.baseline_for(Z, error, f, disparity_error)
+        np.testing.assert_allclose(twoview.depth_error(Z, f, B, disparity_error), error)
+
+
+def test_the_left_right_check_is_that_of_camviz():
+    for arguments in exercise("08.left_right").cases(np.random.default_rng(5)):
+        np.testing.assert_array_equal(lesson08.left_right(*arguments), twoview.left_right_check(*arguments))
+
+
+def test_a_constant_and_a_tolerance_of_one_s_own_are_told_so():
+    said = judge(exercise("08.depth"), lambda d, f, B, doffs: 3.0, np.random.default_rng(0))
+    assert "same number" in said.message
+
+    def far_too_tolerant(d_left, d_right, tolerance):
+        return twoview.left_right_check(d_left, d_right, 9.0)
+
+    assert judge(exercise("08.left_right"), far_too_tolerant, np.random.default_rng(0)).status == "wrong"
+
+
+def test_the_sixteenths_that_a_reply_speaks_of():
+    grey = np.random.default_rng(8).integers(0, 255, (60, 200), dtype=np.uint8)
+    found = cv2.StereoSGBM.create(0, 32, 5).compute(grey, np.roll(grey, -7, axis=1))
+    assert found.dtype == np.int16
+    assert np.median(found[found >= 0]) == 7 * 16
+    assert (found[:, :20] == -16).all()  # no match
+
+
+def test_sixteenths_in_the_replies(says):
+    (one,) = says("You divide the sum by 16, and doffs with it.")
+    (other,) = says("a number of sixteenths is divided by 16 to give pixels")
+    (third,) = says("You divide by 16. OpenCV's matchers count in sixteenths of a pixel")
+    assert all(number == 16 for number in (one, other, third))

@@ -1,0 +1,362 @@
+"""What lesson 09 says about fisheye lenses, recomputed with NumPy, SciPy and OpenCV."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from camviz.scenes import board_corners
+from camviz.scenes.walk import around_board
+
+EXCEPTIONS: dict[str, str] = {}
+
+RADIUS = {
+    "perspective": np.tan,
+    "stereographic": lambda theta: 2 * np.tan(theta / 2),
+    "equidistant": lambda theta: theta,
+    "equisolid": lambda theta: 2 * np.sin(theta / 2),
+    "orthographic": np.sin,
+}
+F, C = np.array([379.045, 379.008]), np.array([505.512, 509.969])
+COEFFICIENTS = np.array([0.00693023, -0.0013828, -0.000272596, -0.000452646])
+K = np.array([[F[0], 0, C[0]], [0, F[1], C[1]], [0, 0, 1]])
+"""The lens of part 3, as the Basalt project's test has it."""
+
+
+def g(theta, k=COEFFICIENTS):
+    return theta * (1 + k[0] * theta**2 + k[1] * theta**4 + k[2] * theta**6 + k[3] * theta**8)
+
+
+def fold(k=COEFFICIENTS):
+    """The smallest θ > 0 with slope 0, from the roots of the slope in θ²."""
+    squares = np.roots([9 * k[3], 7 * k[2], 5 * k[1], 3 * k[0], 1.0])
+    return np.sqrt(min(root.real for root in squares if abs(root.imag) < 1e-12 and root.real > 0))
+
+
+def angle_of(r):
+    return brentq(lambda theta: g(theta) - r, 0, fold())
+
+
+def ray(theta, around=0.0):
+    return np.array([np.sin(theta) * np.cos(around), np.sin(theta) * np.sin(around), np.cos(theta)])
+
+
+def by_opencv(point, k=COEFFICIENTS, matrix=K):
+    pixel, _ = cv2.fisheye.projectPoints(np.reshape(point, (1, 1, 3)), np.zeros(3), np.zeros(3), matrix, k)
+    return pixel.ravel()
+
+
+def stretch(name, theta, step=1e-5):
+    """How many focal lengths a radian gets along the radius and around the axis."""
+    r = RADIUS[name]
+    return (r(theta + step) - r(theta - step)) / (2 * step), r(theta) / np.sin(theta)
+
+
+def test_the_lens_of_the_first_picture_sees_more_than_everything_in_front(says):
+    (across,) = says("wears a lens that sees 183° from edge to edge: more than everything in front of it")
+    assert across == np.degrees(2 * 240 / 150)
+    assert across.value > 180
+
+
+def test_the_five_projections_near_the_axis_and_at_90_degrees(says):
+    says("near the axis they all agree")
+    for r in RADIUS.values():
+        assert r(0.01) == pytest.approx(0.01, rel=1e-4)
+    at_90 = {name: float(r(np.pi / 2)) for name, r in RADIUS.items()}
+    (right_angle,) = says("perspective alone runs off to infinity at 90°. f · tan θ diverges there; the others do not.")
+    assert right_angle == 90
+    assert [name for name, r in at_90.items() if r > 1e6] == ["perspective"]
+    assert np.tan(np.radians(right_angle.value - 1e-6)) > 1e6
+    degrees, equisolid, equidistant, stereographic = says("at 90°: r/f is 1, 1.41, 1.57, 2 and infinity")
+    also, *again = says("at 90° their r/f is 1, 1.41, 1.57, 2 or infinite")
+    assert np.degrees(np.pi / 2) == pytest.approx(degrees.value)
+    assert also == degrees.value
+    names = ("equisolid", "equidistant", "stereographic")
+    for said, name in zip((equisolid, equidistant, stereographic), names, strict=True):
+        assert said == at_90[name]
+    assert [one.value for one in again] == [equisolid.value, equidistant.value, stereographic.value]
+    assert at_90["orthographic"] == pytest.approx(1)
+
+
+def test_pixels_a_degree(says):
+    says("The equidistant lens gives every degree the same number along the radius.")
+    says(
+        "The perspective one spends most of its pixels on its corners. The orthographic one has almost "
+        "none left at its rim."
+    )
+    angles = np.radians([5.0, 40.0, 80.0])
+    assert np.ptp([stretch("equidistant", theta)[0] for theta in angles]) < 1e-9
+    assert stretch("perspective", angles[2])[0] > 30 * stretch("perspective", angles[0])[0]
+    assert stretch("orthographic", np.radians(89))[0] < 0.02
+
+
+def test_what_each_projection_keeps_and_where_it_ends(says):
+    (column,) = says("keeps | at 90° | ends at")
+    assert column == 90
+    (below,) = says("| perspective | f tan θ | straight lines | ∞ | below 90° |")
+    assert np.tan(np.radians(below.value)) > 1e15
+    (almost,) = says("| shapes: circles stay circles | 2 f | below 180° |")
+    assert 2 * np.tan(np.radians(almost.value) / 2) > 1e15
+    at_90, end = says("| equidistant | f θ | angles from the axis | 1.571 f | 180° |")
+    assert at_90 == np.pi / 2
+    assert end == np.degrees(np.pi)
+    at_90, end = says("| areas | 1.414 f | 180° |")
+    assert at_90 == 2 * np.sin(np.pi / 4)
+    assert end == np.degrees(np.pi)
+    (end,) = says("equal areas of the picture give equal light on a surface parallel to the image | f | 90° |")
+    assert stretch("orthographic", np.radians(end.value))[0] == pytest.approx(0, abs=1e-4)
+    for theta in np.radians([10.0, 40.0, 70.0, 85.0]):
+        along, around = stretch("stereographic", theta)
+        assert along == pytest.approx(around)
+        assert np.prod(stretch("equisolid", theta)) == pytest.approx(1)
+        assert np.prod(stretch("orthographic", theta)) == pytest.approx(np.cos(theta))  # the light's obliquity
+    says("the only one of the five that keeps small shapes")
+    for name in set(RADIUS) - {"stereographic"}:
+        along, around = stretch(name, 1.0)
+        assert along != pytest.approx(around, rel=0.05)
+
+
+def test_a_perspective_picture_ends_below_90_degrees(says):
+    limit, f, wide, ends, ten_times = says(
+        "θ = atan(r / f), less than 90°. With f = 150 px, a picture 480 px wide ends 58° from the axis, "
+        "and one ten times as wide at 86°."
+    )
+    assert ends == np.degrees(np.arctan(wide.value / 2 / f.value))
+    assert ten_times == np.degrees(np.arctan(10 * wide.value / 2 / f.value))
+    assert ten_times.value < limit.value
+    (side,) = says("comes in exactly from the side, 90° from the axis?")
+    (nowhere,) = says("Nowhere: tan 90° is infinite.")
+    infinite, beyond = says(
+        "At exactly 90° the tangent is infinite: no place in any picture, on neither side. tan θ does "
+        "turn negative beyond 90°"
+    )
+    for said in (side, nowhere, infinite, beyond):
+        assert ray(np.radians(said.value))[2] == pytest.approx(0, abs=1e-12)  # parallel to the picture
+    assert np.tan(np.radians(beyond.value + 1)) < 0
+
+
+def test_the_window_is_exact_below_its_own_90_degrees(says):
+    (own,) = says("the geometry is exact at every θ below the window's own 90°")
+    small, large = says("Then make the window's field 20°, and 120°.")
+    assert small.value < large.value < 2 * own.value
+    says("as straight as in the middle")
+    line = np.stack([np.linspace(-2, 2, 50), np.full(50, 1.0), np.full(50, 1.5)], axis=-1)  # a joint of the terrace
+    yaw = np.radians(60)
+    turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
+    theta = np.arctan2(np.hypot(line[:, 0], line[:, 1]), line[:, 2])
+    round_picture = theta[:, None] * line[:, :2] / np.hypot(line[:, 0], line[:, 1])[:, None]
+    back = np.stack([ray(np.hypot(*xy), np.arctan2(xy[1], xy[0])) for xy in round_picture]) @ turn.T
+    window = (back[:, :2] / back[:, 2:])[back[:, 2] > 0.1]
+
+    def bow(points):
+        return np.linalg.svd(points - points.mean(axis=0))[1][1]
+
+    assert bow(window) < 1e-9 < 1e-2 < bow(round_picture)
+
+
+def test_opencv_s_omnidirectional_model_is_the_stereographic_projection(says):
+    says("With ξ = 1 and γ = 2f it is the stereographic projection.")
+    rng = np.random.default_rng(9)
+    for _ in range(20):
+        theta, around, f = rng.uniform(0.05, 3.0), rng.uniform(0, 2 * np.pi), rng.uniform(100, 400)
+        gamma = np.diag([2 * f, 2 * f, 1.0])
+        point = ray(theta, around).reshape(1, 1, 3)
+        pixel, _ = cv2.omnidir.projectPoints(point, np.zeros(3), np.zeros(3), gamma, 1.0, np.zeros((1, 4)))
+        want = 2 * f * np.tan(theta / 2) * np.array([np.cos(around), np.sin(around)])
+        np.testing.assert_allclose(pixel.ravel(), want, rtol=1e-9)
+    says("OpenCV's fisheye model with all coefficients 0 is the equidistant one.")
+    np.testing.assert_allclose(by_opencv(ray(1.2), np.zeros(4), np.eye(3)), (1.2, 0), atol=1e-12)
+    (right_angle,) = says("θ is finite for every ray, so nothing diverges at 90°.")
+    assert np.isfinite(g(np.radians(right_angle.value)))
+
+
+def test_the_published_lens(says):
+    f, cx, cy, width, height, across, folds, reach, y, z = says(
+        "f = 379 px, with the middle of the picture near (506, 510). A picture of 1024 × 1024 pixels then "
+        "reaches 155° from side to side. The polynomial folds at 112° from the axis, 1.75 focal lengths "
+        "from the middle. The picture's corners lie beyond that and are empty. A point at (1, 2, 5):"
+    )
+    assert all(f == one for one in F)
+    assert cx == C[0]
+    assert cy == C[1]
+    sides = [angle_of((C[0] + 0.5) / F[0]), angle_of((width.value - 0.5 - C[0]) / F[0])]
+    assert across == np.degrees(sum(sides))
+    assert across == np.degrees(angle_of((C[1] + 0.5) / F[1]) + angle_of((height.value - 0.5 - C[1]) / F[1]))
+    assert folds == np.degrees(fold())
+    assert reach == g(fold())
+    corners = [np.hypot((u - C[0]) / F[0], (v - C[1]) / F[1]) for u in (-0.5, 1023.5) for v in (-0.5, 1023.5)]
+    assert min(corners) > g(fold())
+    point = np.array([1.0, y.value, z.value])
+    theta = np.arctan2(np.hypot(*point[:2]), point[2])
+    np.testing.assert_allclose(F * g(theta) * point[:2] / np.hypot(*point[:2]) + C, by_opencv(point), atol=1e-9)
+    off, pixels = says("the lens of part 3 keeps to the equidistant one within 2 px of 1024")
+    theta = np.linspace(0, max(sides), 1000)
+    assert off == (F[0] * np.abs(g(theta) - theta)).max()
+    assert pixels == width.value
+
+
+def test_opencv_mirrors_what_is_behind(says):
+    field, angle = says("A lens of 220° sees a point 100° from its axis, to the right and a little behind.")
+    assert angle.value < field.value / 2
+    assert ray(np.radians(angle.value))[2] < 0
+    ratio, again, wrong = says(
+        "But r/z is −5.67 here, and atan(−5.67) is −80°: a negative angle, on the opposite side."
+    )
+    assert ratio == np.tan(np.radians(angle.value))
+    assert again == ratio.value
+    assert wrong == np.degrees(np.arctan(np.tan(np.radians(angle.value))))
+    (same,) = says("Yes: atan(r/z) = −80°, and a negative angle points the other way.")
+    (mirror,) = says("On the left, at 80° from the axis.")
+    assert same == wrong.value
+    assert mirror == -wrong.value
+    hundred, eighty, further, u, width = says(
+        "At 100° the true place is on the right. OpenCV puts the point on the left, at the mirror image "
+        "of 80°. The point at 110° lies behind the camera and outside this picture, at u = 1167 of 1024."
+    )
+    left, right = (by_opencv(ray(np.radians(one.value)))[0] for one in (hundred, eighty))
+    assert left - C[0] == pytest.approx(C[0] - right)
+    assert left < C[0]
+    assert u == C[0] + F[0] * g(np.radians(further.value))
+    assert u.value > width.value
+    says("OpenCV puts it into the picture, on the other side.")
+    assert 0 < by_opencv(ray(np.radians(further.value)))[0] < C[0]
+    minus, one = says("atan cannot tell (1, −1) from (−1, 1)")
+    assert np.arctan(1 / minus.value) == np.arctan(one.value / 1)
+    assert np.arctan2(1, minus.value) != np.arctan2(one.value, 1)
+    (beyond,) = says("A fisheye may see beyond 90°, to points behind it:")
+    assert beyond == np.degrees(np.arctan2(1, 0))
+    nature, products, needed = says(
+        '"180° is a limit of nature". It is the limit of one formula. Fisheyes of more than 180° are '
+        "ordinary products. Their model must go past 90° from the axis"
+    )
+    assert nature == products.value
+    assert needed == products.value / 2
+
+
+def test_the_first_guess_of_the_calibration(says):
+    half, field, f = says("Half the picture's width over half its field in radians will do: 320 px / 1.35 = 237 px.")
+    small = 640 / 1024
+    across = angle_of((C[0] + 0.5) / F[0]) + angle_of((1023.5 - C[0]) / F[0])
+    assert half == 640 / 2
+    assert field == across / 2
+    assert f == half.value / (across / 2)
+    assert f.about(F[0] * small, 0.01)
+
+
+def test_the_boards_reached_62_degrees_and_there_the_powers_look_alike(says):
+    reached, begin, end, beyond = says(
+        "The boards reached 62° from the axis, and as far as that the curve is right to a small fraction of a pixel. "
+        "The single coefficients are not: θ³, θ⁵, θ⁷ and θ⁹ look much alike between 0° and 62°, so an error in one is "
+        "made up for by the others. Compare curves, never coefficients. Beyond the last corner, at 70°,"
+    )
+    seen = np.array([place.inv().apply(board_corners().reshape(-1, 3)) for place in around_board(10)])
+    assert reached == np.degrees(np.arctan2(np.hypot(seen[..., 0], seen[..., 1]), seen[..., 2])).max()
+    theta = np.radians(np.linspace(begin.value, end.value, 200)[1:])
+    powers = np.stack([theta**n for n in (3, 5, 7, 9)], axis=-1)
+    assert np.linalg.cond(powers / np.linalg.norm(powers, axis=0)) > 100
+    assert beyond.value > reached.value
+
+
+def test_the_wall_of_the_astronaut(says):
+    (wide,) = says("Put it on a wall that is 100° wide")
+    f = 256 / np.tan(np.radians(wide.value / 2))
+    corner = np.degrees(np.arctan(np.hypot(255.5, 255.5) / f))
+    assert corner < np.degrees(fold())  # the lens sees all of it
+    says("little is missing in the middle, much towards the corners")
+    slope = (g(1e-4) - g(-1e-4)) / 2e-4
+    at_50 = (g(np.radians(50) + 1e-4) - g(np.radians(50) - 1e-4)) / 2e-4
+    covers = {0: f / (F[0] / 2 * slope), 50: f / np.cos(np.radians(50)) ** 2 / (F[0] / 2 * at_50)}
+    assert covers[0] < 1.2 < 2.5 < covers[50]
+
+
+def test_the_map_has_two_numbers_a_pixel(says):
+    (two,) = says("The answer has shape (height, width, 2).")
+    maps = cv2.fisheye.initUndistortRectifyMap(np.eye(3), np.zeros(4), np.eye(3), np.eye(3), (4, 3), cv2.CV_32FC1)
+    assert two == np.stack(maps, axis=-1).shape[-1]
+
+
+def test_the_quiz(says):
+    (right_angle,) = says(
+        "the polynomial acts on tan θ, which is infinite at 90°, and with k1 < 0 it folds long before"
+    )
+    assert np.tan(np.radians(right_angle.value)) > 1e15
+    assert np.degrees(np.arctan(1 / np.sqrt(3 * 0.05))) < 70  # the fold for as little as k1 = −0.05
+    (full,) = says("removing the distortion gives the full 180° as a straight picture")
+    wide, times = says(
+        "A perspective picture of 180° is infinitely wide. At 120° its edges are already stretched four times"
+    )
+    assert full == wide.value
+    assert np.tan(np.radians(wide.value / 2)) > 1e15
+    assert stretch("perspective", np.radians(times.value / 2))[0] == pytest.approx(4)
+    (cloud,) = says("a cloud at 90° is drawn with four times the area of one overhead")
+    assert np.prod(stretch("stereographic", np.radians(cloud.value))) == pytest.approx(4, rel=1e-6)
+    says("the circle of radius f θ is longer than that of the sphere, sin θ: the rim counts too much")
+    assert stretch("equidistant", np.pi / 2)[1] > 1.5
+    third, series = says("here about +1/3, since tan θ ≈ θ + θ³/3")
+    theta = 1e-2
+    assert (np.tan(theta) - theta) / theta**3 == pytest.approx(1 / third.value, rel=1e-3)
+    assert series == third.value
+    (reaches,) = says("so it reaches 90° and beyond")
+    assert np.isfinite(g(np.radians(reaches.value + 20)))
+    says("r = 2f sin(θ/2) makes a pixel worth the same solid angle everywhere")
+    solid, _ = quad(lambda theta: 2 * np.pi * np.sin(theta), 0, 1.0)
+    assert solid == pytest.approx(np.pi * (2 * np.sin(0.5)) ** 2)
+
+
+def test_a_fisheye_that_looks_up_sees_the_whole_horizon(says):
+    (more,) = says(
+        "it is omnidirectional if the whole horizon lies in that cone, as when it looks up and sees more than 180°"
+    )
+    (ahead,) = says("One of 180° that looks straight ahead misses everything behind it.")
+    horizon, wider = says(
+        "let a fisheye look up: the whole horizon is then 90° from its axis, and a lens of more than 180° sees it"
+    )
+    (also,) = says("when it looks up or down and sees more than 180°")
+    around = np.linspace(0, 2 * np.pi, 73)
+    directions = np.stack([np.sin(around), 0 * around, np.cos(around)], axis=-1)  # y is down: all level
+    from_axis = {
+        name: np.degrees(np.arccos(directions @ axis)) for name, axis in (("up", [0, -1, 0]), ("ahead", [0, 0, 1]))
+    }
+    np.testing.assert_allclose(from_axis["up"], horizon.value)
+    for field in (more, wider, also):
+        assert (from_axis["up"] < field.value / 2 + 0.1).all()
+    assert (from_axis["ahead"] > ahead.value / 2 + 1).any()
+
+
+def test_the_angles_in_the_exercises(says):
+    (all_round,) = says(
+        "`np.arctan2(a, b)` is the angle of a ray that goes a to the side and b ahead, right all the way "
+        "round to 180°."
+    )  # fmt: skip
+    assert all_round == np.degrees(np.arctan2(1e-12, -1))
+    (minus,) = says("one behind such as (1, 0, −1)")
+    again, angle, most = says(
+        "The point (1, 0, −1) is 135° from the axis. np.arctan never gives more than 90°, and a negative "
+        "z makes it negative."
+    )
+    assert again == minus.value
+    assert angle == np.degrees(np.arctan2(1, minus.value))
+    assert most == np.degrees(np.arctan(np.inf))
+    assert np.arctan(1 / minus.value) < 0
+    one, other = says("Two points at 100° and at 150° would share a pixel")
+    assert min(one.value, 90) == min(other.value, 90)
+    true, wrong = says("a point at 135° is not at 45°")
+    assert true == angle.value
+    assert wrong == np.degrees(abs(np.arctan(1 / minus.value)))
+    ends = [
+        *says("arctan(r / z) ends at 90° and comes back negative"),
+        *says("A ray at 90°, which no pinhole can show"),
+        *says("θ simply exceeds 90°"),
+        *says("θ goes on beyond 90°, and so does r"),
+        *says("Everything behind the camera is put at 90°."),
+        *says("which stays finite at 90°"),
+        *says("You stop at 90°."),
+        *says("the orthographic lens, which folds at 90°"),
+    ]
+    assert all(one == np.degrees(np.arctan(np.inf)) for one in ends)
+    assert stretch("orthographic", np.pi / 2 - 0.01)[0] > 0 > stretch("orthographic", np.pi / 2 + 0.01)[0]
+    three, five = says("Without the 3 and the 5 the steps are too long.")
+    theta, step = 0.8, 1e-6
+    slope = (g(theta + step, [0.02, 0.001, 0, 0]) - g(theta - step, [0.02, 0.001, 0, 0])) / (2 * step)
+    assert slope == pytest.approx(1 + three.value * 0.02 * theta**2 + five.value * 0.001 * theta**4)
