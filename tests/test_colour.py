@@ -245,7 +245,7 @@ def test_every_balance_makes_grey_what_it_takes_for_grey():
 
 
 def test_grey_world_is_that_of_opencv_but_for_its_scale():
-    """OpenCV scales down to the smallest channel, and takes bytes only."""
+    """OpenCV scales down to the smallest channel, and takes whole numbers only."""
     rgb = np.random.default_rng(8).integers(10, 200, (50, 70, 3)).astype(np.uint8)
     balancer = cv2.xphoto.createGrayworldWB()
     balancer.setSaturationThreshold(1.0)

@@ -18,10 +18,10 @@ from camviz.mosaics.patterns import BLUE, GREEN, RED, Pattern, as_picture
 
 @dataclass(frozen=True)
 class Carrier:
-    """A frequency (fu, fv) at which a grey grating looks to the mosaic like an even colour.
+    """A frequency (fu, fv) at which a grey grating moves the means of the channels' pixels as a colour would.
 
-    `colour` (R, G, B) is what the grating's crest, of height 1 on the first pixel, adds to each channel; its imaginary
-    part belongs to a grating moved by a quarter of its period.
+    `colour` (R, G, B) is what the grating's crest, of height 1 on the first pixel, adds to the mean of each channel's
+    pixels; its imaginary part belongs to a grating moved by a quarter of its period.
     """
 
     fu: float
