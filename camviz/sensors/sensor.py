@@ -207,9 +207,10 @@ class Sensor:
     def threshold_photons(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
         """The absolute sensitivity threshold: how many photons give SNR = 1.
 
-        From η μ = sqrt(σ² + η μ): η μ = ½ + sqrt(σ² + ¼), which EMVA 1288 rounds to σ + ½.
+        From η μ = sqrt(σ² + η μ): η μ = ½ + sqrt(σ² + ¼), exactly; EMVA 1288 prints the approximation σ + ½.
         """
-        return (self._floor_e(exposure_s, temperature_c) + 0.5) / float(self.efficiency())
+        floor = self._floor_e(exposure_s, temperature_c)
+        return (0.5 + float(np.sqrt(floor**2 + 0.25))) / float(self.efficiency())
 
     def dynamic_range(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
         """Saturation over absolute sensitivity threshold, a plain ratio; 20 log10 of it is in dB, log2 in stops."""

@@ -1,0 +1,3 @@
+"""What lesson 14 says about image sensors, recomputed with NumPy and SciPy."""
+
+EXCEPTIONS: dict[str, str] = {}
