@@ -31,7 +31,7 @@ EXPECTED_ELECTRONS = Exercise(
     cases=_electron_cases,
     shown=((np.array(500.0), 4.0, 3.45, 0.01, 0.77),),
     hints=(
-        "Go step by step: lux on the wall → lux on the sensor → photons on each µm² → photons on the pixel → electrons. "
+        "Go step by step: lux on the wall → lux on the sensor → photons per µm² → photons on the pixel → electrons. "
         "Which of these steps is missing, or there twice?",
         "The equation above with π L = lux, T = 1 and θ = 0 tells the lux on the sensor. Photons grow with those lux, "
         "with the time, and with the pixel's area. A share η of the photons frees electrons.",
@@ -190,7 +190,9 @@ def one_stripe(stripes, rows, mains_hz):
     return np.full(np.shape(stripes), 1 / (2 * mains_hz))
 
 
-@ROW_TIME.wrong("More stripes mean a *slower* sensor: the more often the lamp is bright meanwhile, the longer the frame.")
+@ROW_TIME.wrong(
+    "More stripes mean a *slower* sensor: the more often the lamp is bright meanwhile, the longer the frame."
+)
 def fewer_with_more_stripes(stripes, rows, mains_hz):
     return 1 / (2 * mains_hz * rows * np.asarray(stripes))
 
@@ -316,7 +318,7 @@ def over_the_noise(saturation_e, dark_noise_e):
     return 20 * np.log10(np.asarray(saturation_e) / np.asarray(dark_noise_e))
 
 
-@DYNAMIC_RANGE_DB.wrong("`a / b + 0.5` adds the ½ to the *ratio*. It belongs to the noise: keep the brackets around both.")
+@DYNAMIC_RANGE_DB.wrong("`a / b + 0.5` adds the ½ to the *ratio*. It belongs to the noise: keep both in brackets.")
 def half_added_to_the_ratio(saturation_e, dark_noise_e):
     return 20 * np.log10(np.asarray(saturation_e) / np.asarray(dark_noise_e) + 0.5)
 
@@ -369,7 +371,7 @@ ARRIVING = Exercise(
     shown=((np.array([1000.0, 1000.0, 1000.0]), 0.99),),
     hints=(
         "Follow one bucket. What share of it is left after one shift, and after two? How many shifts does row 0 take?",
-        "After n shifts a power of the efficiency is left. Make an array with each row's n: `np.arange` counts rows from "
+        "After n shifts a power of the efficiency is left. Make an array of each row's n: `np.arange` counts from "
         "0, but even row 0 has to be shifted into the register.",
         "`return electrons * efficiency**___`",
     ),
@@ -449,7 +451,7 @@ def far_rows_first(electrons, efficiency):
 
 
 @ARRIVING.wrong(
-    "`efficiency**1 + np.arange(…)` is a power *and then* a sum: `**` binds first. Brackets around the exponent mend it."
+    "`efficiency**1 + np.arange(…)` is a power *and then* a sum: `**` binds first. Brackets round the exponent mend it."
 )
 def brackets_around_the_exponent_forgotten(electrons, efficiency):
     return electrons * (efficiency**1 + np.arange(len(electrons)))

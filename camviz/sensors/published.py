@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from camviz.sensors.efficiency import EfficiencyCurve
 from camviz.sensors.sensor import Sensor
 
-
-EMVA, DATA_SHEET, MEASURED = "measured after EMVA 1288", "data sheet", "measured in another way"
+EMVA = "measured after EMVA 1288"
+DATA_SHEET = "data sheet"
+MEASURED = "measured in another way"
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,8 @@ class PhotonTransferView(View):
 
     `exposure` is in stops: 0 is one second, each step halves or doubles. At `gain` 1 the converter reaches its end as
     the well does, at 15 000 electrons; more gain gives more DN per electron, and less room. With `difference` the
-    noise is that of the difference of two frames over √2, else what varies over the pixels of one. Without `fit` the gain
-    that these points give is not told.
+    noise is that of the difference of two frames over √2, else what varies over the pixels of one. Without `fit` it is
+    not told which gain these points give.
     """
 
     title: ClassVar[str] = "Photon transfer"
