@@ -101,7 +101,7 @@ def pattern_not_squared(electrons, read_noise, prnu):
     return np.sqrt(read_noise**2 + electrons + prnu * electrons)
 
 
-@NOISE.wrong("`prnu * electrons**2` squares the electrons alone. The pattern's deviation is the product: square all of it.")
+@NOISE.wrong("`prnu * electrons**2` squares the electrons alone. The pattern's deviation is the product: square both.")
 def only_the_electrons_squared(electrons, read_noise, prnu):
     return np.sqrt(read_noise**2 + electrons + prnu * electrons**2)
 
@@ -152,8 +152,8 @@ GAIN = Exercise(
     cases=_gain_cases,
     hints=(
         "What do two frames of the same light share, and what not? Do the same with the dark frames.",
-        "A difference of two frames has the variance of two, and no pattern. From the variance in the light take that in "
-        "the dark, from the mean in the light that in the dark. K is the one over the other.",
+        "A difference of two frames has the variance of two and no pattern. From the variance in the light take that "
+        "in the dark, from the mean in the light that in the dark. K is the one over the other.",
         "`variance = (np.var(___) - np.var(___)) / ___`",
     ),
     praise="Four frames and no light meter: Poisson's law is the ruler.",
@@ -378,7 +378,7 @@ FLAT_FIELD = Exercise(
     cases=_flat_cases,
     hints=(
         "Which of the three pictures contain the dark? Take it off those before anything is divided.",
-        "Call what a pixel makes of the even light its answer, and let `np.where` put NaN there where it is not above 0. "
+        "Call what a pixel makes of the even light its answer, and let `np.where` put NaN where it is not above 0. "
         "Of the answers you need the mean without the NaN: NumPy has a function for that.",
         "`return (frame - dark) * ___ / answer`",
     ),
@@ -423,7 +423,7 @@ def dark_left_in_the_frame(frame, dark, flat):
     return frame * np.nanmean(answer) / answer
 
 
-@FLAT_FIELD.wrong("You subtract the dark after dividing. It was added *before* the answer was counted: take it off first.")
+@FLAT_FIELD.wrong("You subtract the dark after dividing. It is added to what the pixel answers: take it off first.")
 def divided_first(frame, dark, flat):
     answer = np.where(flat > dark, flat - dark, np.nan)
     return frame * np.nanmean(answer) / answer - dark
@@ -444,7 +444,9 @@ def scaled_by_the_whole_flat(frame, dark, flat):
     return (frame - dark) * np.mean(flat) / np.where(flat > dark, flat - dark, np.nan)
 
 
-@FLAT_FIELD.wrong("You scale by the mean of the *frame*. The brightness of the flat has to be divided out, not the frame's.")
+@FLAT_FIELD.wrong(
+    "You scale by the mean of the *frame*. The brightness of the flat is to be divided out, not the frame's."
+)
 def scaled_by_the_frame(frame, dark, flat):
     return (frame - dark) * np.mean(frame - dark) / np.where(flat > dark, flat - dark, np.nan)
 
@@ -534,8 +536,8 @@ MERGE = Exercise(
     tolerance=1e-7,
     hints=(
         "Which frames may say something about a pixel? Mark them first, in an array of the shape of `electrons`.",
-        "Give the exposures axes of length 1, `exposures.reshape(-1, 1, …)`, so that they broadcast. Sum over axis 0, the "
-        "frames: once for x, then for the weighted mean. A frame that is not usable has weight 0, and 0/0 is NaN.",
+        "Give the exposures axes of length 1, `exposures.reshape(-1, 1, …)`, so that they broadcast. Sum over axis 0: "
+        "once for x, then for the weighted mean. A frame that is not usable has weight 0, and 0/0 is NaN.",
         "`weight = usable * ___ / (dark_noise**2 + ___)`",
     ),
     praise="No other weights would leave less noise. That is what a noise model is for.",
