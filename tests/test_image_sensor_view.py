@@ -55,9 +55,9 @@ def test_what_is_exposed_at_once_is_the_scene_of_the_first_moment(readout):
 
 
 def test_a_train_leans_what_stands_by_the_closed_form():
-    """f v t / Z: 554.3 px · 40 m/s · 30.72 ms / 3 m = 227 px, which the numbers state."""
+    """f v t / Z: 554.3 px · 40 m/s · 479 · 64 µs / 3 m = 227 px, which the numbers state."""
     view = ReadoutView(subject="view from a train", speed=40)
-    assert view.lean_px == pytest.approx(554.256 * 40 * 480 * 64e-6 / 3, rel=1e-5)
+    assert view.lean_px == pytest.approx(554.256 * 40 * 479 * 64e-6 / 3, rel=1e-5)
     assert "a thing at 3 m moves 227 px" in view.numbers().values()
 
 
@@ -76,6 +76,17 @@ def test_the_picture_is_dark_where_it_is_not_read():
     picture = photo(view, "read")
     assert picture[130:].mean() < 0.25 * picture[:110].mean()
     assert f"{ROWS // 2} of {ROWS} rows" in view.numbers().values()
+
+
+def test_the_fan_s_own_blades_are_straight_and_bent_in_the_picture_alone():
+    """An edge of the scene's blade lies on one ray from the hub; with the rolling shutter it does not."""
+    radius = np.linspace(0.2, 0.8, 25)
+    angle = np.radians(np.arange(0, 360, 0.5))
+    u, v = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
+    still = fan(u, v, 0.37)
+    assert (still == still[:1]).all()  # the same along each ray, at every distance from the hub
+    rolling = fan(u, v, 0.37 + 0.3 * v)  # each row, v, a little later
+    assert np.abs(rolling - rolling[:1]).max() > 0.1
 
 
 def test_a_turn_of_the_fan_is_no_turn():

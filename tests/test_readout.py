@@ -145,7 +145,7 @@ def test_rows_are_exposed_one_after_the_other():
 
 @pytest.mark.parametrize("published", PUBLISHED, ids=lambda one: f"{one.name}, {one.camera}")
 def test_published_figures_agree_with_each_other(published):
-    """The dynamic range stated lies between that over threshold, σ + ½ with quantisation, and that over σ_d alone.
+    """The dynamic range stated lies between that over the threshold, with quantisation, and that over σ_d alone.
 
     Sheets differ in which they divide by; half a tenth of a bit or of a dB is rounding.
     """

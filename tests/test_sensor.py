@@ -182,20 +182,23 @@ def test_steps_do_what_they_say() -> None:
 
 
 def test_threshold_and_dynamic_range_of_the_reference_data_set() -> None:
-    """The emva1288 project's reference camera: K = .280769, η = 45.136 %, σ_d = 10.898 e⁻, DR = 61.732 dB.
+    """The emva1288 project's reference camera: K = .280769, η = 45.136 %, σ_d = 10.898 e⁻, SNR_max = 41.453 dB.
 
-    μ_p.sat = 30957 photons is the figure it publishes; SNR_max = 41.453 dB. With ½ + sqrt(σ² + ¼) in the place of the
-    standard's σ + ½ the dynamic range is 61.723 dB.
+    μ_p.sat = 30957 photons is the figure it publishes. Its 61.732 dB are over σ + ½; over the exact threshold 61.723.
     """
     sensor = Sensor(0.45136, 0.45136 * 30957, 10.898, 0.280769, offset_dn=0, bits=12)
-    assert decibel(sensor.dynamic_range()) == pytest.approx(61.723, abs=0.002)
+    assert decibel(sensor.dynamic_range()) == pytest.approx(61.723, abs=0.001)
+    approximate = (np.hypot(10.898, (1 / 12) ** 0.5 / 0.280769) + 0.5) / 0.45136
+    assert decibel(30957 / approximate) == pytest.approx(61.732, abs=0.001)
     assert decibel(sensor.snr(30957)) == pytest.approx(41.453, abs=0.05)
     assert decibel(sensor.saturation_e**0.5) == pytest.approx(41.453, abs=0.005)
 
 
 def test_signal_equals_noise_at_the_threshold() -> None:
-    """½ + sqrt(σ² + ¼); with the standard's σ + ½ the ratio would be 1 but for 1/8σ."""
-    assert BUSY.snr(BUSY.threshold_photons(0.1, 20), 0.1, 20) == pytest.approx(1, rel=1e-9)
+    """Exactly so: ½ + sqrt(σ² + ¼) solves it. The σ + ½ that EMVA 1288 prints is within 3 % where σ is above 2."""
+    assert BUSY.snr(BUSY.threshold_photons(0.1, 20), 0.1, 20) == pytest.approx(1, abs=1e-12)
+    quiet = Sensor(1.0, 10_000, 0.0, gain_dn_per_e=100.0, bits=16)
+    assert quiet.threshold_photons() == pytest.approx(1, abs=1e-4)  # SNR = √μ, so that a single electron has 1
 
 
 def test_efficiency_has_a_wavelength_and_includes_the_fill_factor_or_not() -> None:

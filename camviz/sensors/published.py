@@ -10,10 +10,18 @@ from dataclasses import dataclass
 from camviz.sensors.efficiency import EfficiencyCurve
 from camviz.sensors.sensor import Sensor
 
+EMVA = "measured after EMVA 1288"
+DATA_SHEET = "data sheet"
+MEASURED = "measured in another way"
+
 
 @dataclass(frozen=True)
 class PublishedSensor:
-    """A sensor as its sheet describes it; `stated_dynamic_range_db` is NaN where the sheet gives none."""
+    """A sensor as its sheet describes it; `stated_dynamic_range_db` is NaN where the sheet gives none.
+
+    `basis` says what sort of sheet: figures that somebody measured in one camera after EMVA 1288, a maker's data sheet,
+    or other measurements. Where EMVA 1288 was followed, the full well is the saturation capacity.
+    """
 
     name: str
     technology: str
@@ -23,6 +31,7 @@ class PublishedSensor:
     stated_dynamic_range_db: float
     source: str
     assumed: tuple[str, ...]
+    basis: str = DATA_SHEET
 
 
 def _filling(full_well_e: float, bits: int, offset_dn: float) -> float:
@@ -37,8 +46,9 @@ IMX174 = PublishedSensor(
     5.86,
     Sensor(0.77, 32_691, 6.83, 1 / 0.51, 0, 16, measured_at_nm=525),
     73.0,
-    "Point Grey's EMVA 1288 figures, quoted on fhotolab.fherb.de, 7 September 2016",
+    "Point Grey's EMVA 1288 figures of its camera, quoted on fhotolab.fherb.de, 7 September 2016",
     ("offset_dn", "bits", "dark_current_e_per_s", "dsnu_e", "prnu"),
+    EMVA,
 )
 
 ICX625_POINT_GREY = PublishedSensor(
@@ -50,6 +60,7 @@ ICX625_POINT_GREY = PublishedSensor(
     20 * 9.41 * 0.30103,
     "Point Grey's EMVA 1288 figures, quoted on mengineer.hatenablog.com, 2 May 2016; 9.41 bits",
     ("gain_dn_per_e", "offset_dn", "bits", "dark_current_e_per_s", "dsnu_e", "prnu"),
+    EMVA,
 )
 
 ICX625_BASLER = PublishedSensor(
@@ -61,6 +72,7 @@ ICX625_BASLER = PublishedSensor(
     20 * 9.1 * 0.30103,
     "Basler's EMVA 1288 figures, quoted on mengineer.hatenablog.com, 2 May 2016; 9.1 bits",
     ("gain_dn_per_e", "offset_dn", "bits", "dark_current_e_per_s", "dsnu_e", "prnu"),
+    EMVA,
 )
 
 CMV4000 = PublishedSensor(
@@ -89,6 +101,7 @@ KAF_3200ME = PublishedSensor(
     float("nan"),
     'measured for the page "Parameters of CCD and CMOS cameras", astrosurf.com',
     ("offset_dn", "dsnu_e", "prnu"),
+    MEASURED,
 )  # fmt: skip
 
 KAF_50100 = PublishedSensor(
@@ -130,6 +143,7 @@ EMVA_REFERENCE = PublishedSensor(
     61.732,
     "the emva1288 project's reference data set, 12 bits, evaluated after EMVA 1288",
     ("offset_dn", "dark_current_e_per_s", "dsnu_e", "prnu", "measured_at_nm"),
+    EMVA,
 )
 
 PUBLISHED = (

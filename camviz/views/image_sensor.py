@@ -38,7 +38,8 @@ class ImageSensorView(View):
 
     The quantum efficiency is a published one. Where only one figure was published, it is drawn dashed at all
     wavelengths, for want of others. `fill_factor` is the share of the pixel that catches light, beyond what the
-    published figure includes. Pitch and read noise are the published sensor's too; the gain fills the converter.
+    published figure includes. Pitch and read noise are the published sensor's too. The gain is such that the converter
+    ends just where the well is full, so the full well is the saturation capacity here. It opens as the IMX174 does.
     """
 
     title: ClassVar[str] = "Image sensor"
@@ -50,9 +51,9 @@ class ImageSensorView(View):
         1.0, 0.1, 1.0, 0.01, label="fill factor", help="the share of the pixel that catches light"
     )
     full_well: float = slider(
-        30_000.0, 300.0, _MOST_E, 100.0, label="full well", unit="e⁻", help="what a pixel can hold"
+        32_700.0, 300.0, _MOST_E, 100.0, label="full well", unit="e⁻", help="what a pixel can hold"
     )
-    bits: float = slider(12.0, 2.0, 16.0, 1.0, unit="bits", help="of the converter")
+    bits: float = slider(16.0, 2.0, 16.0, 1.0, unit="bits", help="of the converter")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -147,7 +148,7 @@ class ImageSensorView(View):
     def _electrons(self) -> str:
         """Electrons of each channel beside the full well and the threshold, on a logarithmic scale."""
         low, high = 0.0, float(np.log10(3 * _MOST_E))
-        panel = plot_panel("electrons", 70, 330, 480, 200, (0.4, 5.4), (low, high))
+        panel = plot_panel("electrons", 70, 330, 480, 200, (0.4, 5.9), (low, high))
         yticks = logarithmic(low, high)
         xticks = [(i + 1.0, name) for i, name in enumerate(("red", "green", "blue", "no filter"))]
         content = grid(panel, xticks=[], yticks=yticks)

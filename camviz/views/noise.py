@@ -34,7 +34,8 @@ class PhotonTransferView(View):
 
     `exposure` is in stops: 0 is one second, each step halves or doubles. At `gain` 1 the converter reaches its end as
     the well does, at 15 000 electrons; more gain gives more DN per electron, and less room. With `difference` the
-    noise is that of the difference of two frames over √2, else what varies over the pixels of one.
+    noise is that of the difference of two frames over √2, else what varies over the pixels of one. Without `fit` it is
+    not told which gain these points give.
     """
 
     title: ClassVar[str] = "Photon transfer"
@@ -51,6 +52,7 @@ class PhotonTransferView(View):
     photon_noise: bool = switch(True, label="photon noise", help="light comes in photons, at random")
     difference: bool = switch(False, label="difference of two frames", help="take the fixed pattern out")
     brighten: bool = switch(True, help="show dim pictures as bright as others")
+    fit: bool = switch(True, label="fit K", help="read the gain K off the points: variance over signal")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -140,7 +142,6 @@ class PhotonTransferView(View):
 
     def numbers(self, pixels: int = 3000) -> dict[str, str]:
         """The state's key figures, as text."""
-        fitted = self.fitted_gain(*self.measured(pixels))
         parts = self.parts(np.array([self.card_e]))
         K = self.sensor.gain_dn_per_e
         whole = float(np.sqrt(sum(part[0] ** 2 for part in parts.values()))) / K
@@ -148,12 +149,19 @@ class PhotonTransferView(View):
         return {
             "exposure": _seconds(self.exposure_s),
             "gain K": f"{K:.4g} DN/e⁻",
-            "K from the curve": f"{fitted:.4g} DN/e⁻, {fitted / K:.3g} × K" if isfinite(fitted) else "none",
+            **self._fitted(pixels),
             "on the card": f"{_electrons(self.card_e)} e⁻ ± {_electrons(whole)}",
             "signal / noise": f"{self.card_e / max(whole, 1e-9):.3g}" if full < 0.5 else "saturated",
             "mostly from": max(parts, key=lambda name: float(parts[name][0])),
             "card saturated": f"{100 * full:.0f} %",
         }
+
+    def _fitted(self, pixels: int) -> dict[str, str]:
+        """The gain that the points give, beside the true one."""
+        if not self.fit:
+            return {}
+        fitted, K = self.fitted_gain(*self.measured(pixels)), self.sensor.gain_dn_per_e
+        return {"K from the curve": f"{fitted:.4g} DN/e⁻, {fitted / K:.3g} × K" if isfinite(fitted) else "none"}
 
     @property
     def _saturated_share(self) -> float:

@@ -33,8 +33,7 @@ _WORDS = {
     "CCD": "Exposed all at once, so nothing leans. Every charge passes through one amplifier, one after the other.",
     "CMOS, global shutter": "Exposed all at once, so nothing leans, though it is a CMOS sensor. Each pixel keeps its "
     "charge in the dark until its row's turn.",
-    "CMOS, rolling shutter": "Each row sees the world a little later than the row above. What moves is bent, however "
-    "short the exposure.",
+    "CMOS, rolling shutter": "Each row sees the world a little later than the row above, so what moves is bent.",
 }
 
 
@@ -98,15 +97,16 @@ class ReadoutView(View):
 
     @cached_property
     def lean_px(self) -> float:
-        """How far the world at the lower end of the frame has moved on since the upper end, pixels of a 640 px row.
+        """How far the world has moved on between the first and the last row, in pixels of a 640 px row.
 
         For the fan, its tips across the frame; for the train, what stands 3 m away: f v t / Z.
         """
         if not self.rolling:
             return 0.0
+        apart_s = (ROWS - 1) * self.row_us * 1e-6
         if self.subject == "fan":
-            return float(2 * np.pi * self.speed * self.frame_s * 0.43 * ROWS)
-        return float(320 / np.tan(np.radians(_FOV_DEG / 2)) * self.speed * self.frame_s / 3)
+            return float(2 * np.pi * self.speed * apart_s * 0.43 * ROWS)
+        return float(320 / np.tan(np.radians(_FOV_DEG / 2)) * self.speed * apart_s / 3)
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
@@ -235,12 +235,15 @@ class ReadoutView(View):
 
 
 def fan(u: ArrayLike, v: ArrayLike, turns: ArrayLike) -> Array:
-    """Linear light (..., 3) of a fan turned by `turns`, at u, v in half heights of the picture from its middle."""
+    """Linear light (..., 3) of a fan turned by `turns`, at u, v in half heights of the picture from its middle.
+
+    The edges of its blades are straight: each lies on a ray from the hub, so that only a shutter can bend them.
+    """
     u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
     radius, angle = np.hypot(u, v), np.arctan2(v, u) / (2 * np.pi)
-    phase = np.mod((angle - np.asarray(turns)) * BLADES + 0.25 * radius, 1.0)
-    blade = (phase < 0.42) & (radius < 0.86) & (radius > 0.12)
-    number = np.mod(np.floor((angle - np.asarray(turns)) * BLADES + 0.25 * radius), BLADES)
+    which = np.mod((angle - np.asarray(turns)) * BLADES, BLADES)
+    number = np.floor(which)
+    blade = (which - number < 0.42) & (radius < 0.86) & (radius > 0.12)
     light = np.empty((*np.broadcast_shapes(blade.shape, np.shape(turns)), 3))
     light[:] = (0.55, 0.66, 0.74)
     light[blade] = (0.05, 0.13, 0.22)

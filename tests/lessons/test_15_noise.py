@@ -1,0 +1,496 @@
+"""What lesson 15 says about sensor noise, recomputed with NumPy, SciPy and OpenCV."""
+
+import cv2
+import numpy as np
+import pytest
+from quoting import LESSONS
+from scipy.constants import physical_constants
+
+from camviz import notebooks
+from camviz.exercises import lesson15
+from camviz.sensors import decibel
+from camviz.sensors.correction import NoiseModel, merged
+from camviz.sensors.statistics import pair
+from camviz.views.noise import PhotonTransferView
+
+EXCEPTIONS: dict[str, str] = {
+    "That alone lowers K to 0.2801 DN/e⁻, by a quarter of a per cent.": "tests/test_emva.py measures it on the "
+    "project's frames, which are not among the samples",
+}
+
+REFERENCE = {  # the emva1288 project's set 001: what its descriptor and its result file say
+    **{"levels": 50, "width": 640, "height": 480, "bits": 12},
+    **{"K": 0.280769280926, "η": 0.451356082834, "σ_d": 10.8980275235, "photons": 30_957, "PRNU": 0.00432704411062},
+}
+FULL_WELL, WHITE, CARD = 15_000, 10_000, 0.4  # electrons; a second of white; the card's share of it
+
+
+def printed():
+    """All that the lesson's cells print."""
+    (path,) = LESSONS.glob("15_*.ipynb")
+    outputs = [output for cell in notebooks.read(path).cells for output in cell.get("outputs", [])]
+    return "\n".join("".join(output.get("text", "")) for output in outputs)
+
+
+def saved_views():
+    """The descriptions of the pictures, and the questions, in the order in which a reader meets them."""
+    (path,) = LESSONS.glob("15_*.ipynb")
+    for cell in notebooks.read(path).cells:
+        for output in cell.get("outputs", []):
+            yield "".join(output.get("data", {}).get("text/plain", ""))
+
+
+def through_the_origin(x, y):
+    return float(np.linalg.lstsq(np.asarray(x)[:, None], np.asarray(y), rcond=None)[0][0])
+
+
+def db(ratio):
+    return 20 * np.log10(ratio)
+
+
+# 1: a garden in bad light ---------------------------------------------------------------------------------------------
+
+
+def test_nothing_tells_an_answer_before_its_question():
+    """K from the points, and the slope of dark current's noise, are shown only after the questions about them."""
+    seen = list(saved_views())
+    asked = next(i for i, words in enumerate(seen) if "find the gain K of a camera" in words)
+    assert not any("K from the curve" in words for words in seen[:asked])
+    assert any("K from the curve" in words for words in seen[asked:])
+    light = next(i for i, words in enumerate(seen) if "counts 500 electrons" in words)
+    assert not any("Photon transfer" in words for words in seen[:light])
+    quiet = PhotonTransferView(dark_current=0.0, fit=False).figure(draft=True).body
+    assert "dark current" not in quiet
+    assert "K from the curve" not in quiet
+
+
+def test_the_first_picture(says):
+    (part,) = says("Here is the garden in 1/256 s.")
+    dark, most = says(
+        "Go to −8 stops. Switch **photon noise** off, and on; then take **read noise** to 0 and to 40. Which of "
+        "the two spoils this picture? Ask the same at 0 stops."
+    )
+    assert part == 2.0**-dark.value
+    assert most == PhotonTransferView.controls()["read_noise_e"].high
+    dim, lit = CARD * WHITE * 2.0**dark.value, CARD * WHITE
+    assert np.sqrt(dim) < PhotonTransferView().read_noise_e < np.sqrt(lit)
+    assert f"1/256 s: {dim:.1f} e⁻" in printed()
+    assert "mostly read noise" in printed()
+
+
+def test_a_full_card_has_hardly_any_noise(says):
+    (stops,) = says("Take the exposure to 2 stops. The card is full: hardly any noise is left, and no picture.")
+    rng, steps = np.random.default_rng(1), 4095 * 0.97 / FULL_WELL
+    expected = CARD * WHITE * 2**stops.value
+    assert expected > FULL_WELL
+    charge = np.minimum(rng.poisson(expected * (1 + 0.015 * rng.standard_normal(100_000))), FULL_WELL)
+    seen = np.clip(np.rint(steps * (charge + 8 * rng.standard_normal(100_000)) + 0.03 * 4095), 0, 4095)
+    assert seen.std() / steps < 0.1 * np.sqrt(expected)
+
+
+def test_light_itself_is_noisy(says):
+    electrons, percent = says("100 electrons are never known better than to 10 %.")
+    drawn = np.random.default_rng(2).poisson(electrons.value, 1_000_000)
+    assert percent == 100 * drawn.std() / drawn.mean()
+    says("In good light nearly all the noise in a photograph is the *light's*.")
+    assert np.sqrt(4000) / np.sqrt(4000 + 8**2) > 0.99
+
+
+def test_the_question_about_four_times_the_light(says):
+    (electrons,) = says("A pixel of the grey card counts 500 electrons. You open the shutter four times as long.")
+    before, after = says("The photons' noise is √μ: from about 22 to 45 electrons.")
+    assert before == np.sqrt(electrons.value)
+    assert after == np.sqrt(4 * electrons.value)
+    says("The signal is four times as large, so signal to noise has doubled.")
+    says("Near saturation the pattern can be the larger one, and then you are nearly right.")
+    noise = [np.sqrt(8**2 + mu + (0.015 * mu) ** 2) for mu in (500, 2000, 3700, 14_800)]
+    assert noise[1] / noise[0] == pytest.approx(2, abs=0.2)
+    assert np.sqrt(14_800) < 0.015 * 14_800
+    assert noise[3] / noise[2] > 2.9
+
+
+# 3: the gain falls out ------------------------------------------------------------------------------------------------
+
+
+def test_four_bits_are_dithered_by_nothing(says):
+    (bits,) = says("Take **bit depth** to 4. In the dark the points are gone: every pixel reads the same number")
+    top = 2**bits.value - 1
+    steps = 0.97 * top / FULL_WELL
+    dark = np.random.default_rng(3).standard_normal(100_000) * np.hypot(8, 5) * steps + 0.03 * top
+    assert np.rint(dark).std() == 0
+    _, noise, _ = PhotonTransferView(bits=int(bits.value), prnu=2.0, dark_current=0.0, fit=False).measured()
+    assert (noise[:5] == 0).all()
+
+
+def test_the_question_about_one_frame(says):
+    top, percent = says(
+        "up to 15,000 electrons. You take the variance of the pixels *within each frame* and fit a line through "
+        "the origin, variance over signal. The pixels differ in their response by 1 %."
+    )
+    spread = percent.value / 100
+    (pixels,) = says("K, since averaging over 300,000 pixels takes the differences out.")
+    assert spread / np.sqrt(pixels.value) < 1e-4  # out of the mean it does
+    again, share, level = says(
+        "a fixed spread of 1 % of the signal adds (0.01 μ)², which at 10,000 electrons is as much as the photons' "
+        "own variance."
+    )
+    assert share == spread == again.value / 100
+    assert (share.value * level.value) ** 2 == pytest.approx(level.value)
+    (too_large,) = says("A K that is about 1 % too large.")
+    assert too_large == percent.value
+    at, fraction, electrons, square, of_pattern = says(
+        "At 10,000 electrons (0.01 · 10,000)² = 10,000: 1 % of pattern has already doubled the variance."
+    )
+    assert at == electrons.value
+    assert square == (fraction.value * electrons.value) ** 2
+    assert of_pattern == 100 * fraction.value
+    highest, times = says("with exposures spread evenly up to 15,000 electrons it comes out 2.1 times too large")
+    assert highest == top.value
+    rng, K = np.random.default_rng(4), 0.28
+    response = 1 + spread * rng.standard_normal(100_000)
+    levels = np.linspace(0, top.value, 31)[1:]
+    variances = [np.var(K * rng.poisson(level * response)) for level in levels]
+    assert times == through_the_origin(K * levels, variances) / K
+    says("A K that is far too large, about twice the true one.")
+
+
+def test_the_difference_of_two_frames_has_the_gain(says):
+    (percent,) = says("What is left has slopes 0 and ½ only, and K comes out right to 2 %.")
+    says("move **PRNU** from end to end. K hardly moves.")
+    found = []
+    for prnu in (0.0, 2.0, 6.0):
+        view = PhotonTransferView(prnu=prnu, dark_current=0.0, difference=True)
+        signal, noise, dark = view.measured(3000)
+        used = signal < 0.7 * signal[np.argmax(noise)]
+        found.append(through_the_origin(signal[used], (noise**2 - dark**2)[used]) / view.sensor.gain_dn_per_e)
+    assert np.abs(np.array(found) - 1).max() < percent.value / 100
+    assert np.ptp(found) < 0.005
+
+
+def test_our_own_sensor_gives_back_what_was_put_in(says):
+    (K,) = says("By hand, on the frames of our own sensor, whose K is 0.25:")
+    (read,) = says("the read noise above was put in as 8")
+    rng = np.random.default_rng(6)
+    response = 1 + 0.015 * rng.standard_normal((200, 300))
+
+    def shoot(electrons):
+        charge = rng.poisson(electrons * response) + read.value * rng.standard_normal(response.shape)
+        return np.rint(K.value * charge + 60)
+
+    dark = np.var(shoot(0) - shoot(0)) / 2
+    levels = np.linspace(500, 10_000, 12)
+    variances = [np.var(shoot(level) - shoot(level)) / 2 - dark for level in levels]
+    found = through_the_origin(K.value * levels, variances)
+    assert found == K
+    assert read == np.sqrt(dark - 1 / 12) / found
+    assert f"{K.text}0 DN/e⁻" in printed()
+
+
+# 4: darkness ----------------------------------------------------------------------------------------------------------
+
+
+def dark_current(celsius):
+    """T^1.5 exp(−E_g / 2kT) with Varshni's band gap, in any unit (Janesick 2001, chapter 7)."""
+    T = celsius + 273.15
+    gap = 1.1557 - 7.021e-4 * T**2 / (1108 + T)
+    return T**1.5 * np.exp(-gap / (2 * physical_constants["Boltzmann constant in eV/K"][0] * T))
+
+
+def doubling(celsius):
+    step = 1e-3
+    slope = (np.log(dark_current(celsius + step)) - np.log(dark_current(celsius - step))) / (2 * step)
+    return np.log(2) / slope
+
+
+def test_the_question_about_darkness(says):
+    celsius, electrons = says("In the dark, at 20 °C, heat frees 100 electrons in each pixel during a minute.")
+    (charge,) = says("The dark *charge* does: 400 electrons.")
+    after, before = says("their noise is the root: 20 electrons instead of 10.")
+    assert charge == 4 * electrons.value
+    assert before == np.sqrt(electrons.value)
+    assert after == np.sqrt(charge.value)
+    times, kelvin = says(
+        "The charge is four times as large, its noise √4 times. Warming the sensor by a few kelvin does the same "
+        "as time: the charge doubles about every 8 K at room temperature"
+    )
+    assert times == charge.value / electrons.value
+    assert kelvin == doubling(celsius.value)
+
+
+def test_cold_takes_the_dark_current_away(says):
+    (celsius,) = says("Take the temperature down to −30 °C. Less than a hundredth")
+    assert dark_current(celsius.value) / dark_current(20) < 0.01
+    for at in (-50, 0, 20, 40):
+        assert f"at {at:3} °C the dark current doubles with every {doubling(at):.1f} K" in printed()
+
+
+# 5: putting it right --------------------------------------------------------------------------------------------------
+
+
+def test_the_question_about_averaging(says):
+    (frames,) = says("You average 64 frames of the same scene.")
+    (same,) = says("The fixed pattern is the same in all 64")
+    count, root = says("What changes from frame to frame falls by √64 = 8.")
+    (times,) = says("64 times: noise is divided by the number of frames.")
+    errors = np.random.default_rng(7).standard_normal((20_000, int(frames.value)))
+    said, sums, divided = says(
+        "The *sum* of 64 independent errors is 8 times one of them, since chance cancels in part; divided by 64 "
+        "that is an eighth."
+    )
+    assert same == count.value == times.value == said.value == divided.value == frames.value
+    assert root == 1 / errors.mean(axis=1).std()
+    assert sums == errors.sum(axis=1).std()
+    assert errors.mean(axis=1).std() == pytest.approx(1 / 8, rel=0.02)
+    (many,) = says("With 64 frames the noise that is left is nearly all pattern.")
+    electrons = CARD * WHITE / 64  # at −6 stops
+    in_time, pattern = (8**2 + electrons) / many.value, 5**2 + (0.02 * electrons) ** 2
+    assert pattern / (pattern + in_time) > 0.9
+
+
+def test_what_a_dark_frame_costs(says):
+    averaged, once = says(
+        "Every frame that you subtract or divide by brings noise of its own, which is why 16 are averaged. A "
+        "single dark frame makes the darkness √2 times as noisy as it was."
+    )
+    (again,) = says("noise in the dark, √2 times as much if it is a single one")
+    dark = 8 * np.random.default_rng(8).standard_normal((1 + int(averaged.value), 100_000))
+    alone = np.std(dark[0] - dark[1]) / 8
+    assert once == again.value == round(alone**2)
+    assert np.std(dark[0] - dark[1:].mean(axis=0)) / 8 < 1.05
+    says("photon and read noise, all but 1/√n of it")
+
+
+def test_a_transform_that_makes_noise_one(says):
+    says("The transform 2√(e + ⅜ + σ_d²) makes it about **1** everywhere")
+    rng = np.random.default_rng(9)
+    for electrons in (3, 30, 300, 3000):
+        seen = rng.poisson(electrons, 400_000) + rng.normal(0, 5, 400_000)
+        assert np.std(2 * np.sqrt(np.maximum(seen + 3 / 8 + 25, 0))) == pytest.approx(1, abs=0.03)
+
+
+# 6: the exercises -----------------------------------------------------------------------------------------------------
+
+
+def cases(exercise):
+    return list(exercise.cases(np.random.default_rng(5)))
+
+
+def test_total_noise_is_that_of_drawn_frames(says):
+    """A million pixels: 0.07 % on a deviation. False failure: 1e-6 (0.5 % is 7 standard deviations)."""
+    rng = np.random.default_rng(1)
+    drawn = rng.poisson(2_000 * (1 + 0.02 * rng.standard_normal(1_000_000))) + rng.normal(0, 9, 1_000_000)
+    assert lesson15.total_noise(np.array(2_000.0), 9.0, 0.02) == pytest.approx(drawn.std(), rel=0.005)
+    (fraction,) = says("`prnu` is a fraction already, 0.01 for one per cent.")
+    assert fraction == 1 / 100
+
+
+def test_the_gain_is_that_of_the_measured_pairs(says):
+    (two,) = says("`bright` and `dark` have the shape (2, height, width): two frames each.")
+    for bright, dark in cases(lesson15.GAIN):
+        assert len(bright) == len(dark) == two.value
+        lit, unlit = pair(*bright), pair(*dark)
+        expected = (lit.variance - unlit.variance) / (lit.mean - unlit.mean)
+        assert lesson15.gain(bright, dark) == pytest.approx(expected, rel=1e-9)
+    (factor,) = says("A factor of 2 too small. Halve the variance of the difference once")
+    one, other = np.random.default_rng(10).standard_normal((2, 100_000))
+    assert factor == np.var(one - other)
+    assert factor == np.var(one - other) / 2 / np.var([one, other], axis=0).mean()  # over n = 2: half, once more
+
+
+def test_the_merged_bracket_is_camviz_s_to_a_tenth_of_its_error():
+    """camviz goes twice through the weights, the exercise once."""
+    for electrons, exposures, dark_noise, full_well in cases(lesson15.MERGE)[:3]:
+        frames = electrons.reshape(len(exposures), 1, -1)
+        expected, error = merged(frames, exposures, NoiseModel(1.0, dark_noise, 0.0, full_well))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found = lesson15.merge(electrons, exposures, dark_noise, full_well).reshape(1, -1)
+        assert (np.isnan(found) == np.isnan(expected)).all()
+        assert np.nanmax(np.abs(found - expected) / error) < 0.1
+
+
+def test_the_merged_bracket_has_less_noise_than_any_other_weights():
+    rng, times, rate = np.random.default_rng(11), np.array([0.1, 1.0]), 500.0
+    counts = rng.poisson(rate * times[:, None], (2, 200_000)) + 6 * rng.standard_normal((2, 200_000))
+    best = lesson15.merge(counts, times, 6.0, 1e9).std()
+    for share in np.linspace(0, 1, 21):
+        assert best < 1.002 * np.std(share * counts[0] / times[0] + (1 - share) * counts[1] / times[1])
+
+
+def published_ratio():
+    """Saturation over σ + ½ of the reference set, from the figures of its result file."""
+    sigma = np.hypot(REFERENCE["σ_d"], np.sqrt(1 / 12) / REFERENCE["K"])
+    return REFERENCE["photons"] * REFERENCE["η"] / (sigma + 0.5), sigma
+
+
+def test_the_published_ratios_have_the_decibels_of_the_standard(says):
+    """A dynamic range of 1220.69871336 is 61.732 dB, not the 142.14 of the file that gives it."""
+    ratio, _ = published_ratio()
+    assert ratio == pytest.approx(1220.69871336, rel=1e-5)
+    assert lesson15.dynamic_range_db(np.array(1220.69871336), np.array(0.5)) == pytest.approx(61.732, abs=5e-4)
+    for saturation, dark_noise in cases(lesson15.DECIBELS):
+        expected = decibel(saturation / (dark_noise + 0.5))
+        np.testing.assert_allclose(lesson15.dynamic_range_db(saturation, dark_noise), expected)
+    (wrong,) = says("A published result file of a real camera claims a dynamic range of 142 dB.")
+    assert wrong == 20 * np.log(ratio)
+    (times,) = says("Every figure was 2.3026 times too large")
+    assert times == np.log(10)
+
+
+def test_decibels(says):
+    for known, decibels in (
+        says("A ratio of 1000 must be 60 dB"),
+        says("saturation 1000 times the threshold is 60 dB"),
+    ):
+        assert decibels == 10 * np.log10(known.value**2)
+    (signals,) = says("EMVA 1288 counts a ratio of signals, with 20.")
+    assert 10 * np.log10(7.0**2) == pytest.approx(signals.value * np.log10(7.0))
+    (halved,) = says("You halved the 20 and left the logarithm as it was.")
+    (kept,) = says("A decibel is a twentieth of it: keep the 20.")
+    assert halved == kept.value == signals.value
+    (base,) = says("You *multiplied* by ln 10. The natural logarithm is too large by that factor already")
+    assert np.log(7.0) / np.log10(7.0) == pytest.approx(np.log(base.value))
+
+
+# 7: real data ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_reference_data_set(says):
+    levels, width, height, bits = says("50 levels, 640 × 480, 12 bits,")
+    assert [one.value for one in (levels, width, height, bits)] == list(REFERENCE.values())[:4]
+    K, efficiency, noise, prnu = says(
+        "finds K = 0.2808 DN/e⁻, a quantum efficiency of 45.1 %, σ_d = 10.9 e⁻, PRNU 0.43 %, as published."
+    )
+    assert REFERENCE["K"] == K
+    assert efficiency == 100 * REFERENCE["η"]
+    assert noise == REFERENCE["σ_d"]
+    assert prnu == 100 * REFERENCE["PRNU"]
+    approximate, exact = says(
+        "Its 61.73 dB are over the threshold σ + ½ that the standard prints; over the exact one they are 61.72 dB."
+    )
+    ratio, sigma = published_ratio()
+    assert approximate == db(ratio)
+    assert exact == db(ratio * (sigma + 0.5) / (0.5 + np.sqrt(sigma**2 + 0.25)))
+
+
+def test_photons_stir_every_block(says):
+    full, held, grey, steps, bits = says(
+        "A pixel that is full at 10,000 electrons holds 3900 of them at a grey value of 100. The photons' noise is "
+        "then 1.6 steps of the 8 bits, enough to stir every block."
+    )
+    step = full.value / (2**bits.value - 1)
+    assert held.about(grey.value * step, within=0.01)
+    assert steps == np.sqrt(held.value) / step
+    drawn = np.rint(np.random.default_rng(12).poisson(held.value, (20_000, 64)) / step)
+    assert (np.ptp(drawn, axis=1) > 0).all()
+
+
+def rounded_variance(ratio):
+    """The variance of Gaussian noise of 1 after rounding to steps of that many times its deviation."""
+    noise = np.random.default_rng(13).standard_normal(1_000_000)
+    return np.var(ratio * np.rint(noise / ratio))
+
+
+def test_what_becomes_of_noise_depends_on_the_step(says):
+    across, down, frequencies = says("JPEG writes each block of 8 × 8 pixels as 64 frequencies")
+    assert frequencies == across.value * down.value
+    (divisor,) = says(
+        "a step much smaller than the noise adds step²/12 to its variance, as any rounding does: hardly anything;"
+    )
+    assert divisor == 1 / np.linspace(-0.5, 0.5, 100_001).var()
+    assert rounded_variance(0.5) == pytest.approx(1 + 0.5**2 / 12, abs=0.01)
+    says(
+        "a step two or three times as large as the noise turns it into jumps of a whole step: *more* noise than "
+        "there was;"
+    )
+    assert min(rounded_variance(ratio) for ratio in (2, 2.5, 3)) > 1.15
+    says("a step many times as large rounds it away: blocks without noise.")
+    assert rounded_variance(8) < 0.01
+
+
+def frames_of(electrons, rng):
+    """Two frames of a sensor of K = 0.38 DN/e⁻, σ_d = 6 e⁻, PRNU 1.2 %, DSNU 4 e⁻: whole DN of 12 bits."""
+    pattern = np.random.default_rng(14).standard_normal((2, 120, 160))
+    charge = rng.poisson(electrons * (1 + 0.012 * pattern[0]), (2, 120, 160)) + 40  # of dark charge in half a second
+    noise = np.sqrt(6**2 + 40) * rng.standard_normal((2, 120, 160))
+    return np.rint(0.38 * (charge + 4 * pattern[1] + noise) + 64)
+
+
+def after_jpeg(frames, quality):
+    decoded = []
+    for frame in frames:
+        coded = cv2.imencode(".jpg", (frame / 16).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        decoded.append(16.0 * cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE))
+    return decoded
+
+
+def variance(pair_of_frames):
+    return np.var(np.subtract(*pair_of_frames)) / 2
+
+
+def test_jpeg_raises_the_noise_or_lowers_it(says):
+    (K,) = says("Let us do it to our own camera, whose K of 0.38 we know, in dim and in bright light:")
+    quality, about, true = says(
+        "Quality 95 *raises* the noise of bright light, and K comes out near 0.5 where 0.38 is true."
+    )
+    says(
+        "In dim light, whose noise is smaller beside the same steps, it lowers the noise. Lower qualities take "
+        "most of it away."
+    )
+    rng = np.random.default_rng(15)
+    dim, bright = frames_of(600, rng), frames_of(5400, rng)
+    dark_variance, signal = 0.38**2 * (36 + 40), 0.38 * 5400
+    assert true == K.value == pytest.approx((variance(bright) - dark_variance) / signal, rel=0.05)
+    compressed = after_jpeg(bright, int(quality.value))
+    assert about == (variance(compressed) - dark_variance) / signal
+    assert variance(compressed) > 1.2 * variance(bright)
+    assert variance(after_jpeg(dim, int(quality.value))) < 0.9 * variance(dim)
+    for light in (dim, bright):
+        assert variance(after_jpeg(light, 50)) < 0.3 * variance(light)
+
+
+def test_a_camera_s_jpeg_has_two_more_faults(says):
+    says(
+        "noise is multiplied by the curve's slope, which is steep in the dark and flat in the light, so that no "
+        "single K is left"
+    )
+    light = np.array([0.02, 0.2, 0.8])
+    slope = 1.055 / 2.4 * light ** (1 / 2.4 - 1)  # of sRGB's curve
+    assert (np.diff(slope) < 0).all()
+    assert slope[0] > 1 > slope[2]
+    says("four pixels share one value, and their noise is averaged")
+    grey = np.full((128, 128, 3), 128.0)
+    noisy = np.clip(grey + 8 * np.random.default_rng(16).standard_normal(grey.shape), 0, 255).astype(np.uint8)
+    kept = cv2.imdecode(cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, 100])[1], cv2.IMREAD_COLOR)
+    before, after = (cv2.cvtColor(one, cv2.COLOR_BGR2YCrCb).astype(float) for one in (noisy, kept))
+    assert after[..., 0].var() > 0.9 * before[..., 0].var()
+    assert after[..., 1:].var(axis=(0, 1)).max() < 0.4 * before[..., 1:].var(axis=(0, 1)).min()
+
+
+# The quiz -------------------------------------------------------------------------------------------------------------
+
+
+def test_the_quiz_about_decibels(says):
+    (ratio,) = says("A sensor saturates at 1200 times its threshold.")
+    (right,) = says("… 61.6 dB.")
+    twenty, again, stops = says("Yes: 20 log10 1200. That is also 10.2 stops.")
+    assert again == ratio.value
+    assert right == twenty.value * np.log10(ratio.value) == db(ratio.value)
+    assert stops == np.log2(ratio.value)
+    (natural,) = says("… 141.8 dB.")
+    twenty, again = says("That is 20 ln 1200.")
+    assert natural == twenty.value * np.log(again.value)
+    (half,) = says("… 30.8 dB.")
+    ten, again, signals = says("That is 10 log10 1200, right for a ratio of powers. EMVA 1288 counts signals, with 20.")
+    assert half == ten.value * np.log10(again.value)
+    assert signals == 2 * ten.value
+
+
+def test_eight_bits_serve_where_there_is_noise_enough(says):
+    (bits,) = says(
+        "Eight bits serve well enough where the noise is half a step or more; EMVA 1288 is used for cameras of 8 "
+        "bits too."
+    )
+    assert bits == 8
+    for noise in (0.5, 1.0, 2.0):
+        drawn = np.random.default_rng(17).uniform(60, 61) + noise * np.random.default_rng(18).standard_normal(400_000)
+        assert np.rint(drawn).var() - 1 / 12 == pytest.approx(noise**2, rel=0.03)
