@@ -135,7 +135,8 @@ def _named(folder: Path, paths: list[Path]) -> Recording:
 def _refuse_suffix(path: Path, suffix: str) -> None:
     if suffix in ("jpg", "jpeg"):
         raise RecordingError(
-            f"{path}: JPEG smooths the noise away and bends the scale; expected PNG or TIFF straight from the sensor."
+            f"{path}: JPEG changes the noise, up or down, and bends the scale; "
+            "expected PNG or TIFF straight from the sensor."
         )
     if suffix not in SUFFIXES:
         raise RecordingError(f"{path}: expected a PNG or TIFF file.")
