@@ -590,7 +590,7 @@ def _distances(R: Array, t: Array, rays_left: Array, rays_right: Array) -> Array
     """λ and μ (n, 2)."""
     A = np.stack([rays_left @ R.T, -rays_right], axis=-1)
     At = A.swapaxes(1, 2)
-    return np.linalg.solve(At @ A, -At @ t[:, None])[..., 0]
+    return np.asarray(np.linalg.solve(At @ A, -At @ t[:, None])[..., 0])
 
 
 def _in_front_cases(rng: np.random.Generator) -> Iterator[Arguments]:
