@@ -124,6 +124,18 @@ def test_parallel_boards_are_refused_in_words(tilt):
         camera_matrix([through(K, pose) for pose in boards])
 
 
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0)])
+def test_boards_that_lean_about_one_row_or_column_lose_a_constraint(axis):
+    leaning = [
+        RigidTransform.from_components([0.1, 0, 0.6], Rotation.from_rotvec(angle * np.array(axis)))
+        for angle in (0.5, -0.3)
+    ]
+    with pytest.raises(ValueError, match="tilted about one axis"):
+        camera_matrix([through(K, pose) for pose in leaning])
+    with pytest.raises(ValueError, match="determine no"):
+        focal_lengths([through(K, leaning[0])], K[:2, 2])
+
+
 def test_a_board_held_flat_gives_no_focal_length():
     with pytest.raises(ValueError, match="determine no"):
         focal_lengths([through(K, RigidTransform.from_translation([0.1, 0, 0.6]))], K[:2, 2])

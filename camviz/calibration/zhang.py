@@ -52,8 +52,9 @@ def constraints(H: ArrayLike) -> Array:
 def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Array:
     """K (3, 3) of the one camera behind all these homographies: two of them, or three where `skew` is unknown too.
 
-    Boards that are parallel count as one. Raises ValueError where there are too few, where they determine no K (they
-    are parallel), or where no K fits them (with noise, nearly parallel boards).
+    Boards that are parallel count as one, and boards tilted about one and the same row or column leave K undetermined.
+    Raises ValueError where there are too few, where they determine no K, or where no K fits them (with noise, nearly
+    parallel boards).
     """
     needed = 3 if skew else 2
     if len(homographies) < needed:
@@ -69,7 +70,8 @@ def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Arra
 def focal_lengths(homographies: Sequence[ArrayLike], centre: ArrayLike) -> tuple[float, float]:
     """(fx, fy) in pixels from one homography or more, where the principal point `centre` (2,) is known and skew is 0.
 
-    Two unknowns, two constraints: one board is enough, if it is tilted. Raises ValueError where it is not.
+    Two unknowns, two constraints: one board is enough, if it is tilted about a slanting axis. Raises ValueError for one
+    that faces the camera, or is tilted about a row or a column of the picture: that loses a constraint.
     """
     if not len(homographies):
         raise ValueError("homographies must hold at least one, got none")
@@ -115,7 +117,9 @@ def _null_vector(V: Array) -> Array:
         raise ValueError("these boards determine no camera matrix: they face the camera squarely")
     _, s, Vt = np.linalg.svd(np.vstack([V / size, np.zeros(len(size))]), full_matrices=False)
     if not s[-2] > _UNDECIDED * s[0]:
-        raise ValueError("these boards determine no camera matrix: they are parallel, and parallel boards count as one")
+        raise ValueError(
+            "these boards determine no camera matrix: they are parallel, and count as one, or tilted about one axis"
+        )
     return Vt[-1] / size
 
 

@@ -51,9 +51,6 @@ class EpipolarView(TwoCameras):
             "right epipole": _pixel(_epipole(self.right, self.left), nowhere),
             "point, right": _pixel(self.uv_right, "no image") + ("" if self.right.sees(self.point) else ", outside"),
         }
-        if self.F is not None:
-            away = twoview.line_distance(self.line, self.uv_right)
-            figures["off its line"] = f"{away:.2f} px:  xᵀFx = {self.residual:.6f}"
         if self.estimate is not None:
             figures["estimated lines"] = f"off by {self.estimate_error:.3g} px ({len(self.pairs[0])} matches)"
             figures["its epipole"] = f"turned by {self.epipole_error:.3g}°"
