@@ -109,6 +109,10 @@ def _questions(notebook: Notebook, number: str) -> list[str]:
         found.append(f"at least two predict questions are wanted, {len(asked)} are asked")
     if quizzes != [number]:
         found.append(f'the lesson must end with one quiz("{number}"), has {quizzes}')
+    sources = [cell.source for cell in notebook.cells]
+    recap = next((i for i, source in enumerate(sources) if _heading("Recap", source)), len(sources))
+    if any(source.startswith("quiz(") for source in sources[recap:]):
+        found.append("the quiz must stand above the recap, which repeats its answers")
     return found
 
 

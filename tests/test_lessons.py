@@ -60,9 +60,9 @@ def lesson():
     cells = [
         text(HEADER),
         code(SETUP, "setup"),
-        code('ask("05.barrel")'),
+        code('ask("05.grid")'),
         text("## Predict", teacher="10 minutes.\nAsk for hands before the reveal."),
-        code('ask("05.fold")'),
+        code('ask("05.far_rays")'),
         code('ask("05.undistort")'),
         code("print(round((1 / 0.9) ** 0.5, 3))", "nbval-check-output"),
         *(cell for name in exercises("05") for cell in exercise_cells(name)),
@@ -97,6 +97,12 @@ def drop_first(notebook):
     del notebook.cells[0]
 
 
+def quiz_last(notebook):
+    quiz = next(cell for cell in notebook.cells if cell.source.startswith("quiz("))
+    notebook.cells.remove(quiz)
+    notebook.cells.append(quiz)
+
+
 def drop_notes(notebook):
     for cell in notebook.cells:
         cell.metadata.get("camviz", {}).pop("teacher", None)
@@ -111,8 +117,8 @@ def drop_notes(notebook):
         (replace("mybinder.org", "elsewhere.org"), "mybinder.org"),
         (drop("setup"), "tagged setup"),
         (replace("import numpy as np", "import numpy as np\nsize = 3"), "the same as everywhere"),
-        (replace('ask("05.fold")', ""), "05.fold is never asked"),
-        (replace('ask("05.fold")', 'ask("05.quiz_fold")'), "no such predict question"),
+        (replace('ask("05.far_rays")', ""), "05.far_rays is never asked"),
+        (replace('ask("05.far_rays")', 'ask("05.quiz_fold")'), "no such predict question"),
         (replace('quiz("05")', ""), "one quiz"),
         (drop("check"), "needs one cell tagged check"),
         (drop("solution"), "needs one cell tagged solution"),
@@ -126,6 +132,7 @@ def drop_notes(notebook):
         (replace("[fold](00_start_here.ipynb#fold)", "fold"), "at least three terms"),
         (replace("<details>", "<div>"), "not folded"),
         (drop_notes, "note for the teacher"),
+        (quiz_last, "above the recap"),
     ],
 )  # fmt: skip
 def test_each_departure_from_the_pattern_is_named(lesson, change, complaint):
@@ -226,7 +233,7 @@ def test_refreshing_runs_a_lesson_with_static_outputs_twice_alike(tmp_path):
     cells = [
         code("import os\nfrom camviz.widgets.question import ask"),
         code("print(os.environ['CAMVIZ_STATIC'], os.environ['CAMVIZ_RENDERER'])"),
-        code('ask("05.fold")'),
+        code('ask("05.far_rays")'),
         text("", "glossary"),
     ]
     notebooks.write(nbformat.v4.new_notebook(cells=cells), path)

@@ -148,12 +148,12 @@ def test_a_message_that_makes_no_sense_is_shown_in_the_pane_and_raised(widget, m
 
 
 def test_without_a_kernel_questions_are_a_page_with_folded_replies():
-    sheet = ask("05.fold")
+    sheet = ask("05.far_rays")
     assert isinstance(sheet, Sheet)
     html = sheet._repr_html_()
-    assert html.count("<details>") == html.count("<summary>") == len(question("05.fold").choices)
+    assert html.count("<details>") == html.count("<summary>") == len(question("05.far_rays").choices)
     assert "(a)" in repr(sheet)
-    assert question("05.fold").choices[0].reply.split(".")[0] not in repr(sheet)
+    assert question("05.far_rays").choices[0].reply.split(".")[0] not in repr(sheet)
 
 
 def test_in_a_kernel_the_widget_is_shown_and_the_page_beside_it(monkeypatch):

@@ -1,6 +1,6 @@
 """Lesson 05, lens distortion: the polynomial, its tangential part with a bug in it, its fold and its inverse.
 
-Everything here acts on normalised coordinates, ideal → distorted, as Brown (1971) and OpenCV have it.
+Everything here acts on normalised coordinates, ideal → distorted, as OpenCV has it; the terms are Brown's (1971).
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ TANGENTIAL = Exercise(
         "For x = y = 1 and p1 alone the equation gives the shift p1 (2, 4). Which of the two numbers does yours miss?",
         "`dx = ___ * p1 * x * y + p2 * (r2 + 2 * x**2)`",
     ),
-    praise="All four terms are there. This very bug has been published in a widely read notebook.",
+    praise="All four terms are there. This very bug has been published.",
 )
 
 
@@ -470,8 +470,8 @@ def clamped_to_the_fold(r_d, k1):
 
 
 @UNDISTORT.wrong(
-    "The slope of r + k1 r³ is 1 + *3* k1 r². With 1 + k1 r² the steps are too long, and the iteration misses far from "
-    "the axis. Where it misses, you answer NaN, though there is a point."
+    "The slope of r + k1 r³ is 1 + *3* k1 r². With 1 + k1 r² the steps have the wrong length, too short for k1 < 0 and "
+    "too long for k1 > 0, and four of them do not arrive. Where they have not, you answer NaN, though there is a point."
 )
 def wrong_slope(r_d, k1):
     r = np.asarray(r_d, dtype=float)

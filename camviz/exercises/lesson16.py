@@ -153,12 +153,13 @@ ROBUST_SIGMA = Exercise(
     cases=_sigma_cases,
     tolerance=1e-3,  # where the number of corners is even, a median of squares is not quite the square of a median
     hints=(
-        "Half of all corners decide a median: up to half of them may be as wild as they like.",
+        "A median stands in the middle: as long as fewer than half are wild, it does not matter how wild they are.",
         "For Gaussian noise of σ in each coordinate the median *length* is σ √(2 ln 2) = 1.177 σ. Solve for σ; "
         "`np.nanmedian` passes over corners that were not seen.",
         "`return np.nanmedian(___) / np.sqrt(2 * np.log(2))`",
     ),
-    praise="A view that is thirty pixels off no longer moves your idea of what is normal.",
+    praise="A view that is thirty pixels off moves your idea of what is normal only a little, and one that is three hundred "
+    "pixels off moves it no more.",
 )
 
 
@@ -259,7 +260,7 @@ LINES = Exercise(
         "along which axis does the median of one row run?",
         "`lengths = np.linalg.norm(residuals, axis=-1).reshape(___)`",
     ),
-    praise="Now a bad column is a bad column. With a board of 9 × 6 the wrong reshape raises no error at all.",
+    praise="Now a bad column is a bad column. The wrong reshape never raises an error.",
 )
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from camviz.clinic.faults import FAULTS, Case
 from camviz.clinic.findings import Inspection
 from camviz.clinic.injections import healthy
 from camviz.files.calibration import Calibration
+
+if TYPE_CHECKING:
+    from camviz.views.fault_lab import FaultLabView
 
 HEALTHY = "healthy"
 
@@ -135,6 +138,14 @@ class Patient:
         display(live.widget)
 
 
+def anna_and_ben() -> tuple[FaultLabView, FaultLabView]:
+    """Two calibrations of one camera: Anna's from sharp corners of boards held parallel, Ben's from tilted ones."""
+    from camviz.views.fault_lab import FaultLabView
+
+    anna = FaultLabView(fault="parallel boards", strength=1.0, noise=0.14, seed=5, told=False)
+    return anna, anna.but(strength=0.0, noise=0.39)
+
+
 def _admitted(ward: int, patient: int, complaint: Complaint | None, story: str) -> Patient:
     rng = np.random.default_rng([ward, 2, patient])
     name = f"Patient {patient}"
@@ -158,7 +169,7 @@ def reply(patient: Patient, answer: Any, attempt: int) -> Verdict:
         return Verdict(patient.name, "wrong", f"{patient.name} is not well, however good the fit.", hint)
     kind = kinds()[answer]
     if patient.finding == HEALTHY:
-        said = f"A patient with `{answer}` has {kind.symptom}. Look for that: it is not there."
+        said = f"With `{answer}` one sees this: {kind.symptom}. Look for it: it is not there."
         return Verdict(patient.name, "wrong", said, "How large would it have to be, to be more than noise?")
     if answer in {finding.id for finding in patient.inspected().findings}:
         said = f"The clinic names `{answer}` too, but as what follows from something else. What would cause it?"

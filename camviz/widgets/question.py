@@ -1,4 +1,4 @@
-"""Questions to commit to before seeing: `ask("05.fold")` and the exit quiz `quiz("05")`.
+"""Questions to commit to before seeing: `ask("05.far_rays")` and the exit quiz `quiz("05")`.
 
 Live, the answer stays in the kernel until the reader has committed to a choice. Without a kernel, or with
 CAMVIZ_STATIC=1, the same questions are a page of folded replies.
