@@ -105,5 +105,6 @@ def _seen_from(view: Floats, slopes: Floats, down: float, right: float) -> Float
     )
     # where neither the near thing nor what belongs behind it is seen, what is seen beside the near thing stands in
     uncovered = (met_before <= near - _APART) & (met_behind < far + _APART)
-    at = [np.where(uncovered, there, here) for there, here in zip(behind, before, strict=True)]
-    return np.asarray(cv2.remap(view, *at, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))  # linear would blur
+    right_at, down_at = (np.where(uncovered, there, here) for there, here in zip(behind, before, strict=True))
+    seen = cv2.remap(view, right_at, down_at, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)  # linear would blur
+    return np.asarray(seen, np.float32)
