@@ -1,5 +1,7 @@
 """The light field visualizer shows true numbers and true pictures."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -67,6 +69,34 @@ def test_the_picture_is_what_scipy_shifts_and_numpy_sums():
     np.testing.assert_allclose(view.image().astype(int), to_display(np.mean(total, axis=0)).astype(int), atol=1)
 
 
+def test_openings_blur_a_view_by_its_slope_and_leave_what_is_in_focus():
+    pinholes, wide = (
+        LightFieldView(column=BALL[0], row=BALL[1]),
+        LightFieldView(column=BALL[0], row=BALL[1], opening=1.0),
+    )
+    assert pinholes.numbers()["a view blurs"] == "0.00 px at the mark"
+    assert wide.numbers()["a view blurs"] == f"{abs(wide.slope_here):.2f} px at the mark"
+    assert wide.but(opening=0.5).numbers()["a view blurs"] == f"{abs(wide.slope_here) / 2:.2f} px at the mark"
+    assert wide.slope_here == pinholes.slope_here
+    fence = LightFieldView(fence=True, slope=3.25)
+    soft = fence.but(opening=1.0)
+    sharp, blurred = (cv2.Sobel(one.image()[..., 1].astype(float), -1, 1, 0)[20:40, 40:120] for one in (fence, soft))
+    assert np.abs(sharp).mean() > 1.15 * np.abs(blurred).mean()
+
+
+def test_the_band_of_exact_refocusing_is_drawn_where_it_ends():
+    """|d| ≤ 1 px with openings that fill the lens, 2 px with openings half as wide; pinholes have no end."""
+    assert "exact" not in LightFieldView().figure(draft=True).body
+    view = LightFieldView(opening=1.0)
+    assert "exact: |d| ≤ 1 px" in view.figure(draft=True).body
+    for width, ends in ((1.0, 1.0), (0.5, 2.0)):
+        left, right = (view._plot.place((end, 5.0))[0] for end in (-ends, ends))
+        band = view.but(opening=width)._exact_range()
+        x, wide = (float(re.search(rf' {name}="([\d.]+)"', band)[1]) for name in ("x", "width"))
+        assert (x, wide) == pytest.approx((left, right - left), abs=0.01)
+    assert LightFieldView(opening=0.25)._exact_range() == ""
+
+
 def test_a_fence_out_of_focus_vanishes():
     """Behind it the summed picture is 6 dB nearer to that without a fence than a single view is."""
     fenced, clear = LightFieldView(fence=True, slope=1.0), LightFieldView(slope=1.0)
@@ -132,7 +162,7 @@ def test_a_field_of_one_s_own_is_shown_with_its_own_ranges():
     view = LightFieldView.of(small(1, 2))
     assert view.offered()["u"].high == 1
     assert view.offered()["row"].high == 23
-    assert "fence" not in view.offered()
+    assert not {"fence", "opening"} & view.offered().keys()
     assert view.numbers()["focused at"] == "none"  # nothing is known of its cameras
     assert "attached:picture" in view.figure(draft=True).body
 

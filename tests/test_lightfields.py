@@ -14,10 +14,12 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lightfields import (
     APERTURES,
     LightField,
+    Openings,
     aperture,
     disparity_by_structure,
     disparity_by_sweep,
     epipolar_plane_image,
+    exact_range,
     fourier_slice,
     from_microlens_image,
     from_mosaic,
@@ -266,6 +268,85 @@ def test_a_whole_aperture_sees_through_a_fence():
     one = to_encoded(fenced.light(2, 2))[inner] * 255
     assert cv2.PSNR(one, to_encoded(clear.light(2, 2))[inner] * 255) < 15
     assert cv2.PSNR(far(fenced), far(clear)) > cv2.PSNR(one, to_encoded(clear.light(2, 2))[inner] * 255) + 6
+
+
+# Openings ---------------------------------------------------------------------------------------------------------
+
+
+def through_an_opening(scene, camera, baseline, focus, width, many=9):
+    """The middle view as the mean of many × many pinholes, evenly over its opening."""
+    dense = photograph_field(scene, camera, many, many, width * baseline / many, focus)
+    return np.mean([dense.light(v, u) for v, u in np.ndindex(many, many)], axis=0)
+
+
+def opened(scene, camera, baseline, focus, width):
+    return Openings(photograph_field(scene, camera, 3, 3, baseline, focus, encoded=True), scene, camera).opened(width)
+
+
+@pytest.mark.parametrize(("depth", "width"), [(2.5, 1.0), (4.0, 1.0), (2.2, 0.7)])
+def test_a_view_through_an_opening_is_the_mean_of_what_its_places_see(depth, width):
+    """A flat picture, in linear light; a pinhole's picture is farther off wherever there is blur."""
+    camera, scene = Camera(Intrinsics.from_fov(160, 120, 25)), picture_at(depth)
+    truth = through_an_opening(scene, camera, 8 / camera.intrinsics.fx, 4.0, width)
+    inner = np.s_[20:100, 20:140]
+    error, pinhole = (
+        np.sqrt(np.mean((one - truth)[inner] ** 2))
+        for one in (
+            opened(scene, camera, 8 / camera.intrinsics.fx, 4.0, width).light(1, 1),
+            opened(scene, camera, 8 / camera.intrinsics.fx, 4.0, 0).light(1, 1),
+        )
+    )
+    assert error < 0.002
+    assert depth == 4.0 or error < 0.6 * pinhole
+
+
+def test_the_blur_of_a_point_has_the_width_of_its_slope():
+    """Second moments: an edge spread evenly over |d| pixels has the variance d²/12 more; to a tenth of the width."""
+    camera = Camera(Intrinsics.from_fov(160, 120, 25))
+    black = Texture.plain((0.0, 0.0, 0.0))
+    scene = Scene([Rectangle(np.array([0.0, -9, 2.5]), np.array([9.0, 0, 0]), np.array([0, 18.0, 0]), black)])
+    spread = {}
+    for width in (0.0, 0.5, 1.0):
+        field = opened(scene, camera, 20 / camera.intrinsics.fx, 4.0, width)
+        line = -np.diff(field.light(1, 1)[60, :, 1].astype(float))
+        line /= line.sum()
+        x = np.arange(len(line)) - line @ np.arange(len(line))
+        spread[width] = line @ x**2
+    d = float(field.disparity(2.5))
+    assert d == pytest.approx(3.0)
+    assert spread[1.0] - spread[0.0] == pytest.approx(d**2 / 12, rel=0.2)
+    assert spread[0.5] - spread[0.0] == pytest.approx((0.5 * d) ** 2 / 12, rel=0.2)
+
+
+def test_behind_a_fence_openings_are_nearer_to_the_truth_than_pinholes():
+    """Where things hide each other the step from place to place is only nearly right."""
+    camera = Camera(Intrinsics.from_fov(120, 90, 38), world_from_cam=RigidTransform.from_translation([0.15, 0.55, 0]))
+    slat = Texture.plain((0.1, 0.3, 0.1))
+    slats = [
+        Rectangle(camera.centre + (x, -1, 2.0), np.array([0.03, 0, 0]), np.array([0, 2.0, 0]), slat)
+        for x in np.arange(-0.6, 0.6, 0.11)
+    ]
+    scene = Scene([*slats, *textured_scene().surfaces], textured_scene().sky)
+    truth = to_encoded(through_an_opening(scene, camera, 0.056, 4.0, 1.0, many=5)) * 255
+    wide, pinhole = (to_encoded(opened(scene, camera, 0.056, 4.0, width).light(1, 1)) * 255 for width in (1.0, 0.0))
+    assert cv2.PSNR(wide, truth) > cv2.PSNR(pinhole, truth) + 4
+    assert cv2.PSNR(wide, truth) > 27
+
+
+def test_the_exact_range_is_where_no_view_is_blurred_by_more_than_a_pixel():
+    near, far = exact_range(BENCHMARK, 1.0)
+    assert np.abs(BENCHMARK.disparity([near, far])) == pytest.approx(1)
+    assert near < BENCHMARK.focus_distance < far
+    assert exact_range(BENCHMARK, 0.0) == (0.0, np.inf)
+    assert exact_range(BENCHMARK, 0.1)[1] == np.inf  # from 1/z < 0 on nothing is left to be blurred
+    for bad in (-0.1, 1.1, np.nan):
+        with pytest.raises(ValueError, match="width must lie between 0 and 1"):
+            exact_range(BENCHMARK, bad)
+
+
+def test_an_opening_wider_than_the_places_are_apart_is_refused():
+    with pytest.raises(ValueError, match=r"width must lie between 0 and 1, got 1\.5"):
+        opened(picture_at(3.0), Camera(Intrinsics.from_fov(8, 6, 25)), 0.02, 4.0, 1.5)
 
 
 @pytest.mark.parametrize(

@@ -11,16 +11,20 @@ from camviz.lightfields.plenoptic import (
     to_mosaic,
 )
 from camviz.lightfields.refocusing import fourier_slice, periodic_shift_and_sum, refocus
-from camviz.lightfields.rendering import photograph_field, true_disparity
+from camviz.lightfields.rendering import disparity_of_views, photograph_field, true_disparity
 from camviz.lightfields.slopes import disparity_by_structure, disparity_by_sweep
+from camviz.lightfields.subapertures import Openings, exact_range
 
 __all__ = [
     "APERTURES",
     "LightField",
+    "Openings",
     "aperture",
     "disparity_by_structure",
     "disparity_by_sweep",
+    "disparity_of_views",
     "epipolar_plane_image",
+    "exact_range",
     "fourier_slice",
     "from_microlens_image",
     "from_mosaic",

@@ -25,7 +25,7 @@ def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) 
     Raises ValueError for a mask of another shape, or with no view in it.
     """
     weights = _weights(field, mask)
-    table = _linear_bytes() if field.views.dtype == np.uint8 else None
+    table = linear_bytes() if field.views.dtype == np.uint8 else None
     down, right = field.steps()
     total = np.zeros(field.views.shape[2:], np.float32)
     for u in np.flatnonzero(weights.any(axis=0)):
@@ -46,7 +46,8 @@ def _weights(field: LightField, mask: ArrayLike | None) -> Array:
     return weights / weights.sum()
 
 
-def _linear_bytes() -> Floats:
+def linear_bytes() -> Floats:
+    """The linear light (256,) of each sRGB byte."""
     return np.asarray(to_linear(np.arange(256, dtype=np.uint8)), dtype=np.float32)
 
 

@@ -50,6 +50,13 @@ def true_disparity(scene: Scene, camera: Camera, field: LightField) -> NDArray[n
     return field.disparity(depth).astype(np.float32)
 
 
+def disparity_of_views(scene: Scene, camera: Camera, field: LightField) -> NDArray[np.float32]:
+    """The disparity (v, u, height, width) of what each view of the field sees, traced."""
+    return np.stack([true_disparity(scene, moved, field) for _, _, moved in _cameras(field, camera)]).reshape(
+        field.views.shape[:4]
+    )
+
+
 def _cameras(field: LightField, camera: Camera) -> Iterator[tuple[int, int, Camera]]:
     """Every place of the grid, and the camera that stands there.
 

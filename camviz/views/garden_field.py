@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
-from camviz.lightfields import LightField, disparity_by_sweep, photograph_field, to_mosaic, true_disparity
+from camviz.lightfields import LightField, Openings, disparity_by_sweep, photograph_field, to_mosaic, true_disparity
 from camviz.poses import RigidTransform
 from camviz.scenes import Rectangle, Scene, Texture, textured_scene, to_display
 
@@ -28,6 +28,17 @@ Floats = NDArray[np.float32]
 def garden_field(fence: bool = False) -> LightField:
     """9 × 9 views of the garden, 160 × 120 pixels each, as sRGB bytes; with a fence of slats two metres away."""
     return photograph_field(garden(fence), CAMERA, VIEWS, VIEWS, BASELINE, FOCUS_DISTANCE, encoded=True)
+
+
+@lru_cache(maxsize=2)
+def _openings(fence: bool) -> Openings:
+    return Openings(garden_field(fence), garden(fence), CAMERA)
+
+
+@lru_cache(maxsize=1)
+def opened_field(fence: bool, width: float) -> LightField:
+    """The garden's field through openings of a `width`, 0 … 1 of the distance between the places of the lens."""
+    return _openings(fence).opened(width)
 
 
 def garden(fence: bool = False) -> Scene:
@@ -66,7 +77,6 @@ def all_views(field: LightField, width: int = 424) -> bytes:
     """The views side by side, small, as JPEG."""
     import cv2
 
-    shown = field.views if field.views.dtype == np.uint8 else to_display(field.views)
     small = max(4, width // field.columns), max(3, round(width / field.columns * field.height / field.width))
-    views = [[cv2.resize(one, small, interpolation=cv2.INTER_AREA) for one in row] for row in shown]
-    return jpeg(to_mosaic(np.array(views)), quality=70)
+    views = np.array([[cv2.resize(one, small, interpolation=cv2.INTER_AREA) for one in row] for row in field.views])
+    return jpeg(to_mosaic(views if views.dtype == np.uint8 else to_display(views)), quality=70)

@@ -29,8 +29,10 @@ class LightFieldView(View):
     """A light field as a plenoptic camera records it, and a picture made of it afterwards.
 
     The picture is sharp where points move by `slope` pixels from view to view. Mark and slice lie at (column, row) of
-    the middle view; (u, v) is one of the views, counted from 0 at the top left. `field` takes the place of the garden;
-    its slopes lie within `limits`.
+    the middle view; (u, v) is one of the views, counted from 0 at the top left. `opening` is the width of each place of
+    the lens that a view looks through, over the distance between places: 0 is a pinhole, sharp at all distances, and at
+    1 the openings fill the lens and each view blurs what moves by d pixels over |d| pixels. Slopes are measured in the
+    pinholes' views. `field` takes the place of the garden; its slopes lie within `limits`.
     """
 
     title: ClassVar[str] = "Light field"
@@ -41,6 +43,9 @@ class LightFieldView(View):
     v: int = slider(4, 0, 8, 1, label="view v", help="row of the view, from the top; the pinhole's place")
     column: int = slider(118, 0, 159, 1, unit="px", help="of the mark in the picture")
     row: int = slider(48, 0, 119, 1, unit="px", help="of the mark, and of the slice")
+    opening: float = slider(
+        0.0, 0.0, 1.0, 0.05, label="openings", help="0: pinholes; 1: as wide as they are apart, and no light is lost"
+    )
     fence: bool = switch(False, label="a fence in front", help="slats two metres before the lens")
     show: str = choice("refocused", "slopes", help="the picture, or the slope measured at every pixel")
     field: LightField | None = None
@@ -62,13 +67,13 @@ class LightFieldView(View):
         return view.but(slope=float(np.clip(round(view.slope_here, 2), *limits)))
 
     def offered(self) -> dict[str, Control]:
-        """The controls with the ranges of this field; a given one has no fence."""
+        """The controls with the ranges of this field; a given one has no fence, and openings as it has them."""
         controls = self.controls()
         for name, size in zip(("v", "u", "row", "column"), self.views.shape, strict=False):
             controls[name] = replace(controls[name], low=0, high=size - 1)
         controls["slope"] = replace(controls["slope"], low=self.limits[0], high=self.limits[1])
         fixed = [name for name, control in controls.items() if control.low is not None and control.low == control.high]
-        for name in fixed + ["fence"] * (self.field is not None):
+        for name in fixed + ["fence", "opening"] * (self.field is not None):
             del controls[name]
         return controls
 
@@ -77,11 +82,17 @@ class LightFieldView(View):
     @property
     def light_field(self) -> LightField:
         """The field shown."""
+        if self.field or not self.opening:
+            return self._pinholes
+        return garden_field.opened_field(self.fence, self.opening)
+
+    @property
+    def _pinholes(self) -> LightField:
         return self.field or garden_field.garden_field(self.fence)
 
     @property
     def views(self) -> np.ndarray:
-        return self.light_field.views if self.field else garden_field.garden_field(False).views
+        return self._pinholes.views if self.field else garden_field.garden_field(False).views
 
     @property
     def mask(self) -> Array:
@@ -91,7 +102,7 @@ class LightFieldView(View):
     @property
     def slopes(self) -> np.ndarray:
         """The slope (height, width) measured at every pixel of the middle view."""
-        return garden_field.measured_slopes(self.light_field, *self.limits)
+        return garden_field.measured_slopes(self._pinholes, *self.limits)
 
     @property
     def slope_here(self) -> float:
@@ -114,6 +125,7 @@ class LightFieldView(View):
             truth = float(garden_field.true_slopes(self.fence)[self.row, self.column])
             known["in truth"] = f"{_signed(truth)} px, {metres(float(field.depth(truth)))}"
             known["α"] = f"{float(field.alpha(self.slope, PITCH)):.3f}"
+            known["a view blurs"] = f"{self.opening * abs(self.slope_here):.2f} px at the mark"
         return known | {
             "views summed": f"{count} of {rows * columns}",
             "sensor": f"{columns * width} × {rows * height} px",
@@ -145,7 +157,7 @@ class LightFieldView(View):
                 svg.rectangle(0, 0, 960, 618, "paper"),
                 picture,
                 self._slice_panel(),
-                microlens_diagram.drawn(500, 34, self.slope_here, self.slope, self.mask[self.v], self.u),
+                microlens_diagram.drawn(500, 34, self.slope_here, self.slope, self.mask[self.v], self.u, self.opening),
                 self._views_panel(),
                 self._sensor_panel(),
                 self._depth_panel(),
@@ -271,9 +283,19 @@ class LightFieldView(View):
         here, now = panel.place([within(self.slope_here), within(self.slope)])
         marks = curve + ring(here, "yellow", 8) + svg.dots([now], "red", 10)
         label = "Depth against slope; drag or press the arrow keys to change the slope"
-        content = plot.grid(panel) + plot.upright(panel, self.slope, "red dashed") + marks
+        content = self._exact_range() + plot.grid(panel) + plot.upright(panel, self.slope, "red dashed") + marks
         named = plot.axes(panel, "slope d, pixels a view", "depth, m")
         return named + panel.show(content, title="Slope is depth", note=self.equation(), drag="slope", label=label)
+
+    def _exact_range(self) -> str:
+        """The slopes at which no view is blurred by more than a pixel, where openings bound them."""
+        panel, bound = self._plot, 1 / self.opening if self.opening else np.inf
+        left, right = (float(np.clip(end, *self.limits)) for end in (-bound, bound))
+        if (left, right) == self.limits:
+            return ""
+        x = panel.place([(left, panel.top), (right, panel.top)])[:, 0]
+        words = svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note middle") if self.opening == 1 else ""
+        return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words
 
     def equation(self) -> str:
         """d = b f (1/z − 1/z_f) with this field's numbers."""
@@ -286,7 +308,9 @@ class LightFieldView(View):
 
     def _numbers_block(self) -> str:
         parts = [svg.text((20, 515), "This picture", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
+        figures = self.numbers()
+        figures = {name: figures[name] for name in sorted(figures, key="a view blurs".__eq__)}
+        for i, (name, value) in enumerate(figures.items()):
             x, y = 20 + 255 * (i // 4), 538 + 22 * (i % 4)
             parts += [svg.text((x, y), name, "note"), svg.text((x + (112 if i < 4 else 96), y), value, "label")]
         return "".join(parts)

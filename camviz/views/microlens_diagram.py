@@ -15,25 +15,45 @@ _PLACE, _PITCH = 14.0, 5.0  # between places of the aperture, and between microl
 _MIDDLE = _HEIGHT / 2
 
 
-def drawn(x: float, y: float, slope: float, shear: float, row: Array, chosen: int) -> str:
+def drawn(x: float, y: float, slope: float, shear: float, row: Array, chosen: int, opening: float = 0.0) -> str:
     """The panel at (x, y): rays of a point that moves by `slope`, and the film that shearing by `shear` stands for.
 
     `row` (columns,) are the weights of the aperture's places, `chosen` one of them. At the microlenses, the ray through
     the place j steps from the middle arrives slope · j microlenses from the axis: it is the light of that view's pixel.
+    Through an `opening` as wide as so many steps the light of one view spreads over slope · opening microlenses.
     """
     panel = Panel("microlenses", x, y, _WIDTH, _HEIGHT, 0, _WIDTH, 0, _HEIGHT)
     steps = np.arange(len(row)) - (len(row) - 1) / 2
     scale = min(1.0, 8 / max(len(row) - 1, 1))
-    content = _camera(scale * steps) + _rays(scale * steps, slope, row, chosen) + _film(shear)
+    content = _camera(scale * steps) + _bundle(scale * (chosen - (len(row) - 1) / 2), scale * opening, slope)
+    content += _rays(scale * steps, slope, row, chosen) + _film(shear)
     return panel.show(content, title="Rays of the marked point", note="not to scale")
+
+
+def _conjugates(slope: float) -> tuple[float, float]:
+    """Where a point of this slope lies, and how far behind the lens its rays meet.
+
+    1/object + 1/image is the same for every point: what is near meets behind the microlenses.
+    """
+    nearer = slope * _PITCH / _PLACE / _FILM
+    return _LENS_X - 1 / max(1 / _OBJECT + nearer, 1e-4), 1 / max(1 / _FILM - nearer, 1e-4)
+
+
+def _bundle(step: float, width: float, slope: float) -> str:
+    """What comes through one opening, as wide as it is, and the opening itself."""
+    if not width:
+        return ""
+    start, _ = _conjugates(slope)
+    edges = step + np.array([-0.5, 0.5]) * width
+    lens = [(_LENS_X, _MIDDLE + edge * _PLACE) for edge in edges]
+    film = [(_LENS_X + _FILM, _MIDDLE + slope * edge * _PITCH) for edge in edges]
+    light = svg.polygon([(start, _MIDDLE), lens[0], film[0], film[1], lens[1]], "wash fill-purple")
+    return light + svg.line(lens, "purple thick")
 
 
 def _rays(steps: np.ndarray, slope: float, row: Array, chosen: int) -> str:
     """From the point through every place of the lens to its microlens, and on to where they would meet."""
-    # 1/object + 1/image is the same for every point: what is near meets behind the microlenses
-    nearer = slope * _PITCH / _PLACE / _FILM
-    start = _LENS_X - 1 / max(1 / _OBJECT + nearer, 1e-4)
-    meeting = 1 / max(1 / _FILM - nearer, 1e-4)
+    start, meeting = _conjugates(slope)
     parts = []
     for j, (step, weight) in enumerate(zip(steps, row, strict=True)):
         lens = (_LENS_X, _MIDDLE + step * _PLACE)

@@ -1,0 +1,491 @@
+"""What lesson 10 says about mirrors, the unified sphere, cubes and rings, recomputed with NumPy, SciPy and OpenCV."""
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from quoting import LESSONS
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from camviz import notebooks
+from camviz.command import main
+from camviz.cubemap import FACES, face_camera
+from camviz.exercises import exercise, lesson10
+from camviz.lenses import DoubleSphere, UnifiedSphere
+from camviz.ring import Ring
+
+EXCEPTIONS: dict[str, str] = {}
+
+
+def unified(points, f, xi):
+    """Mei's formula, written out here."""
+    points = np.asarray(points, dtype=float)
+    return f * points[..., :2] / (points[..., 2:] + xi * np.linalg.norm(points, axis=-1, keepdims=True))
+
+
+def at_angle(degrees, turn=0.0):
+    """The unit ray so many degrees from the axis."""
+    a = np.radians(degrees)
+    return np.stack([np.sin(a) * np.cos(turn), np.sin(a) * np.sin(turn), np.cos(a)], axis=-1)
+
+
+def reflected(directions, normals):
+    normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    return directions - 2 * np.sum(directions * normals, axis=-1, keepdims=True) * normals
+
+
+def bent(points):
+    """By how much the middle of three image points lies beside the line through the other two."""
+    a, b, c = points
+    along = (c - a) / np.linalg.norm(c - a)
+    return abs(np.cross(np.append(along, 0), np.append(b - a, 0))[2])
+
+
+# The doughnut and its window -----------------------------------------------------------------------------------------
+
+
+def test_in_the_doughnut_only_lines_that_point_at_the_middle_are_straight(says):
+    says("In the doughnut only lines that point at the middle are straight, such as the lamp posts.")
+    along = np.linspace(-1, 1, 3)[:, None]
+    post = np.array([2.0, 1.0, 0.0]) + along * [0, 0, 1]  # the camera's axis is upright
+    brick = np.array([2.0, 1.0, 0.3]) + along * [1, -1, 0]
+    assert bent(unified(post, 1.0, 0.92)) < 1e-12
+    assert bent(unified(brick, 1.0, 0.92)) > 0.01
+    says("The bricks and the edges of the slabs are *straight* in it.")
+    for line in (post, brick):
+        assert bent(unified(line @ Rotation.from_euler("y", 60, degrees=True).as_matrix(), 1.0, 0.0)) < 1e-12
+
+
+def test_straight_back_is_half_a_turn_and_six_windows_make_a_cube(says):
+    (back,) = says("Look straight back (180°)")
+    assert np.cos(np.radians(back.value)) == -1
+    (window,) = says("six windows of 90° side by side")
+    (pinholes,) = says("Six pinholes of 90° see everything")
+    (six,) = says("Six pinholes of 90°, chosen by one comparison.")
+    face = 2 * np.degrees(np.arctan(1.0))  # half a face, seen from the centre at the distance of half a face
+    assert window == pinholes.value == six.value == face
+
+
+def test_one_fisheye_that_looks_up_sees_the_whole_horizon(says):
+    (whole,) = says("of more than 180° that looks straight up. *Fisheye* says how a lens draws")
+    says("A fisheye that looks ahead misses what is behind it.")
+    (both,) = says(
+        "A fisheye of more than 180° that looks straight up is both; one that looks ahead is not omnidirectional."
+    )
+    (one,) = says(
+        "a fisheye of more than 180° that looks straight up shows the whole horizon near the rim of its picture"
+    )
+    turn = np.linspace(0, 2 * np.pi, 36, endpoint=False)
+    horizon = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
+    from_the_zenith = np.degrees(np.arccos(horizon @ [0, 0, 1]))
+    ahead = np.degrees(np.arccos(np.clip(horizon @ [1, 0, 0], -1, 1)))
+    for angle in (whole, both, one):
+        assert 2 * from_the_zenith == pytest.approx(angle.value)
+        assert (2 * ahead > 200).any()  # beyond even a fisheye of 200°
+
+
+def test_a_ray_that_misses_the_point_is_wrong_by_h_over_z(says):
+    says("the direction is then wrong by an angle ε with sin ε = h/Z")
+    h, Z, along = 0.0032, 0.3, np.array([0.0, 0.0, 1.0])
+    thing = np.array([h, 0.0, 0.0]) + np.sqrt(Z**2 - h**2) * along  # on a ray that passes the origin at h
+    assert np.linalg.norm(thing) == pytest.approx(Z)
+    assert np.arccos(thing @ along / Z) == pytest.approx(np.arcsin(h / Z))
+
+
+# Mirrors with a single viewpoint -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("e", [0.6, 1.5, 3.0])
+def test_conics_reflect_what_aims_at_one_focus_into_the_other(says, e):
+    says("Such a mirror reflects rays that aim at one of its foci into the other.")
+    says("Around its focus a conic has the polar equation r = p / (1 + e cos θ), and e > 1 makes a hyperbola.")
+    says("The camera stands in the *other* focus, 2pe/(e² − 1) away.")
+    p, theta = 0.03, np.radians([20.0, 50.0, 80.0, 100.0])
+    r = p / (1 + e * np.cos(theta))
+    slope = p * e * np.sin(theta) / (1 + e * np.cos(theta)) ** 2
+    point = np.stack([r * np.sin(theta), r * np.cos(theta)], axis=-1)
+    tangent = np.stack([slope * np.sin(theta) + r * np.cos(theta), slope * np.cos(theta) - r * np.sin(theta)], axis=-1)
+    normal = tangent[:, ::-1] * [1, -1]
+    towards_the_focus = -point / np.linalg.norm(point, axis=-1, keepdims=True)
+    out = reflected(towards_the_focus, normal)
+    other = np.array([0, 2 * p * e / (e**2 - 1)])
+    gap = other - point
+    np.testing.assert_allclose(out[:, 0] * gap[:, 1] - out[:, 1] * gap[:, 0], 0, atol=1e-15)
+
+
+def test_a_paraboloid_makes_them_parallel_and_a_plane_is_one_more_and_a_sphere_is_none(says):
+    says("For the paraboloid the other focus is infinitely far, so its camera is orthographic.")
+    says("A plane and the inside of an ellipsoid are the only others of use")
+    says("only a plane, an ellipsoid, a hyperboloid or a paraboloid has a single viewpoint")
+    x = np.array([0.2, 0.5, 0.9])
+    on = np.stack([x, 0.5 - x**2 / 2], axis=-1)  # its focus is the origin
+    out = reflected(-on / np.linalg.norm(on, axis=-1, keepdims=True), np.stack([x, np.ones(3)], axis=-1))
+    np.testing.assert_allclose(out, [[0, 1]] * 3 @ np.diag([1, -1 if out[0, 1] < 0 else 1]), atol=1e-12)
+    eye = np.array([0.0, -1.0])
+    plane = np.stack([x, 0 * x], axis=-1)
+    back = reflected((plane - eye) / np.linalg.norm(plane - eye, axis=-1, keepdims=True), np.array([[0.0, 1.0]]))
+    assert np.ptp(plane[:, 1] - plane[:, 0] * back[:, 1] / back[:, 0]) < 1e-12  # prolonged, all pass (0, 1)
+    turn = np.radians([5, 20, 40])
+    ball = np.stack([np.sin(turn), np.cos(turn)], axis=-1)
+    out = reflected((ball - [0, 4]) / np.linalg.norm(ball - [0, 4], axis=-1, keepdims=True), ball)
+    assert np.ptp(ball[:, 1] - ball[:, 0] * out[:, 1] / out[:, 0]) > 0.05  # they cross the axis in different places
+
+
+def test_plane_and_ellipsoid_show_half_of_all_directions_at_most(says):
+    """A ray that aims at the viewpoint must come past the mirror: where the mirror is in direction d, none is in −d."""
+    says("neither can show more than half of all directions")
+    directions = np.random.default_rng(0).normal(size=(10000, 3))
+    mirror = directions[:, 2] > 0  # as much as may be: with more, some −d would be on the mirror too
+    assert not (mirror & ((-directions)[:, 2] > 0)).any()
+    assert mirror.mean() == pytest.approx(0.5, abs=0.02)
+
+
+def test_the_xi_of_mirrors_goes_from_0_to_1(says):
+    says("No mirror has such a ξ, for 2e/(1 + e²) is at most 1, but the formula still works.")
+    e = np.linspace(0, 50, 5001)
+    assert (2 * e / (1 + e**2)).max() == pytest.approx(1)
+    (axis,) = says("No direction at 90° from the axis or beyond has an image.")
+    assert at_angle(axis.value)[2] == pytest.approx(0)
+    says("This is a parabolic mirror, and also a *lens*, the stereographic fisheye")
+    (two,) = says("half of the stereographic 2 tan(θ/2)")
+    theta = np.radians([10, 60, 120])
+    np.testing.assert_allclose(two.value * unified(at_angle(np.degrees(theta)), 1.0, 1.0)[:, 0], 2 * np.tan(theta / 2))
+
+
+# The unified sphere --------------------------------------------------------------------------------------------------
+
+
+def test_the_middle_tells_f_over_1_plus_xi_only(says):
+    says("In the middle the three cameras agree to about a hundredth of a pixel.")
+    (apart,) = says("At the rim they are more than 100 px apart.")
+    cameras = ((300.0, 0.0), (600.0, 1.0), (1200.0, 3.0))
+    middle, rim = ([unified(point, f, xi)[0] for f, xi in cameras] for point in ([0.05, 0.0, 1.0], [1.0, 0.0, 0.2]))
+    assert 0.005 < np.ptp(middle) < 0.02
+    assert np.abs(np.diff(rim)).min() > apart.value
+    (xi,) = says("You double the focal length f of a unified sphere with ξ = 1 and change ξ to 3")
+    assert 2 / (1 + xi.value) == 1 / (1 + 1)
+    says("The rim does change, but it shrinks: a larger ξ draws it in.")
+    assert rim[0] > rim[1] > rim[2]
+
+
+def test_the_two_forms_are_one_lens(says):
+    says("with ξ = α/(1 − α) and **γ = f/(1 − α)**")
+    alpha, f = says("A file gives α = 0.6 and f = 190 px for a unified sphere")
+    point = np.array([0.4, 0.7, -0.1])
+    in_alpha = f.value * point[:2] / (alpha.value * np.linalg.norm(point) + (1 - alpha.value) * point[2])
+    xi, gamma = says("ξ = 1.5, γ = 475 px")
+    np.testing.assert_allclose(unified(point, gamma.value, xi.value), in_alpha)
+    wrong_xi, wrong_gamma = says("ξ = 0.6, γ = 190 px")
+    right_xi, half_right = says("ξ = 1.5, γ = 190 px")
+    assert not np.allclose(unified(point, wrong_gamma.value, wrong_xi.value), in_alpha)
+    assert not np.allclose(unified(point, half_right.value, right_xi.value), in_alpha)
+    (middle,) = says("γ/(1 + ξ) = 190 px = f")
+    assert middle == gamma.value / (1 + xi.value)
+
+
+@pytest.mark.parametrize("xi", [0.8, 1.7])
+def test_opencv_gives_an_image_to_points_that_have_none(says, xi):
+    says("Its `projectPoints` takes ξ as a plain number, not as the array that a calibration returns.")
+    says("for ξ ≤ 1 these have Z ≤ −ξD, and their image comes out mirrored through the middle")
+    says("for ξ > 1 these have Z ≤ −D/ξ. They lie on the far side of the sphere and share their pixel with a point")
+
+    def opencv(point, xi):
+        flat = np.asarray(point, dtype=float).reshape(1, 1, 3)
+        return cv2.omnidir.projectPoints(flat, np.zeros(3), np.zeros(3), np.eye(3), xi, np.zeros(4))[0].ravel()
+
+    with pytest.raises(cv2.error):
+        opencv([1, 2, 5], np.array([xi]))
+    limit = np.degrees(np.arccos(-min(xi, 1 / xi)))
+    seen, hidden = at_angle(limit - 5), at_angle(limit + 5)
+    assert opencv(seen, xi)[0] > 0
+    if xi < 1:
+        assert opencv(hidden, xi)[0] < 0
+    else:
+        angles = np.linspace(1, limit, 20000)
+        near = unified(at_angle(angles), 1.0, xi)[:, 0]
+        assert (np.diff(near) > 0).all()
+        assert near[0] < opencv(hidden, xi)[0] < near[-1]
+
+
+def test_the_double_sphere_fits_fisheyes_better(says):
+    says("It has one number more, and fits fisheye lenses better.")
+    theta = np.linspace(0.01, np.radians(100), 200)
+    x, _, z = at_angle(np.degrees(theta)).T
+
+    def double(f, xi, alpha):
+        return f * x / (alpha * np.hypot(x, xi + z) + (1 - alpha) * (xi + z))
+
+    for radius in (theta, 2 * np.sin(theta / 2), theta - 0.02 * theta**3):
+        one = least_squares(lambda p, r=radius: p[0] * x / (z + p[1]) - r, [2, 1.2]).cost
+        two = least_squares(lambda p, r=radius: double(*p) - r, [1, 0.1, 0.6]).cost
+        assert two < one / 100
+
+
+# The valley ----------------------------------------------------------------------------------------------------------
+
+
+def fitted(uv, corners, starts, f, xi):
+    """The RMS that is left when every board has its best pose."""
+    squares = 0.0
+    for view, start in zip(uv, starts, strict=True):
+
+        def misfit(pose, view=view):
+            there = Rotation.from_rotvec(pose[:3]).apply(corners) + pose[3:]
+            return (unified(there, f, xi) + [399.5, 319.5] - view).ravel()
+
+        squares += 2 * least_squares(misfit, start, method="lm").cost
+    return np.sqrt(squares / uv[..., 0].size)
+
+
+def test_the_valley_of_boards_near_the_axis_and_the_pit_of_boards_far_out(says):
+    f, xi = says("in front of the *same* camera, f = 560 px and ξ = 1.1")
+    near_deg, far_deg, noise = says(
+        "One set reaches 15° from the axis, the other 66°. The corners carry noise of 0.1 px."
+    )
+    total, over, along = says("The dashed line is f/(1 + ξ) = 560/2.1 = **266.7 px**.")
+    assert (total.value, over.value) == (f.value, 1 + xi.value)
+    assert along == f.value / (1 + xi.value)
+    other_xi, other_f, worse, best = says("ξ = 0.5 with f = 400 px leaves 0.141 px where the truth leaves 0.136 px.")
+    seen, off = says("Nobody who sees a misfit of 0.14 px would think that f is wrong by 160 px.")
+    assert other_f.value / (1 + other_xi.value) == pytest.approx(along.value, abs=0.1)
+    assert off == f.value - other_f.value
+
+    code = "\n".join(cell.source for cell in notebooks.read(LESSONS / "10_omnidirectional.ipynb").cells)
+    spreads = re.search(r'near the axis": boards\(rng, ([\d.]+), .*rim": boards\(rng, ([\d.]+), ', code)
+    assert spreads
+    namespace = {"np": np}
+    setting = next(cell for cell in code.split("from scipy.spatial.transform import")[1:] if "def boards" in cell)
+    exec(
+        "from camviz.lenses import UnifiedSphere\nfrom scipy.spatial.transform import"
+        + setting.partition("from camviz.calibration.valley")[0],
+        namespace,
+    )
+    rng, corners = np.random.default_rng(4), namespace["board"].corners
+    for spread, away, reach in ((0.1, (0.6, 0.9), near_deg), (0.9, (0.2, 0.3), far_deg)):
+        poses, uv = namespace["boards"](rng, spread, away)
+        there = np.stack([pose.apply(corners) for pose in poses])
+        assert reach == np.degrees(np.arctan2(np.hypot(there[..., 0], there[..., 1]), there[..., 2])).max()
+        error = uv - unified(there, f.value, xi.value) - [399.5, 319.5]
+        assert noise.about(error.std(), 0.05)
+        starts = [np.append(pose.rotation.as_rotvec(), pose.translation) for pose in poses]
+        true, elsewhere = (
+            fitted(uv, corners, starts, one.value, its.value) for one, its in ((f, xi), (other_f, other_xi))
+        )
+        if reach is near_deg:
+            assert best == true
+            assert worse == elsewhere
+            assert seen == elsewhere
+        else:
+            assert elsewhere > 5 * true
+
+
+def test_the_quiz_about_two_calibrations(says):
+    f1, xi1, f2, xi2, rms = says("(f, ξ) = (560, 1.1) and (640, 1.4). Both have an RMS of 0.2 px.")
+    middle = at_angle(np.linspace(0, 15, 16))
+    assert np.abs(unified(middle, f1.value, xi1.value) - unified(middle, f2.value, xi2.value)).max() < rms.value
+    quotient, one, other, two, both = says("560/2.1 and 640/2.4 are both 266.7")
+    assert (quotient.value, other.value) == (f1.value, f2.value)
+    assert (one.value, two.value) == (1 + xi1.value, 1 + xi2.value)
+    assert both == f1.value / (1 + xi1.value)
+    assert both == f2.value / (1 + xi2.value)
+    (again,) = says("Yes: 266.7 px both times.")
+    assert again == both.value
+    f, xi, mean = says("The mean is (600, 1.25), with 266.7 px once more.")
+    assert f == (f1.value + f2.value) / 2
+    assert xi == (xi1.value + xi2.value) / 2
+    assert mean == f.value / (1 + xi.value)
+
+
+# The ring ------------------------------------------------------------------------------------------------------------
+
+
+def seen_at(camera, thing, S):
+    """The longitude at which a panorama, stitched for S, shows a thing that the camera sees: where its ray meets S."""
+    ray = (thing - camera) / np.linalg.norm(thing - camera)
+    b = camera @ ray
+    hit = camera + (-b + np.sqrt(b * b - camera @ camera + S * S)) * ray
+    return np.arctan2(hit[0], hit[1])
+
+
+def test_what_a_ring_does_to_a_globe_at_a_seam(says):
+    (r_cm,) = says("Six cameras look outwards from a ring of 25 cm radius")
+    (z,) = says("At a seam stands a globe, 3 m away.")
+    (stitched,) = says("It could make the globe whole by stitching for 3 m. Then the lamps behind it are torn")
+    (lowered,) = says("Lower **stitched for** to about 3 m. The globe becomes whole")
+    assert stitched.value == lowered.value == z.value
+    alpha, r = np.pi / 6, r_cm.value / 100
+    right = r * np.array([np.sin(alpha), np.cos(alpha)])
+    globe, lamp, near = (np.array([0.0, at]) for at in (z.value, 7.0, 1.5))
+    assert seen_at(right, globe, 1e9) == pytest.approx(-np.arctan2(right[0], z.value - right[1]), abs=1e-6)
+    assert abs(seen_at(right, globe, stitched.value)) < 1e-12
+    assert abs(seen_at(right, lamp, stitched.value)) > 0.01
+    says("at the seam nearer things are partly lost and farther ones doubled")
+    assert seen_at(right, near, z.value) < 0  # the right camera shows what is to the right: this it does not show
+    assert seen_at(right, lamp, z.value) > 0
+
+
+def test_what_remains_far_from_the_ring(says):
+    says("Of n cameras, each of the two beside a seam is turned α = π/n from it.")
+    says("Where the panorama is stitched for a distance S instead of infinity, about b (1/Z − 1/S) remains.")
+    n, r, S = 6, 0.25, 30.0
+    right = r * np.array([np.sin(np.pi / n), np.cos(np.pi / n)])
+    for Z, within in ((1.0, 0.3), (10.0, 0.03)):
+        exact = -2 * seen_at(right, np.array([0.0, Z]), S)
+        assert 2 * right[0] * (1 / Z - 1 / S) == pytest.approx(exact, rel=within)
+        assert exact > 1.01 * 2 * right[0] * (1 / Z - 1 / S)
+
+
+def test_half_a_centimetre_between_lenses(says):
+    px, distance, width = says(
+        "Even half a centimetre between two lenses makes 3 px at a distance of 1 m, in a panorama of 4000."
+    )
+    assert px == 2 * np.arctan(0.0025 / distance.value) * width.value / (2 * np.pi)
+
+
+# The earth and the cube ----------------------------------------------------------------------------------------------
+
+
+def test_a_circle_on_the_sphere_stays_a_circle_or_becomes_a_line(says):
+    says("A circle on the sphere stays a circle, or becomes a straight line")
+    says("In the mirror the middle is the south pole, and the horizon is the equator.")
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    cone = np.stack([0.5 * np.cos(turn), 0.5 * np.sin(turn), np.full(40, np.sqrt(0.75))], axis=-1)
+    circle = unified(Rotation.from_euler("xy", [50, 30], degrees=True).apply(cone), 1.0, 1.0)
+    fit, *_ = np.linalg.lstsq(np.column_stack([circle, np.ones(40)]), (circle**2).sum(axis=-1), rcond=None)
+    radii = np.linalg.norm(circle - fit[:2] / 2, axis=-1)
+    assert np.ptp(radii) < 1e-12
+    meridian = unified(at_angle(np.array([10, 60, 150]), 0.7), 1.0, 1.0)
+    assert bent(meridian) < 1e-12
+
+
+def test_how_large_a_face_must_be(says):
+    quarter, *_ = says("A quarter of the map's width, 180 px, is too small.")
+    width, degrees, per_degree, again = says(
+        "At the equator the map has 720/360 = 2 px per degree, that is 720/(2π) per radian."
+    )
+    assert (quarter.value, again.value) == (width.value / 4, width.value)
+    assert per_degree == width.value / degrees.value
+    assert degrees.value == np.degrees(2 * np.pi)
+    over, needed, small, has = says("So w must be 720/π = 229 px; with 180 px the middle has only 1.57 px per degree.")
+    assert over.value == width.value
+    tangent = np.tan(np.radians(0.005))
+    for side, wanted in ((small.value, has), (needed.value, per_degree)):
+        assert wanted.about(side / 2 * 2 * tangent / 0.01, 0.005)  # of a face, by a hundredth of a degree
+    assert needed == width.value / np.pi
+    says("In its middle it has w/2 pixels per radian, and elsewhere more.")
+    assert np.tan(np.radians(40.01)) - np.tan(np.radians(39.99)) > 2 * np.tan(np.radians(0.01))
+
+
+# The exercises -------------------------------------------------------------------------------------------------------
+
+
+def test_the_point_of_the_double_sphere_s_hint(says):
+    point = says("Write down both distances for the point (0, 3, 4) with ξ = 1, by hand.")
+    d1, *moved, squared = says(
+        "D₁ is 5 there. The point is then moved by ξ D₁ along z, to (0, 3, 9), and D₂ is the distance of *that* "
+        "point, √90."
+    )
+    there = np.array([0.0, *(one.value for one in point)])
+    assert d1 == np.linalg.norm(there)
+    there[2] += d1.value  # ξ is 1
+    np.testing.assert_allclose(there[1:], [one.value for one in moved])
+    assert squared == there @ there
+
+
+def test_the_inverse_s_quadratic(says):
+    (two,) = says("η is the larger root of the quadratic equation η² (1 + r²) − 2ηξ + ξ² = 1.")
+    (again,) = says("η² (1 + r²) − 2 η ξ + ξ² = 1")
+    assert two.value == again.value
+    for xi, x in ((0.7, 1.4), (1.3, 0.8)):
+        eta = np.roots([1 + x * x, -two.value * xi, xi * xi - 1]).max()
+        ray = np.array([eta * x, 0, eta - xi])
+        assert np.linalg.norm(ray) == pytest.approx(1)
+        assert unified(ray, 1.0, xi)[0] == pytest.approx(x)
+        assert ray[2] > -min(xi, 1 / xi)
+
+
+def test_the_cube_s_side(says):
+    (side,) = says("Your cube has side 1. Its faces are at ±1, so that its side is 2.")
+    assert side == 1 - -1
+
+
+def test_the_shapes_that_exercises_ask_for(says):
+    flat, solid = says("Image points (…, 2), in focal lengths, of points (…, 3), by (X, Y)/(Z + ξD)")
+    ray, pixel = says("The unit rays (…, 3) of image points (…, 2).")
+    direction, point, least = says(
+        "Where do directions (…, 3) meet the cube with faces at ±1 around the camera? The answer is a point (…, 3), "
+        "one of whose coordinates is +1 or −1."
+    )
+    (sign,) = says("you divide by the largest coordinate with its sign, and that makes −1 into +1")
+    space = np.ones((5, int(solid.value)))
+    image = cv2.omnidir.projectPoints(space[None], np.zeros(3), np.zeros(3), np.eye(3), 0.5, np.zeros(4))[0]
+    assert image.shape[-1] == flat.value == pixel.value
+    assert solid.value == ray.value == direction.value == point.value
+    left = np.array([-2.0, 0.5, 1.0])
+    assert (left / np.abs(left).max())[0] == least.value == sign.value
+    assert (left / left[0])[0] == -sign.value
+
+
+def test_the_units_in_the_ring_s_replies(says):
+    (half_a_turn,) = says("α is in degrees in yours, 180/n.")
+    (turn,) = says("Your angle is in radians, but you took width/360 pixels: that is per *degree*.")
+    assert np.radians(half_a_turn.value) == np.pi
+    assert np.radians(turn.value) == 2 * np.pi
+    (two,) = says("The two cameras see the thing 2ψ apart")
+    left, right = (seen_at(np.array([side, 0.2]), np.array([0.0, 2.0]), 1e9) for side in (-0.1, 0.1))
+    assert left - right == pytest.approx(-two.value * right)
+
+
+def cases(name):
+    return list(exercise(name).cases(np.random.default_rng(5)))
+
+
+def test_the_answers_are_camviz_s_own():
+    for points, xi in cases("10.project"):
+        np.testing.assert_allclose(lesson10.project(points, xi), UnifiedSphere(xi).project(points), atol=1e-12)
+    for xy, xi in cases("10.unproject"):
+        np.testing.assert_allclose(lesson10.unproject(xy, xi), UnifiedSphere(xi).unproject(xy), atol=1e-12)
+    for points, xi, alpha in cases("10.double_sphere"):
+        there = DoubleSphere(xi, alpha).project(points)
+        np.testing.assert_allclose(lesson10.double_sphere(points, xi, alpha), there, atol=1e-12)
+    for cameras, radius, distance, width in cases("10.parallax"):
+        there = Ring(cameras, radius).parallax(distance, np.inf) * width / (2 * np.pi)
+        assert lesson10.parallax(cameras, radius, distance, width) == pytest.approx(float(there), abs=1e-9)
+
+
+def test_the_point_on_the_cube_lies_on_the_face_whose_camera_sees_the_direction(says):
+    says("The coordinate that is ±1 names the face: +z front, +x right, −y up, and so on.")
+    outwards = {"front": (0, 0, 1), "right": (1, 0, 0), "back": (0, 0, -1), "left": (-1, 0, 0), "up": (0, -1, 0)}
+    outwards["down"] = (0, 1, 0)
+    (directions,) = cases("10.cube_point")[2]
+    for direction, on in zip(directions, lesson10.cube_point(directions), strict=True):
+        seen = [np.all(np.abs(face_camera(face, 100).project(direction) - 49.5) <= 50) for face in FACES]
+        assert sum(seen) == 1
+        assert on @ outwards[FACES[seen.index(True)]] == pytest.approx(1)
+
+
+# The commands --------------------------------------------------------------------------------------------------------
+
+
+def commands():
+    text = "\n".join(cell.source for cell in notebooks.read(LESSONS / "10_omnidirectional.ipynb").cells)
+    return sorted(re.findall(r"`camviz ([^`]+)`", text))
+
+
+def test_the_commands_of_the_lesson_run_as_they_are_written(tmp_path, monkeypatch, samples):
+    monkeypatch.chdir(tmp_path)
+    calibrate, reproject = commands()
+    Path("pictures").mkdir()
+    for number in (1, 2, 3, 4, 5, 6):
+        shutil.copy(samples / f"left0{number}.jpg", "pictures")
+    assert main(shlex.split(calibrate)) == 0
+    assert not cv2.FileStorage("camera.yaml", cv2.FILE_STORAGE_READ).getNode("xi").empty()
+    earth = np.random.default_rng(0).integers(0, 255, (180, 360, 3), dtype=np.uint8)
+    cv2.imwrite("earth.jpg", earth)
+    assert main(shlex.split(reproject)) == 0
+    assert cv2.imread("window.png") is not None

@@ -1,0 +1,279 @@
+"""What lesson 11 says about slopes, refocusing and its range, and what it costs, recomputed with NumPy and SciPy."""
+
+import re
+
+import numpy as np
+import pytest
+from quoting import LESSONS
+from scipy.ndimage import shift
+
+from camviz import notebooks
+from camviz.exercises import exercise, lesson11
+from camviz.lightfields import LightField, from_microlens_image
+
+EXCEPTIONS: dict[str, str] = {}
+
+F = 80 / np.tan(np.radians(19))  # 160 pixels over 38°, as the garden's camera has them
+B, Z_F, PLACES = 0.056, 4.0, 9
+
+
+def slope(z, b=B, f=F, z_f=Z_F):
+    """From the images of one point in two parallel cameras, less those of a point in focus."""
+    images = [f * (0 - place) / z - f * (0 - place) / z_f for place in (0.0, b)]
+    return images[0] - images[1]
+
+
+def depth(d, b=B, f=F, z_f=Z_F):
+    return 1 / (d / (b * f) + 1 / z_f)
+
+
+# The lens and its views ----------------------------------------------------------------------------------------------
+
+
+def test_the_views_of_the_lens(says):
+    says("The virtual camera has a lens half a metre wide today")
+    assert abs(PLACES * B - 0.5) < 0.01
+    (millimetres,) = says("So far every view came through a pinhole, 56 mm from the next")
+    assert millimetres == 1000 * B
+    n, again = says("The virtual camera's has 9 × 9 pixels under each microlens")
+    assert n.value == again.value == PLACES
+    (views,) = says("One of the 81 views is shown")
+    (agree,) = says("keep the one at which the 81 views agree best")
+    assert views == n.value**2
+    assert agree == n.value**2
+
+
+def test_the_fence_and_the_focus(says):
+    (fence,) = says("Turn **slope** to +3.25: the fence is sharp")
+    away, blur = says(
+        "The shear is right for the fence, 2.0 m away, and yet the slats are soft: each view blurs them over 3.25 px."
+    )
+    assert fence == slope(away.value)
+    assert blur == abs(slope(away.value))
+    says("What the main lens had in focus, at $z_f = 4$ m, stands upright")
+    assert slope(Z_F) == 0
+    (bf,) = says("Here b f = 13.0 px·m")
+    assert bf == B * F
+
+
+def test_what_is_nearer_leans_to_the_left(says):
+    (at,) = says("What the main lens was focused on, at 4 m, has the same place in all views.")
+    (nearer,) = says("What does a point *nearer* than 4 m draw in the slice?")
+    (stands,) = says("That is what a point at 4 m draws")
+    assert at.value == nearer.value == stands.value == Z_F
+    (over,) = says("One step of the camera to the right moves a near point to the left, by d = b f (1/z − 1/4) pixels.")
+    says("What is nearer leans to the left as u grows, what is farther to the right.")
+    column = [F * (0.3 - u * B) / 3.0 + F * u * B / Z_F for u in range(PLACES)]
+    assert (np.diff(column) < 0).all()
+    assert np.ptp(np.diff(column)) < 1e-9  # a straight line
+    assert np.diff(column)[0] == pytest.approx(-B * F * (1 / 3.0 - 1 / over.value))
+    says("where two lines cross, the one that leans more to the left is in front")
+    assert slope(2.5) > slope(3.5) > slope(6.0)
+
+
+# How far it reaches --------------------------------------------------------------------------------------------------
+
+
+def test_a_view_through_an_opening_as_wide_as_the_step_blurs_over_d_pixels(says):
+    says("every view blurs it over |d| pixels")
+    (sharp,) = says("A single view now has a depth of field: what is 4 m away is sharp, the fence is not.")
+    through = np.linspace(-B / 2, B / 2, 101)  # places of one opening
+    for z in (2.0, 3.0, 6.5):
+        landed = F * (0.1 - through) / z + F * through / Z_F
+        assert np.ptp(landed) == pytest.approx(abs(slope(z)))
+    assert np.ptp(F * (0.1 - through) / sharp.value + F * through / Z_F) < 1e-9
+
+
+def test_the_range_of_exact_refocusing(says):
+    (pixel,) = says("as sharply as its pixels allow for **|d| ≤ 1 px**")
+    (again,) = says(r"to the pixel, only where \|d\| ≤ 1 px")
+    assert again.value == pixel.value
+    near, far = says("Here it reaches from 3.06 m to 5.78 m.")
+    assert near == depth(pixel.value)
+    assert far == depth(-pixel.value)
+    width, whole_near, whole_far = says(
+        "A lens of the same width, 504 mm, without microlenses keeps its blur within a pixel from 3.87 m to 4.14 m "
+        "only."
+    )
+    assert width == 1000 * PLACES * B
+    whole = width.value / 1000
+    assert whole_near == depth(1.0, b=whole)
+    assert whole_far == depth(-1.0, b=whole)
+    says("In 1/z the range is nine times as wide, because there are nine views in a row.")
+    ratio = (1 / depth(1.0) - 1 / depth(-1.0)) / (1 / depth(1.0, b=whole) - 1 / depth(-1.0, b=whole))
+    assert ratio == pytest.approx(PLACES)
+
+
+def test_refocused_through_openings_a_point_stays_as_wide_as_one_view_has_it(says):
+    says("and no shear takes that back")
+    for d in (0.5, 1.0, 3.25):
+        places = np.linspace(-PLACES / 2, PLACES / 2, 9 * 200, endpoint=False) + 1 / 400
+        step = np.rint(places)  # of the view that a place belongs to
+        landed = -d * places + d * step
+        assert np.ptp(landed) == pytest.approx(d, rel=0.01)
+
+
+# α -------------------------------------------------------------------------------------------------------------------
+
+
+def test_the_slope_is_linear_in_the_inverse_of_alpha(says):
+    says("So the slope is linear in 1/α, not in α, and it is not the depth either.")
+    says("the slope is proportional to 1 − 1/α")
+    pitch, sensor = 0.002, F * 0.002
+    focal = 1 / (1 / Z_F + 1 / sensor)
+    d = np.array([-3.0, -1.0, 0.0, 2.0, 3.0])
+    alpha = 1 / (1 / focal - 1 / depth(d)) / sensor
+    np.testing.assert_allclose(1 - 1 / alpha, d * pitch / B, atol=1e-12)
+    says("Near α = 1 equal steps of one are nearly equal steps of the other, farther away they are not.")
+    assert np.gradient(alpha, d)[2] == pytest.approx(pitch / B, rel=0.03)
+    assert np.gradient(alpha, d)[-1] > 1.1 * pitch / B
+    says("the picture becomes α times as large")  # an image is as large as its distance from the lens
+    says("A point at twice the depth has its image only a little nearer to the lens.")
+    assert 0.95 < (1 / (1 / 0.05 - 1 / 4.0)) / (1 / (1 / 0.05 - 1 / 2.0)) < 1
+    says("For z far beyond f, α hardly differs from 1")
+    says("the film of a nearer point lies *farther* behind the lens, so α > 1 for z < z_f")
+    assert alpha[-1] > 1
+
+
+def test_the_published_benchmark(says):
+    focal_mm, sensor_mm, pixels = says("f = 100 mm on a 35 mm sensor of 512 pixels")
+    apart_mm, focus = says("two neighbours 25 mm apart and a focus at 4.25 m")
+    far, near, deepest, nearest = says("Its slopes from −1.6 to 1.5 px must be depths from 5.22 to 3.62 m.")
+    f, b = focal_mm.value / sensor_mm.value * pixels.value, apart_mm.value / 1000
+    assert deepest == depth(far.value, b, f, focus.value)
+    assert nearest == depth(near.value, b, f, focus.value)
+
+
+# What it costs -------------------------------------------------------------------------------------------------------
+
+
+def test_what_views_cost_in_pixels(says):
+    sensor, n, again = says(
+        "A light field camera has a sensor of 40 million pixels and 9 × 9 of them under each microlens."
+    )
+    total, views, millions, width, height = says("Yes: 40 / 81 = 0.49 million, a picture of about 700 × 700 pixels.")
+    assert total.value == sensor.value
+    assert views == n.value * again.value
+    assert millions == sensor.value / views.value
+    assert width.about(1000 * np.sqrt(millions.value), 0.01)
+    assert height.value == width.value
+    (all_of_them,) = says("40 million: every pixel of the sensor takes part in it.")
+    assert all_of_them.value == sensor.value
+    (a_ninth,) = says("About 4.4 million, a ninth.")
+    assert a_ninth == sensor.value / n.value
+    (under_one,) = says("They do take part, 81 at a time")
+    (directions,) = says("What was spent on 81 directions is not there for places.")
+    assert directions.value == views.value
+    (rows, columns, share) = says("9 × 9 = 81 views share the sensor")
+    assert share == rows.value * columns.value
+    assert under_one.value == share.value
+    wide, tall = says("one sensor of 720 × 540 pixels, three ways")
+    three, again_three, nine, again_nine = says("All pixels go to one view; to 3 × 3 views; to 9 × 9.")
+    n, m, every, left = says(
+        "With 9 × 9 views the focus and the viewpoint are free, and of the sensor's 388,800 pixels 4800 are left."
+    )
+    assert every == wide.value * tall.value
+    assert left == every.value / (n.value * m.value)
+    assert (three.value, nine.value) == (again_three.value, again_nine.value)
+    sensor = np.zeros((int(tall.value), int(wide.value)))
+    assert sensor[:: int(nine.value), :: int(again_nine.value)].size == left.value
+    assert sensor[:: int(three.value), :: int(again_three.value)].size == every.value / 9
+
+
+def test_the_quiz_about_the_fence(says):
+    hidden, views = says("A slat of the fence hides the globe in 20 of 81 views.")
+    seen, of_all, slat, of_all_again = says("The globe with a veil, 61/81 of its own light and 20/81 from the slat.")
+    light = np.full(int(views.value), 1.0)
+    light[: int(hidden.value)] = 0.0
+    assert seen == light.sum()
+    assert of_all.value == of_all_again.value == views.value
+    assert slat == (1 - light).sum()
+    (again,) = says("It is hidden in 20 views only.")
+    (others,) = says("The other 61 look past the slat.")
+    (left_out,) = says("A mask that leaves out the 20 views would remove the veil")
+    assert again.value == left_out.value == hidden.value
+    assert others == views.value - hidden.value
+
+
+def test_the_telephone_on_the_ruler(says):
+    (wide,) = says("the aperture is a slit, 16 cm wide and as high as a telephone's lens")
+    says("take nine pictures, two centimetres apart")
+    assert wide == (9 - 1) * 2
+    says("Its axes are parallel, so $z_f = \\infty$ and every slope is positive.")
+    assert slope(np.array([1.0, 10.0, 1000.0]), z_f=np.inf).min() > 0
+    says("Here the slope of infinity is −b f / z_f, and it is negative.")
+    assert slope(1e9) == pytest.approx(-B * F / Z_F)
+    assert slope(1e9) < 0
+
+
+# The exercises -------------------------------------------------------------------------------------------------------
+
+
+def cases(name):
+    return list(exercise(name).cases(np.random.default_rng(5)))
+
+
+def test_the_answers_are_camviz_s_own():
+    for sensor, n, v, u in cases("11.sub_aperture"):
+        np.testing.assert_array_equal(lesson11.sub_aperture(sensor, n, v, u), from_microlens_image(sensor, n, n)[v, u])
+    for z, b, f, z_f in cases("11.disparity"):
+        field = LightField(np.zeros((1, 1, 1, 1, 3)), b, f, z_f)
+        np.testing.assert_allclose(lesson11.disparity(z, b, f, z_f), field.disparity(z))
+    published = lesson11.disparity(np.array([5.2207, 3.6191]), 0.025, 100 / 35 * 512, 4.25)
+    np.testing.assert_allclose(published, [-1.6, 1.5], atol=5e-4)
+
+
+def test_the_mended_sum_focuses_what_moves_by_d_and_holds_the_middle_view_still(says):
+    says("Now the middle view holds still, and the picture no longer slides when you turn the focus.")
+    picture = np.random.default_rng(0).random((16, 16))
+    views = np.array([[np.roll(picture, (-2 * (v - 1), -2 * (u - 2)), (0, 1)) for u in range(5)] for v in range(3)])
+    np.testing.assert_allclose(lesson11.refocused(views, 2), picture, atol=1e-12)
+    slid = lesson11.refocused_as_given(views, 2)
+    np.testing.assert_allclose(slid, np.roll(picture, (2, 4), (0, 1)), atol=1e-12)
+    (three,) = says("One step too far: views count from 0, so the middle of 3 views is number 1")
+    assert int(three.value) // 2 == 1
+
+
+@pytest.mark.parametrize("d", [-0.8, -0.3, 0.0, 0.45])
+def test_the_slope_is_the_one_put_in(says, d):
+    says("The plane may have a texture everywhere, or be a plain wall with one spot")
+    rng = np.random.default_rng(1)
+    assert lesson11.slope(lesson11._waves(rng, 7, 80, d)) == pytest.approx(d, abs=0.01)
+    assert lesson11.slope(lesson11._spot(rng, 7, d)) == pytest.approx(d, abs=0.01)
+    wall = np.array([shift(np.hanning(41), -d * u, order=3) for u in range(5)])
+    assert lesson11.slope(wall) == pytest.approx(d, abs=0.02)
+
+
+def test_means_of_derivatives_tell_nothing_of_a_spot_on_a_plain_wall(says):
+    says("Rising and falling flanks cancel in a mean")
+    _, L_x = np.gradient(lesson11._spot(np.random.default_rng(0), 5, 0.6))
+    assert abs(L_x.mean()) < 1e-12 < np.sum(L_x**2)
+
+
+def test_a_correlation_is_near_one_for_any_slope(says):
+    (least,) = says("This is a correlation, near +1 or −1 for any slope.")
+    for d in (-0.6, -0.2):
+        L_u, L_x = np.gradient(lesson11._spot(np.random.default_rng(0), 5, d))
+        assert np.corrcoef(L_u.ravel(), L_x.ravel())[0, 1] == pytest.approx(least.value, abs=0.01)
+
+
+def test_alpha_is_the_ratio_of_thin_lens_image_distances():
+    for z, f, z_f in cases("11.alpha"):
+        image, sensor = (distance * f / (distance - f) for distance in (z, z_f))
+        np.testing.assert_allclose(lesson11.alpha(z, f, z_f), image / sensor)
+
+
+def test_the_pair_s_focus(says):
+    says("A pair of parallel cameras with different principal points (`doffs`) is a sheared light field of two.")
+    says("this pair has its focus where d = 0, at")
+    f, b, doffs = 100.0, 0.2, 5.0
+    z = f * b / doffs
+    assert f * b / z - doffs == pytest.approx(0)
+
+
+def test_the_whole_code_says_what_the_prose_says_of_it(says):
+    says("It takes five lines, and one to undo the sRGB curve")
+    code = "\n".join(cell.source for cell in notebooks.read(LESSONS / "11_light_field.ipynb").cells)
+    body = re.search(r"def shift_and_sum.*?\n((?:    .+\n)+)", code)[1].strip("\n").splitlines()
+    assert len(body) == 5 + 1
+    assert sum("to_linear" in line for line in body) == 1
