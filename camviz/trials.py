@@ -71,15 +71,12 @@ class Exercise:
     shown: tuple[Arguments, ...] = ()
     canonical: Callable[[Array], Array] | None = None
     laws: tuple[Callable[[Function, np.random.Generator], str], ...] = ()
-    bug: bool = False
     as_given: Function | None = None
-    misconceptions: list[Misconception] = field(default_factory=list)
-    right_ways: list[Function] = field(default_factory=list)
+    misconceptions: list[Misconception] = field(default_factory=list, init=False)
+    right_ways: list[Function] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "misconceptions", list(self.misconceptions))
-        object.__setattr__(self, "bug", self.bug or self.as_given is not None)
-        if not 0 < len(self.hints) <= HINTS:
+        if len(self.hints) != HINTS:
             raise ValueError(f"hints of exercise {self.name} must be {HINTS}, got {len(self.hints)}")
         if not self.tolerance > 0:
             raise ValueError(f"tolerance of exercise {self.name} must be positive, got {self.tolerance}")
@@ -97,6 +94,11 @@ class Exercise:
         """Decorates another right way: OpenCV's function, the lesson's own formula, another order of the terms."""
         self.right_ways.append(function)
         return function
+
+    @property
+    def bug(self) -> bool:
+        """True where the task is to find the bug in a function that is given."""
+        return self.as_given is not None
 
     @property
     def parameters(self) -> list[str]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camviz.checks import SHAPES, Exercise, Misconception, judge
+from camviz.checks import SHAPES, Exercise, judge
 from camviz.exercises import Tutor, exercise, exercises
 from camviz.trials import Trial
 
@@ -24,10 +24,14 @@ DISTANCE = Exercise(
     reference=distance,
     cases=lambda rng: [(rng.uniform(1, 2, (*shape, 3)),) for shape in SHAPES],
     shown=((np.array([3.0, 0.0, 4.0]),),),
-    hints=("Think of Pythagoras.", "`np.sqrt(np.sum(points**2, axis=-1))`"),
+    hints=("Think of Pythagoras.", "The sum of squares.", "`np.sqrt(___)`"),
     praise="Pythagoras holds.",
-    misconceptions=(Misconception(lambda points: np.sum(points**2, axis=-1), "This is the *square* of the distance."),),
 )
+
+
+@DISTANCE.wrong("This is the *square* of the distance.")
+def squared_distance(points):
+    return np.sum(points**2, axis=-1)
 
 
 def verdict(function, attempt=1, of=DISTANCE, seed=0):
@@ -93,13 +97,13 @@ def test_each_kind_of_wrong_answer_is_named(change, word):
 
 
 def test_reversed_and_transposed_answers_are_recognised():
-    turn = Exercise("00.turn", lambda m: m, lambda rng: [(rng.normal(size=(3, 3)),)], ("-",), "-")
+    turn = Exercise("00.turn", lambda m: m, lambda rng: [(rng.normal(size=(3, 3)),)], ("-",) * 3, "-")
     assert "transpose" in verdict(lambda m: m.T, of=turn).message
     assert "reverse order" in verdict(lambda m: m[:, ::-1], of=turn).message
 
 
 def test_a_number_where_nothing_can_be_is_asked_to_be_nan():
-    root = Exercise("00.root", lambda x: np.sqrt(x), lambda rng: [(rng.uniform(-1, 1, 20),)], ("-",), "-")
+    root = Exercise("00.root", lambda x: np.sqrt(x), lambda rng: [(rng.uniform(-1, 1, 20),)], ("-",) * 3, "-")
     assert "NaN is wanted" in verdict(lambda x: np.sqrt(np.maximum(x, 0)), of=root).message
 
 
@@ -141,7 +145,7 @@ def test_a_matrix_up_to_scale_is_accepted_at_any_scale():
         "00.scale",
         lambda m: m,
         lambda rng: [(rng.uniform(1, 2, (3, 3)),)],
-        ("-",),
+        ("-",) * 3,
         "-",
         canonical=lambda m: m / m[0, 0],
     )
@@ -154,7 +158,7 @@ def test_a_law_that_does_not_hold_speaks_for_itself():
         return "" if function(rng.normal(size=3)) >= 0 else "A distance is never negative."
 
     lawful = Exercise(
-        "00.law", distance, DISTANCE.cases, ("-",), "-", laws=(pure, lambda function, rng: function(np.zeros(3))[0])
+        "00.law", distance, DISTANCE.cases, ("-",) * 3, "-", laws=(pure, lambda function, rng: function(np.zeros(3))[0])
     )
     assert "IndexError" in verdict(distance, of=lawful).message
 

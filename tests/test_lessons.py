@@ -273,7 +273,7 @@ def test_every_lesson_follows_the_pattern(path):
 
 
 @EACH
-def test_every_place_says_the_same_of_how_long_a_lesson_takes(path):
+def test_every_place_says_the_same_of_a_lesson_s_question_and_of_how_long_it_takes(path):
     """Header, the map in lesson 00, README, and the teacher's note at the header."""
     number, header = path.name[:2], notebooks.read(path).cells[0]
     (minutes,) = re.findall(r"About (\d+) minutes", header.source)
@@ -284,6 +284,8 @@ def test_every_place_says_the_same_of_how_long_a_lesson_takes(path):
         start = notebooks.read(path.parent / "00_start_here.ipynb")
         text = "\n".join(cell.source for cell in start.cells)
         assert re.findall(rf"^\| {number} .*\| (\d+) \|$", text, re.MULTILINE) == [minutes]
+        (question, *_) = re.findall(r"\*\*([^*]+\?)\*\*", header.source)
+        assert all(f"| {question} |" in page for page in (readme, text))
 
 
 @EACH

@@ -158,8 +158,8 @@ ROBUST_SIGMA = Exercise(
         "`np.nanmedian` passes over corners that were not seen.",
         "`return np.nanmedian(___) / np.sqrt(2 * np.log(2))`",
     ),
-    praise="A view that is thirty pixels off moves your idea of what is normal only a little, and one that is three hundred "
-    "pixels off moves it no more.",
+    praise="A view that is thirty pixels off moves your idea of what is normal only a little, and one that is three "
+    "hundred pixels off moves it no more.",
 )
 
 

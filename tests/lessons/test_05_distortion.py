@@ -62,8 +62,8 @@ def test_where_k1_alone_folds(says):
     (k1,) = says("Take the simplest barrel there is, k1 = −0.3 and nothing else.")
     fold = folds_at(k1.value)
     again, radicand, r, angle, at, reach = says(
-        "For k1 = −0.3 this is 1/√0.9 = **1.054**, a ray **46.5°** from the axis, and the largest radius that any ray "
-        "can reach in the picture is g(1.054) = 0.703."
+        "For k1 = −0.3 this is 1/√0.9 = **1.054**, a ray **46.5°** from the axis, and the largest radius that a ray "
+        "before the fold can reach in the picture is g(1.054) = 0.703."
     )
     assert again == k1.value
     assert radicand == -3 * k1.value
@@ -90,10 +90,16 @@ def test_rays_past_the_fold_come_back(says):
     assert angle == degrees(fold)
     (r,) = says("A polynomial cannot stay level: after its highest point, at r = 1.054, it comes down again")
     assert r == fold
-    again, reach = says("The largest r_d that k1 = −0.3 can reach is 0.703, however far you turn")
-    assert again == k1.value
-    inside = np.linspace(0, np.sqrt(-1 / k1.value), 10000)  # beyond this r_d is negative: the picture's other side
-    assert reach == g(inside, k1.value).max()
+    reach, beyond = says(
+        "Up to the fold the largest r_d is 0.703. What this model puts farther out lies beyond 64.6° and on the "
+        "wrong side."
+    )
+    assert reach == g(np.linspace(0, fold, 10000), k1.value).max()
+    far = np.tan(np.radians(beyond.value + np.array([-0.1, 0.1])))
+    assert abs(g(far[0], k1.value)) < g(fold, k1.value) < abs(g(far[1], k1.value))
+    assert g(far[1], k1.value) < 0
+    (through,) = says("Beyond 61.3° the polynomial even passes through the centre and out on the other side.")
+    assert through == degrees(np.sqrt(-1 / k1.value))
     (angle,) = says("such as that of an orthographic fisheye at 90°")
     assert np.cos(np.radians(angle.value)) == pytest.approx(0, abs=1e-12)  # the slope of sin θ
     k1, angle = says("for k1 = −0.3 it lies 46.5° from the axis")
@@ -161,13 +167,14 @@ def test_flipping_the_sign_of_k1_is_not_the_inverse(says):
 
 def test_the_published_stereo_calibration_folds_inside_its_images(says):
     width, height = says("Look at both lenses out to the corners of their 640 × 480 images:")
-    folds, reaches, corners = {}, {}, {}
+    folds, reaches, nearest, corners = {}, {}, {}, {}
     for name, ((f, cx, cy), coefficients) in (("left", LEFT), ("right", RIGHT)):
         folds[name] = folds_at(*coefficients)
         reaches[name] = g(folds[name], *coefficients)
         ends = [np.hypot(u - cx, v - cy) / f for u in (-0.5, width.value - 0.5) for v in (-0.5, height.value - 0.5)]
-        corners[name] = max(ends)
-    (corner,) = says("that is after distortion, the corners of the left image are 0.77 from the centre")
+        nearest[name], corners[name] = min(ends), max(ends)
+    near, corner = says("that is after distortion, the corners of the left image are 0.72 to 0.77 from the centre")
+    assert near == nearest["left"]
     assert corner == corners["left"]
     fold, reach = says(
         "The left polynomial turns back at r = 0.73 before distortion, and that ray lands at 0.63 in the photograph."
@@ -175,12 +182,12 @@ def test_the_published_stereo_calibration_folds_inside_its_images(says):
     assert fold == folds["left"]
     assert reach == reaches["left"]
     fold, reach = says(
-        "The right polynomial turns back at r = 0.98, and none of its rays lands beyond 0.72: its corners are empty "
+        "The right polynomial turns back at r = 0.98, and no ray before that lands beyond 0.72: its corners are empty "
         "too."
     )
     assert fold == folds["right"]
     assert reach == reaches["right"]
-    assert all(reaches[name] < corners[name] for name in corners)
+    assert all(reaches[name] < nearest[name] for name in corners)
 
 
 def test_one_of_the_two_goes_out_and_then_in(says):
@@ -222,15 +229,17 @@ def test_the_quiz_about_the_fold(says):
 
 
 def test_the_quiz_about_a_low_error(says):
-    says("Nothing: there the polynomial extrapolates.")
+    says("This number says nothing about it: there the polynomial extrapolates.")
     fitted, *again = (says("fits its corners to 0.2 pixels") + says("It is known to about 0.2 pixels there too.")
                       + says("The 0.2 pixels were measured where there were corners."))  # fmt: skip
     assert all(one == fitted.value for one in again)
-    k3, focal_lengths, pixels, f = says(
-        "At r = 1 even k3 = −0.2 moves a point by 0.2 focal lengths, 107 pixels for a lens of f = 536 px."
+    r, width, height, f, k3, pixels = says(
+        "At r = 0.78, the corner of a 640 × 480 image with f = 536 px, even k3 = −0.2 moves a point by 19 px."
     )
-    assert focal_lengths == 1 - g(1.0, 0, 0, k3.value)
-    assert pixels == focal_lengths.value * f.value
+    corner = np.hypot(342 + 0.5, 480 - 236 - 0.5) / f.value
+    assert r == corner
+    assert (width.value, height.value) == (640, 480)
+    assert pixels == f.value * (corner - g(corner, 0, 0, k3.value))
 
 
 def test_the_tangential_exercise_s_point_and_its_twos(says):
