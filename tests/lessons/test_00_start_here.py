@@ -86,3 +86,12 @@ def test_gamma_is_near_a_power_of_1_over_2_2(says):
     linear = np.linspace(0.02, 1, 200)
     encoded = 1.055 * linear ** (1 / 2.4) - 0.055  # IEC 61966-2-1
     np.testing.assert_allclose(encoded, linear ** (1 / power.value), atol=0.02)
+
+
+def test_one_fisheye_sees_the_whole_horizon_from_180_degrees_on(says):
+    (degrees,) = says("or by a single fisheye of more than 180° that looks straight up or down")
+    half = np.radians(degrees.value / 2)
+    horizon = np.stack([np.cos(np.linspace(0, 6, 12)), np.sin(np.linspace(0, 6, 12)), np.zeros(12)], axis=-1)
+    from_the_axis = np.arccos(horizon @ [0, 0, 1])
+    assert (from_the_axis <= half + 1e-12).all()
+    assert (from_the_axis > half - np.radians(1)).all()

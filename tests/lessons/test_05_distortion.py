@@ -236,7 +236,7 @@ def test_the_quiz_about_a_low_error(says):
     r, width, height, f, k3, pixels = says(
         "At r = 0.78, the corner of a 640 × 480 image with f = 536 px, even k3 = −0.2 moves a point by 19 px."
     )
-    corner = np.hypot(342 + 0.5, 480 - 236 - 0.5) / f.value
+    corner = np.hypot(342, 479 - 236) / f.value  # the centre of the last pixel
     assert r == corner
     assert (width.value, height.value) == (640, 480)
     assert pixels == f.value * (corner - g(corner, 0, 0, k3.value))
