@@ -29,7 +29,7 @@ LESSONS = HERE.parents[1] / "lessons"
 
 _NUMBER = re.compile(
     r"(?<![A-Za-z_\d.²³⁴₀-₉])"  # part of a name or of a longer number
-    r"((?:(?<![\w)\]}²³°])[−-])?(?:\d{1,3}(?:,\d{3})+(?![\d,])|\d+)(?:\.\d+)?(?:e[−-]?\d+)?)"
+    r"((?:(?<![\w)\]}²³°])[−-])?(?:\d{1,3}(?:,\d{3})+(?!\d|,\d)|\d+)(?:\.\d+)?(?:e[−-]?\d+)?)"
     r"(?![A-Za-z_\d])"
 )
 _SYMBOL = r"(?:[kpsτ][₁-₆\d]|[rxyzXYZfNθλξπσndcuvwtBCRQαφωμΔ]|√|\()[₀-₉²³⁴⁶′']*(?![A-Za-z])"
@@ -41,9 +41,10 @@ NOT_STATED = (
     (r"\]\([^)]*\)|</?[A-Za-z][^<>]*>|&\w+;", "an address"),
     (r"(?m)^#+ \d+ ·|^#+ .*?Exercise \d+|^\s*\d+\. ", "the number of a heading or of an item"),
     (r"(?i)\b(?:lessons?|parts?|exercises?|sections?|chapters?|chap\.|sec\.|figures?|steps?|cells?|table|volume"
-     r"|vol\.|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*",
+     r"|vol\.|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*"
+     r"(?![\d.]*\d? ?(?:mm|cm|m|px|°|%)\b)",
      "a reference"),
-    (r"\b(?:EMVA(?: Standard)?|ISO(?:/IEC)?|CIE|ITU|IEC|IEEE|OpenCV|Python|NumPy|Nikon|Canon|Sony|Sigma|Kodak|Type"
+    (r"\b(?:EMVA(?: Standard)?|ISO(?:/IEC)?|CIE|ITU|IEC|IEEE|OpenCV|Python|NumPy|Nikon|Canon|Sony|Sigma|Kodak|KAF|Type"
      r"|illuminant|Apache|CC BY|BY) ?[A-Z]{0,3}-?\d[\d.:-]*", "a proper name"),
     (r"(?:(?<=[(A-Za-zé.,;] )|(?<=\())(?:1[5-9]|20)\d\d(?=[,;.:)\s]|$)(?! ?(?:K|px|mm|nm|µm|m|DN|e⁻|photons|electrons"
      r"|pixels|[×x%°–]))", "a year"),

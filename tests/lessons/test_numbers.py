@@ -39,6 +39,7 @@ def test_the_exceptions_are_few_have_reasons_and_are_all_needed(name):
         ("from 5–95 % of 30,000 e⁻ in 3D, r² and x_1", ["5", "95", "30,000"]),
         ("9−5 is 4, (2)-1 too, and −2 is negative", ["9", "5", "4", "2", "1", "−2"]),
         ("2e-13 px in 12×8 squares", ["2e-13", "12", "8"]),
+        ("100,000, and 30,000", ["100,000", "30,000"]),
     ],
 )
 def test_numbers_are_found_as_they_are_written(text, numbers):
@@ -53,6 +54,7 @@ def test_only_what_states_nothing_is_left_out():
         "Brown (1971), in 1966, section 7.4, ISO 12233: 1 + 3 k1 r² at 2000 K, 640 × 480 px and 3 points."
     )
     assert numbers_in(_stated(text)) == ["2000", "640", "480", "3"]
+    assert numbers_in(_stated("views 25 mm apart in view 2; 1e-6 off")) == ["25", "1e-6"]
     assert all(reason for _, reason in NOT_STATED)
 
 
