@@ -101,7 +101,7 @@ def test_a_good_file_is_read_and_a_doubled_question_refused():
 
 
 def test_a_wrong_name_is_answered_with_the_right_ones():
-    with pytest.raises(ValueError, match=r"05\.fold"):
+    with pytest.raises(ValueError, match=r"05\.far_rays"):
         question("05.fould")
     with pytest.raises(ValueError, match=r"no questions for lesson '\.\./05'"):
         questions("../05")

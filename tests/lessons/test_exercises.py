@@ -59,10 +59,8 @@ def test_no_right_way_is_refused(one):
     print(f"{one.name}: {len(ways)} right ways × {len(SEEDS)} seeds, 0 refused")
 
 
-@EACH
+@pytest.mark.parametrize("one", [one for one in ALL if one.bug], ids=lambda one: one.name)
 def test_the_function_given_to_be_mended_is_not_tried_yet_and_gives_nothing_away(one):
-    if one.as_given is None:
-        pytest.skip("nothing is given: its stub is empty")
     for seed in SEEDS:
         answer = judge(one, one.as_given, np.random.default_rng(seed))
         assert answer.status == "unsolved"

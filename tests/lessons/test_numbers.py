@@ -3,10 +3,16 @@
 import importlib
 
 import pytest
-from quoting import HERE, NOT_STATED, Passage, Said, numbers_in, numbers_left, passages, plain, quotations
+from quoting import HERE, LESSONS, NOT_STATED, Passage, Said, numbers_in, numbers_left, passages, plain, quotations
 
 HELD = sorted(path.name for path in HERE.glob("test_[0-9][0-9]_*.py"))
 MOST_EXCEPTIONS = 0.05
+
+
+def test_every_lesson_has_its_test_file():
+    assert [name.removeprefix("test_") for name in HELD] == [
+        path.stem + ".py" for path in sorted(LESSONS.glob("*.ipynb"))
+    ]
 
 
 @pytest.mark.parametrize("name", HELD)
