@@ -94,6 +94,8 @@ def _judged(found: Measurement, name: str, one: Estimate) -> Figure:
     if not name.startswith("linearity") and not name.endswith("_db"):
         low = max(low, 0.0)
     told = kept(name, one)
+    if name in SPLIT and not told:  # parts of one picture share its chance, so that only a ceiling is sure
+        low = min(low, 0.0)
     return Figure(one.value if told else nan, low, high, "" if told else _why(found, name, one))
 
 
