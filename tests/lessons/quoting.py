@@ -44,7 +44,7 @@ NOT_STATED = (
      r"|vol\.|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*"
      r"(?![\d.]*\d? ?(?:mm|cm|m|px|°|%)\b)",
      "a reference"),
-    (r"\b(?:EMVA(?: Standard)?|ISO(?:/IEC)?|CIE|ITU|IEC|IEEE|OpenCV|Python|NumPy|Nikon|Canon|Sony|Sigma|Kodak|KAF|Type"
+    (r"\b(?:EMVA(?: Standard)?|ISO(?:/IEC)?|CIE|ITU|IEC|IEEE|OpenCV|Python|NumPy|Nikon|Canon|Sony|Sigma|Kodak|Type"
      r"|illuminant|Apache|CC BY|BY) ?[A-Z]{0,3}-?\d[\d.:-]*", "a proper name"),
     (r"(?:(?<=[(A-Za-zé.,;] )|(?<=\())(?:1[5-9]|20)\d\d(?=[,;.:)\s]|$)(?! ?(?:K|px|mm|nm|µm|m|DN|e⁻|photons|electrons"
      r"|pixels|[×x%°–]))", "a year"),
