@@ -15,7 +15,7 @@ def says(request):
     quotes.hold()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def samples():
     """The folder of OpenCV's sample pictures and calibrations."""
     folder = os.environ.get("CAMVIZ_SAMPLES")

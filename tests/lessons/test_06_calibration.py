@@ -3,10 +3,8 @@
 The corners are the lesson's own throws of the dice; what is estimated from them is estimated here anew.
 """
 
-import os
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -536,12 +534,10 @@ BOARD = np.float32([(0.025 * column, 0.025 * row, 0) for row in range(6) for col
 
 
 @pytest.fixture(scope="module")
-def taken():
-    if "CAMVIZ_SAMPLES" not in os.environ:
-        pytest.skip("CAMVIZ_SAMPLES does not name a folder with OpenCV's samples")
+def taken(samples):
     found = []
     for number in NUMBERS:
-        path = Path(os.environ["CAMVIZ_SAMPLES"]) / "opencv-samples" / f"left{number:02}.jpg"
+        path = samples / f"left{number:02}.jpg"
         grey = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2GRAY)
         uv = cv2.findChessboardCorners(grey, (9, 6))[1]
         found.append(cv2.cornerSubPix(grey, uv, (11, 11), (-1, -1), (3, 30, 1e-3)).reshape(54, 2))

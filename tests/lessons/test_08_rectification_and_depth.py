@@ -1,8 +1,5 @@
 """What lesson 08 says about rectification, disparity and depth, recomputed with NumPy, SciPy and OpenCV."""
 
-import os
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -330,12 +327,9 @@ def test_the_strip_that_the_left_right_check_removes(says):
 
 
 @pytest.fixture(scope="module")
-def rig():
+def rig(samples):
     """The thirteen pairs of OpenCV's samples, calibrated with OpenCV alone: corners, K, lenses, R and t."""
-    if not os.environ.get("CAMVIZ_SAMPLES"):
-        pytest.skip("CAMVIZ_SAMPLES does not name a folder with OpenCV's samples")
-    folder = Path(os.environ["CAMVIZ_SAMPLES"]) / "opencv-samples"
-    uv = {side: np.array([corners(path) for path in sorted(folder.glob(f"{side}??.jpg"))]) for side in SIDES}
+    uv = {side: np.array([corners(path) for path in sorted(samples.glob(f"{side}??.jpg"))]) for side in SIDES}
     K, lens = {}, {}
     for side in SIDES:
         _, K[side], lens[side], _, _ = cv2.calibrateCamera([BOARD] * 13, list(uv[side]), (640, 480), None, None)
