@@ -144,18 +144,31 @@ def test_the_answers_of_before_are_told_at_the_end_and_not_earlier(book):
         assert (widget.looking_back, widget.can_export) == ("", False)
         widget.commit(number, choice)
     assert "4 of 4 right" in widget.looking_back
+    assert widget.looking_back.count("You chose the answer:") == 4
     assert all(
         prose.to_html(one.choices[one.answer].reply)[3:40] in widget.looking_back for one in quiz_questions("05", "A")
     )
     assert form("B", "after", book).can_export
-    assert looking_back_is_empty_without(book)
 
 
-def looking_back_is_empty_without(book):
-    book.path.unlink()
+def test_looking_back_shows_a_wrong_choice_with_its_reply_and_the_answer_beside_it(book):
+    wrong = [(answer + 1) % 3 for answer in right("A")]
+    answer(form("A", "before", book), wrong[:1])
     widget = form("B", "after", book)
     answer(widget, right("B"))
-    return widget.looking_back == "" and widget.can_export
+    one = quiz_questions("05", "A")[0]
+    assert "0 of 1 right" in widget.looking_back
+    assert re.search("You chose:.*The answer:", widget.looking_back)
+    for choice in (one.choices[wrong[0]], one.choices[one.answer]):
+        assert prose.inline(choice.text) in widget.looking_back
+        assert prose.to_html(choice.reply) in widget.looking_back
+
+
+def test_who_skipped_the_quiz_before_the_lesson_has_nothing_to_look_back_at(book):
+    widget = form("B", "after", book)
+    answer(widget, right("B"))
+    assert widget.looking_back == ""
+    assert widget.can_export
 
 
 def test_half_a_class_can_have_the_forms_the_other_way_round(book):

@@ -26,7 +26,7 @@ Tries = tuple[int, ...]
 """The choices a reader has committed to, in order; () before the first."""
 
 
-LEAD = "What seems right to you? Nothing is marked here. The answers come with the quiz at the end."
+LEAD = "Choose what seems right to you today. What is right, you learn with the quiz at the end."
 KEPT = "Kept. The answers come with the quiz at the end."
 
 
@@ -254,12 +254,12 @@ def _html(one: Question) -> str:
 
 
 def _then(one: Question, chosen: int) -> str:
-    """A question of before the lesson: what was chosen, the reply to it, and the right choice where it was another."""
-    shown = [one.choices[index] for index in dict.fromkeys((chosen, one.answer))]
+    """A question of before the lesson: what was chosen and, where that was wrong, the answer, each with its reply."""
+    shown = {chosen: "You chose:", one.answer: "You chose the answer:" if chosen == one.answer else "The answer:"}
     replies = "".join(
-        f"<p>{prose.inline(choice.text)}</p><blockquote>{prose.to_html(_judged(choice.correct, choice.reply))}"
-        "</blockquote>"
-        for choice in shown
+        f"<p><em>{says}</em> {prose.inline(one.choices[index].text)}</p>"
+        f"<blockquote>{prose.to_html(one.choices[index].reply)}</blockquote>"
+        for index, says in shown.items()
     )
     return f"<div>{prose.to_html(one.text)}{replies}</div>"
 
