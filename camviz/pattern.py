@@ -23,6 +23,8 @@ LONGEST_CELL = 30
 """Lines of code a reader can take in at once."""
 
 WORDS_A_MINUTE, MINUTES_A_QUESTION, MINUTES_AN_EXERCISE = 200, 3, 8
+MINUTES_A_FIRST_THOUGHT = 1
+"""For a question of form A: it is read and answered, and there is no reply to read or to argue with."""
 
 MOST_DRAWING = 8
 """Lines that plot, in one cell: what a reader would write, and not more than shows the result."""
@@ -44,7 +46,9 @@ def minutes(notebook: Notebook, number: str) -> int:
     )
     words = len(_WORD.findall(_NOT_READ.sub(" ", text)))
     patients = sum(bool(_PATIENT.fullmatch(cell.source)) for cell in notebook.cells)
-    asked = MINUTES_A_QUESTION * (len(questions.questions(number)) + patients)
+    first = len(questions.quiz_questions(number, "A"))
+    asked = MINUTES_A_FIRST_THOUGHT * first
+    asked += MINUTES_A_QUESTION * (len(questions.questions(number)) - first + patients)
     return 5 * round((words / WORDS_A_MINUTE + asked + MINUTES_AN_EXERCISE * len(exercises(number))) / 5)
 
 
@@ -105,20 +109,30 @@ def _links(notebook: Notebook) -> list[str]:
 
 def _questions(notebook: Notebook, number: str) -> list[str]:
     code = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
-    asked, quizzes = re.findall(r"\bask\(\"([^\"]+)\"\)", code), re.findall(r"\bquiz\(\"([^\"]+)\"\)", code)
+    asked, quizzes = re.findall(r"\bask\(\"([^\"]+)\"\)", code), re.findall(r"\bquiz\((.*)\)", code)
     known = {one.name: one for one in questions.questions(number).values()}
     predict = [name for name, one in known.items() if one.kind == "predict"]
     found = [f"ask({name!r}): lesson {number} has no such predict question" for name in asked if name not in predict]
     found += [f"the predict question {name} is never asked" for name in predict if name not in asked]
     if len(asked) < 2:
         found.append(f"at least two predict questions are wanted, {len(asked)} are asked")
-    if quizzes != [number]:
+    if quizzes.count(f'"{number}"') != 1:
         found.append(f'the lesson must end with one quiz("{number}"), has {quizzes}')
     sources = [cell.source for cell in notebook.cells]
+    if questions.quiz_questions(number, "A"):
+        found += _first_thoughts(sources, number)
     recap = next((i for i, source in enumerate(sources) if _heading("Recap", source)), len(sources))
     if any(source.startswith("quiz(") for source in sources[recap:]):
         found.append("the quiz must stand above the recap, which repeats its answers")
     return found
+
+
+def _first_thoughts(sources: list[str], number: str) -> list[str]:
+    """Form A comes before anything that teaches: below the setup cell, which it needs, and one sentence of its own."""
+    first, setup = f'quiz("{number}", "A")', next((i for i, source in enumerate(sources) if source == SETUP), 0)
+    if sources.count(first) != 1:
+        return [f"a cell {first} must ask what the reader thinks before the lesson, {sources.count(first)} do"]
+    return [] if sources.index(first) == setup + 2 else [f"{first} must stand below the setup cell and one sentence"]
 
 
 def _exercises(notebook: Notebook, number: str) -> list[str]:

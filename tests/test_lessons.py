@@ -20,7 +20,7 @@ EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 HEADER = """# 05 Lens distortion
 *What does a polynomial do beyond its last data point?* [launch](https://mybinder.org/v2)
 
-About 60 minutes.
+About 65 minutes.
 **Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""
 
 ENDING = """## Recap
@@ -60,6 +60,8 @@ def lesson():
     cells = [
         text(HEADER),
         code(SETUP, "setup"),
+        text("Before you begin:"),
+        code('quiz("05", "A")'),
         code('ask("05.grid")'),
         text("## Predict", teacher="10 minutes.\nAsk for hands before the reveal."),
         code('ask("05.far_rays")'),
@@ -103,6 +105,11 @@ def quiz_last(notebook):
     notebook.cells.append(quiz)
 
 
+def first_thoughts_later(notebook):
+    cells = notebook.cells
+    cells[3], cells[4] = cells[4], cells[3]
+
+
 def drop_notes(notebook):
     for cell in notebook.cells:
         cell.metadata.get("camviz", {}).pop("teacher", None)
@@ -112,14 +119,16 @@ def drop_notes(notebook):
     ("change", "complaint"),
     [
         (drop_first, "header"),
-        (replace("About 60 minutes", "About an hour"), "minutes"),
-        (replace("About 60", "About 50"), "About 60 minutes"),
+        (replace("About 65 minutes", "About an hour"), "minutes"),
+        (replace("About 65", "About 50"), "About 65 minutes"),
         (replace("mybinder.org", "elsewhere.org"), "mybinder.org"),
         (drop("setup"), "tagged setup"),
         (replace("import numpy as np", "import numpy as np\nsize = 3"), "the same as everywhere"),
         (replace('ask("05.far_rays")', ""), "05.far_rays is never asked"),
         (replace('ask("05.far_rays")', 'ask("05.quiz_fold")'), "no such predict question"),
         (replace('quiz("05")', ""), "one quiz"),
+        (replace('quiz("05", "A")', ""), 'a cell quiz("05", "A") must ask what the reader thinks before'),
+        (first_thoughts_later, 'quiz("05", "A") must stand below the setup cell'),
         (drop("check"), "needs one cell tagged check"),
         (drop("solution"), "needs one cell tagged solution"),
         (replace('check("05.distort"', 'check("05.tangential"'), 'must call check("05.distort"'),
@@ -224,7 +233,7 @@ def test_saved_outputs_are_fresh_until_the_code_changes(lesson):
     assert lessons.is_fresh(saved)
     saved.cells[0].source += "\nOne more word."
     assert lessons.is_fresh(saved)
-    saved.cells[6].source += "\n"
+    saved.cells[8].source += "\n"
     assert not lessons.is_fresh(saved)
 
 

@@ -58,11 +58,32 @@ def test_a_reply_is_a_sentence_of_its_own_and_ends_like_one(one):
 
 
 @pytest.mark.parametrize("lesson", LESSONS)
-def test_every_exit_quiz_has_three_to_five_questions_whose_answers_do_not_stand_in_one_place(lesson):
-    quiz = quiz_questions(lesson)
-    if lesson != "00":
+@pytest.mark.parametrize("form", "AB")
+def test_every_quiz_has_three_to_five_questions_whose_answers_do_not_stand_in_one_place(lesson, form):
+    quiz = quiz_questions(lesson, form)
+    if lesson != "00" and (form == "B" or quiz):
         assert 3 <= len(quiz) <= 5
         assert len({one.answer for one in quiz}) > 1
+
+
+@pytest.mark.parametrize("lesson", [lesson for lesson in LESSONS if quiz_questions(lesson, "A")])
+def test_the_two_forms_ask_of_the_same_concepts_in_other_words(lesson):
+    before, after = ({one.concept: one for one in quiz_questions(lesson, form)} for form in "AB")
+    assert list(before) == list(after)
+    for concept, one in before.items():
+        assert one.misconceptions == after[concept].misconceptions
+        assert len(one.choices) == len(after[concept].choices)
+        assert one.text != after[concept].text
+        replies = {choice.reply for choice in one.choices}
+        assert not replies & {choice.reply for choice in after[concept].choices}
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_no_sentence_of_form_a_has_more_than_35_words(one):
+    if one.form == "A":
+        texts = [one.text, *(text for choice in one.choices for text in (choice.text, choice.reply))]
+        sentences = [sentence for text in texts for sentence in re.split(r"(?<=[.?!:;])\s", text)]
+        assert max(len(sentence.split()) for sentence in sentences) <= 35
 
 
 @pytest.mark.parametrize("lesson", LESSONS)
@@ -98,6 +119,40 @@ def test_a_good_file_is_read_and_a_doubled_question_refused():
     assert parse("99", GOOD)["99.colour"].answer == 0
     with pytest.raises(ValueError, match="occurs 2 times"):
         parse("99", GOOD + GOOD)
+
+
+TWIN = GOOD.replace('"colour"', '"grass"').replace("sky blue", "grass green")
+PAIR = "".join(
+    text.replace('"predict"', f'"quiz"\nform = "{form}"\nconcept = "colours"')
+    for form, text in (("A", GOOD), ("B", TWIN))
+)
+
+
+def test_a_pair_is_read_and_a_quiz_without_forms_is_form_b(monkeypatch):
+    assert [one.form for one in parse("99", PAIR).values()] == ["A", "B"]
+    for text, forms in ((PAIR, ["99.colour"]), (GOOD.replace("predict", "quiz"), [])):
+        monkeypatch.setattr("camviz.questions.questions", lambda lesson, text=text: parse(lesson, text))
+        assert [one.name for one in quiz_questions("99", "A")] == forms
+        assert len(quiz_questions("99")) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ('form = "A"', 'form = "C"', "question 99.colour: form must be \"A\" or \"B\", got 'C'"),
+        ('form = "A"', "", "question 99.colour: form and concept must be given together"),
+        ('form = "A"', "form = 1", "question 99.colour: form must be given as str, got 1"),
+        ('"quiz"\nform = "A"', '"predict"\nform = "A"', "question 99.colour: a predict question has no form"),
+        ('form = "A"\nconcept = "colours"', "", "question 99.colour: needs a form and a concept"),
+        ('form = "A"', 'form = "B"', "question 99.colour: 99.colour and 99.grass have one concept, 'colours'"),
+        ('concept = "colours"', 'concept = "hues"', "no question of form B has its concept, 'hues'"),
+        ('"the sky is a ceiling"', '"air is water"', "its twin 99.grass must share its misconceptions"),
+    ],
+)  # fmt: skip
+def test_a_pair_that_is_none_is_refused_by_name(old, new, complaint):
+    assert old in PAIR
+    with pytest.raises(ValueError, match=re.escape(complaint)):
+        parse("99", PAIR.replace(old, new, 1))
 
 
 def test_a_wrong_name_is_answered_with_the_right_ones():
@@ -174,7 +229,7 @@ def test_in_a_kernel_the_widget_is_shown_and_the_page_beside_it(monkeypatch):
 
 
 def test_a_lesson_without_a_quiz_says_so(monkeypatch):
-    monkeypatch.setattr("camviz.widgets.question.quiz_questions", lambda lesson: ())
+    monkeypatch.setattr("camviz.widgets.question.quiz_questions", lambda lesson, form: ())
     with pytest.raises(ValueError, match="lesson '05' has no quiz"):
         quiz("05")
 

@@ -1,4 +1,5 @@
 // A question to commit to. The kernel sends `cards`; the page sends { question, choice } and shows the reply that comes.
+// A card that has been answered and is neither right nor wrong (`correct` is null) is closed: it takes one choice only.
 
 let views = 0;
 
@@ -32,18 +33,21 @@ function cardForm(name, number, send) {
   const reply = element("div", "camviz-reply");
   button.type = "submit";
   reply.setAttribute("role", "status"); // read out when it changes
+  reply.tabIndex = -1; // takes the focus of a button that has gone
   fieldset.append(text, rows, button);
   form.append(fieldset, reply);
   let card = null;
 
+  const closed = () => card.tries > 0 && card.correct === null;
   const selected = () => {
     const radio = rows.querySelector("input:checked");
     return radio ? Number(radio.value) : null;
   };
   const refresh = () => {
-    button.disabled = selected() === null || selected() === card.chosen || card.correct === true;
+    button.disabled = selected() === null || selected() === card.chosen || card.correct === true || closed();
     button.textContent = card.tries ? "Commit to this instead" : "Commit to this answer";
-    button.hidden = card.correct === true;
+    button.hidden = card.correct === true || closed();
+    rows.querySelectorAll("input").forEach((radio) => { radio.disabled = closed(); });
   };
   rows.addEventListener("change", refresh);
   form.addEventListener("submit", (event) => {
@@ -62,12 +66,37 @@ function cardForm(name, number, send) {
       } else if (card.chosen !== null) {
         rows.querySelectorAll("input")[card.chosen].checked = true;
       }
-      const verdict = card.correct ? "✓ Correct." : "✗ Not this one.";
-      reply.innerHTML = card.reply ? `<strong>${verdict}</strong>${card.reply}` : "";
-      reply.className = `camviz-reply${card.reply ? (card.correct ? " camviz-right" : " camviz-wrong") : ""}`;
+      const [verdict, colour] = closed() ? ["", " camviz-kept"]
+        : card.correct ? ["<strong>✓ Correct.</strong>", " camviz-right"] : ["<strong>✗ Not this one.</strong>", " camviz-wrong"];
+      reply.innerHTML = card.reply ? `${verdict}${card.reply}` : "";
+      reply.className = `camviz-reply${card.reply ? colour : ""}`;
       const hadFocus = document.activeElement === button;
       refresh();
-      if (hadFocus && (button.hidden || button.disabled)) rows.querySelector("input:checked").focus();
+      if (hadFocus && closed()) reply.focus();
+      else if (hadFocus && (button.hidden || button.disabled)) rows.querySelector("input:checked").focus();
+    },
+  };
+}
+
+// The button that writes the answers to a file, and what was thought before the lesson; both come with the last answer.
+function lastWords(send) {
+  const node = element("div", "camviz-last");
+  const back = element("div");
+  const button = keepKeys(element("button", "camviz-commit"));
+  const said = element("div");
+  button.type = "button";
+  button.textContent = "Write my answers to a file, without my name";
+  button.addEventListener("click", () => send({ export: true }));
+  said.setAttribute("role", "status");
+  node.append(back, button, said);
+  let shown = null;
+  return {
+    node,
+    show(lookingBack, canExport, exported) {
+      if (lookingBack !== shown) back.innerHTML = shown = lookingBack;
+      back.querySelectorAll("summary").forEach(keepKeys);
+      button.hidden = !canExport;
+      said.textContent = exported;
     },
   };
 }
@@ -81,11 +110,14 @@ function render({ model, el }) {
   const forms = model.get("cards").map((_, number) =>
     cardForm(`camviz-${view}-${number}`, number, (message) => model.send(message)),
   );
+  const lead = element("div", "camviz-lead");
+  lead.textContent = model.get("lead");
+  const last = lastWords((message) => model.send(message));
   const summary = element("div", "camviz-summary");
   summary.setAttribute("role", "status");
   const problem = element("div", "camviz-problem");
   problem.setAttribute("role", "alert");
-  root.append(title, ...forms.map((one) => one.form), summary, problem);
+  root.append(title, lead, ...forms.map((one) => one.form), summary, last.node, problem);
   const hidesStill = element("style");   // while this lives, the saved page is not needed
   hidesStill.textContent = model.get("still_hidden");
   el.append(hidesStill, root);
@@ -93,9 +125,10 @@ function render({ model, el }) {
   const update = () => {
     model.get("cards").forEach((card, number) => forms[number].show(card));
     summary.textContent = model.get("summary");
+    last.show(model.get("looking_back"), model.get("can_export"), model.get("exported"));
     problem.textContent = model.get("problem");
   };
-  const names = ["cards", "summary", "problem"];
+  const names = ["cards", "summary", "looking_back", "can_export", "exported", "problem"];
   names.forEach((name) => model.on(`change:${name}`, update));
   update();
   return () => names.forEach((name) => model.off(`change:${name}`, update));

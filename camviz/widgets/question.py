@@ -1,12 +1,16 @@
-"""Questions to commit to before seeing: `ask("05.far_rays")` and the exit quiz `quiz("05")`.
+"""Questions to commit to before seeing: `ask("05.far_rays")`, and the quiz in two forms.
+
+`quiz("05", "A")` stands before a lesson, takes one choice a question and tells nothing. `quiz("05")`, form B, stands at
+its end and replies to each choice. What is chosen in either is kept beside the notebook (camviz.answers).
 
 Live, the answer stays in the kernel until the reader has committed to a choice. Without a kernel, or with
-CAMVIZ_STATIC=1, the same questions are a page of folded replies.
+CAMVIZ_STATIC=1, the same questions are a page of folded replies; of what is asked before a lesson, without any.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +18,7 @@ from typing import Any
 import traitlets
 
 from camviz import prose
+from camviz.answers import KEPT_IN, WHEN, AnswerBook
 from camviz.questions import Question, question, quiz_questions
 from camviz.widgets.still import StillWidget
 
@@ -21,40 +26,72 @@ Tries = tuple[int, ...]
 """The choices a reader has committed to, in order; () before the first."""
 
 
+LEAD = "Choose what seems right to you today. What is right, you learn with the quiz at the end."
+KEPT = "Kept. The answers come with the quiz at the end."
+
+
 @dataclass(frozen=True)
 class Sheet:
-    """Questions as a page: each choice can be opened to see its reply."""
+    """Questions as a page: each choice can be opened to see its reply.
+
+    `when` is "before" or "after" a lesson, or "" for a predict question. What is asked before a lesson has no replies.
+    """
 
     questions: tuple[Question, ...]
     title: str
+    when: str = ""
+
+    @property
+    def silent(self) -> bool:
+        """True where nothing may be told."""
+        return self.when == "before"
+
+    @property
+    def lead(self) -> str:
+        """What to know before choosing, or ""."""
+        return LEAD if self.silent else ""
 
     def __repr__(self) -> str:
-        return "\n\n".join([self.title, *(_plain(one) for one in self.questions)])
+        return "\n\n".join([self.title, *filter(None, [self.lead]), *(_plain(one) for one in self.questions)])
 
     def unanswered(self) -> str:
         """The page without any reply, for a reader who has yet to choose."""
-        questions = "".join(_unanswered(one) for one in self.questions)
-        return f"<section><h4>{prose.inline(self.title)}</h4>{questions}<p>Run this cell to answer.</p></section>"
+        return self._page(_unanswered, "<p>Run this cell to answer.</p>")
 
     def _repr_html_(self) -> str:
-        return f"<section><h4>{prose.inline(self.title)}</h4>{''.join(_html(one) for one in self.questions)}</section>"
+        return self.unanswered() if self.silent else self._page(_html)
+
+    def _page(self, show: Callable[[Question], str], end: str = "") -> str:
+        head = f"<h4>{prose.inline(self.title)}</h4>{prose.to_html(self.lead)}"
+        return f"<section>{head}{''.join(map(show, self.questions))}{end}</section>"
 
 
 class QuestionWidget(StillWidget):
-    """The live questions. Only what the reader may see is in `cards`; replies come when a choice has been made."""
+    """The live questions. Only what the reader may see is in `cards`; replies come when a choice has been made.
+
+    Quizzes are kept in `book`; one before a lesson shows again what was chosen, and takes no second choice.
+    """
 
     _esm = Path(__file__).with_name("question.js")
     _css = Path(__file__).with_name("question.css")
 
     title = traitlets.Unicode().tag(sync=True)
+    lead = traitlets.Unicode().tag(sync=True)
     cards: traitlets.List = traitlets.List().tag(sync=True)
     summary = traitlets.Unicode().tag(sync=True)
+    looking_back = traitlets.Unicode().tag(sync=True)
+    can_export = traitlets.Bool().tag(sync=True)
+    exported = traitlets.Unicode().tag(sync=True)
     problem = traitlets.Unicode().tag(sync=True)
 
-    def __init__(self, sheet: Sheet) -> None:
+    def __init__(self, sheet: Sheet, book: AnswerBook | None = None) -> None:
         self.sheet = sheet
+        self.book = book if sheet.questions[0].form else None
         self.tries: tuple[Tries, ...] = ((),) * len(sheet.questions)
-        super().__init__(title=sheet.title, cards=_cards(sheet, self.tries))
+        super().__init__(title=sheet.title, lead=sheet.lead)
+        if sheet.silent:
+            self._kept(self._recall)
+        self._show()
         self.on_msg(self._receive)
 
     def commit(self, number: int, choice: int) -> None:
@@ -62,9 +99,15 @@ class QuestionWidget(StillWidget):
         if number not in range(len(self.tries)) or choice not in range(len(self.sheet.questions[number].choices)):
             raise ValueError(f"there is no choice {choice!r} of question {number!r}")
         before = self.tries
+        if self.sheet.silent and before[number]:
+            raise ValueError("this question takes one choice, and has it")
+        self._kept(lambda book: book.keep(self.sheet.questions[number], self.sheet.when, choice))
         self.tries = (*before[:number], (*before[number], choice), *before[number + 1 :])
-        self.cards = _cards(self.sheet, self.tries)
-        self.summary = score(self.sheet.questions, self.tries)
+        self._show()
+
+    def export(self) -> None:
+        """Writes the answers to a file for the teacher, and says where it is and what is in it."""
+        self._kept(self._export)
 
     def __repr__(self) -> str:
         return repr(self.sheet)
@@ -73,9 +116,50 @@ class QuestionWidget(StillWidget):
         """The questions without their replies, which would give the answers away."""
         return {"text/plain": repr(self.sheet), "text/html": self.sheet.unanswered()}
 
+    def _show(self) -> None:
+        self.cards = _cards(self.sheet, self.tries)
+        self.summary = "" if self.sheet.silent else score(self.sheet.questions, self.tries)
+        self._kept(self._account)
+
+    def _recall(self, book: AnswerBook) -> None:
+        """What was chosen before the kernel was last started."""
+        self.tries = tuple(book.chosen(one, self.sheet.when)[:1] for one in self.sheet.questions)
+
+    def _account(self, book: AnswerBook) -> None:
+        """Once all is kept: where it is or, after the lesson, what was thought before it."""
+        if not all(book.chosen(one, self.sheet.when) for one in self.sheet.questions):
+            return
+        if self.sheet.silent:
+            code = book.participant(self._lesson)
+            self.summary = f"Kept in {KEPT_IN} beside this notebook, under the random code {code} and without a name."
+        else:
+            self.can_export = True
+            self.looking_back = looking_back(book, self._lesson)
+
+    def _export(self, book: AnswerBook) -> None:
+        path = book.export(self._lesson)
+        count = len(book.answers(self._lesson))
+        self.exported = f"Written to {path.name}, beside this notebook: {count} choices, a random code, no name."
+
+    @property
+    def _lesson(self) -> str:
+        return self.sheet.questions[0].name.partition(".")[0]
+
+    def _kept(self, what: Callable[[AnswerBook], object]) -> None:
+        """Does something with the book, if there is one; what goes wrong with its file is said, and stops nothing."""
+        if self.book is None:
+            return
+        try:
+            what(self.book)
+        except (OSError, ValueError) as error:
+            self.problem = f"Your choices cannot be kept in {self.book.path}: {error}"
+
     def _receive(self, _widget: Any, message: Any, _buffers: Any) -> None:
         try:
-            self.commit(message["question"], message["choice"])
+            if message == {"export": True}:
+                self.export()
+            else:
+                self.commit(message["question"], message["choice"])
         except Exception as error:
             self.problem = f"This went wrong in the kernel: {type(error).__name__}: {error}"
             raise
@@ -86,12 +170,19 @@ def ask(name: str) -> QuestionWidget | Sheet:
     return _shown(Sheet((question(name),), "Predict"))
 
 
-def quiz(lesson: str) -> QuestionWidget | Sheet:
-    """The exit quiz of a lesson ("05"), with a score. Raises ValueError when the lesson has none."""
-    questions = quiz_questions(lesson)
+def quiz(lesson: str, form: str = "B", when: str = "") -> QuestionWidget | Sheet:
+    """A form of a lesson's quiz: A before it, without replies, B after it, with replies and a score.
+
+    `when`, "before" or "after", asks a form at the other end: half of a class can so answer B first and A last.
+    Raises ValueError when the lesson has no such form, and for another `when`.
+    """
+    if (when or "after") not in WHEN:
+        raise ValueError(f'when must be "before" or "after", got {when!r}')
+    questions = quiz_questions(lesson, form)
     if not questions:
-        raise ValueError(f"lesson {lesson!r} has no quiz")
-    return _shown(Sheet(questions, "Exit quiz"))
+        raise ValueError(f"lesson {lesson!r} has no quiz" if form == "B" else f"the quiz of {lesson!r} has no {form!r}")
+    when = when or ("before" if form == "A" else "after")
+    return _shown(Sheet(questions, "What do you think now?" if when == "before" else "Exit quiz", when))
 
 
 def score(questions: tuple[Question, ...], tries: tuple[Tries, ...]) -> str:
@@ -102,8 +193,20 @@ def score(questions: tuple[Question, ...], tries: tuple[Tries, ...]) -> str:
     return f"{right} of {len(questions)} right at the first try."
 
 
+def looking_back(book: AnswerBook, lesson: str) -> str:
+    """What a reader thought before the lesson, with the replies, as folded HTML; "" where nothing was chosen then."""
+    forms = [quiz_questions(lesson, form) for form in ("A", "B")]
+    made = [(one, book.chosen(one, "before")) for form in forms for one in form]
+    chosen = [(one, choices[0]) for one, choices in made if choices]
+    if not chosen:
+        return ""
+    right = sum(one.answer == choice for one, choice in chosen)
+    summary = f"Before the lesson: {right} of {len(chosen)} right. What you chose then, and the answers"
+    return f"<details><summary>{summary}</summary>{''.join(_then(*pair) for pair in chosen)}</details>"
+
+
 def _shown(sheet: Sheet) -> QuestionWidget | Sheet:
-    return QuestionWidget(sheet) if _live() else sheet
+    return QuestionWidget(sheet, AnswerBook(Path.cwd())) if _live() else sheet
 
 
 def _live() -> bool:
@@ -116,14 +219,16 @@ def _live() -> bool:
 
 
 def _cards(sheet: Sheet, tries: tuple[Tries, ...]) -> list[dict[str, Any]]:
-    return [_card(one, made) for one, made in zip(sheet.questions, tries, strict=True)]
+    return [_card(one, made, sheet.silent) for one, made in zip(sheet.questions, tries, strict=True)]
 
 
-def _card(one: Question, made: Tries) -> dict[str, Any]:
-    """What the page may know of a question: its texts, and after a try the reply to the choice made."""
+def _card(one: Question, made: Tries, silent: bool) -> dict[str, Any]:
+    """What the page may know of a question: its texts, and after a try, unless silent, the reply to the choice made."""
     shown = {"text": prose.to_html(one.text), "choices": [prose.inline(choice.text) for choice in one.choices]}
     if not made:
         return {**shown, "tries": 0, "chosen": None, "correct": None, "reply": ""}
+    if silent:
+        return {**shown, "tries": 1, "chosen": made[0], "correct": None, "reply": prose.to_html(KEPT)}
     choice = one.choices[made[-1]]
     reply = prose.to_html(choice.reply)
     return {**shown, "tries": len(made), "chosen": made[-1], "correct": choice.correct, "reply": reply}
@@ -146,6 +251,17 @@ def _html(one: Question) -> str:
         for choice in one.choices
     )
     return f"<div>{prose.to_html(one.text)}{choices}</div>"
+
+
+def _then(one: Question, chosen: int) -> str:
+    """A question of before the lesson: what was chosen and, where that was wrong, the answer, each with its reply."""
+    shown = {chosen: "You chose:", one.answer: "You chose the answer:" if chosen == one.answer else "The answer:"}
+    replies = "".join(
+        f"<p><em>{says}</em> {prose.inline(one.choices[index].text)}</p>"
+        f"<blockquote>{prose.to_html(one.choices[index].reply)}</blockquote>"
+        for index, says in shown.items()
+    )
+    return f"<div>{prose.to_html(one.text)}{replies}</div>"
 
 
 def _judged(correct: bool, reply: str) -> str:

@@ -365,3 +365,52 @@ def test_a_door_calibrates_a_phone(says):
     says("f = pixels · Z / height")
     top, bottom = opencv_s([[0, -1.0, 4.0], [0, 1.0, 4.0]])
     assert (bottom - top)[1] * 4.0 / 2.0 == pytest.approx(K[1, 1])
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_what_a_hole_shows_sharply(says):
+    d, near, far = says(
+        "A camera with a hole 0.3 mm wide and no lens photographs a flower 1 m away and a church 100 m away."
+    )
+    box, flower, church = says(
+        "In a box 50 mm deep its shadow is 0.315 mm wide for the flower and 0.300 mm for the church."
+    )
+    for one, Z in ((flower, near.value), (church, far.value)):
+        rims = [
+            on_the_wall([0, 0, 1000 * Z], box.value)[0] + side * d.value / 2 * (1 + box.value / (1000 * Z))
+            for side in (-1, 1)
+        ]
+        assert one == rims[1] - rims[0]
+    says("the two spots differ by a twentieth only")
+    assert flower.value / church.value == pytest.approx(1 + 1 / 20, abs=0.001)
+    assert (
+        min(blur(d.value, box.value, 1000 * Z.value) for Z in (near, far)) > d.value
+    )  # "at least as wide as the hole"
+
+
+def test_before_the_lesson_a_homogeneous_pixel(says):
+    x, y, w = says("A program prints a pixel in homogeneous coordinates: (640, 480, 4).")
+    pixel = cv2.convertPointsFromHomogeneous(np.array([[x.value, y.value, w.value]]))[0, 0]
+    u, v = says("At (160, 120).")
+    assert u == pixel[0]
+    assert v == pixel[1]
+    a, n, u, b, m, v = says("640/4 is 160 and 480/4 is 120")
+    assert u == a.value / n.value
+    assert v == b.value / m.value
+    wrong = says("At (640, 480); the 4 says how far away the point is.")
+    same = says("(640, 480, 4) and (160, 120, 1) are one pixel")
+    (divisor,) = says("The 4 is a divisor and no label:")
+    assert divisor == w.value
+    assert [one.value for one in wrong] == [one.value for one in same[:3]] == [x.value, y.value, w.value]
+    np.testing.assert_allclose(pixel, [one.value for one in same[3:]])
+
+
+def test_before_the_lesson_a_walk_does_not_move_a_vanishing_point(says):
+    (walk,) = says("You walk 20 m to the side and photograph it again")
+    (again,) = says("Farther along, your 20 m matter less and less")
+    assert again == walk.value
+    shift = [np.ptp(opencv_s([[0, 1.6, Z], [-walk.value, 1.6, Z]])[:, 0]) for Z in (10, 100, 1e4, 1e9)]
+    assert all(np.diff(shift) < 0)
+    assert shift[-1] < 1e-3

@@ -508,3 +508,63 @@ def test_the_quiz_about_the_phone(says):
     shares = [blur(one.value, N.value, 1000, 5000) / one.value for one in (f, full)]  # the sensors go with f
     assert shares[1] / shares[0] == pytest.approx(5.2, rel=0.03)
     says("the cone of light that it takes from a point of the scene is five times as slender")
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_where_to_focus(says):
+    (H,) = says("Focused at infinity, a lens shows everything beyond 8 m sharply enough.")
+    f, N = 50.0, 4.0
+    c = f**2 / (N * (1000 * H.value - f))
+    infinity = brentq(lambda u: blur(f, N, 1e12, u) - c, 1000, 1e6) / 1000
+    assert H.about(infinity, 0.01)
+    at, near = says("At 8 m: then it is sharp enough from 4 m on.")
+    assert at == H.value
+    assert near == limits(f, N, 1001 * at.value, c)[0] / 1000
+    at, wrong = says("At 4 m: then it is sharp enough from 2 m to infinity.")
+    again, beyond = says("Focused at 4 m, the lens shows things beyond 8 m with more blur than is allowed.")
+    assert again == at.value
+    near_limit, far_limit = limits(f, N, 1000 * at.value, c)
+    assert beyond == far_limit / 1000
+    (true,) = says("And the near limit is 2.7 m.")
+    assert true == near_limit / 1000
+    assert wrong.value < true.value
+    gained, end = says("Then what lies between 4 m and 8 m is lost for nothing.")
+    (nearest,) = says("Infinity stays sharp enough when the focus comes nearer, as far as 8 m.")
+    assert gained == near.value
+    assert end == H.value
+    assert nearest == H.value
+    assert blur(f, N, 1000 * H.value, 1e12) == pytest.approx(c, rel=0.01)
+
+
+def test_before_the_lesson_what_an_app_promises(says):
+    focus, near, far = says("An app says of your lens: focused at 4 m, sharp from 3 m to 6 m.")
+    (face,) = says("How sharp is a face at 5.5 m?")
+    f, N = 50.0, 4.0
+    c = blur(f, N, 1000 * focus.value, 1000 * far.value)
+    assert blur(f, N, 1000 * focus.value, 1000 * near.value) == pytest.approx(c)
+    assert 0 < blur(f, N, 1000 * focus.value, 1000 * face.value) < c
+    from_, limit = says("From 4 m on the blur grows all the way, and at 6 m it passes a limit that somebody chose.")
+    assert limit == far.value
+    for (one,) in (says("As sharp as a face at 4 m."), says("Less sharp than a face at 4 m"), [from_]):
+        assert one == focus.value
+    circle, pixels, pitch = says("It allows a circle, often 0.03 mm wide, and that is 5 pixels of 6 µm.")
+    assert pixels == circle.value * 1000 / pitch.value
+
+
+def test_before_the_lesson_whose_background_is_more_blurred(says):
+    small, large = says("A small camera has f = 9 mm at f/2, a large one f = 36 mm at f/2.")
+    wide, narrow = says("The large one's: its aperture is 18 mm wide, the other's 4.5 mm.")
+    assert wide == large.value / 2
+    assert narrow == small.value / 2
+    (needed,) = says("The small camera would need f/0.5 for the same background.")
+    assert needed == small.value / wide.value
+    (times,) = says("as a share of the picture, blur goes with the aperture's width: here 4 times as much")
+    shares = [blur(one.value, 2, 2000, 9000) / one.value for one in (small, large)]  # the sensors go with f
+    assert times.about(shares[1] / shares[0], 0.02)
+
+
+def test_before_the_lesson_light_near_the_rim_arrives_too(says):
+    says("To the same point of the paper as the light through the middle.")
+    assert blur(50.0, 1.0, 2000.0, 2000.0) == pytest.approx(0, abs=1e-12)  # both rims, and so all between them

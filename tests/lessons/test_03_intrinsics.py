@@ -381,3 +381,59 @@ def test_a_frame_of_film(says):
     assert diagonal == np.hypot(width.value, height.value)
     says("good to some per cent")
     assert np.isclose(0.5 / 26, 0.02, atol=0.001)  # EXIF keeps whole millimetres
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_what_skew_is(says):
+    fx, skew, _ = row = says(
+        "The first row of K reads 800, 8, 320, where the second number, the skew, is nearly always 0."
+    )
+    K = matrix(row[0].value, 800.0, row[2].value, 240.0, row[1].value)
+    columns = np.linalg.inv(K)[:2, :2] @ np.array([[1.0, 0.0], [0.0, 1.0]])  # a step to the right and a step down
+    angle = np.degrees(np.arccos(columns[:, 0] @ columns[:, 1] / np.prod(np.linalg.norm(columns, axis=0))))
+    (off,) = says("they are off by about 0.6°")
+    assert off == abs(angle - 90)
+    a, b, exactly = says("Yes, by atan(8/800) = 0.57°.")
+    assert (a.value, b.value) == (skew.value, fx.value)
+    assert exactly == abs(angle - 90)
+
+
+def test_before_the_lesson_what_leaves_k_alone(says):
+    (near,) = says("You have turned the focus ring from 1 m to infinity.")
+    f, percent = says("for a thin 35 mm lens by 3.5 %")
+    assert percent == 100 * (1 - f.value / sensor_at(f.value, 1000 * near.value))
+    (turn,) = says("You have turned the camera on its tripod by 90°.")
+    axis = np.radians(turn.value) * np.array([0, 1.0, 0])
+    world = np.array([[3.0, 0.2, 0.1]])
+    turned = cv2.Rodrigues(axis)[0] @ world[0]  # the pose alone
+    np.testing.assert_allclose(
+        cv2.projectPoints(world, axis, np.zeros(3), matrix(), None)[0][0], pixels(turned, matrix())
+    )
+
+
+def test_before_the_lesson_two_ways_to_count_pixels(says):
+    (first,) = says("One program calls the centre of the first pixel 0.5, another calls it 0.")
+    (lamp,) = says("The first program finds a lamp at column 100.0.")
+    (column,) = says("At 99.5.")
+    assert column == lamp.value - first.value
+    (wrong,) = says("At 100.5.")
+    assert wrong == lamp.value + first.value
+    for (one,) in (says("what one program calls 0.5 the other calls 0"), says("as 0.5 becomes 0")):
+        assert one == first.value
+    (unmoved,) = says("At 100.0, for the lamp has not moved.")
+    assert unmoved == lamp.value
+
+
+def test_before_the_lesson_the_shape_of_a_pixel(says):
+    shape, fy = says("A camera has an ordinary lens and pixels that are 1.5 times as high as wide. Its fy is 600.")
+    height = 0.006
+    f = fy.value * height
+    (fx,) = says("900.")
+    assert fx == f / (height / shape.value)
+    (wrong,) = says("400.")
+    assert wrong == fy.value / shape.value
+    (same,) = says("600 as well: the lens has one focal length.")
+    heights, times = says("the same focal length is 600 pixel heights, or 1.5 times as many pixel widths")
+    assert [same.value, heights.value, times.value] == [fy.value, fy.value, shape.value]

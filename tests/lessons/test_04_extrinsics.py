@@ -390,3 +390,66 @@ def test_the_photographs_know_that_the_camera_stood_still(says, samples):
     change = np.abs(photographs - np.median(photographs, axis=0)).mean(axis=0)
     keyboard, middle = change[400:470, 60:150], change[150:350, 250:450]
     assert np.median(keyboard) < 10 < 30 < np.median(middle)
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_what_t_tells(says, rng):
+    (t,) = says("The extrinsics [R | t] of a camera have t = (0, 0, 5) m.")
+    shift = np.array([0, 0, t.value])
+    (ahead,) = says("The world's origin lies 5 m straight ahead of the camera.")
+    (along,) = says("X_world = 0 becomes X_cam = t, which is 5 m along the camera's own z axis")
+    centre, away = says(
+        "For R = I, for one, that is (0, 0, −5) m, and for another R it is another place 5 m from the origin."
+    )
+    assert centre == -shift[2]
+    for R in Rotation.random(20, rng=rng).as_matrix():
+        assert all(one == (R @ np.zeros(3) + shift)[2] for one in (ahead, along))
+        assert away == np.linalg.norm(-R.T @ shift)
+    for (wrong,) in (says("The camera stands at (0, 0, 5) m in the world."), says("The camera has moved by 5 m since")):
+        assert wrong == t.value
+
+
+def test_before_the_lesson_what_goes_into_the_projection(says):
+    (angle,) = says("A camera stands elsewhere in it, turned by 30°.")
+    R = world_from_cam(angle.value, 0, 0).T
+    lamp, centre = np.array([1.0, -2.0, 6.0]), np.array([3.0, -1.0, 0.5])
+    depth = (R @ (lamp - centre))[2]
+    assert abs(depth - (lamp - centre)[2]) > 0.1
+    K = np.diag([500.0, 500.0, 1.0])
+    seen = cv2.projectPoints(lamp[None], cv2.Rodrigues(R)[0], -R @ centre, K, None)[0][0, 0]
+    np.testing.assert_allclose(seen, 500 * (R @ (lamp - centre))[:2] / depth)
+
+
+def test_before_the_lesson_a_change_of_units(says, rng):
+    rows, columns = says("cam_from_world is a 4×4 matrix with R and t, in metres.")
+    assert rows.value == columns.value == 4
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.random(rng=rng).as_matrix(), [1, -2, 0.5]
+    points = np.append(rng.normal(size=(5, 3)), np.ones((5, 1)), axis=1)
+    (times,) = says("Only t, which is multiplied by 100.")
+    changed = T.copy()
+    changed[:3, 3] *= times.value
+    centimetres = points * [100, 100, 100, 1]
+    np.testing.assert_allclose((centimetres @ changed.T)[:, :3], 100 * (points @ T.T)[:, :3])
+    (R_too,) = says("R and t: both are multiplied by 100.")
+    (enlarged,) = says("Multiplied by 100 it would enlarge them too, with a determinant of a million.")
+    assert np.linalg.det(enlarged.value * T[:3, :3]) == pytest.approx(1e6)
+    numbers, all_ = says("All 16 numbers are multiplied by 100.")
+    assert numbers == T.size
+    scaled = points @ (all_.value * T).T
+    np.testing.assert_allclose(scaled[:, :3] / scaled[:, 3:], (points @ T.T)[:, :3])
+    (more,) = says("t is a length, 100 times as many centimetres as metres")
+    assert more.value == R_too.value == 100
+
+
+def test_before_the_lesson_three_angles_are_not_enough(says):
+    first, second, _ = angles = says("mounted at Euler angles 40, 20, 10")
+    assert all(0 < one.value < 90 for one in angles)
+    about_y, about_x, apart = says(
+        "Turning by 40 about y and 20 about x, in one order or the other, ends up 14° apart."
+    )
+    y, x = about([0, 1, 0], np.radians(about_y.value)), about([1, 0, 0], np.radians(about_x.value))
+    assert apart == angle_of((y @ x).T @ (x @ y))
+    assert (about_y.value, about_x.value) == (first.value, second.value)

@@ -291,3 +291,53 @@ def test_the_map_has_two_numbers_a_pixel(says):
     maps = cv2.initUndistortRectifyMap(np.eye(3), np.zeros(4), np.eye(3), np.eye(3), (4, 3), cv2.CV_32FC1)
     assert two == np.stack(maps[:2], axis=-1).shape[-1]
     assert again == two.value
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_what_keeps_k1(says):
+    says("Resizing and cropping change K, and the rays stay what they were.")
+    says("Resizing to half makes k1 four times as large; cropping leaves it alone.")
+    f, ray = 500.0, np.array([[0.3, 0.4]])
+    pixels, halved = f * bend(ray, -0.2, 0.0, 0.0, 0.0), f / 2 * bend(ray, -0.2, 0.0, 0.0, 0.0)
+    np.testing.assert_allclose(halved, pixels / 2)  # one k1 serves both sizes
+    assert 4 * (0.5 * f) ** 2 == f**2  # in pixels it would be four of them
+
+
+def test_before_the_lesson_where_a_polynomial_turns_back(says):
+    (k,) = says("A lens model is r_d = r (1 − 0.2 r²), without any other term.")
+    fold = folds_at(-k.value)
+    r, angle = says("For the one at r = 1.291, about 52° from the axis.")
+    slope, radicand, again, at, exactly = says(
+        "The slope 1 − 0.6 r² is zero at r = 1/sqrt(0.6) = 1.291, and atan 1.291 = 52.2°."
+    )
+    assert all(one == fold for one in (r, again, at))
+    assert slope == 3 * k.value
+    assert radicand == 3 * k.value
+    (seen,) = says("A small one does so farther out, here at 52°, which a wide lens sees.")
+    assert all(one == degrees(fold) for one in (angle, exactly, seen))
+    far = np.linspace(0, 5, 50001)
+    assert far[g(far, -k.value).argmax()] == pytest.approx(fold, abs=1e-4)
+    zero = 1 / np.sqrt(k.value)
+    r, angle = says("For the one at r = 2.236, about 66° from the axis.")
+    (factor,) = says("There 1 − 0.2 r² is zero, and the model has come all the way back to the centre.")
+    assert factor == k.value
+    assert r == zero
+    assert angle == degrees(zero)
+    assert g(zero, -k.value) == pytest.approx(0, abs=1e-12)
+
+
+def test_before_the_lesson_a_low_error(says):
+    width, height, left = says("A calibration of a 1280 × 960 camera leaves 0.3 px of error.")
+    (seen,) = says("No corner of the board was ever farther than 300 px from the middle.")
+    (wanted,) = says("You want to measure 700 px from the middle.")
+    assert seen.value < wanted.value < np.hypot(width.value, height.value) / 2
+    again, within = says("The 0.3 px were measured within 300 px of the middle.")
+    (claimed,) = says("Yes, to about 0.3 px.")
+    assert again == left.value
+    assert claimed == left.value
+    assert within == seen.value
+    r, f, k3, moved = says("At r = 0.8, with f = 900 px, even k3 = −0.05 moves a point by 9.4 px.")
+    assert moved == f.value * (r.value - g(r.value, 0.0, 0.0, k3.value))
+    assert r.about(wanted.value / f.value)

@@ -632,3 +632,57 @@ def test_the_quiz_about_parallel_boards(says):
     flat = calibrated(tilt=0.0, boards=12, noise=0.05)
     assert flat.rms < fitted.value
     assert flat.sigma_of_fx_at_the_truth > 100
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_squarely_at_a_wall(says):
+    says("a longer f and a wall farther away look the same")
+    (percent,) = says("With f and all distances 10 % greater, every corner stays in its pixel.")
+    (too_long,) = says("An f that is 10 % too long fits them equally well here.")
+    assert too_long == percent.value
+    grown = 1 + percent.value / 100
+    board = np.array([[x, y, 0.0] for x in range(9) for y in range(6)]) * 0.04
+    for Z in (0.8, 1.5, 2.4):
+        pixels = [
+            cv2.projectPoints(board, np.zeros(3), np.array([-0.1, 0.05, s * Z]), np.diag([s * 600, s * 600, 1]), None)[
+                0
+            ]
+            for s in (1.0, grown)
+        ]
+        np.testing.assert_allclose(*pixels)
+    (fits,) = says("A calibration fits them to 0.2 px.")
+    (claimed,) = says("To about 0.2 px.")
+    assert claimed == fits.value
+    says("Two tenths of a pixel is how well the corners fit.")
+
+
+def test_before_the_lesson_one_picture_of_a_flat_board(says):
+    corners, numbers = says("One picture shows a flat board with 88 corners: 176 numbers.")
+    assert numbers == 2 * corners.value
+    (again,) = says("Everything: 176 numbers are many more than K has.")
+    assert again == numbers.value
+    says("Once four corners are known, the others follow: a map of eight numbers ties them together")
+    H = np.array([[500, 20, 300], [-30, 480, 200], [0.1, 0.2, 1]])
+    board = np.array([[x, y] for x in range(11) for y in range(8)], dtype=float)
+    seen = cv2.perspectiveTransform(board[None], H)[0]
+    four = [0, 7, 80, 87]
+    again = cv2.getPerspectiveTransform(np.float32(board[four]), np.float32(seen[four]))
+    np.testing.assert_allclose(cv2.perspectiveTransform(board[None], again)[0], seen, atol=0.01)
+    says("Such a map has rank three.")
+    assert np.linalg.matrix_rank(H) == 3
+
+
+def test_before_the_lesson_a_pose_from_four_marks(says):
+    says("Four marks are eight numbers, for the six unknown ones of a pose.")
+    marks = np.array([[0, 0, 0], [3, 0, 0], [3, 2, 0], [0, 2, 0]], dtype=float)
+    rotation, t, K = (
+        np.array([2.4, 0.3, 0.2]),
+        np.array([-1.0, 0.8, 6.0]),
+        np.array([[900.0, 0, 640], [0, 900, 480], [0, 0, 1]]),
+    )
+    seen = cv2.projectPoints(marks, rotation, t, K, None)[0]
+    _, found, where = cv2.solvePnP(marks, seen, K, None, flags=cv2.SOLVEPNP_IPPE)
+    np.testing.assert_allclose(where.ravel(), t, atol=1e-6)
+    np.testing.assert_allclose(found.ravel(), rotation, atol=1e-6)

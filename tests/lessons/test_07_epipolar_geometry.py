@@ -471,3 +471,49 @@ def test_one_board_is_not_enough(says, rig):
     median = [np.median(np.abs(off_their_lines(F, left, right))[:n]) for F in (one, every)]
     assert median[0] < median[1] < 0.2
     assert np.median(np.abs(off_their_lines(one, left, right))[n:]) > 10
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_what_moves_the_epipole(says):
+    says("the epipole of the right picture is where the right camera sees the left one, or would see it")
+    view = EpipolarView()
+    F = true_F(view)
+    epipole = np.linalg.svd(F)[0][:, 2]
+    seen = view.right.intrinsics.K @ (view.right.cam_from_world * view.left.world_from_cam).translation
+    np.testing.assert_allclose(np.cross(epipole, seen / np.linalg.norm(seen)), 0, atol=1e-9)
+
+
+def test_before_the_lesson_e_knows_no_length(says):
+    says("everything a hundred times smaller, a toy drone would take the same two pictures")
+    K, turn, t = np.diag([500.0, 500.0, 1.0]), np.array([0.0, 0.1, 0.02]), np.array([1.0, 0.1, 0.2])
+    points = np.random.default_rng(7).uniform([-2, -2, 4], [2, 2, 9], (10, 3))
+    large, small = (cv2.projectPoints(s * points, turn, s * t, K, None)[0] for s in (1.0, 0.01))
+    np.testing.assert_allclose(large, small, atol=1e-9)
+    says("The program made t as long as 1, or whatever it likes.")
+    E = cross_matrix(t) @ cv2.Rodrigues(turn)[0]
+    assert np.linalg.norm(cv2.recoverPose(E, large, large, K)[2]) == pytest.approx(1)
+    says("Their ratio has a meaning, and it is 1.")
+    s = np.linalg.svd(E)[1]
+    assert s[0] / s[1] == pytest.approx(1)
+
+
+def test_before_the_lesson_a_camera_that_pans(says):
+    (angle,) = says("A camera on a pole pans by 20° between two pictures and does not move from its place.")
+    (claimed,) = says("A turn of 20°, and t = 0.")
+    assert claimed == angle.value
+    says("Many different E fit these pairs exactly")
+    R = Rotation.from_euler("y", angle.value, degrees=True).as_matrix()
+    x = np.random.default_rng(8).uniform([-1, -1, 2], [1, 1, 5], (20, 3))
+    A = ((x @ R.T)[:, :, None] * x[:, None, :]).reshape(-1, 9)
+    assert np.linalg.matrix_rank(A) == 9 - 3
+    for axis in np.eye(3):
+        assert np.abs(A @ (cross_matrix(axis) @ R).ravel()).max() < 1e-12
+
+
+def test_before_the_lesson_four_motions(says):
+    says("All four R are turns, with determinant +1.")
+    E = cross_matrix(np.array([1.0, 0.2, -0.1])) @ Rotation.from_euler("yx", [10, -4], degrees=True).as_matrix()
+    for R in cv2.decomposeEssentialMat(E)[:2]:
+        assert np.linalg.det(R) == pytest.approx(1)

@@ -501,3 +501,53 @@ def test_sixteenths_in_the_replies(says):
     (other,) = says("a number of sixteenths is divided by 16 to give pixels")
     (third,) = says("You divide by 16. OpenCV's matchers count in sixteenths of a pixel")
     assert all(number == 16 for number in (one, other, third))
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_which_f(says):
+    f, B = says("A rectified pair has f = 700 px and a baseline of 0.12 m.")
+    before, lens = says("The left camera's own K, found before rectifying, has fx = 820, and its lens says 4 mm.")
+    (d,) = says("A point has a disparity of 35 px.")
+    for focal, claim, sum_ in (
+        (f, says("2.4 m."), says("Yes: 700 · 0.12/35.")),
+        (before, says("2.8 m."), says("That is 820 · 0.12/35.")),
+        (lens, says("1.4 cm."), says("That is 4 · 0.12/35, in millimetres times metres per pixel.")),
+    ):
+        assert [one.value for one in sum_] == [focal.value, B.value, d.value]
+        assert claim[0] == focal.value * B.value / d.value * (100 if focal is lens else 1)
+    (again,) = says("The picture with fx = 820 is not the one in which the disparity was measured.")
+    assert again == before.value
+    Q = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, f.value], [0, 0, 1 / B.value, 0]])
+    Z = cv2.reprojectImageTo3D(np.full((1, 1), d.value, np.float32), Q)[0, 0, 2]
+    assert pytest.approx(2.4, rel=1e-6) == Z
+
+
+def test_before_the_lesson_how_much_the_baseline_grows(says):
+    near, error = says("A stereo camera hangs 1 m above a conveyor belt and is right to 1 mm.")
+    far, kept = says("It has to hang 3 m above it and be right to 1 mm still.")
+    assert kept == error.value
+
+    def off(Z, B, step=1e-6):  # ΔZ for a small Δd, from Z = f B/d by differences
+        return (1 / (1 / (Z * B) * B - step / B) - Z) / step
+
+    factor = off(far.value, 1.0) / off(near.value, 1.0)
+    (right,) = says("By 9.")
+    (times,) = says("Z² has grown 9 times, so B has to")
+    assert all(abs(one.value - factor) < 1e-3 for one in (right, times))
+    assert off(far.value, right.value) == pytest.approx(off(near.value, 1.0), rel=1e-4)
+    (tripled,) = says("By 3.")
+    (worse,) = says("Then the error would be 3 mm: the same share of the distance, and three times too much.")
+    assert worse == error.value * off(far.value, tripled.value) / off(near.value, 1.0)
+    says("Its error in the disparity would have to shrink to a ninth.")
+
+
+def test_before_the_lesson_which_side_is_hidden(says):
+    says("From farther to the right, the trunk covers more of what is on its left.")
+    trunk, hedge, B = (-0.1, 0.1, 2.0), 4.0, 0.12  # left and right edge, its depth; the hedge's; the baseline
+    hidden = {}
+    for name, camera in (("left", 0.0), ("right", B)):
+        hidden[name] = [camera + (edge - camera) * hedge / trunk[2] for edge in trunk[:2]]
+    assert hidden["right"][0] < hidden["left"][0]  # more on the left of the trunk
+    assert hidden["right"][1] < hidden["left"][1]

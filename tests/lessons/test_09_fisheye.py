@@ -360,3 +360,56 @@ def test_the_angles_in_the_exercises(says):
     theta, step = 0.8, 1e-6
     slope = (g(theta + step, [0.02, 0.001, 0, 0]) - g(theta - step, [0.02, 0.001, 0, 0])) / (2 * step)
     assert slope == pytest.approx(1 + three.value * 0.02 * theta**2 + five.value * 0.001 * theta**4)
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_a_lens_of_more_than_180(says):
+    (across,) = says("The lens of a doorbell sees 190° from edge to edge.")
+    (behind,) = says("A ray 95° from the axis comes from behind, where Z < 0.")
+    (number,) = says("By such a rule 95° is a number like any other.")
+    assert behind == across.value / 2
+    assert number == behind.value
+    assert ray(np.radians(behind.value))[2] < 0
+    says("X/Z would put it on the wrong side")
+    assert ray(np.radians(behind.value))[0] / ray(np.radians(behind.value))[2] < 0
+    at, times, edge = says(
+        "75° from the axis a degree already takes 15 times the room it has in the middle, and 90° are infinitely "
+        "far out"
+    )
+    assert times == stretch("perspective", np.radians(at.value))[0] / stretch("perspective", 1e-3)[0]
+    assert np.tan(np.radians(edge.value)) > 1e15
+
+
+def test_before_the_lesson_equal_pieces_of_sky(says):
+    def area(name, theta):
+        return np.prod(stretch(name, theta))
+
+    says("The equisolid one, r = 2f sin(θ/2).")
+    assert area("equisolid", 0.1) == pytest.approx(area("equisolid", 1.5))
+    says("The equidistant one, r = f θ.")
+    (rim,) = says("a patch at the horizon gets 1.57 times the pixels it would get overhead")
+    assert rim == area("equidistant", np.pi / 2) / area("equidistant", 1e-3)
+    says("The stereographic one, r = 2f tan(θ/2).")
+    at, times = says("A patch 60° from the axis gets 1.78 times the pixels it would get overhead.")
+    assert times == area("stereographic", np.radians(at.value)) / area("stereographic", 1e-3)
+
+
+def test_before_the_lesson_an_angle_is_not_its_tangent(says):
+    at, angle, tangent = says("At 80° the angle is 1.40 and its tangent 5.67")
+    assert angle == np.radians(at.value)
+    assert tangent == np.tan(np.radians(at.value))
+
+
+def test_before_the_lesson_one_lens_for_the_whole_horizon(says):
+    (across,) = says("Its owner buys one fisheye lens of 200°.")
+    (horizon,) = says("Yes, if it looks straight up: the horizon is then 90° from its axis.")
+    assert horizon == np.degrees(np.arccos(ray(np.pi / 2)[2]))
+    reach, spare = says("the lens reaches 100° from its axis. There are 10° to spare")
+    (side,) = says("Looking ahead, it sees 100° to each side of that direction.")
+    (within,) = says("One lens does it when the whole horizon lies within its 200°.")
+    assert reach == across.value / 2
+    assert side == reach.value
+    assert spare == reach.value - horizon.value
+    assert within == across.value

@@ -489,3 +489,70 @@ def test_the_commands_of_the_lesson_run_as_they_are_written(tmp_path, monkeypatc
     cv2.imwrite("earth.jpg", earth)
     assert main(shlex.split(reproject)) == 0
     assert cv2.imread("window.png").std() > 5  # of a panorama of noise
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_the_order_of_xi(says):
+    says("Flat, hyperbolic, parabolic: from 0 up to 1.")
+    says("All hyperbolas lie in between.")
+    point = np.array([1.0, 0.5, 2.0])
+    np.testing.assert_allclose(unified(point, 1.0, 0.0), point[:2] / point[2])
+    eccentricity = np.array([1.0, 1.001, 1.5, 4.0, 1e6])  # Geyer and Daniilidis: ξ = 2e/(1 + e²)
+    xi = 2 * eccentricity / (1 + eccentricity**2)
+    assert xi[0] == 1
+    assert (np.diff(xi) < 0).all()
+    assert 0 < xi[-1] < 1e-5
+
+
+def test_before_the_lesson_from_alpha_to_xi(says):
+    alpha, f = says("A file gives α = 0.2 and f = 160 px for a unified sphere")
+    xi, gamma = says("ξ = 0.25, γ = 200 px")
+    rest, rest_again = says(
+        "In the file, Z is multiplied by 0.8; in the program it stands alone. Divide by 0.8 above and below"
+    )
+    (divided,) = says("numerator and denominator were divided by 1 − α = 0.8")
+    assert all(one == 1 - alpha.value for one in (rest, rest_again, divided))
+    point = np.array([0.7, -0.2, 0.4])
+    D = np.linalg.norm(point)
+    wanted = f.value * point[:2] / (alpha.value * D + (1 - alpha.value) * point[2])
+    np.testing.assert_allclose(unified(point, gamma.value, xi.value), wanted)
+    a, n, q, b, m, p = says("0.2/0.8 = 0.25 and 160/0.8 = 200")
+    assert q == a.value / n.value
+    assert p == b.value / m.value
+    half, kept = says("ξ = 0.25, γ = 160 px")
+    same, unchanged = says("ξ = 0.2, γ = 160 px")
+    assert [half.value, same.value] == [xi.value, alpha.value]
+    assert kept.value == unchanged.value == f.value
+
+
+def test_before_the_lesson_anna_and_ben(says):
+    anna, xi_anna, ben, xi_ben, _ = fits = says(
+        "Anna finds (f, ξ) = (300 px, 0.5), Ben (400 px, 1.0). Both fits leave 0.2 px."
+    )
+    assert fits[-1].value > 0  # the same for both: it tells nothing apart
+    a, n, b, middle = says("In the middle they agree, since 300/1.5 and 400/2 are both 200 px.")
+    assert (a.value, n.value) == (anna.value, 1 + xi_anna.value)
+    assert (b.value, 2) == (ben.value, 1 + xi_ben.value)
+    assert middle == a.value / n.value
+    assert middle == b.value / 2
+    mean, mean_xi = says("Use the mean, (350 px, 0.75).")
+    assert mean == (anna.value + ben.value) / 2
+    assert mean_xi == (xi_anna.value + xi_ben.value) / 2
+    f, by, again = says("350/1.75 is 200 px once more")
+    assert f == mean.value
+    assert by == 1 + mean_xi.value
+    assert again == f.value / by.value
+    (apart,) = says("two values of f that are 100 px apart cannot both be right")
+    assert apart == ben.value - anna.value
+    near, far = (
+        np.abs(unified(at_angle(t), anna.value, xi_anna.value) - unified(at_angle(t), ben.value, xi_ben.value)).max()
+        for t in (5, 80)
+    )
+    assert near < 0.1 < 5 < far
+
+
+def test_before_the_lesson_a_fisheye_that_looks_ahead(says):
+    (across,) = says("It has a fisheye lens of 180°.")
+    assert at_angle(across.value / 2 + 1)[2] < 0  # whatever is farther from the axis lies behind

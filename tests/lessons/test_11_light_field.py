@@ -277,3 +277,49 @@ def test_the_whole_code_says_what_the_prose_says_of_it(says):
     body = re.search(r"def shift_and_sum.*?\n((?:    .+\n)+)", code)[1].strip("\n").splitlines()
     assert len(body) == 5 + 1
     assert sum("to_linear" in line for line in body) == 1
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_alpha_is_not_the_slope(says):
+    far, near = says("How much farther does α = 2 go than α = 1.1?")
+
+    def slope_of(alpha, pitch=0.002):
+        sensor = F * pitch
+        focal = 1 / (1 / Z_F + 1 / sensor)
+        return slope(1 / (1 / focal - 1 / (alpha * sensor)))
+
+    (times,) = says("5.5 times as far in slope.")
+    assert times == slope_of(far.value) / slope_of(near.value)
+    half, at, tenth, for_ = says("which is 0.5 for α = 2 and 0.091 for α = 1.1")
+    assert (at.value, for_.value) == (far.value, near.value)
+    assert half == 1 - 1 / far.value
+    assert tenth == 1 - 1 / near.value
+    wrong, less = says("10 times as far in slope: α − 1 is 1 instead of 0.1.")
+    assert less == near.value - 1
+    assert wrong == (far.value - 1) / less.value
+    twice, little = says("To things 2 times as far away as before, instead of 1.1 times.")
+    assert (twice.value, little.value) == (far.value, near.value)
+
+
+def test_before_the_lesson_what_stands_still_is_in_focus(says):
+    (focus, views) = says("was focused at 3 m. A bird stands in the same pixel of all 81 views")
+    (at,) = says("At 3 m.")
+    assert views == PLACES**2
+    assert at == depth(0.0, z_f=focus.value)
+    assert slope(2.0, z_f=focus.value) * slope(9.0, z_f=focus.value) < 0  # one way and the other
+
+
+def test_before_the_lesson_a_wire_in_front_of_a_coin(says):
+    hidden, views = says("A wire hides a coin in 9 of 49 views, the middle one among them.")
+    light = np.ones(int(views.value))
+    light[: int(hidden.value)] = 0.0
+    seen, of_all, wire, again = says("The coin, with 40/49 of its light, under a veil of 9/49 from the wire.")
+    assert seen == light.sum()
+    assert wire == (1 - light).sum()
+    assert of_all.value == again.value == views.value
+    (one_of,) = says("The middle view is one of 49. Forty of them look past the wire and show the coin.")
+    (all_,) = says("Nine of the 49 views show wire at that place")
+    assert one_of.value == all_.value == views.value
+    assert (light.sum(), (1 - light).sum()) == (40, 9)

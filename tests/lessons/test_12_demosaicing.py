@@ -741,3 +741,50 @@ def above(question):
 )
 def test_nothing_above_a_question_answers_it(question, words):
     assert re.search(words, above(question)) is None
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_the_jacket(says):
+    (f,) = says("A jacket has vertical stripes, 0.46 cycles per pixel.")
+    (wide,) = says("Bands of orange and blue, about 25 pixels from orange to orange.")
+    (too,) = says("Bands of green and magenta, about 25 pixels from green to green.")
+    half, minus, away, width = says("Yes: 0.5 − 0.46 = 0.04 cycles per pixel, a band in 25 pixels.")
+    assert minus.value == f.value
+    assert away == half.value - f.value
+    assert width == 1 / beat(f.value)
+    assert wide.value == too.value == width.value
+    (fine,) = says("Coloured stripes as fine as those of the jacket, about 2 pixels each.")
+    assert fine == 1 / f.value
+    (middle,) = says("the nearer to 0.5, the wider its bands")
+    assert middle.value == half.value
+    assert beat(0.48) < beat(f.value) < beat(0.44)
+
+
+def test_before_the_lesson_the_first_column_cut_off(says):
+    says("R G R G becomes G R G, and below it G B G B becomes B G B")
+    says("That comes of cutting off the first row.")
+    laid_out, letters = np.tile(RGGB, (2, 2)), np.array(list("RGB"))
+    assert "".join(letters[laid_out[:2, 1:3]].ravel()) == "GRBG"
+    assert "".join(letters[laid_out[1:3, :2]].ravel()) == "GBRG"
+    assert "".join(letters[laid_out[0]]) == "RGRG"
+    assert "".join(letters[laid_out[1]]) == "GBGB"
+
+
+def test_before_the_lesson_three_decibels(says):
+    a, b = says("algorithm A reaches 40 dB and B 37 dB")
+    tens, decibels, per, ratio = says("Yes: 10^(−3/10) = 0.50.")
+    assert decibels == -(a.value - b.value)
+    assert tens.value == per.value == 10  # tenths of a power of ten
+    truth = np.zeros(100)
+    errors = [np.full(100, 10 ** (-one.value / 20)) for one in (a, b)]
+    assert decibels_apart(errors, truth) == pytest.approx(a.value - b.value)
+    assert ratio == np.mean(errors[0] ** 2) / np.mean(errors[1] ** 2)
+    says("A's mean squared error on it is half of B's.")
+
+
+def decibels_apart(pictures, truth):
+    """Of two pictures, by OpenCV."""
+    one, other = (cv2.PSNR(picture, truth, R=1.0) for picture in pictures)
+    return one - other

@@ -616,3 +616,43 @@ def above(question):
 )
 def test_nothing_above_a_question_answers_it(question, words):
     assert re.search(words, above(question), re.IGNORECASE) is None
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_d65_is_no_glowing_body(says):
+    white = colour.xy_to_UCS_uv((0.3127, 0.3290))
+    nearest, duv = colour.temperature.uv_to_CCT_Ohno2013(white)
+    (kelvin,) = says("its nearest colour temperature is about 6504 K")
+    assert kelvin == nearest
+    (off,) = says("No glowing body has this colour: its Duv is +0.003, a little towards green.")
+    assert off == duv
+    (body,) = says("That of a glowing black body at 6500 K.")
+    (again,) = says("One of 6500 K is a little more pink.")
+    assert body.value == again.value == 6500
+    red, green, blue = colour.XYZ_to_sRGB(colour.xy_to_XYZ((0.3135, 0.3236)), apply_cctf_encoding=False)
+    assert green < min(red, blue)  # D65 itself has three times the same
+
+
+def test_before_the_lesson_a_mean_hides_a_red(says):
+    raw, gains, matrix, truth = shot(BULB)
+    off = delta((raw * gains) @ matrix.T, truth)
+    mean, red = says("a mean of 0.96 goes with a red patch that is off by 3.3")
+    assert mean == off.mean()
+    assert red == off[NAMES.index("red")]
+    left, patches = says("A camera's matrix leaves a ΔE2000 of 0.8 on average over 24 patches of a chart")
+    (claimed,) = says("They are right to about 0.8.")
+    assert claimed.value == left.value < 1
+    same, spectra_, surfaces = (
+        says("in other ways than the 24 patches")
+        + says("was fitted to those 24 spectra")
+        + says("The chart has 24 surfaces.")
+    )
+    assert all(one == len(CHART) for one in (patches, same, spectra_, surfaces))
+
+
+def test_before_the_lesson_a_matrix_has_nine_numbers(says):
+    rows, columns_ = says("The maker of a camera has measured a 3 × 3 matrix")
+    says("the best translation that nine numbers can give")
+    assert rows.value * columns_.value == shot(BULB)[2].size == 9

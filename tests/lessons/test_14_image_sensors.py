@@ -618,3 +618,43 @@ def test_the_quiz_about_decibels(says):
     assert cleaner == np.sqrt(full_a.value)
     assert other == np.sqrt(full_b.value)
     assert bottom_b.value == pytest.approx(bottom.value / 3)
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_two_efficiencies(says):
+    high, low = says("Two data sheets promise quantum efficiencies of 70 % and of 60 %.")
+    (asked,) = says("What can make the sensor with 60 % collect more electrons in the same light?")
+    here, there = says("That its 60 % hold for your wavelength, and the other's 70 % for another one.")
+    assert (here.value, asked.value, there.value) == (low.value, low.value, high.value)
+    peak = max(KAF_0400_CURVE.values())
+    assert min(KAF_0400_CURVE.values()) / peak < low.value / high.value  # wavelengths differ by more than these two
+
+
+def test_before_the_lesson_cmos_sensors_with_a_global_shutter(says):
+    says("the IMX174 and the CMV4000 are CMOS sensors")
+    assert all(one.technology.startswith("CMOS") and "global shutter" in str(one) for one in (IMX174, CMV4000))
+
+
+def test_before_the_lesson_two_sensors_of_one_range(says):
+    half = 0.5
+    full_a, noise_a, full_b = says(
+        "Sensor A is saturated at 45,000 e⁻ and has 8.5 e⁻ of noise in the dark, sensor B 7500 e⁻ and 1 e⁻."
+    )
+    says("Dynamic range is saturation divided by the threshold, which is the noise plus ½.")
+    ratios = full_a.value / (noise_a.value + half), full_b.value / (1 + half)
+    (same,) = says("Both have the same, 5000 to 1.")
+    assert all(same == one for one in ratios)
+    decibels, stops = says("Yes, 74 dB or 12.3 stops.")
+    assert decibels == db(ratios[0])
+    assert stops == np.log2(ratios[1])
+    b, by_b, a, by_a, both = says("B gets 7500/1.5, and A 45,000/9: both 5000.")
+    a_2, by_a_2, b_2, by_b_2, both_2 = says("A gets 45,000/9, and B 7500/1.5: both 5000.")
+    assert (a.value, b.value) == (a_2.value, b_2.value) == (full_a.value, full_b.value)
+    assert (by_a.value, by_b.value) == (by_a_2.value, by_b_2.value) == (noise_a.value + half, 1 + half)
+    assert both == a.value / by_a.value
+    assert both_2 == b.value / by_b.value
+    says("it holds six times as many electrons")
+    says("Its threshold is six times as high, too.")
+    assert full_a.value / full_b.value == by_a.value / by_b.value == 6

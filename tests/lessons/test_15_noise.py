@@ -518,3 +518,46 @@ def test_what_is_told_of_your_camera_is_within_what_is_promised(says):
     assert abs(found["gain_dn_per_e"] / 0.38 - 1) < figures.value / 100
     assert abs(found["read_noise_e"] / 6 - 1) < figures.value / 100
     assert abs(found["prnu"] / 0.012 - 1) < patterns.value / 100
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_the_part_of_the_curve_that_tells_the_gain(says):
+    says("From the part where the noise grows as the square root of the signal.")
+    says(
+        "Counted in electrons, the variance of light equals the signal. Counted in steps, it is the signal times "
+        "the gain."
+    )
+    rng, K = np.random.default_rng(15), 0.28
+    electrons = rng.poisson(4000, 400_000)
+    assert electrons.var() / electrons.mean() == pytest.approx(1, rel=0.01)
+    assert (K * electrons).var() / (K * electrons).mean() == pytest.approx(K, rel=0.01)
+    says("A percentage is the same in electrons and in steps.")
+    uneven = 4000 * (1 + 0.01 * rng.standard_normal(400_000))
+    assert uneven.std() / uneven.mean() == pytest.approx((K * uneven).std() / (K * uneven).mean())
+
+
+def test_before_the_lesson_five_hundred_to_one(says):
+    (ratio,) = says("A sensor is saturated at 500 times its threshold.")
+    (right,) = says("… 54.0 dB.")
+    twenty, again, stops = says("Yes: 20 log10 500, or 9.0 stops.")
+    assert again == ratio.value
+    assert right == twenty.value * np.log10(ratio.value) == db(ratio.value)
+    assert stops == np.log2(ratio.value)
+    (natural,) = says("… 124.3 dB.")
+    twenty, again = says("That is 20 ln 500.")
+    assert natural == twenty.value * np.log(again.value)
+    (half,) = says("… 27.0 dB.")
+    ten, again, signals = says("That is 10 log10 500. The standard counts signals, and so with 20.")
+    assert half == ten.value * np.log10(again.value)
+    assert signals == 2 * ten.value
+
+
+def test_before_the_lesson_eight_bits(says):
+    few, enough = says("They have 8 bits; noise needs more.") + says(
+        "With 8 bits one can measure as long as the noise is"
+    )
+    assert few.value == enough.value == 8
+    noise = 60.3 + 0.5 * np.random.default_rng(19).standard_normal(400_000)  # in steps of 8 bits
+    assert np.round(noise).var() - 1 / 12 == pytest.approx(0.25, rel=0.03)

@@ -359,3 +359,38 @@ def test_the_published_stereo_rig(says):
     assert near == min(np.hypot(x - cx, y - cy) / f for x in (-0.5, 639.5) for y in (-0.5, 479.5))
     assert corner == max(np.hypot(x - cx, y - cy) / f for x in (-0.5, 639.5) for y in (-0.5, 479.5))
     assert round(100 * np.mean(radius > reach)) == 7
+
+
+# Before the lesson ---------------------------------------------------------------------------------------------------
+
+
+def test_before_the_lesson_what_an_error_of_the_fit_says(says):
+    (error,) = says("A report says: error of the fit 0.11 px.")
+    (agrees,) = says("Where corners were found, the model agrees with them to about 0.11 px.")
+    (claimed,) = says("The focal length is right to about 0.11 px.")
+    assert error.value == agrees.value == claimed.value
+    rms, f, *_ = solved(ANNA)  # boards that were all held alike
+    assert abs(f - true_f(ANNA)) > 10 * rms
+
+
+def test_before_the_lesson_how_much_one_corner_weighs(says):
+    bad, others = says("In one of them the error is 3 px, in the others 0.2 px.")
+    off, corners, each = says("one corner that is 3 px off weighs as much as 225 that are 0.2 px off")
+    assert (off.value, each.value) == (bad.value, others.value)
+    assert corners == off.value**2 / each.value**2
+
+
+def test_before_the_lesson_a_turn_explains_most_of_cy(says):
+    moved, f = says("Now cy is 8 px greater, at f = 640 px.")
+    (claimed,) = says("Yes: by 8 px.")
+    (explained,) = says("The question is how much of the 8 px a turn explains.")
+    assert claimed.value == explained.value == moved.value
+    (angle,) = says("A turn by 0.7° moves the picture by nearly as much")
+    K = np.array([[f.value, 0, 319.5], [0, f.value, 239.5], [0, 0, 1]])
+    assert angle == np.degrees(np.arctan(moved.value / f.value))
+    turn = cv2.Rodrigues(np.array([np.arctan(moved.value / f.value), 0, 0]))[0]
+    x, y = np.meshgrid(np.linspace(-0.4, 0.4, 9), np.linspace(-0.3, 0.3, 7))
+    points = np.stack([x, y, np.ones_like(x)], axis=-1)
+    before, after = (p[..., :2] / p[..., 2:] for p in (points @ K.T, points @ turn.T @ K.T))
+    steps = (after - before)[..., 1]
+    assert np.abs(steps + moved.value).max() < 0.2 * moved.value
