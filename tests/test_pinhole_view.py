@@ -1,5 +1,7 @@
 """The pinhole visualizer shows what the optics say, and its controls do what they are named for."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -54,12 +56,43 @@ def test_the_numbers_are_those_of_the_optics():
 
 
 def test_a_reader_who_is_to_predict_the_blur_is_shown_none():
-    quiet = PinholeView(sharpness=False)
+    quiet = PinholeView(panels="box picture")
     for word in ("blur", "Airy", "shadow"):
         assert word not in quiet.description()
         assert word not in quiet.figure(draft=True).body
         assert word in PinholeView().description()
     assert quiet.dragged("orbit", 0, 0, 30, 10).eye != quiet.eye
+
+
+def by_a_reader(points, f, cx, cy):
+    return f * points[..., :2] / points[..., 2:] + (cx, cy)
+
+
+def test_a_reader_s_projection_draws_the_garden_where_camviz_does():
+    view = PinholeView(depth_mm=40, object_m=2.5, panels="picture yours", yours=by_a_reader)
+    body = view.figure(draft=True).body
+    (right,), (yours,) = (re.findall(rf'<path d="([^"]*)" class="{colour}"', body) for colour in ("yellow", "orange"))
+    assert yours == right
+    assert len(right) > 5000
+    corner = TOWER + (0.31 * np.cos(0.5) - 0.31 * np.sin(0.5), 0.58, -0.31 * np.sin(0.5) - 0.31 * np.cos(0.5))
+    panel = view.camera().project(corner)  # a foot of the crate, which is turned by half a radian
+    places = np.array([place.split(",") for place in re.findall(r"-?[\d.]+,-?[\d.]+", right)], dtype=float)
+    assert np.linalg.norm(places - (panel + 0.5) * 440 / PIXELS, axis=1).min() < 0.2
+
+
+def test_a_wrong_projection_is_drawn_and_one_that_stops_is_told_of():
+    view = PinholeView(panels="picture yours", yours=lambda points, f, cx, cy: f * points[..., :2] + (cx, cy))
+    assert 'class="orange"' in view.figure(draft=True).body
+    for function, words in ((None, "No function"), (lambda *_: None, "returns nothing"), (lambda x: x, "no answer")):
+        figure = view.but(yours=function).figure(draft=True)
+        assert words in figure.body
+        assert 'class="orange"' not in figure.body
+        assert "nan" not in figure.body
+
+
+def test_panels_that_there_are_not_are_refused():
+    with pytest.raises(ValueError, match="panels"):
+        PinholeView(panels="picture blur")
 
 
 def test_the_description_states_the_state():

@@ -677,4 +677,4 @@ def depth_outside_the_root(focal_mm, wavelength_nm):
     return np.sqrt(2.44 * wavelength_nm * 1e-6) * focal_mm
 
 
-EXERCISES = (PROJECT, VANISHING, IN_FRONT, RAY, BEST_HOLE)
+EXERCISES = (PROJECT, VANISHING, RAY, IN_FRONT, BEST_HOLE)

@@ -1,10 +1,14 @@
-"""The pinhole visualizer: a box with a hole, the picture of the garden on its wall, and how sharp that can be."""
+"""The pinhole visualizer: a box with a hole, the picture of the garden on its wall, and how sharp that can be.
+
+A reader's own projection can draw the garden's outlines over that picture.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -19,6 +23,7 @@ from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, Sheet, draw_sp
 from camviz.poses import RigidTransform
 from camviz.scenes import render, snapshot, textured_scene, to_display
 from camviz.views.base import View, slider, switch
+from camviz.yours import tried
 
 WALL_MM = np.array([36.0, 27.0])
 PIXELS = 480  # across the wall: 75 µm each
@@ -26,7 +31,10 @@ WHITE_PHOTONS = 2000  # in a pixel that is just white
 ENLARGED = 30  # the box beside the garden, or nobody would see it
 TOWER = np.array([0.68, 0.67, 3.3])  # the middle of the crate and the globe on it, in the world
 TOWER_M = 1.16
+_POINTS_A_LINE = 33
 _GRID = np.array([[0, 1], [3, 2]])  # of an outline's corners, as a picture hangs on them
+_PANELS = ("box picture blur", "box picture", "picture yours")
+_HEIGHTS = dict(zip(_PANELS, (590, 470, 496), strict=True))
 _HOLES, _BLURS = (0.05, 2.0), (0.1, 4.0)  # the plot's range, mm
 _POINTS = {  # of the tower, from its middle, metres: what the rays start from
     "blue": (0.0, -TOWER_M / 2, 0.0),
@@ -42,8 +50,12 @@ class PinholeView(View):
 
     The picture is ray-traced, blurred by what waves make of the hole in green light, dimmed by the exposure and, with
     `noise`, counted in photons. `match_exposure` exposes for as long as it takes instead of `exposure_s`. On the wall
-    the picture is turned by 180°, seen from behind; `turn_picture` puts it upright. Without `sharpness` the view says
-    nothing of blur in curves and numbers, for readers who are to predict it.
+    the picture is turned by 180°, seen from behind; `turn_picture` puts it upright.
+
+    `panels` names what is drawn: "box picture blur"; without blur, for readers who are to predict it; or "picture
+    yours", the upright picture with the garden's outlines over it, once as they are projected, in yellow, and once in
+    orange by `yours`, a reader's function of (points, f, cx, cy): points (..., 3) in camera coordinates to pixels
+    (..., 2), with f, cx and cy in pixels.
     """
 
     title: ClassVar[str] = "Pinhole camera"
@@ -56,10 +68,13 @@ class PinholeView(View):
     turn_picture: bool = switch(False, label="turn the picture", help="as it hangs on the wall, or upright")
     noise: bool = switch(True, label="photon noise", help="light arrives in photons: dim pictures are grainy")
     eye: Eye = Eye(distance=0.8, yaw_deg=46, pitch_deg=18)  # its distance counts in lengths of what there is to see
-    sharpness: bool = True
+    panels: str = "box picture blur"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.panels not in _PANELS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _PANELS))}, got {self.panels!r}")
         for name in ("hole_mm", "depth_mm", "object_m", "exposure_s"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
@@ -112,7 +127,7 @@ class PinholeView(View):
         return {
             "f-number": f"f/{float(optics.f_number(self.hole_mm, self.depth_mm)):.0f}",
             "field of view": f"{optics.field_of_view_deg(WALL_MM[0], self.depth_mm):.1f}° across",
-            **(blur if self.sharpness else {}),
+            **(blur if "blur" in self.panels else {}),
             "exposure": _seconds(self.exposed_s),
             "brightness": f"{_times(self.brightness)} correct",
         }
@@ -125,19 +140,28 @@ class PinholeView(View):
     def description(self) -> str:
         """The state in words and numbers."""
         figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
-        shown = "upright" if self.turn_picture else "upside down, as on the wall"
+        shown = "upright" if self._upright else "upside down, as on the wall"
         return (
             f"A hole of {self.hole_mm:g} mm, {self.depth_mm:g} mm before the wall, {self.object_m:g} m from the globe: "
             f"{figures}; the crate and globe, {TOWER_M} m tall, are {self._tower_image_mm:.1f} mm tall on the wall. "
             f"Picture shown {shown}."
         )
 
+    @property
+    def _upright(self) -> bool:
+        return self.turn_picture or "yours" in self.panels  # pixels count in the upright picture
+
     def figure(self, *, draft: bool = False) -> Picture:
-        upright = self.image(320 if draft else PIXELS)
-        box, photographs = self._box_panel(upright, draft)
-        blur, height = (self._blur_panel(), 590) if self.sharpness else ("", 470)
-        body = "".join([svg.rectangle(0, 0, 960, height, "paper"), box, self._picture_panel(), blur, self._numbers()])
-        photographs["wall"] = jpeg(upright if self.turn_picture else upright[::-1, ::-1].copy())
+        upright, height = self.image(320 if draft else PIXELS), _HEIGHTS[self.panels]
+        photographs = {"wall": jpeg(upright if self._upright else upright[::-1, ::-1].copy())}
+        if "yours" in self.panels:
+            content = self._both_projections()
+        else:
+            box, more = self._box_panel(upright, draft)
+            photographs |= more
+            content = box + self._picture_panel() + self._numbers()
+            content += self._blur_panel() if "blur" in self.panels else ""
+        body = svg.rectangle(0, 0, 960, height, "paper") + content
         return Picture(body, 960, height, self.title, self.description(), photographs)
 
     # The picture -----------------------------------------------------------------------------------------------------
@@ -158,7 +182,7 @@ class PinholeView(View):
             svg.dots([panel.place(self._pixel(point))], f"{colour} ringed", 8) for colour, point in _POINTS.items()
         )
         ends = panel.place([self._pixel(_POINTS["blue"]), self._pixel(_POINTS["orange"])])
-        title = "The picture, turned upright" if self.turn_picture else "The picture on the wall, from behind"
+        title = "The picture, turned upright" if self._upright else "The picture on the wall, from behind"
         content = photograph(panel, "wall", pixels.width, pixels.height) + svg.line(ends, "yellow dashed thin") + marks
         return panel.show(content, title=title, note=f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm")
 
@@ -166,7 +190,49 @@ class PinholeView(View):
         """Where a point of the tower is in the picture shown."""
         pixels = self.camera().intrinsics
         uv = self.camera().project(TOWER + point)
-        return uv if self.turn_picture else np.array([pixels.width - 1, pixels.height - 1]) - uv
+        return uv if self._upright else np.array([pixels.width - 1, pixels.height - 1]) - uv
+
+    # The reader's own projection -------------------------------------------------------------------------------------
+
+    def _both_projections(self) -> str:
+        """The picture twice, with the garden's outlines over it: as they are projected, and as the reader does it."""
+        camera = self.camera()
+        outlines = _garden_outlines() - camera.centre  # the box is not turned
+        right = Camera(camera.intrinsics).project(outlines)
+        yours, problem = self._your_pixels(outlines)
+        words = svg.paragraph((14, 30), problem, 412) if problem else ""
+        pictures = self._outlined("right", 20, right, "yellow", "The picture, its outlines projected")
+        pictures += self._outlined("yours", 500, yours, "orange", "The same, projected by your function", words)
+        return pictures + self._pixel_numbers()
+
+    def _your_pixels(self, points: np.ndarray) -> tuple[np.ndarray, str]:
+        """Where the reader's function puts points (..., 3), and what is wrong with it."""
+        pixels = self.camera().intrinsics
+        if self.yours is None:
+            return np.full((*points.shape[:-1], 2), np.nan), "No function of yours has been given."
+        return tried(self.yours, (points, pixels.fx, pixels.cx, pixels.cy), points[..., :2])
+
+    def _outlined(self, name: str, x: float, lines: np.ndarray, colour: str, title: str, words: str = "") -> str:
+        pixels = self.camera().intrinsics
+        panel = image_panel(name, x, 34, 440, pixels.width, pixels.height)
+        picture = "" if words else photograph(panel, "wall", pixels.width, pixels.height)
+        return panel.show(picture + svg.path(panel.place(lines), colour) + words, title=title)
+
+    def _pixel_numbers(self) -> str:
+        """What the function is given, under the pictures."""
+        pixels, pitch_um = self.camera().intrinsics, 1000 * WALL_MM[0] / PIXELS
+        given = [
+            ("focal length", f"f = {self.depth_mm:g} mm / {pitch_um:g} µm = {pixels.fx:.1f} px"),
+            ("principal point", f"cx = {pixels.cx:g} px, cy = {pixels.cy:g} px"),
+            ("picture", f"{pixels.width} × {pixels.height} pixels, {WALL_MM[0]:g} × {WALL_MM[1]:g} mm"),
+        ]
+        rows = [svg.text((20, 398), "What your function is given", "title")]
+        for i, (name, value) in enumerate(given):
+            rows.append(svg.text((20, 424 + 21 * i), name, "note"))
+            rows.append(svg.text((140, 424 + 21 * i), value, "label"))
+        rows.append(svg.text((500, 424), "crate and globe on the wall, by similar triangles:", "note"))
+        rows.append(svg.text((500, 445), self.equation(), "label"))
+        return "".join(rows)
 
     # The box ---------------------------------------------------------------------------------------------------------
 
@@ -261,7 +327,7 @@ class PinholeView(View):
     # The numbers -----------------------------------------------------------------------------------------------------
 
     def _numbers(self) -> str:
-        left, below = (580, 546) if self.sharpness else (20, 386)  # of the blur's curve, or in its place
+        left, below = (580, 546) if "blur" in self.panels else (20, 386)  # of the blur's curve, or in its place
         rows = [svg.text((left, 360), "This box", "title")]
         for i, (name, value) in enumerate(self.numbers().items()):
             rows.append(svg.text((left, 386 + 21 * i), name, "note"))
@@ -285,6 +351,17 @@ def _stage() -> np.ndarray:
     pixels = Intrinsics(380, 288, 600, 600, 189.5, 143.5)
     pose = RigidTransform.from_translation(TOWER - (0, 0, 3.0))
     return snapshot(textured_scene(), Camera(pixels, world_from_cam=pose))
+
+
+@lru_cache(maxsize=1)
+def _garden_outlines() -> np.ndarray:
+    """The outlines (lines, points, 3) of what stands in the garden, in the world, all with as many points."""
+    lines = [line for name, line in textured_scene().outlines() if name not in ("terrace", "lawn", "easel")]
+    share = np.linspace(0, 1, _POINTS_A_LINE)
+    along = [np.linspace(0, 1, len(line)) for line in lines]
+    return np.array(
+        [np.stack([np.interp(share, t, c) for c in line.T], axis=-1) for t, line in zip(along, lines, strict=True)]
+    )
 
 
 @lru_cache(maxsize=2)
