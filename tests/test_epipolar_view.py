@@ -174,3 +174,59 @@ def test_photographs_take_the_place_of_the_garden():
     pixels = cv2.imdecode(np.frombuffer(view.figure().photographs["left"], np.uint8), cv2.IMREAD_COLOR)
     assert abs(pixels.astype(int) - 128).max() <= 1
     assert not np.isfinite(view.surface).any()
+
+
+# The reader's own F --------------------------------------------------------------------------------------------------
+
+
+def test_the_readers_own_F_draws_the_right_line_or_another_one():
+    def right(K_left, K_right, R, t):
+        return np.linalg.inv(K_right).T @ np.cross(t, np.eye(3)).T @ R @ np.linalg.inv(K_left)
+
+    def turned_backwards(K_left, K_right, R, t):
+        return right(K_left, K_right, R.T, t)
+
+    view = FORWARD.but(yaw=-8.0, roll=5.0, yours=right)
+    assert "0.0 px from the point" in view.figure(draft=True).body
+    np.testing.assert_allclose(np.abs(view.your_line), np.abs(view.line), atol=1e-9)
+    wrong = view.but(yours=turned_backwards)
+    assert wrong._your_figure() != view._your_figure()
+    assert wrong.figure(draft=True).body != view.figure(draft=True).body
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [
+        (lambda *given: None, "returns nothing yet"),
+        (lambda *given: np.eye(4), "answers in shape"),
+        (lambda *given: 1 / 0, "ZeroDivisionError"),
+        (lambda *given: np.full((3, 3), np.nan), "not all finite"),
+        (lambda *given: np.zeros((3, 3)), "no line"),
+    ],
+)
+def test_a_function_without_an_F_leaves_the_line_out_and_says_why(function, words):
+    figure = FORWARD.but(yours=function).figure(draft=True)
+    assert words in re.sub(r"</text><text[^>]*>", " ", figure.body)
+    assert not re.search(r"\bnan\b", figure.body)
+
+
+def test_where_a_lens_bends_no_F_is_asked_for():
+    view = STEREO.but(lens="fisheye", yours=lambda *given: 1 / 0)
+    assert "ZeroDivisionError" not in view.figure(draft=True).body
+
+
+def test_a_moved_point_asks_the_function_once():
+    calls = []
+    view = STEREO.but(yours=lambda *given: calls.append(1))
+    view.figure(draft=True)
+    view.but(depth=3.0).figure(draft=True)
+    assert len(calls) == 1
+
+
+def test_panels_are_left_out_and_others_refused():
+    first = STEREO.but(panels="space match")
+    assert "epipole" not in first.figure(draft=True).body
+    assert "F, of unit norm" not in first.figure(draft=True).body
+    assert "Do they match?" in first.figure(draft=True).body
+    with pytest.raises(ValueError, match="got \\['nonsense'\\]"):
+        EpipolarView(panels="nonsense")

@@ -160,3 +160,45 @@ def test_a_field_of_view_that_no_pinhole_has_is_answered_by_its_name(degrees):
     """tan 250° is positive, so 500° would be drawn as if it were 140°."""
     with pytest.raises(ValueError, match="field of view, must lie between 0 and 180"):
         FrustumView(hfov_deg=degrees)
+
+
+# The reader's own centre ---------------------------------------------------------------------------------------------
+
+
+def test_the_readers_camera_stands_where_their_function_says():
+    view = FrustumView(mode="edit t", x=0.2, y=0.0, z=1.0, yaw_deg=30.0, pitch_deg=0.0, yours=lambda R, t: -R.T @ t)
+    np.testing.assert_allclose(view._your_camera.centre, view.camera.centre, atol=1e-12)
+    assert "0.00 m from the camera" in view.figure(draft=True).body
+    wrong = view.but(yours=lambda R, t: -t)
+    np.testing.assert_allclose(wrong._your_camera.centre, (-0.2, 0, -1))
+    assert wrong._your_numbers() != view._your_numbers()
+    assert wrong._world_panel(np.zeros((3, 4, 3), np.uint8), True) != view._world_panel(
+        np.zeros((3, 4, 3), np.uint8), True
+    )
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [
+        (lambda R, t: None, "returns nothing yet"),
+        (lambda R, t: np.eye(3), "answers in shape"),
+        (lambda R, t: t / 0, "not all finite"),
+        (lambda R, t: undefined, "NameError"),  # noqa: F821
+    ],
+)
+def test_a_function_without_a_centre_puts_no_camera_there_and_says_why(function, words):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        body = FrustumView(yours=function).figure(draft=True).body
+    assert words in body
+    assert "nan" not in body.replace("your centre are not all finite", "")
+    assert ">yours</text>" not in body
+
+
+def test_the_first_view_leaves_out_K_the_chain_and_the_formula():
+    body = FrustumView(panels="").figure(draft=True).body
+    assert "−Rᵀt" not in body
+    assert "intrinsics" not in body
+    assert "R X + t" not in body
+    assert "−Rᵀt" in FrustumView().figure(draft=True).body
+    with pytest.raises(ValueError, match="got \\['nonsense'\\]"):
+        FrustumView(panels="nonsense")

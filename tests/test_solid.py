@@ -211,6 +211,33 @@ def test_wireframes_can_be_asked_for(monkeypatch):
     assert "CAMVIZ_RENDERER" in why_not_solid()
 
 
+def test_pyvista_is_not_wanted_where_wireframes_are_and_vtk_stays_out(monkeypatch):
+    code = (
+        "import sys; from camviz.draw.opengl import why_not_pyvista; print(why_not_pyvista());"
+        "print('vtkmodules' in sys.modules, 'pyvista' in sys.modules)"
+    )
+    monkeypatch.setenv("CAMVIZ_RENDERER", "wire")
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "CAMVIZ_RENDERER=wire" in run.stdout
+    assert run.stdout.endswith("False False\n")
+
+
+def test_without_pyvista_its_absence_is_the_reason(monkeypatch):
+    monkeypatch.setattr(opengl, "find_spec", lambda name: None)
+    assert "pip install pyvista" in opengl.why_not_pyvista()
+
+
+@needs_opengl
+def test_a_pyvista_plotter_draws_and_says_nothing_on_stderr():
+    pytest.importorskip("pyvista")
+    code = (
+        "import numpy as np; from camviz.draw.opengl import pyvista_plotter; plotter = pyvista_plotter();"
+        "plotter.add_lines(np.eye(3), color='black', connected=True); print(np.ptp(plotter.screenshot()) > 100)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "True", "")
+
+
 def test_a_crash_while_asking_for_opengl_is_survived_and_named(monkeypatch):
     crash = f"import os; os.kill(os.getpid(), {int(signal.SIGSEGV)})"
     run = subprocess.run

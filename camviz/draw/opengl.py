@@ -8,6 +8,7 @@ import subprocess
 import sys
 from functools import cache
 from importlib.util import find_spec
+from typing import Any
 
 REMEDY = "On Debian and Ubuntu, `apt install libegl1 libgl1` brings what it needs."
 
@@ -32,6 +33,29 @@ def why_not_solid() -> str:
         return "CAMVIZ_RENDERER=wire asks for wireframes."
     works, answer = opengl_works()
     return "" if works else answer
+
+
+def why_not_pyvista() -> str:
+    """Why a lesson draws its points in space with matplotlib here, in a sentence; "" where PyVista can draw them.
+
+    Asks as `why_not_solid` does, and imports neither PyVista nor VTK: a kernel that drew with them weighs 330 MB more.
+    """
+    if find_spec("pyvista") is None:
+        return "PyVista is not installed; `pip install pyvista` brings it."
+    return why_not_solid().replace("asks for wireframes", "asks for pictures without OpenGL")
+
+
+def pyvista_plotter() -> Any:
+    """A `pyvista.Plotter` without a window on the screen, where `why_not_pyvista` gives no reason against it.
+
+    VTK is told which of its windows works here; left alone it tries a display first, and complains on stderr.
+    """
+    import pyvista
+
+    works, window = opengl_works()
+    if works:
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = window
+    return pyvista.Plotter(off_screen=True)
 
 
 def _windows() -> list[str]:

@@ -745,4 +745,4 @@ def half_the_angle(r):
     return rodrigues(r / 2)
 
 
-EXERCISES = (CENTRE, CHAIN, IS_ROTATION, INVERT, RODRIGUES)
+EXERCISES = (CENTRE, RODRIGUES, CHAIN, INVERT, IS_ROTATION)

@@ -1,10 +1,14 @@
-"""The epipolar visualizer: one point, two cameras, and the line on which the second picture must show it."""
+"""The epipolar visualizer: one point, two cameras, and the line on which the second picture must show it.
+
+A reader's own F can draw its line beside the right one.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,21 +24,39 @@ from camviz.scenes import textured_scene
 from camviz.views import garden
 from camviz.views.marks import border_arrow, camera_outline, clipped, crop, on_photograph, ring
 from camviz.views.two_cameras import TwoCameras
+from camviz.yours import tried
 
 _DISTANCES = np.concatenate([np.geomspace(0.02, 400, 120), [np.inf]])
 _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point
 _PATCH = 48  # pixels on a side of the details that are compared
 _PLANES = 40  # epipolar planes in a full turn around the baseline
 _WIDTH, _TALLEST = 455, 342
+_PANELS = {"space", "match", "epipoles", "F"}
 
 
 @dataclass(frozen=True)
 class EpipolarView(TwoCameras):
-    """Where a point of the left picture can appear in the right one, and what a fundamental matrix knows of it."""
+    """Where a point of the left picture can appear in the right one, and what a fundamental matrix knows of it.
+
+    `panels` names what is shown with the two pictures: space (the cameras from outside), match (the two details),
+    epipoles (they and all lines through them) and F. `yours` is a reader's function of (K_left, K_right, R, t) for the
+    motion right_from_left = [R | t], which gives an F (3, 3); the line and the epipole of that F are orange.
+    """
 
     title: ClassVar[str] = "Epipolar geometry"
 
+    panels: str = "space match epipoles F"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     eye: Eye = Eye(target=(-0.1, 0.25, 1.7), distance=4.6, yaw_deg=-62, pitch_deg=22, vfov_deg=30)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self._shown <= _PANELS:
+            raise ValueError(f"panels must be some of space, match, epipoles, F, got {sorted(self._shown)}")
+
+    @property
+    def _shown(self) -> set[str]:
+        return set(self.panels.split())
 
     # Words -----------------------------------------------------------------------------------------------------------
 
@@ -45,12 +67,12 @@ class EpipolarView(TwoCameras):
     @cached_property
     def _figures(self) -> dict[str, str]:
         nowhere = "none" if not self.baseline else "at infinity" if self.F is not None else "beyond the lens’s field"
-        figures = {
-            "baseline": f"{self.baseline:.3f} m",
-            "left epipole": _pixel(_epipole(self.left, self.right), nowhere),
-            "right epipole": _pixel(_epipole(self.right, self.left), nowhere),
-            "point, right": _pixel(self.uv_right, "no image") + ("" if self.right.sees(self.point) else ", outside"),
-        }
+        figures = {"baseline": f"{self.baseline:.3f} m"}
+        if "epipoles" in self._shown:
+            figures["left epipole"] = _pixel(_epipole(self.left, self.right), nowhere)
+            figures["right epipole"] = _pixel(_epipole(self.right, self.left), nowhere)
+        outside = "" if self.right.sees(self.point) else ", outside"
+        figures["point, right"] = _pixel(self.uv_right, "no image") + outside
         if self.estimate is not None:
             figures["estimated lines"] = f"off by {self.estimate_error:.3g} px ({len(self.pairs[0])} matches)"
             figures["its epipole"] = f"turned by {self.epipole_error:.3g}°"
@@ -74,6 +96,43 @@ class EpipolarView(TwoCameras):
         where = f"The point at ({self.u:.0f}, {self.v:.0f}) in the left picture lies {self.depth:.2f} m along its ray"
         figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
         return f"{where}. {figures}. Right epipolar line: {self.equation()}."
+
+    # The reader's own F ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def your_F(self) -> tuple[Array, str]:
+        """The F (3, 3) of the reader's function, NaN where it has none, and what is wrong with it."""
+        if self.yours is None or self.F is None:
+            return np.full((3, 3), np.nan), ""
+        motion = twoview.right_from_left(self.left, self.right)
+        K_left, K_right = self.left.intrinsics.K, self.right.intrinsics.K
+        arguments = (K_left, K_right, motion.rotation.as_matrix(), motion.translation)
+        return tried(self.yours, arguments, self.F)
+
+    @cached_property
+    def your_line(self) -> Array:
+        """The epipolar line (3,) that the reader's F gives for the point; NaN where there is none."""
+        F, _ = self.your_F
+        return twoview.epipolar_lines(F, [self.u, self.v]) if np.isfinite(F).all() else np.full(3, np.nan)
+
+    def _your_figure(self) -> str:
+        """How far the point's right pixel lies from the reader's line."""
+        away = float(twoview.line_distance(self.your_line, self.uv_right))
+        return f"{away:.1f} px from the point" if np.isfinite(away) else "no line"
+
+    def _your_marks(self, panel: Panel) -> str:
+        """In the right picture, the line of the reader's F and the place where all of its lines meet."""
+        if self.yours is None or self.F is None or panel.name == "left":
+            return ""
+        F, problem = self.your_F
+        if problem:
+            return _notice(panel, problem)
+        if not np.isfinite(F).all():
+            return _notice(panel, "The numbers of your F are not all finite, so it has no line.")
+        line = panel.place(twoview.clip_lines(self.your_line, self.right.intrinsics))
+        e = np.linalg.svd(F)[0][:, 2]  # Fᵀ e = 0, as nearly as a matrix of any rank can
+        epipole = panel.place(_inside(self.right, twoview.from_homogeneous(e)))
+        return on_photograph([line], "orange dashed") + svg.dots([epipole], "orange", 9)
 
     # Hands -----------------------------------------------------------------------------------------------------------
 
@@ -110,8 +169,8 @@ class EpipolarView(TwoCameras):
 
     def figure(self, *, draft: bool = False) -> Picture:
         images, attached = self._pictures(draft)
-        space, sheets = self._space_panel(images, draft)
-        details, crops = self._details(images)
+        space, sheets = self._space_panel(images, draft) if "space" in self._shown else ("", {})
+        details, crops = self._details(images) if "match" in self._shown else ("", {})
         panels = [
             self._picture_panel(self._left_panel, self.left, self.right, "drag the point", "move the point"),
             self._picture_panel(self._right_panel, self.right, self.left, self.equation(), "move it along its ray"),
@@ -152,6 +211,7 @@ class EpipolarView(TwoCameras):
                 self._match_dots(panel),
                 self._own_line(panel, camera),
                 self._estimated_line(panel, camera),
+                self._your_marks(panel),
                 self._other_camera(panel, camera, other),
                 self._epipole_mark(panel, camera, other),
                 self._point_mark(panel, camera),
@@ -163,7 +223,7 @@ class EpipolarView(TwoCameras):
 
     def _pencil(self, panel: Panel, camera: Camera) -> str:
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
-        if not self.baseline:
+        if not self.baseline or "epipoles" not in self._shown:
             return ""
         if panel.name not in self.drawn:
             axes = self.left.extrinsics[0]
@@ -202,7 +262,7 @@ class EpipolarView(TwoCameras):
         return svg.dots(panel.place(seen), "paper-dot", 7) + svg.dots(panel.place(seen), "purple", 5)
 
     def _epipole_mark(self, panel: Panel, camera: Camera, other: Camera) -> str:
-        if not self.baseline:
+        if not self.baseline or "epipoles" not in self._shown:
             return ""
         uv = _epipole(camera, other)
         at = panel.place(uv)
@@ -285,13 +345,18 @@ class EpipolarView(TwoCameras):
     # The numbers -----------------------------------------------------------------------------------------------------
 
     def _numbers_block(self) -> str:
-        x, y = 540, 401
-        rows = [svg.text((x, y), "F, of unit norm" if self.F is not None else "No F here", "title")]
-        for i, row in enumerate(self.F if self.F is not None else ()):
-            rows.append(svg.text((x, y + 22 + 18 * i), _row(row), "number"))
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((x, y + 92 + 19 * i), name, "note"))
-            rows.append(svg.text((x + 112, y + 92 + 19 * i), value, "label"))
+        x, y, rows = 540, 401, list[str]()
+        if "F" in self._shown:
+            rows.append(svg.text((x, y), "F, of unit norm" if self.F is not None else "No F here", "title"))
+            for i, row in enumerate(self.F if self.F is not None else ()):
+                rows.append(svg.text((x, y + 22 + 18 * i), _row(row), "number"))
+            y += 92
+        figures = [(name, value, "label") for name, value in self.numbers().items()]
+        if self.yours is not None and self.F is not None:
+            figures.append(("your line", self._your_figure(), "label orange"))
+        for i, (name, value, class_) in enumerate(figures):
+            rows.append(svg.text((x, y + 19 * i), name, "note"))
+            rows.append(svg.text((x + 112, y + 19 * i), value, class_))
         return "".join(rows)
 
     def _details(self, images: dict[str, np.ndarray]) -> tuple[str, dict[str, bytes]]:
@@ -336,6 +401,12 @@ def _far(uv: Array, camera: Camera) -> str:
 
 def _infinity(at: Array) -> str:
     return svg.dots([at], "green", 8) + svg.text(at + (0, -9), "∞", "green halo middle")
+
+
+def _notice(panel: Panel, words: str) -> str:
+    """Words over a photograph, on a ground of the paper's colour."""
+    ground = svg.rectangle(8, 8, panel.width - 16, 60, "paper")
+    return ground + svg.paragraph((18, 28), words, panel.width - 36)
 
 
 def _inside(camera: Camera, uv: Array) -> Array:

@@ -1,7 +1,11 @@
-"""The frustum visualizer: a camera in its world, the picture it takes, and the numbers that say where it stands."""
+"""The frustum visualizer: a camera in its world, the picture it takes, and the numbers that say where it stands.
+
+A reader's own function can say where the camera stands; that camera is drawn beside the right one.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import atan, degrees, radians, tan
@@ -33,6 +37,7 @@ from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.marks import border_arrow, clipped
+from camviz.yours import tried
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
 
@@ -51,6 +56,9 @@ class FrustumView(View):
 
     x, y, z are what `mode` says: the camera's centre C ("edit C"), the t of its extrinsics [R | t] ("edit t"), or where
     the camera has the middle of the scene ("orbit"). Changing the mode leaves the camera where it is.
+    `panels` names what stands below the pictures beside R, t and C: K, and the chain of one point with C's formula.
+    `yours` is a reader's function of (R, t) that gives the centre (3,): the camera that stands there is orange, with
+    what it would see of the board, and the right camera is blue.
     """
 
     title: ClassVar[str] = "A camera in its world"
@@ -67,6 +75,8 @@ class FrustumView(View):
     far: float = slider(1.2, 0.3, 6.0, 0.1, unit="m", help="where the drawn volume ends")
     seen_from: str = choice("world view", "camera view", label="seen from", help="what stands still: world or camera")
     points: bool = switch(True, help="the board's corners and the world's axes, projected over the picture")
+    panels: str = "K chain"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 60))
     lens: Lens = field(default_factory=Perspective)
     eye: Eye = Eye(target=(0.0, 0.3, 2.2), distance=8.0, yaw_deg=-38, pitch_deg=24)
@@ -75,6 +85,8 @@ class FrustumView(View):
         super().__post_init__()
         if not 0 < self.hfov_deg < 180:
             raise ValueError(f"hfov_deg, the field of view, must lie between 0 and 180 degrees, got {self.hfov_deg:g}")
+        if not set(self.panels.split()) <= {"K", "chain"}:
+            raise ValueError(f"panels must be some of K, chain, got {self.panels.split()}")
 
     @classmethod
     def of(cls, camera: Camera, **state: Any) -> Self:
@@ -88,6 +100,24 @@ class FrustumView(View):
         p = np.array([self.x, self.y, self.z])
         centre = p if self.mode == "edit C" else self._pivot - rotation.apply(p)
         return Camera(self._zoomed(), self.lens, RigidTransform.from_components(centre, rotation))
+
+    @cached_property
+    def your_centre(self) -> tuple[Array, str]:
+        """Where the reader's function has the camera, (3,), NaN where nowhere, and what is wrong with it."""
+        if self.yours is None:
+            return np.full(3, np.nan), ""
+        centre, problem = tried(self.yours, self.camera.extrinsics, self.camera.centre)
+        if not problem and not np.isfinite(centre).all():
+            problem = "The numbers of your centre are not all finite, so no camera stands there."
+        return centre, problem
+
+    @property
+    def _your_camera(self) -> Camera | None:
+        """The camera at the reader's centre, turned as the right one is; None where there is none."""
+        centre, problem = self.your_centre
+        if self.yours is None or problem:
+            return None
+        return self.camera.at(RigidTransform.from_components(centre, self.camera.world_from_cam.rotation))
 
     @property
     def _pivot(self) -> Array:
@@ -162,10 +192,14 @@ class FrustumView(View):
 
     def _items(self, image: np.ndarray) -> list[Item]:
         near = self.near if self.near < self.far else 0
-        items = camera_body(self.camera, self.far, image=image, colour="orange", near=near)
+        colour = "orange" if self.yours is None else "blue"
+        items = camera_body(self.camera, self.far, image=image, colour=colour, near=near)
+        if self._your_camera is not None:
+            items += camera_body(self._your_camera, self.far, colour="orange", near=near)
+            items.append(Label(self._your_camera.centre - 0.55 * _up(self.camera), "yours", "label orange"))
         items += axes_triad(RigidTransform.identity(), 0.7, "world")
         items += axes_triad(self.camera.world_from_cam, 0.35)
-        items.append(Label(self.camera.centre + 0.25 * _up(self.camera), "C", "label orange"))
+        items.append(Label(self.camera.centre + 0.25 * _up(self.camera), "C", f"label {colour}"))
         if self.mode != "edit C":
             items.append(Line(np.array([self.camera.centre, self._pivot]), "purple dashed", 1.8))
             items.append(Dots(self._pivot, "purple", 8))
@@ -185,19 +219,39 @@ class FrustumView(View):
         reach = np.linspace(0, 0.7, 33)[:, None]
         axes = [svg.path(clipped(panel, panel.place(self.camera.project(reach * axis))), f"{colour} thick")
                 for axis, colour in zip(np.eye(3), ("orange", "green", "blue"), strict=True)]  # fmt: skip
-        return corners + "".join(axes)
+        return corners + self._your_corners(panel) + "".join(axes)
+
+    def _your_corners(self, panel: Panel) -> str:
+        """The board's corners where the reader's camera would see them."""
+        if self._your_camera is None:
+            return ""
+        uv = self._your_camera.project(board_corners())
+        return svg.dots(panel.place(np.where(self.camera.intrinsics.contains(uv)[:, None], uv, np.nan)), "orange", 3.5)
 
     def _numbers_panel(self) -> str:
-        n, from_sliders = self.numbers(), " ← x, y, z"
-        return "".join(
-            [
-                _matrix((580, 360), "K, intrinsics [px]", n["K"], 1),
-                _matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
-                _matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
-                _matrix((450, 486), "C = −Rᵀt [m]" + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
-                self._chain(),
-            ]
-        )
+        n, from_sliders, shown = self.numbers(), " ← x, y, z", self.panels.split()
+        centre = "C = −Rᵀt [m]" if "chain" in shown else "C [m]"
+        parts = [
+            _matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
+            _matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
+            _matrix((450, 486), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
+        ]
+        if "K" in shown:
+            parts.append(_matrix((580, 360), "K, intrinsics [px]", n["K"], 1))
+        if "chain" in shown:
+            parts.append(self._chain())
+        return "".join([*parts, self._your_numbers()])
+
+    def _your_numbers(self) -> str:
+        """The reader's centre and its distance from the right one, or why there is none."""
+        if self.yours is None:
+            return ""
+        (centre, problem), x, y = self.your_centre, 580, 324
+        if problem:
+            return svg.paragraph((x, y), problem, 360)
+        away = float(np.linalg.norm(centre - self.camera.centre))
+        where = svg.text((x, y), f"your C: {_row(centre)} m", "label orange")
+        return where + svg.text((x, y + 18), f"{away:.2f} m from the camera", "label orange")
 
     def _chain(self) -> str:
         """One point, step by step."""

@@ -20,7 +20,7 @@ from camviz.views.base import View, choice, slider, switch
 
 _TURN: dict[str, Any] = {"low": -40.0, "high": 40.0, "step": 0.5, "unit": "°"}
 _OF_THE_POINT = {"u", "v", "depth", "noise", "matches", "normalised", "truth", "eye"}  # the cameras stand still
-_OF_THE_CAMERAS = {"left", "right", "baseline", "F", "drawn"}
+_OF_THE_CAMERAS = {"left", "right", "baseline", "F", "your_F", "drawn"}
 _STAND = RigidTransform.from_translation([-0.4, 0.0, 0.0])  # of the left camera in the garden
 _CAMERAS = {
     "perspective": Camera(Intrinsics.from_fov(640, 480, 65), Perspective()),

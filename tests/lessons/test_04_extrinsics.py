@@ -111,6 +111,21 @@ def test_minus_t_is_right_only_for_t_on_the_axis(says, rng):
     assert np.linalg.norm(-R.T @ axis) == pytest.approx(np.linalg.norm(axis))
 
 
+def test_one_camera_by_hand(says):
+    (yaw,) = says("With yaw 90° and t = (0, 0, 1)")
+    R = world_from_cam(yaw.value, 0, 0).T
+    np.testing.assert_allclose(R, [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-12)  # as the next cell has it
+    np.testing.assert_allclose(np.linalg.solve(R, [0, 0, -1]), [-1, 0, 0], atol=1e-12)
+
+
+def test_a_quarter_turn_about_z_by_hand(says):
+    says("It takes the x axis to the y axis.")
+    k = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 0]])
+    R = np.eye(3) + k + k @ k
+    np.testing.assert_allclose(R, about([0, 0, 1], np.pi / 2), atol=1e-12)
+    np.testing.assert_allclose(R @ [1, 0, 0], [0, 1, 0])
+
+
 def test_what_one_moves_the_world_undoes(says):
     says("to the right: in front of the camera, the world goes to the left")
     says("Turn it to the right with **yaw**, and the world turns to the left about the camera.")
@@ -147,8 +162,8 @@ def test_looking_straight_up_yaw_and_roll_are_one(says):
 
 def test_near_the_lock_the_two_differ_less_and_less(says):
     at, back, there, off, near = says(
-        "At pitch 90°, move yaw, then roll, and watch R. Then take pitch back to 60° and do it again. Notice that "
-        "at 90° the two sliders change R in the same way, in opposite directions: two sliders, one freedom. At 60° "
+        "At pitch 90°, move yaw, then roll, and watch R. Then take pitch back to 60° and do it again. "
+        "At 90° the two sliders change R in the same way, in opposite directions: two sliders, one freedom. At 60° "
         "they differ. The nearer you come to 90°, the less they do."
     )
     assert at.value == there.value == near.value
@@ -229,7 +244,7 @@ def test_the_same_three_angles_in_another_order(says):
 
 def test_four_by_four(says):
     square = [*says(
-        "it is: a 4×4 [homogeneous transformation"
+        "and their matrices are 4×4:"
     ), *says("Other 4×4 matrices scale, shear, mirror, or project:"),
               *says("shape (..., 4, 4)"), *says("What mends the 4×4 matrix cam_from_board")]  # fmt: skip
     assert {one.value for one in square} == {len("xyz") + 1}
@@ -346,7 +361,7 @@ def corners_found(path):
 
 def test_the_published_rows(says, calibration):
     (pictures,) = says("a calibration made of 13 photographs of a board")
-    (again,) = says("find out where a camera stood before a board in 13 pictures")
+    (again,) = says("find with your own functions where a camera stood in 13 pictures of a board")
     poses = calibration.getNode("extrinsic_parameters").mat()
     assert pictures.value == again.value == len(poses) == calibration.getNode("nframes").real()
     source = next(cell.source for cell in notebooks.read(LESSON).cells if cell.source.startswith("published ="))
