@@ -56,6 +56,7 @@ _SLOTS: dict[str, tuple[dict[str, tuple[float, ...]], int]] = {  # where panels 
 }  # fmt: skip
 _ALL = "space doughnut window section unrolled"
 _GROUND = 1.2  # metres from the viewpoint down to the grid of the reader's own
+_AWAY = 2.5  # metres to what a window shows, for a function that takes its distance for 1
 
 
 @dataclass(frozen=True)
@@ -259,6 +260,10 @@ class OmnidirectionalView(View):
     def _slot(self, name: str) -> tuple[float, ...]:
         return _SLOTS[self.panels][0][name]
 
+    def _box(self, name: str, width: int, height: int) -> Panel:
+        x, y, across = self._slot(name)[:3]
+        return image_panel(name, x, y, across, width, height)
+
     def _seen(self, draft: bool) -> Camera:
         return self.window(112 if draft else 320)
 
@@ -270,7 +275,8 @@ class OmnidirectionalView(View):
     # The panels ------------------------------------------------------------------------------------------------------
 
     def _space_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = space_panel("space", *self._slot("space"))
+        x, y, width, height = self._slot("space")
+        panel = space_panel("space", x, y, width, height)
         small = cv2.resize(picture, (128, 128), interpolation=cv2.INTER_AREA)
         items = in_space(self.rig, small, self.looking, draft=draft)
         content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer="wire")
@@ -281,7 +287,7 @@ class OmnidirectionalView(View):
 
     @property
     def _doughnut_box(self) -> Panel:
-        return image_panel("doughnut", *self._slot("doughnut"), _FINE, _FINE)
+        return self._box("doughnut", _FINE, _FINE)
 
     def _doughnut_panel(self) -> str:
         panel, camera = self._doughnut_box, self.camera(_FINE)
@@ -307,7 +313,7 @@ class OmnidirectionalView(View):
         )
 
     def _window_panel(self) -> str:
-        panel = image_panel("window", *self._slot("window"), 320, 240)
+        panel = self._box("window", 320, 240)
         label = "The virtual pan-tilt-zoom window; drag or press the arrow keys to look around, + and - to zoom"
         seen = photograph(panel, "window", 320, 240)
         return panel.show(seen, title="A window in it", hint="drag to look around", drag="window", label=label)
@@ -351,11 +357,11 @@ class OmnidirectionalView(View):
 
     # The reader's own function ---------------------------------------------------------------------------------------
 
-    def _your_pixels(self, rays: Array) -> tuple[Array, str]:
-        """Where the reader's function puts world directions (..., 3) in the doughnut, and what is wrong with it."""
+    def _your_pixels(self, garden_points: Array) -> tuple[Array, str]:
+        """Where the reader's function puts points (..., 3) of the garden in the doughnut, and what is wrong with it."""
         if self.yours is None:
-            return np.full((*rays.shape[:-1], 2), np.nan), "No function of yours has been given."
-        points = rays @ np.asarray(UP.inv().as_matrix()[:3, :3]).T
+            return np.full((*garden_points.shape[:-1], 2), np.nan), "No function of yours has been given."
+        points = garden_points @ np.asarray(UP.inv().as_matrix()[:3, :3]).T
         xy, problem = tried(self.yours, (points, self._xi), points[..., :2])
         uv = self.camera(_FINE).intrinsics.to_pixels(xy)
         return np.where(np.abs(uv) < 5 * _FINE, uv, np.nan), problem
@@ -376,8 +382,8 @@ class OmnidirectionalView(View):
 
     def _your_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
         """The window once more, every pixel of it looked up where the reader's function says."""
-        panel = image_panel("yours", *self._slot("yours"), 320, 240)
-        uv, problem = self._your_pixels(self._seen(draft).rays())
+        panel = self._box("yours", 320, 240)
+        uv, problem = self._your_pixels(_AWAY * self._seen(draft).rays())
         if problem:
             return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
         places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (picture.shape[1] / _FINE) - 0.5
