@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from camviz.exercises import exercises
 from camviz.scenes import snapshot, textured_scene
 from camviz.views.fisheye import EQUATIONS, LENSES, FisheyeView
 
@@ -90,3 +91,42 @@ def test_every_control_changes_the_picture_at_both_ends(draft):
         assert EQUATIONS[state.projection] in picture.description
         assert "nan" not in picture.body
     assert len(shown) == len(states) + 1
+
+
+WITH_YOURS = "picture window curves yours"
+
+
+def shown(view, name, draft):
+    return cv2.imdecode(np.frombuffer(view.figure(draft=draft).photographs[name], np.uint8), cv2.IMREAD_COLOR)
+
+
+@pytest.mark.parametrize("draft", [True, False])
+@pytest.mark.parametrize("yaw", [35.0, 100.0])
+def test_a_right_function_of_the_reader_s_cuts_the_same_window(draft, yaw):
+    right = exercises("09")["09.equidistant"].reference
+    view = FisheyeView(panels=WITH_YOURS, yours=right, yaw_deg=yaw)
+    apart = np.abs(shown(view, "window", draft).astype(int) - shown(view, "yours", draft)).max(axis=-1)
+    assert np.mean(apart > 30) < 0.02  # but for the rim of the round picture
+    assert "0.524 1.047 1.571" in view.figure(draft=True).body.split(">yours<")[-1]
+
+
+def test_a_wrong_one_cuts_another_and_none_leaves_a_sentence():
+    exercise = exercises("09")["09.equidistant"]
+    for known in exercise.misconceptions:
+        if known.function.__name__ == "principal_point_swapped":
+            continue  # the picture's middle has cx = cy
+        view = FisheyeView(panels=WITH_YOURS, yours=known.function, yaw_deg=75.0)
+        apart = np.abs(shown(view, "window", True).astype(int) - shown(view, "yours", True)).max(axis=-1)
+        assert np.mean(apart > 30) > 0.02, known.explanation
+    picture = FisheyeView(panels=WITH_YOURS, yours=lambda points, f, cx, cy: None).figure(draft=True)
+    assert "returns nothing yet" in picture.body
+    assert "yours" not in picture.photographs
+
+
+def test_few_panels_tell_only_their_own_figures():
+    curves, window = (FisheyeView(panels=panels).figure(draft=True) for panels in ("picture curves", "picture window"))
+    assert "window" not in curves.photographs
+    assert "window looks" not in curves.description
+    assert "pixels a degree" not in window.description
+    with pytest.raises(ValueError, match="panels must be one of"):
+        FisheyeView(panels="picture")

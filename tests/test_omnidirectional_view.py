@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from camviz.exercises import exercises
 from camviz.lenses import UnifiedSphere
 from camviz.reprojection import reproject
 from camviz.scenes import snapshot, textured_scene
@@ -109,3 +110,40 @@ def test_the_description_states_the_state():
 def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
         OmnidirectionalView(**bad)
+
+
+WITH_YOURS = "doughnut window section yours"
+
+
+def shown(view, name, draft):
+    return cv2.imdecode(np.frombuffer(view.figure(draft=draft).photographs[name], np.uint8), cv2.IMREAD_COLOR)
+
+
+@pytest.mark.parametrize("draft", [True, False])
+@pytest.mark.parametrize("xi", [0.3, 0.8, 1.0])
+def test_a_right_function_of_the_reader_s_cuts_the_same_window(draft, xi):
+    right = exercises("10")["10.project"].reference
+    view = OmnidirectionalView(panels=WITH_YOURS, yours=right, xi=xi, pitch_deg=-20)
+    apart = np.abs(shown(view, "window", draft).astype(int) - shown(view, "yours", draft)).max(axis=-1)
+    assert np.mean(apart > 30) < 0.02  # but for the rims of the mirror and of the camera's own hole
+
+
+def test_a_wrong_one_cuts_another_and_none_leaves_a_sentence():
+    alike = {"mirror_images_kept", "zero_for_no_image", "divided_by_the_size"}  # where the mirror shows something
+    for known in exercises("10")["10.project"].misconceptions:
+        if known.function.__name__ in alike:
+            continue
+        view = OmnidirectionalView(panels=WITH_YOURS, yours=known.function, xi=0.8, pitch_deg=0)
+        apart = np.abs(shown(view, "window", True).astype(int) - shown(view, "yours", True)).max(axis=-1)
+        assert np.mean(apart > 30) > 0.02, known.explanation
+    picture = OmnidirectionalView(panels=WITH_YOURS, yours=lambda points, xi: None).figure(draft=True)
+    assert "returns nothing yet" in picture.body
+    assert "yours" not in picture.photographs
+
+
+def test_before_the_first_question_nothing_names_the_mirror():
+    picture = OmnidirectionalView(panels="doughnut window").figure(draft=True)
+    assert "hyperbolic" not in picture.body + picture.description
+    assert "viewpoint" not in picture.body + picture.description
+    with pytest.raises(ValueError, match="panels must be one of"):
+        OmnidirectionalView(panels="doughnut")

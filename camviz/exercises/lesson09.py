@@ -336,8 +336,8 @@ ANGLE = Exercise(
     tolerance=1e-7,
     shown=((np.array([0.5, 1.0]), 0.02, 0.001),),
     hints=(
-        "Part 3 inverts a polynomial of this kind. Improve a first guess of θ step by step, then put θ back into the "
-        "polynomial and see whether the radius comes out. Which angles can a ray have at all?",
+        "The three steps above do this for one coefficient. Improve a first guess of θ step by step, then put θ back "
+        "into the polynomial and see whether the radius comes out. Which angles can a ray have at all?",
         "Begin at θ = radius. Newton's step subtracts (what θ gives − radius) / (the slope at θ); twenty or thirty "
         "steps are plenty. The slope is the derivative of θ + k1 θ³ + k2 θ⁵. In the end `np.where(condition, theta, "
         "np.nan)` keeps what lies in 0 … π.",

@@ -1,12 +1,17 @@
-"""The fisheye visualizer: five projections side by side, the picture one of them makes, and a window cut out of it."""
+"""The fisheye visualizer: five projections side by side, the picture one of them makes, and a window cut out of it.
+
+A reader's own projection can draw its curve, its grid and the window beside the right ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import asin, atan2, cos, degrees, pi, radians, sin
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
+import cv2
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
@@ -21,6 +26,7 @@ from camviz.reprojection import reproject, window
 from camviz.views import garden
 from camviz.views.base import View, choice, slider
 from camviz.views.marks import on_photograph
+from camviz.yours import tried
 
 SIDE = 480  # pixels of the picture, which is square
 
@@ -48,11 +54,36 @@ _COLOURS = {
 _LAST = {"equidistant": 180.0, "equisolid": 180.0, "stereographic": 180.0, "orthographic": 90.0, "perspective": 90.0}
 _TOP = 3.4  # focal lengths shown by the curves
 _INFINITE = 1e6  # focal lengths: tan 90° as rounded numbers have it
+_TABLED = np.radians([30.0, 60.0, 90.0])
+_FAR = 5 * SIDE  # pixels: what a reader's function puts farther out is not drawn
+_GREY = (69, 69, 69)  # of what a picture does not show
+_SLOTS = {  # where panels stand, (x, y, width, height), by which there are; then the figure's height
+    "picture curves": ({"picture": (20, 34, 330, 330), "curves": (425, 34, 320, 290)}, 390),
+    "picture window": ({"picture": (20, 34, 330, 330), "window": (375, 34, 375, 281)}, 390),
+    "picture window curves rays": (
+        {"picture": (20, 34, 320, 320), "window": (365, 34, 360, 270), "curves": (70, 400, 400, 160),
+         "rays": (500, 370, 250, 220)},
+        610,
+    ),
+    "picture window curves yours": (
+        {"picture": (20, 34, 320, 320), "window": (365, 34, 360, 270), "curves": (70, 400, 270, 190),
+         "yours": (365, 344, 360, 270)},
+        650,
+    ),
+}  # fmt: skip
+_TOLD = {  # the figures that few panels speak of
+    "picture curves": ("across the picture", "a ray at 90° lands at", "pixels a degree, 0°", "pixels a degree, 80°"),
+    "picture window": ("across the picture", "window's middle"),
+}
 
 
 @dataclass(frozen=True)
 class FisheyeView(View):
-    """What a fisheye does to the angle of a ray, and that a straight picture can be cut out of its round one."""
+    """What a fisheye does to the angle of a ray, and that a straight picture can be cut out of its round one.
+
+    `panels` names what is drawn: "picture curves", "picture window", or both and "rays" or "yours". `yours` is a
+    reader's function of (points, f, cx, cy), camera-frame points (..., 3) to pixels (..., 2); what it does is orange.
+    """
 
     title: ClassVar[str] = "Fisheye"
 
@@ -63,7 +94,14 @@ class FisheyeView(View):
     yaw_deg: float = slider(35.0, -180.0, 180.0, 1.0, label="window yaw", unit="°", help="to the right")
     pitch_deg: float = slider(-20.0, -90.0, 90.0, 1.0, label="window pitch", unit="°", help="up")
     hfov_deg: float = slider(80.0, 20.0, 120.0, 1.0, label="window's field", unit="°", help="of the perspective window")
+    panels: str = "picture window curves rays"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     eye: Eye = Eye(target=(0.0, 0.0, 0.2), distance=4.4, yaw_deg=-40, pitch_deg=22)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.panels not in _SLOTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
 
     # Cameras ---------------------------------------------------------------------------------------------------------
 
@@ -107,79 +145,152 @@ class FisheyeView(View):
             "window's middle": f"({u:.0f}, {v:.0f}) px" if np.isfinite([u, v]).all() else "has no image",
         }
 
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        figures = self.numbers()
+        return {name: figures[name] for name in _TOLD.get(self.panels, figures)}
+
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
-        return (
-            f"{self.projection}, {EQUATIONS[self.projection]}, f = {self.f:g} px: {figures}. The window looks "
-            f"{self.yaw_deg:.0f}° to the right and {self.pitch_deg:.0f}° up and is {self.hfov_deg:.0f}° wide."
-        ).replace("-", "−")
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        window = (
+            f" The window looks {self.yaw_deg:.0f}° to the right and {self.pitch_deg:.0f}° up "
+            f"and is {self.hfov_deg:.0f}° wide."
+        )
+        words = f"{self.projection}, {EQUATIONS[self.projection]}, f = {self.f:g} px: {figures}."
+        return (words + window * self._has("window")).replace("-", "−")
+
+    def _has(self, panel: str) -> bool:
+        return panel in self.panels.split()
 
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        side = garden.DRAFT if draft else garden.FINE
-        image, taken = _photographed(self.camera, side)
-        small = Camera(self.camera.intrinsics.within(side), self.camera.lens)
-        seen = (
-            self.window
-            if not draft
-            else Camera(self.window.intrinsics.resized(160, 120), self.window.lens, self.window.world_from_cam)
-        )
-        cut = reproject(image, small, seen, antialias=False)
-        dome, photographs = self._dome_panel(draft)
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 610, "paper"),
-                self._picture_panel(),
-                self._window_panel(),
-                self._curves_panel(),
-                dome,
-                self._numbers_column(),
-            ]
-        )
-        photographs |= {"fisheye": taken, "window": jpeg(cut)}
-        return Picture(body, 960, 610, self.title, self.description(), photographs)
+        slots, height = _SLOTS[self.panels]
+        image, taken = _photographed(self.camera, garden.DRAFT if draft else garden.FINE)
+        photographs = {"fisheye": taken}
+        body = [svg.rectangle(0, 0, 960, height, "paper"), self._picture_panel()]
+        if self._has("window"):
+            photographs["window"] = jpeg(self._cut(image, draft))
+            body.append(self._window_panel())
+        if self._has("curves"):
+            body.append(self._curves_panel(*slots["curves"]))
+        if self._has("rays"):
+            dome, attached = self._dome_panel(*slots["rays"], draft=draft)
+            photographs |= attached
+            body.append(dome)
+        if self._has("yours"):
+            yours, attached = self._your_panel(*slots["yours"], image, draft=draft)
+            photographs |= attached
+            body.append(yours)
+        body.append(self._numbers_column())
+        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+
+    def _cut(self, image: np.ndarray, draft: bool) -> np.ndarray:
+        """The window's picture, cut out of the fisheye's `image`, which is as small as a draft is."""
+        small = Camera(self.camera.intrinsics.within(image.shape[1]), self.camera.lens)
+        return np.asarray(reproject(image, small, self._seen(draft), antialias=False))
+
+    def _seen(self, draft: bool) -> Camera:
+        seen = self.window
+        return Camera(seen.intrinsics.resized(160, 120), seen.lens, seen.world_from_cam) if draft else seen
 
     @cached_property
     def _panel(self) -> Panel:
-        return image_panel("fisheye", 20, 34, 320, SIDE, SIDE)
+        x, y, width, _ = _SLOTS[self.panels][0]["picture"]
+        return image_panel("fisheye", x, y, width, SIDE, SIDE)
 
     def _picture_panel(self) -> str:
         panel = self._panel
+        content = photograph(panel, "fisheye", SIDE, SIDE) + self._grid_lines(panel)
+        title = f"The {self.projection} lens"
+        if not self._has("window"):
+            return panel.show(content, title=title)
         outline = self.camera.project(self.window.unproject(self.window.intrinsics.border(16)))
         edges = np.vstack([outline, outline[:1]])
         far = np.linalg.norm(np.diff(edges, axis=0, append=edges[:1]), axis=-1) > SIDE / 2  # once round the back
         edges[far] = np.nan
-        content = photograph(panel, "fisheye", SIDE, SIDE) + on_photograph([panel.place(edges)], "yellow thick")
+        content += on_photograph([panel.place(edges)], "yellow thick")
         label = "The fisheye's picture; drag it, or press the arrow keys, to move the window; plus and minus zoom"
-        title = f"Through the {self.projection} lens"
         return panel.show(content, title=title, hint="drag the window", drag="window", label=label)
 
     def _window_panel(self) -> str:
-        panel = image_panel("cut", 365, 34, 360, 320, 240)
+        x, y, width, _ = _SLOTS[self.panels][0]["window"]
+        panel = image_panel("cut", x, y, width, 320, 240)
         note = f"perspective, {self.hfov_deg:.0f}° wide"
         return panel.show(photograph(panel, "window", 320, 240), title="The window cut out of it", note=note)
 
-    def _curves_panel(self) -> str:
-        panel = plot.plot_panel("curves", 70, 400, 400, 160, (0, 180), (0, _TOP))
+    def _curves_panel(self, x: float, y: float, width: float, height: float) -> str:
+        panel = plot.plot_panel("curves", x, y, width, height, (0, 180), (-1.8 if self.yours else 0, _TOP))
         edge = SIDE / 2 / self.f
         drawn = plot.grid(panel) + plot.upright(panel, 90, "muted dashed")
         drawn += svg.line(panel.place([(0, edge), (180, edge)]), "green dashed") if edge < _TOP else ""
-        for name in sorted(LENSES, key=lambda name: name == self.projection):
+        names = sorted(LENSES, key=lambda name: name == self.projection) if not self.yours else [self.projection]
+        for name in names:
             theta = np.linspace(0, _LAST[name], 181)
             drawn += plot.curve(
                 panel, theta, self.radius(np.radians(theta), name), f"{_COLOURS[name]} {self._weight(name)}"
             )
-        drawn += "".join(self._name(panel, name) for name in LENSES)
+        drawn += self._your_curve(panel) if self.yours else "".join(self._name(panel, name) for name in names)
         drawn += (
             svg.text(panel.place((2, edge)) + (0, -6), "edge of the picture", "green halo")
-            if edge < 0.92 * _TOP
+            if edge < 0.92 * _TOP and not self.yours
             else ""
         )
         return plot.axes(panel, "θ, angle from the axis [°]", "r / f") + panel.show(
             drawn, title="How far from the middle", note=EQUATIONS[self.projection]
         )
+
+    # The reader's own function ---------------------------------------------------------------------------------------
+
+    def _your_pixels(self, points: Array) -> tuple[Array, str]:
+        """Where the reader's function puts camera-frame points (..., 3), and what is wrong with it."""
+        if self.yours is None:
+            return np.full((*points.shape[:-1], 2), np.nan), "No function of yours has been given."
+        k = self.camera.intrinsics
+        uv, problem = tried(self.yours, (points, k.fx, k.cx, k.cy), points[..., :2])
+        return np.where(np.abs(uv) < _FAR, uv, np.nan), problem
+
+    def _grid_lines(self, panel: Panel) -> str:
+        """Circles every 30° around the axis, and twelve lines out from it: where they land, and by the reader's own."""
+        if not self.yours:
+            return ""
+        turn = np.linspace(0.01, 2 * pi + 0.01, 73)
+        reach = np.radians(np.linspace(2, min(self.half_field_deg(), 150), 73))
+        circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        lines = np.array(
+            [_ring(circle, radians(theta)) for theta in (30, 60, 90)]
+            + [_meridian(reach, around) for around in np.linspace(0.01, 2 * pi + 0.01, 13)[:-1]]
+        )
+        yours, _ = self._your_pixels(lines)
+        return svg.path(panel.place(self.camera.project(lines)), "yellow thin") + svg.path(
+            panel.place(yours), "orange dashed"
+        )
+
+    def _your_curve(self, panel: Panel) -> str:
+        """r/f by the reader's function, of rays to the right, and what the lines are."""
+        theta = np.linspace(1, 179, 179)  # neither on the axis nor straight behind, where no direction is told
+        entries = [(_COLOURS[self.projection], self.projection), ("orange dashed", "yours"), ("green dashed", "edge")]
+        drawn = plot.curve(panel, theta, self._your_radius(np.radians(theta)), "orange dashed thick")
+        return drawn + plot.legend(panel, entries)
+
+    def _your_radius(self, theta: Array) -> Array:
+        """r/f (...) by the reader's function of rays to the right, `theta` (...) radians from the axis."""
+        uv, _ = self._your_pixels(_meridian(theta, 0.0))
+        return (uv[..., 0] - self.camera.intrinsics.cx) / self.f
+
+    def _your_panel(
+        self, x: float, y: float, width: float, height: float, image: np.ndarray, *, draft: bool
+    ) -> tuple[str, dict[str, bytes]]:
+        """The window once more, every pixel of it looked up where the reader's function says."""
+        panel = image_panel("yours", x, y, width, 320, 240)
+        seen = self._seen(draft)
+        uv, problem = self._your_pixels(seen.rays())
+        if problem:
+            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
+        places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (image.shape[1] / SIDE) - 0.5
+        cut = cv2.remap(image, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=_GREY)
+        return panel.show(photograph(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
     def _weight(self, name: str) -> str:
         return "thick" if name == self.projection else "half"
@@ -198,8 +309,10 @@ class FisheyeView(View):
 
     # The dome --------------------------------------------------------------------------------------------------------
 
-    def _dome_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = space_panel("dome", 500, 370, 250, 220)
+    def _dome_panel(
+        self, x: float, y: float, width: float, height: float, *, draft: bool
+    ) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("dome", x, y, width, height)
         content, photographs = draw_space(panel, self._rays(), self.eye, draft=draft, renderer="wire")
         label = "The rays in space; drag or press the arrow keys to walk around"
         return panel.show(content, title="Its rays", hint="drag to turn", drag="eye", label=label), photographs
@@ -227,17 +340,27 @@ class FisheyeView(View):
         x = 775
         rows = [svg.text((x, 26), "This lens", "title"), svg.text((x, 50), EQUATIONS[self.projection], "label")]
         rows.append(svg.text((x, 70), f"f = {self.f:g} px", "label"))
-        for i, (name, value) in enumerate(self.numbers().items()):
+        for i, (name, value) in enumerate(self._told().items()):
             rows.append(svg.text((x, 104 + 42 * i), name, "note"))
             rows.append(svg.text((x, 121 + 42 * i), value, "label"))
+        if self.panels in _TOLD:
+            return "".join(rows)
         rows.append(svg.text((x, 394), "r / f at 30°, 60°, 90°", "title"))
-        for i, name in enumerate(LENSES):
-            values = self.radius(np.radians([30.0, 60.0, 90.0]), name)
-            words = " ".join(f"{value:.3f}" if np.isfinite(value) else "    ∞" for value in values)
-            strong = "" if name == self.projection else " half"
-            rows.append(svg.text((x, 420 + 36 * i), name, f"{_COLOURS[name]}{strong}"))
-            rows.append(svg.text((x, 436 + 36 * i), words, f"number{strong}"))
+        radii = {name: self.radius(_TABLED, name) for name in ([self.projection] if self.yours else LENSES)}
+        for i, (name, values) in enumerate(
+            (radii | ({"yours": self._your_radius(_TABLED)} if self.yours else {})).items()
+        ):
+            strong = "" if name in (self.projection, "yours") else " half"
+            colour = _COLOURS.get(name, "orange")
+            rows.append(svg.text((x, 420 + 36 * i), name, f"{colour}{strong}"))
+            rows.append(
+                svg.text((x, 436 + 36 * i), self._tabled(name, values), f"number {colour * (name == 'yours')}{strong}")
+            )
         return "".join(rows)
+
+    def _tabled(self, name: str, values: Array) -> str:
+        missing = "    –" if name == "yours" else "    ∞"
+        return " ".join(f"{value:.3f}" if np.isfinite(value) else missing for value in values).replace("-", "−")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 

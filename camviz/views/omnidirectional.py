@@ -1,8 +1,12 @@
-"""The omnidirectional visualizer: a camera in a mirror, its doughnut of a picture, unrolled, and a window in it."""
+"""The omnidirectional visualizer: a camera in a mirror, its doughnut of a picture, unrolled, and a window in it.
+
+A reader's own projection can bend the grid on the picture and cut the window out of it, beside the right ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import degrees, isfinite
 from typing import Any, ClassVar, Self
@@ -27,6 +31,7 @@ from camviz.views import garden
 from camviz.views.base import View, choice, slider
 from camviz.views.marks import on_photograph
 from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
+from camviz.yours import tried
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
 UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))
@@ -35,6 +40,23 @@ _GREY = (69, 69, 69)  # of what a picture does not show
 _COUNTED = 400  # pixels across the picture whose focal length is told
 _OF_THE_WINDOW = {"yaw_deg", "pitch_deg", "hfov_deg", "unroll", "model", "eye"}  # the mirror stands still
 _OF_THE_MIRROR = {"rig", "central", "lens", "rim_angle_deg", "missed_mm", "_doughnuts"}
+_SLOTS: dict[str, tuple[dict[str, tuple[float, ...]], int]] = {  # where panels stand, and the figure's height
+    "doughnut window": ({"doughnut": (20, 34, 330), "window": (375, 34, 385)}, 390),
+    "doughnut section": ({"doughnut": (20, 34, 330), "section": (380, 34, 370, 330)}, 390),
+    "space doughnut window section unrolled": (
+        {"space": (20, 34, 280, 270), "doughnut": (320, 34, 270), "window": (610, 34, 330),
+         "section": (20, 340, 280, 250), "unrolled": (320, 340, 440, 250)},
+        614,
+    ),
+    "doughnut window section yours": (
+        {"doughnut": (20, 34, 320), "window": (365, 34, 360), "section": (20, 386, 320, 250),
+         "yours": (365, 344, 360)},
+        656,
+    ),
+}  # fmt: skip
+_ALL = "space doughnut window section unrolled"
+_GROUND = 1.2  # metres from the viewpoint down to the grid of the reader's own
+_AWAY = 2.5  # metres to what a window shows, for a function that takes its distance for 1
 
 
 @dataclass(frozen=True)
@@ -43,6 +65,9 @@ class OmnidirectionalView(View):
 
     A hyperbolic mirror has the shape that goes with `xi`; at 0 it is flat, at 1 it is the parabolic one. The camera
     stands in its second focus, or `shift_mm` below. The middle of the picture is straight down, its top ahead.
+    `panels` names what is drawn: "doughnut window", "doughnut section", "doughnut window section yours" or all five.
+    `yours` is a reader's function of (points, ξ), points (..., 3) in the picture's frame, z towards its middle, to
+    image points (..., 2) in focal lengths; what it does is orange.
     """
 
     title: ClassVar[str] = "Omnidirectional camera"
@@ -58,7 +83,14 @@ class OmnidirectionalView(View):
     hfov_deg: float = slider(64.0, 20.0, 120.0, 1.0, label="zoom: field of view", unit="°")
     unroll: str = choice("equirectangular", "cube map", help="the same picture, rolled out or folded")
     model: str = choice("mirror", "sphere", label="drawn as", help="cut along the axis: the mirror, or the sphere")
+    panels: str = _ALL
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     eye: Eye = Eye(target=(0.0, 0.3, 0.0), distance=2.7, yaw_deg=75, pitch_deg=12)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.panels not in _SLOTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
 
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed; what depends on the mirror alone is kept while the window turns."""
@@ -149,10 +181,22 @@ class OmnidirectionalView(View):
         f = self.camera(_COUNTED).intrinsics.fx
         return f"u = {f:.1f} X / (Z + {self._xi:g} D), of {_COUNTED} pixels across the doughnut"
 
+    def _has(self, panel: str) -> bool:
+        return panel in self.panels.split()
+
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        figures = self.numbers()
+        if not self._has("section"):
+            return {name: figures[name] for name in ("window looks", "window is")}
+        return {name: text for name, text in figures.items() if self._has("window") or not name.startswith("window")}
+
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
-        return f"A camera looks up into a {self.mirror} mirror: {figures}. The picture is unrolled as {self.unroll}."
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        kind = f"{self.mirror} mirror" if self._has("section") else "mirror"
+        unrolled = f" The picture is unrolled as {self.unroll}." if self._has("unrolled") else ""
+        return f"A camera looks up into a {kind}: {figures}.{unrolled}"
 
     # The pictures ----------------------------------------------------------------------------------------------------
 
@@ -188,21 +232,40 @@ class OmnidirectionalView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         side = _DRAFT if draft else _FINE
         picture, camera = self.doughnut(side, draft=draft), self.camera(side)
-        space, photographs = self._space_panel(picture, draft)
-        photographs["doughnut"] = jpeg(picture)
-        photographs["window"] = jpeg(_resampled(picture, camera, self.window(112 if draft else 320), draft))
-        photographs["unrolled"] = jpeg(_resampled(picture, camera, self._unrolled(draft), draft))
-        body = [
-            svg.rectangle(0, 0, 960, 614, "paper"),
-            space,
-            self._doughnut_panel(),
-            self._window_panel(),
-            self._section_panel(),
-            self._unrolled_panel(),
-            self._numbers_column(),
-            svg.text((320, 606), self.equation(), "note"),
-        ]
-        return Picture("".join(body), 960, 614, self.title, self.description(), photographs)
+        photographs = {"doughnut": jpeg(picture)}
+        body = [svg.rectangle(0, 0, 960, self._height, "paper"), self._doughnut_panel()]
+        if self._has("space"):
+            space, attached = self._space_panel(picture, draft)
+            photographs |= attached
+            body.append(space)
+        if self._has("window"):
+            photographs["window"] = jpeg(_resampled(picture, camera, self._seen(draft), draft))
+            body.append(self._window_panel())
+        if self._has("section"):
+            body.append(self._section_panel())
+        if self._has("unrolled"):
+            photographs["unrolled"] = jpeg(_resampled(picture, camera, self._unrolled(draft), draft))
+            body += [self._unrolled_panel(), svg.text((320, 606), self.equation(), "note")]
+        if self._has("yours"):
+            yours, attached = self._your_panel(picture, draft)
+            photographs |= attached
+            body.append(yours)
+        body.append(self._numbers_column())
+        return Picture("".join(body), 960, self._height, self.title, self.description(), photographs)
+
+    @property
+    def _height(self) -> int:
+        return _SLOTS[self.panels][1]
+
+    def _slot(self, name: str) -> tuple[float, ...]:
+        return _SLOTS[self.panels][0][name]
+
+    def _box(self, name: str, width: int, height: int) -> Panel:
+        x, y, across = self._slot(name)[:3]
+        return image_panel(name, x, y, across, width, height)
+
+    def _seen(self, draft: bool) -> Camera:
+        return self.window(112 if draft else 320)
 
     def _unrolled(self, draft: bool) -> Camera:
         if self.unroll == "cube map":
@@ -212,7 +275,8 @@ class OmnidirectionalView(View):
     # The panels ------------------------------------------------------------------------------------------------------
 
     def _space_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = space_panel("space", 20, 34, 280, 270)
+        x, y, width, height = self._slot("space")
+        panel = space_panel("space", x, y, width, height)
         small = cv2.resize(picture, (128, 128), interpolation=cv2.INTER_AREA)
         items = in_space(self.rig, small, self.looking, draft=draft)
         content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer="wire")
@@ -223,20 +287,23 @@ class OmnidirectionalView(View):
 
     @property
     def _doughnut_box(self) -> Panel:
-        return image_panel("doughnut", 320, 34, 270, _FINE, _FINE)
+        return self._box("doughnut", _FINE, _FINE)
 
     def _doughnut_panel(self) -> str:
         panel, camera = self._doughnut_box, self.camera(_FINE)
-        frame = self.window()
+        frame, colour = self.window(), "yellow thick" if self.yours else "orange"
         outline = frame.unproject(frame.intrinsics.border(12))
         uv = camera.project(np.vstack([outline, outline[:1]]))
         turn = np.linspace(-np.pi, np.pi, 73)
         horizon = camera.project(np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=-1))
         seen = photograph(panel, "doughnut", _FINE, _FINE)
-        marks = svg.line(panel.place(horizon), "yellow dashed thin") + on_photograph([panel.place(uv)], "orange")
-        middle = camera.project(frame.extrinsics[0][2])
         words = svg.text((panel.width / 2, panel.height / 2 + 4), "camera", "note halo middle")
-        dot = svg.dots([panel.place(middle)], "orange", 8)
+        if not self._has("window"):
+            horizon_line = svg.line(panel.place(horizon), "yellow dashed thin")
+            return panel.show(seen + horizon_line + words, title="What it photographs", note="dashed: the horizon")
+        marks = self._grid_lines(panel) if self.yours else svg.line(panel.place(horizon), "yellow dashed thin")
+        marks += on_photograph([panel.place(uv)], colour)
+        dot = svg.dots([panel.place(camera.project(frame.extrinsics[0][2]))], colour.split()[0], 8)
         return panel.show(
             seen + marks + words + dot,
             title="What it photographs",
@@ -246,7 +313,7 @@ class OmnidirectionalView(View):
         )
 
     def _window_panel(self) -> str:
-        panel = image_panel("window", 610, 34, 330, 320, 240)
+        panel = self._box("window", 320, 240)
         label = "The virtual pan-tilt-zoom window; drag or press the arrow keys to look around, + and - to zoom"
         seen = photograph(panel, "window", 320, 240)
         return panel.show(seen, title="A window in it", hint="drag to look around", drag="window", label=label)
@@ -254,16 +321,23 @@ class OmnidirectionalView(View):
     def _section_panel(self) -> str:
         angle = degrees(np.arctan2(np.hypot(*self.looking[:2]), self.looking[2]))
         if self.model == "sphere" and self.central:
-            panel = Panel("section", 20, 340, 280, 250, -2.24, 2.24, -1.9, 2.1)
+            panel = self._section_box(2.1, -1.9)
             return panel.show(sphere(panel, self._xi, self.rim_angle_deg, angle), title="The same, as a sphere")
-        panel = Panel("section", 20, 340, 280, 250, -64, 64, -30, 84.3)
+        panel = self._section_box(84.3, -30.0)
         note = "" if self.model == "mirror" else "no sphere without one viewpoint"
         return panel.show(section(panel, self.rig, angle), title="Cut along the axis", note=note)
+
+    def _section_box(self, lowest: float, highest: float) -> Panel:
+        """The section's panel, downwards from `highest` to `lowest`, as wide as its shape makes it."""
+        x, y, width, height = self._slot("section")
+        half = (lowest - highest) * width / height / 2
+        return Panel("section", x, y, width, height, -half, half, highest, lowest)
 
     def _unrolled_panel(self) -> str:
         camera = self._unrolled(False)
         width, height = camera.intrinsics.width, camera.intrinsics.height
-        panel = image_panel("unrolled", 320, 340, 440, width, height, tallest=250)
+        x, y, across, tallest = self._slot("unrolled")
+        panel = image_panel("unrolled", x, y, across, width, height, tallest=tallest)
         frame = self.window()
         outline = frame.unproject(frame.intrinsics.border(24))
         uv = panel.place(camera.project(np.vstack([outline, outline[:1]])))
@@ -274,11 +348,47 @@ class OmnidirectionalView(View):
         return panel.show(seen + svg.line(uv, "orange"), title=title)
 
     def _numbers_column(self) -> str:
-        x, rows = 784, [svg.text((784, 332), "This camera", "title")]
-        for i, (name, figure) in enumerate(self.numbers().items()):
-            rows.append(svg.text((x, 354 + 38 * i), name, "note"))
-            rows.append(svg.text((x, 371 + 38 * i), figure, "label"))
+        x, y = 784, 332 if self.panels == _ALL else 26
+        rows = [svg.text((x, y), "This camera" if self._has("section") else "This window", "title")]
+        for i, (name, figure) in enumerate(self._told().items()):
+            rows.append(svg.text((x, y + 22 + 38 * i), name, "note"))
+            rows.append(svg.text((x, y + 39 + 38 * i), figure, "label"))
         return "".join(rows)
+
+    # The reader's own function ---------------------------------------------------------------------------------------
+
+    def _your_pixels(self, garden_points: Array) -> tuple[Array, str]:
+        """Where the reader's function puts points (..., 3) of the garden in the doughnut, and what is wrong with it."""
+        if self.yours is None:
+            return np.full((*garden_points.shape[:-1], 2), np.nan), "No function of yours has been given."
+        points = garden_points @ np.asarray(UP.inv().as_matrix()[:3, :3]).T
+        xy, problem = tried(self.yours, (points, self._xi), points[..., :2])
+        uv = self.camera(_FINE).intrinsics.to_pixels(xy)
+        return np.where(np.abs(uv) < 5 * _FINE, uv, np.nan), problem
+
+    def _grid_lines(self, panel: Panel) -> str:
+        """A square grid on level ground, and circles above it: where they land, and by the reader's function."""
+        along = np.linspace(-4, 4, 61)
+        across = [np.stack([along, 0 * along + _GROUND, 0 * along + z], axis=-1) for z in range(-4, 5, 2)]
+        lines = across + [line[:, ::-1] for line in across]  # x and z change places
+        turn = np.linspace(-np.pi, np.pi, 61)
+        rings = np.radians([90.0, self.rim_angle_deg - 6])
+        lines += [
+            np.stack([np.sin(a) * np.sin(turn), 0 * turn + np.cos(a), np.sin(a) * np.cos(turn)], -1) for a in rings
+        ]
+        yours, _ = self._your_pixels(np.array(lines))
+        right = self.camera(_FINE).project(np.array(lines))
+        return svg.path(panel.place(right), "yellow thin") + svg.path(panel.place(yours), "orange dashed")
+
+    def _your_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+        """The window once more, every pixel of it looked up where the reader's function says."""
+        panel = self._box("yours", 320, 240)
+        uv, problem = self._your_pixels(_AWAY * self._seen(draft).rays())
+        if problem:
+            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
+        places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (picture.shape[1] / _FINE) - 0.5
+        cut = cv2.remap(picture, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=_GREY)
+        return panel.show(photograph(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
     # The hands -------------------------------------------------------------------------------------------------------
 
@@ -286,7 +396,7 @@ class OmnidirectionalView(View):
         if handle == "orbit":
             return self.but(eye=self.eye.orbited(dx, dy))
         if handle == "window" or np.isnan(x):
-            per_unit = self.hfov_deg / 330
+            per_unit = self.hfov_deg / (self._slot("window")[2] if self._has("window") else 330)
             return self._looking(self.yaw_deg - per_unit * dx, self.pitch_deg + per_unit * dy)
         panel = self._doughnut_box
         ahead = self.camera(_FINE).unproject(panel.data((x - panel.x, y - panel.y)))

@@ -60,11 +60,11 @@ def test_the_lens_of_the_first_picture_sees_more_than_everything_in_front(says):
 
 
 def test_the_five_projections_near_the_axis_and_at_90_degrees(says):
-    says("near the axis they all agree")
+    says("Near the axis they all agree")
     for r in RADIUS.values():
         assert r(0.01) == pytest.approx(0.01, rel=1e-4)
     at_90 = {name: float(r(np.pi / 2)) for name, r in RADIUS.items()}
-    (right_angle,) = says("perspective alone runs off to infinity at 90°. f · tan θ diverges there; the others do not.")
+    (right_angle,) = says("Perspective alone runs off to infinity at 90°. f · tan θ diverges there; the others do not.")
     assert right_angle == 90
     assert [name for name, r in at_90.items() if r > 1e6] == ["perspective"]
     assert np.tan(np.radians(right_angle.value - 1e-6)) > 1e6
@@ -172,11 +172,15 @@ def test_opencv_s_omnidirectional_model_is_the_stereographic_projection(says):
 
 
 def test_the_published_lens(says):
-    f, cx, cy, width, height, across, folds, reach, y, z = says(
-        "f = 379 px, with the middle of the picture near (506, 510). A picture of 1024 × 1024 pixels then "
-        "reaches 155° from side to side. The polynomial folds at 112° from the axis, 1.75 focal lengths "
-        "from the middle. The picture's corners lie beyond that and are empty. A point at (1, 2, 5):"
+    f, cx, cy, width, height, across = says(
+        "It has f = 379 px, with the middle of the picture near (506, 510). A picture of 1024 × 1024 pixels then "
+        "reaches 155° from side to side."
     )
+    folds, reach, y, z = says(
+        "at 112° from the axis, 1.75 focal lengths from the middle. The picture's corners lie beyond that and are "
+        "empty. Here is a point at (1, 2, 5):"
+    )
+    assert height == width.value
     assert all(f == one for one in F)
     assert cx == C[0]
     assert cy == C[1]
@@ -190,7 +194,7 @@ def test_the_published_lens(says):
     point = np.array([1.0, y.value, z.value])
     theta = np.arctan2(np.hypot(*point[:2]), point[2])
     np.testing.assert_allclose(F * g(theta) * point[:2] / np.hypot(*point[:2]) + C, by_opencv(point), atol=1e-9)
-    off, pixels = says("the lens of part 3 keeps to the equidistant one within 2 px of 1024")
+    off, pixels = says("The lens of part 3 keeps to the equidistant one within 2 px of 1024")
     theta = np.linspace(0, max(sides), 1000)
     assert off == (F[0] * np.abs(g(theta) - theta)).max()
     assert pixels == width.value
@@ -221,7 +225,7 @@ def test_opencv_mirrors_what_is_behind(says):
     assert u.value > width.value
     says("OpenCV puts it into the picture, on the other side.")
     assert 0 < by_opencv(ray(np.radians(further.value)))[0] < C[0]
-    minus, one = says("atan cannot tell (1, −1) from (−1, 1)")
+    minus, one = says("atan(r/z) cannot tell (1, −1) from (−1, 1)")
     assert np.arctan(1 / minus.value) == np.arctan(one.value / 1)
     assert np.arctan2(1, minus.value) != np.arctan2(one.value, 1)
     (beyond,) = says("A fisheye may see beyond 90°, to points behind it:")
@@ -247,8 +251,8 @@ def test_the_first_guess_of_the_calibration(says):
 def test_the_boards_reached_62_degrees_and_there_the_powers_look_alike(says):
     reached, begin, end, beyond = says(
         "The boards reached 62° from the axis, and as far as that the curve is right to a small fraction of a pixel. "
-        "The single coefficients are not: θ³, θ⁵, θ⁷ and θ⁹ look much alike between 0° and 62°, so an error in one is "
-        "made up for by the others. Compare curves, never coefficients. Beyond the last corner, at 70°,"
+        "The single coefficients are not. θ³, θ⁵, θ⁷ and θ⁹ look much alike between 0° and 62°, so the others make up "
+        "for an error in one. Compare curves, never coefficients. Beyond the last corner, at 70°,"
     )
     seen = np.array([place.inv().apply(board_corners().reshape(-1, 3)) for place in around_board(10)])
     assert reached == np.degrees(np.arctan2(np.hypot(seen[..., 0], seen[..., 1]), seen[..., 2])).max()
@@ -263,7 +267,7 @@ def test_the_wall_of_the_astronaut(says):
     f = 256 / np.tan(np.radians(wide.value / 2))
     corner = np.degrees(np.arctan(np.hypot(255.5, 255.5) / f))
     assert corner < np.degrees(fold())  # the lens sees all of it
-    says("little is missing in the middle, much towards the corners")
+    says("Little is missing in the middle. Much is missing towards the corners")
     slope = (g(1e-4) - g(-1e-4)) / 2e-4
     at_50 = (g(np.radians(50) + 1e-4) - g(np.radians(50) - 1e-4)) / 2e-4
     covers = {0: f / (F[0] / 2 * slope), 50: f / np.cos(np.radians(50)) ** 2 / (F[0] / 2 * at_50)}
@@ -271,6 +275,8 @@ def test_the_wall_of_the_astronaut(says):
 
 
 def test_the_map_has_two_numbers_a_pixel(says):
+    (three,) = says("Write the pixels of any number of `points` (…, 3) all around the camera")
+    assert three == by_opencv(ray(1.0)).size + 1
     (two,) = says("The answer has shape (height, width, 2).")
     maps = cv2.fisheye.initUndistortRectifyMap(np.eye(3), np.zeros(4), np.eye(3), np.eye(3), (4, 3), cv2.CV_32FC1)
     assert two == np.stack(maps, axis=-1).shape[-1]
@@ -413,3 +419,65 @@ def test_before_the_lesson_one_lens_for_the_whole_horizon(says):
     assert side == reach.value
     assert spare == reach.value - horizon.value
     assert within == across.value
+def test_one_ray_by_hand_and_what_the_sliders_show(says):
+    (f,) = says("the distance from the middle, here r = f θ with f = 150 px;")
+    (more,) = says("The angle is more than 90°, because the point is behind the camera.")
+    width, height = says("Still it has a pixel in this picture of 480 × 480.")
+    point = np.array([1.0, -0.5, -0.2])
+    theta = np.arccos(point[2] / np.linalg.norm(point))
+    u, v = 239.5 + f.value * theta * point[:2] / np.hypot(*point[:2])
+    assert np.degrees(theta) > more.value
+    assert 0 < u < width.value
+    assert 0 < v < height.value
+    circles = says("The grid has circles 30°, 60° and 90° from the axis; the right one is yellow.")
+    assert all(f.value * np.radians(one.value) < width.value / 2 for one in circles)  # all are in the picture
+    (yaw,) = says("Turn window yaw to 80°. Part of the window then shows what is beside and behind the camera.")
+    half = 40
+    assert yaw.value + half > more.value
+    assert np.degrees(width.value / 2 / f.value) < yaw.value + half  # the picture ends inside the window
+    (digits,) = says("by less than 1e-13")
+    rays = np.random.default_rng(1).normal(size=(1000, 3))
+    rays = rays[rays[:, 2] > 0.1]
+    theta = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2])
+    ours = rays[:, :2] * (theta / np.hypot(rays[:, 0], rays[:, 1]))[:, None]
+    theirs, _ = cv2.fisheye.projectPoints(rays[None], np.zeros(3), np.zeros(3), np.eye(3), np.zeros(4))
+    assert np.abs(ours - theirs[0]).max() < digits.value
+
+
+def test_newton_s_three_steps_and_where_the_dots_stop(says):
+    k1, r, *slope = says(
+        "Take one coefficient, k1 = 0.02, and the radius r = 2. The slope of θ + k1 θ³ is 1 + 3 k1 θ²."
+    )
+    assert not slope  # a formula's numbers
+    truth = brentq(lambda theta: theta + k1.value * theta**3 - r.value, 0, 3)
+    theta = r.value
+    for _ in range(3):
+        theta -= (theta + k1.value * theta**3 - r.value) / (1 + 3 * k1.value * theta**2)
+    assert theta == pytest.approx(truth, abs=1e-6)
+    (last,) = says("they must stop where it stops: at 180°")
+    assert last == np.degrees(np.pi)
+
+
+def test_one_pixel_of_a_window(says):
+    width, height, wide, half, angle, f, yaw, u, v = says(
+        "Take a window of 400 × 400 pixels that is 80° wide, so that its focal length is 200/tan 40° = 238.4 px. It "
+        "looks 45° to the right. Which pixel of the fisheye's picture belongs in its pixel (300, 120)?"
+    )
+    assert half == width.value / 2
+    assert angle == wide.value / 2
+    assert f == half.value / np.tan(np.radians(angle.value))
+    assert max(u.value, v.value) < width.value == height.value
+    turn, _ = cv2.Rodrigues(np.array([0.0, np.radians(yaw.value), 0.0]))
+    ahead = turn @ [(u.value - 199.5) / f.value, (v.value - 199.5) / f.value, 1.0]
+    assert np.degrees(np.arccos(ahead[2] / np.linalg.norm(ahead))) == pytest.approx(68.9, abs=0.05)  # as printed
+
+
+def test_the_equidistant_map_nearly_straightens_the_published_lens(says):
+    size, off = says(
+        "At this size, 512 pixels, the two maps differ by 0.96 px in the corners and by less elsewhere. So your picture"
+    )
+    f = size.value / 2 / np.tan(np.radians(50))
+    theta = np.linspace(0, np.arctan(np.hypot(255.5, 255.5) / f), 2000)
+    apart = F[0] / 2 * np.abs(g(theta) - theta)
+    assert off == apart.max()
+    assert apart.argmax() == len(apart) - 1

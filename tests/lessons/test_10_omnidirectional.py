@@ -64,11 +64,11 @@ def test_in_the_doughnut_only_lines_that_point_at_the_middle_are_straight(says):
 def test_straight_back_is_half_a_turn_and_six_windows_make_a_cube(says):
     (back,) = says("Look straight back (180°)")
     assert np.cos(np.radians(back.value)) == -1
-    (window,) = says("six windows of 90° side by side")
     (pinholes,) = says("Six pinholes of 90° see everything")
     (six,) = says("Six pinholes of 90°, chosen by one comparison.")
     face = 2 * np.degrees(np.arctan(1.0))  # half a face, seen from the centre at the distance of half a face
-    assert window == pinholes.value == six.value == face
+    assert pinholes.value == six.value
+    assert six == face
 
 
 def test_one_fisheye_that_looks_up_sees_the_whole_horizon(says):
@@ -103,8 +103,8 @@ def test_a_ray_that_misses_the_point_is_wrong_by_h_over_z(says):
 @pytest.mark.parametrize("e", [0.6, 1.5, 3.0])
 def test_conics_reflect_what_aims_at_one_focus_into_the_other(says, e):
     says("Such a mirror reflects rays that aim at one of its foci into the other.")
-    says("Around its focus a conic has the polar equation r = p / (1 + e cos θ), and e > 1 makes a hyperbola.")
-    says("The camera stands in the *other* focus, 2pe/(e² − 1) away.")
+    says("A conic with eccentricity e and parameter p has the polar equation r = p / (1 + e cos θ)")
+    says("the camera stands at the distance L = 2pe/(e² − 1) from the first focus")
     p, theta = 0.03, np.radians([20.0, 50.0, 80.0, 100.0])
     r = p / (1 + e * np.cos(theta))
     slope = p * e * np.sin(theta) / (1 + e * np.cos(theta)) ** 2
@@ -213,7 +213,7 @@ def test_opencv_gives_an_image_to_points_that_have_none(says, xi):
 
 
 def test_the_double_sphere_fits_fisheyes_better(says):
-    says("It has one number more, and fits fisheye lenses better.")
+    says("It has one number more, and fits fisheye lenses better:")
     theta = np.linspace(0.01, np.radians(100), 200)
     x, _, z = at_angle(np.degrees(theta)).T
 
@@ -352,7 +352,7 @@ def test_half_a_centimetre_between_lenses(says):
 
 def test_a_circle_on_the_sphere_stays_a_circle_or_becomes_a_line(says):
     says("A circle on the sphere stays a circle, or becomes a straight line")
-    says("In the mirror the middle is the south pole, and the horizon is the equator.")
+    says("The middle is the south pole, and the horizon is the equator.")
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     cone = np.stack([0.5 * np.cos(turn), 0.5 * np.sin(turn), np.full(40, np.sqrt(0.75))], axis=-1)
     circle = unified(Rotation.from_euler("xy", [50, 30], degrees=True).apply(cone), 1.0, 1.0)
@@ -416,7 +416,7 @@ def test_the_cube_s_side(says):
 
 def test_the_shapes_that_exercises_ask_for(says):
     flat, solid = says("Image points (…, 2), in focal lengths, of points (…, 3), by (X, Y)/(Z + ξD)")
-    ray, pixel = says("The unit rays (…, 3) of image points (…, 2).")
+    ray, pixel = says("Write the unit rays (…, 3) of any number of image points (…, 2), by the larger root.")
     direction, point, least = says(
         "Where do directions (…, 3) meet the cube with faces at ±1 around the camera? The answer is a point (…, 3), "
         "one of whose coordinates is +1 or −1."
@@ -556,3 +556,66 @@ def test_before_the_lesson_anna_and_ben(says):
 def test_before_the_lesson_a_fisheye_that_looks_ahead(says):
     (across,) = says("It has a fisheye lens of 180°.")
     assert at_angle(across.value / 2 + 1)[2] < 0  # whatever is farther from the axis lies behind
+# By hand -------------------------------------------------------------------------------------------------------------
+
+
+def test_one_ray_reflected_by_hand(says):
+    (e,) = says("The section of this mirror is a hyperbola with the eccentricity e = 1.5.")
+    (angle,) = says("Take the point of the mirror 80° from the axis.")
+    p, theta = 0.03, np.radians(angle.value)
+    point = p / (1 + e.value * np.cos(theta)) * np.array([np.sin(theta), np.cos(theta)])
+    camera = np.array([0.0, 2 * p * e.value / (e.value**2 - 1)])
+    assert 1000 * camera[1] == pytest.approx(72.0)  # as printed
+    difference = np.linalg.norm(point - camera) - np.linalg.norm(point)
+    assert difference == pytest.approx(2 * p / (e.value**2 - 1))  # 2a, the same for every point of the hyperbola
+    says("The reflected ray seems to come from the focus. So it is for every point of the mirror: a single viewpoint.")
+
+
+def test_the_proof_that_the_rays_meet(says):
+    says("the normal is then along u₂ − u₁")
+    says("Both are unit vectors, so $|u_2 - u_1|^2 = 2\\,(1 - u_1 \\cdot u_2)$")
+    says("the reflected ray continues the line from the first focus")
+    u1, u2 = at_angle(20), at_angle(75, 1.0)
+    assert np.sum((u2 - u1) ** 2) == pytest.approx(2 * (1 - u1 @ u2))
+    assert u2 @ (u2 - u1) == pytest.approx(1 - u1 @ u2)
+    np.testing.assert_allclose(reflected(u2, u2 - u1), u1)
+
+
+def test_points_by_hand_and_the_reader_s_difference_from_opencv(says):
+    (xi,) = says("Put in a point in front of the camera, with ξ = 0.8, and then one behind it:")
+    says("A point a little behind the camera still has an image. The last one has none, because Z + ξD is negative.")
+    depths = [Z + xi.value * np.sqrt(1 + 4 + Z * Z) for Z in (5.0, -1.0, -5.0)]
+    assert [depth > 0 for depth in depths] == [True, True, False]
+    (digits,) = says("Yours should differ by less than 1e-9 px.")
+    alpha, f, point = 0.6291060871161842, 191.14799816648748, np.array([1.0, 2.0, 5.0])
+    gamma, xi = f / (1 - alpha), alpha / (1 - alpha)
+    K = np.diag([gamma, gamma, 1.0])
+    there = cv2.omnidir.projectPoints(point.reshape(1, 1, 3), np.zeros(3), np.zeros(3), K, xi, np.zeros(4))[0].ravel()
+    assert np.abs(unified(point, gamma, xi) - there).max() < digits.value
+
+
+def test_the_published_double_sphere_and_the_first_answer_on_the_cube(says):
+    f, xi, alpha = says("draws a flat grid through a published lens: f = 402.5 px, ξ = −0.075, α = 0.744, again")
+    assert f == 0.5 * 805  # getTestProjections in basalt-headers, camera/double_sphere_camera.hpp
+    assert xi == 0.5 * -0.150694
+    assert alpha == 0.5 * 1.48785
+    x, y, z, size, by, cx, cy, cz, face = says(
+        "Take the direction (0.5, −1.5, 0.9). Its largest coordinate, by size, is −1.5. Divide all three by 1.5: "
+        "(0.333, −1, 0.6) lies on the face y = −1, the upper one, for y points down."
+    )
+    direction = np.array([x.value, y.value, z.value])
+    assert size == direction[np.abs(direction).argmax()]
+    assert by == abs(size.value)
+    for said, its in zip((cx, cy, cz), direction / by.value, strict=True):
+        assert said == its
+    assert face == cy.value
+
+
+def test_every_twelfth_pixel_and_the_dots_above_the_lines(says):
+    says("the ground below, the sky above")
+    says("there your dots belong on them, and near the ring above them")
+    for radius in (0.05, 0.15, 0.25):
+        beside, along = radius * np.sin(np.pi / 6), radius * np.cos(np.pi / 6)
+        near, far = (2 * np.arctan2(beside, Z - along) / (2 * beside / Z) for Z in (0.6, 20.0))
+        assert near > 1.05
+        assert far == pytest.approx(1, abs=0.02)
