@@ -1,14 +1,17 @@
 """The demosaicing visualizer shows true pictures and true numbers, and marks where false colour must be."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
 
 from camviz import mosaics
+from camviz.exercises.lesson12 import edge_green, malvar_green
 from camviz.mosaics import BAYER, PATTERNS, XTRANS
 from camviz.photographs import photograph
 from camviz.scenes import to_display, to_linear
-from camviz.views.demosaicing import LOUPE, DemosaicingView, _everywhere, nearest_carrier
+from camviz.views.demosaicing import LAYOUTS, LOUPE, DemosaicingView, _everywhere, nearest_carrier
 
 
 def attached(picture, name):
@@ -147,3 +150,55 @@ def test_a_photograph_of_ones_own_is_shown_as_it_is_or_smaller(size):
 def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
         DemosaicingView(**bad)
+
+
+def nothing_yet(around):
+    """Not written yet."""
+
+
+@pytest.mark.parametrize(("function", "algorithm"), [(malvar_green, "Malvar"), (edge_green, "edge-aware")])
+@pytest.mark.parametrize("pattern", BAYER)
+def test_a_right_green_of_the_readers_makes_the_algorithms_picture(pattern, function, algorithm):
+    view = DemosaicingView(
+        picture="astronaut", panels="picture yours", pattern=pattern, algorithm=algorithm, yours=function
+    )
+    pixels, problem = view.your_picture
+    assert problem == ""
+    np.testing.assert_allclose(pixels.astype(int), view.rebuilt, atol=1)
+    figure = view.figure()
+    assert cv2.PSNR(attached(figure, "yours"), pixels) > 27
+    assert figure.body.count(f"PSNR {view.measures.psnr_db:.2f} dB") == 2
+    other = view.but(yours=lambda around: function(around) + 0.05)
+    assert other.measures == view.measures
+    assert mosaics.psnr(other.your_picture[0], view.truth) < view.measures.psnr_db
+
+
+@pytest.mark.parametrize(
+    ("function", "pattern", "sentence"),
+    [
+        (nothing_yet, "RGGB", "`nothing_yet` returns nothing yet"),
+        (lambda around: around, "RGGB", "answers in shape"),
+        (lambda around: around.colour, "RGGB", "AttributeError"),
+        (None, "RGGB", "No function of yours"),
+        (malvar_green, "X-Trans", "choose one of the four Bayer patterns"),
+    ],
+)
+@pytest.mark.parametrize("show", ["rebuilt", "mosaic", "false colour"])
+def test_a_function_without_an_answer_leaves_its_picture_empty_and_a_sentence_in_it(function, pattern, sentence, show):
+    view = DemosaicingView(panels="picture yours", pattern=pattern, yours=function, show=show)
+    figure = view.figure()
+    assert "yours" not in figure.photographs
+    words = " ".join(re.findall(r">([^<>]+)</text>", figure.svg()))
+    assert sentence in words
+
+
+def test_a_view_opens_with_the_panels_that_are_asked_for():
+    few, some, all_of_them = (DemosaicingView(panels=one).figure() for one in LAYOUTS[:3])
+    assert "Spectrum" not in few.svg()
+    assert "PSNR" not in few.svg()
+    assert "PSNR" in some.svg()
+    assert "Spectrum" not in some.svg()
+    assert "carrier" not in some.description
+    assert "Spectrum" in all_of_them.svg()
+    with pytest.raises(ValueError, match="panels"):
+        DemosaicingView(panels="loupe")

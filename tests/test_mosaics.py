@@ -22,11 +22,13 @@ from camviz.mosaics import (
     bilinear,
     demosaic,
     edge_aware,
+    green_windows,
     in_colour,
     malvar,
     menon,
     mosaic,
     opencv,
+    with_green,
 )
 from camviz.photographs import photograph
 
@@ -247,3 +249,23 @@ def test_a_smooth_slope_is_interpolated_exactly_inside(name, algorithm):
 def test_what_cannot_be_demosaiced_is_refused_in_one_sentence(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+@pytest.mark.parametrize("name", BAYER)
+def test_green_from_windows_completes_the_pictures_of_the_algorithms(picture, name):
+    """With Malvar's green, a fixed filter of 5 × 5, and with that of any algorithm, its own picture comes out."""
+    measured = mosaic(picture, BAYER[name])
+    windows = green_windows(measured, BAYER[name])
+    weights = np.array([[0, 0, -1, 0, 0], [0, 0, 2, 0, 0], [-1, 2, 4, 2, -1], [0, 0, 2, 0, 0], [0, 0, -1, 0, 0]]) / 8
+    filled = with_green(measured, BAYER[name], np.sum(windows * weights, axis=(1, 2)), "Malvar")
+    np.testing.assert_allclose(filled, malvar(measured, BAYER[name]), atol=1e-12)
+    elsewhere = ~BAYER[name].mask(GREEN, *measured.shape)
+    for algorithm in ("nearest", "bilinear", "edge-aware"):
+        right = demosaic(measured, BAYER[name], algorithm)
+        filled = with_green(measured, BAYER[name], right[elsewhere, GREEN], algorithm)
+        np.testing.assert_allclose(filled, right, atol=1e-12)
+
+
+def test_green_from_windows_takes_bayers_patterns_only():
+    with pytest.raises(ValueError, match="Bayer patterns only"):
+        green_windows(np.zeros((12, 12)), XTRANS)

@@ -1,4 +1,4 @@
-"""Lesson 12, colour filter arrays: the mosaic, its phase after a crop, two guesses of green, and the false colour.
+"""Lesson 12, colour filter arrays: the mosaic, the false colour, two guesses of green, and the phase after a crop.
 
 Tiles are arrays of channels (0 red, 1 green, 2 blue) that repeat from a mosaic's upper left pixel.
 """
@@ -141,7 +141,7 @@ def filters_repeated(picture, tile):
     return picture[v, u, tile[v // 2 % tile.shape[0], u // 2 % tile.shape[1]]]
 
 
-# 2: find the bug in the phase after a crop ---------------------------------------------------------------------------
+# 5: find the bug in the phase after a crop ---------------------------------------------------------------------------
 
 
 def cropped_tile(tile: Array, x0: int, y0: int) -> Array:
@@ -392,7 +392,7 @@ def one_window_only(around):
     return green + (around[2, 2] - red) / 2
 
 
-# 4: what colour will the shirt be? -----------------------------------------------------------------------------------
+# 2: what colour will the shirt be? -----------------------------------------------------------------------------------
 
 
 def false_frequency(f: ArrayLike) -> Array:
@@ -513,7 +513,7 @@ def per_red_pixel(f):
     return 2 * false_frequency(f)
 
 
-# 5: look before you average ------------------------------------------------------------------------------------------
+# 4: look before you average ------------------------------------------------------------------------------------------
 
 
 def edge_green(around: Array) -> Array:

@@ -1,5 +1,6 @@
 """Colour filter arrays: patterns and mosaics, demosaicing, and measures of what it gets wrong."""
 
+from camviz.mosaics.by_green import BY_DIFFERENCES, green_windows, with_green
 from camviz.mosaics.demosaicing import (
     ALGORITHMS,
     ANY_PATTERN,
@@ -33,6 +34,7 @@ __all__ = [
     "ANY_PATTERN",
     "BAYER",
     "BLUE",
+    "BY_DIFFERENCES",
     "GREEN",
     "MONOCHROME",
     "PATTERNS",
@@ -50,6 +52,7 @@ __all__ = [
     "demosaic",
     "edge_aware",
     "false_colour",
+    "green_windows",
     "in_colour",
     "low_pass",
     "malvar",
@@ -58,6 +61,7 @@ __all__ = [
     "nearest",
     "opencv",
     "psnr",
+    "with_green",
     "zipper",
     "zone_plate",
 ]

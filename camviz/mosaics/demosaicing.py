@@ -49,7 +49,7 @@ def bilinear(values: ArrayLike, pattern: Pattern) -> Array:
 
 def malvar(values: ArrayLike, pattern: Pattern) -> Array:
     """Bilinear interpolation corrected by the second derivative of the measured colour (Malvar, He and Cutler 2004)."""
-    measured = _bayer(values, pattern)
+    measured = bayer_mosaic(values, pattern)
     green, beside, below, across = (_filtered(measured, one) for one in (_GREEN, _BESIDE, _BESIDE.T, _ACROSS))
     planes = np.stack([measured] * 3)
     for colour in (RED, BLUE):
@@ -66,20 +66,24 @@ def edge_aware(values: ArrayLike, pattern: Pattern) -> Array:
 
     The choice for green is that of J. F. Hamilton and J. E. Adams (US patent 5,629,734, 1997).
     """
-    measured = _bayer(values, pattern)
+    measured = bayer_mosaic(values, pattern)
     by_rows, by_columns = _green_both_ways(measured, pattern)
     slope = np.array([[-1.0, 0, 1]]), np.array([[-1.0, 0, 2, 0, -1]])
     across_rows = sum(np.abs(_filtered(measured, one)) for one in slope)
     across_columns = sum(np.abs(_filtered(measured, one.T)) for one in slope)
     weight = 0.5 + 0.5 * np.sign(across_columns - across_rows)  # 1 along rows, 0 along columns, ½ where it is a draw
-    green = weight * by_rows + (1 - weight) * by_columns
-    difference = measured - green
+    return by_differences(measured, pattern, weight * by_rows + (1 - weight) * by_columns)
+
+
+def by_differences(values: ArrayLike, pattern: Pattern, green: Array) -> Array:
+    """The picture (height, width, 3) of green in all pixels and interpolated differences red − green, blue − green."""
+    difference = bayer_mosaic(values, pattern) - green
     return np.stack([green + _spread(difference, pattern, c) if c != GREEN else green for c in range(3)], axis=-1)
 
 
 def menon(values: ArrayLike, pattern: Pattern) -> Array:
     """Green both ways, and afterwards the way that left the smoother colours; then refined (Menon et al. 2007)."""
-    measured = _bayer(values, pattern)
+    measured = bayer_mosaic(values, pattern)
     by_rows, by_columns = _green_both_ways(measured, pattern)
     along_rows = _changes(measured - by_rows) <= _changes((measured - by_columns).T).T
     planes = np.stack([measured, np.where(along_rows, by_rows, by_columns), measured])
@@ -199,7 +203,8 @@ def _sites(pattern: Pattern, colour: int) -> _Sites:
     return _Sites((rows, columns), (rows, other_columns), (other_rows, columns), (other_rows, other_columns))
 
 
-def _bayer(values: ArrayLike, pattern: Pattern) -> Array:
+def bayer_mosaic(values: ArrayLike, pattern: Pattern) -> Array:
+    """A mosaic (height, width) of at least 4 × 4 numbers under a Bayer pattern; ValueError for others."""
     measured = as_mosaic(values)
     _require_bayer(pattern)
     if min(measured.shape) < 4:

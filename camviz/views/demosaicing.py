@@ -1,8 +1,12 @@
-"""The demosaicing visualizer: a mosaic, the picture rebuilt from it, what is false in it, and where that had to be."""
+"""The demosaicing visualizer: a mosaic, the picture rebuilt from it, what is false in it, and where that had to be.
+
+A reader's own guess of green can rebuild a second picture beside the first.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
@@ -24,10 +28,17 @@ from camviz.mosaics.measures import Measures
 from camviz.photographs import photograph
 from camviz.scenes import render, textured_scene, to_display, to_linear
 from camviz.views.base import View, choice, slider
+from camviz.yours import tried
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side
-_MAIN, _SMALL = 472, 118  # widths in picture units
+_MAIN, _PAIRED = 472, 402  # widths of the large picture, alone and beside another, in picture units
+_RIGHT = 490  # where the other begins
+_LOUPES = {  # where the three small pictures stand, (x, y), and how wide they are
+    "spectrum": (((560, 34), (691, 34), (822, 34)), 118),
+    "": (((560, 34), (758, 34), (560, 256)), 182),
+}
+LAYOUTS = ("picture loupe", "picture loupe figures", "picture loupe spectrum figures", "picture yours")
 _WORST = 60.0  # of the map of errors, in units of CIELAB
 _TICKS = [(-0.5, "−½"), (0.0, "0"), (0.5, "½")]
 
@@ -38,7 +49,9 @@ Source = tuple[str, float] | tuple[bytes, tuple[int, ...]]
 class DemosaicingView(View):
     """A picture under a colour filter array, demosaiced. Light is linear in the mosaic, sRGB on the screen.
 
-    The loupe stands on the pixel (u, v). With `photograph` (height, width, 3) uint8, that is the picture.
+    The loupe stands on the pixel (u, v). With `photograph` (height, width, 3) uint8, that is the picture. `panels` is
+    one of LAYOUTS. `yours` takes windows (n, 5, 5) of a Bayer mosaic around its red and blue pixels to a reader's
+    green (n,) in their middles; the picture that it makes stands beside the algorithm's, which makes red and blue.
     """
 
     title: ClassVar[str] = "Demosaicing"
@@ -61,10 +74,14 @@ class DemosaicingView(View):
     show: str = choice("rebuilt", "mosaic", "false colour", help="the large picture")
     u: float = 235.0
     v: float = 128.0
+    panels: str = "picture loupe spectrum figures"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     photograph: NDArray[np.uint8] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.panels not in LAYOUTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, LAYOUTS))}, got {self.panels!r}")
         own = self.photograph
         if own is not None and not (own.dtype == np.uint8 and own.shape[2:] == (3,) and min(own.shape[:2]) >= LOUPE):
             takes = f"uint8 (height, width, 3), at least {LOUPE} pixels each way"
@@ -108,6 +125,19 @@ class DemosaicingView(View):
         """How far it is from the picture."""
         return _compared(self.source, self.filters, self.spots_px, self.used)
 
+    @cached_property
+    def your_picture(self) -> tuple[NDArray[np.uint8] | None, str]:
+        """The picture with the reader's green, as sRGB bytes (height, width, 3), or None and what is in the way."""
+        if self.yours is None:
+            return None, "No function of yours has been given."
+        if not self.filters.is_bayer:
+            return None, "Your function looks at windows of a Bayer mosaic: choose one of the four Bayer patterns."
+        windows = mosaics.green_windows(self.measured, self.filters)
+        green, problem = tried(self.yours, (windows,), windows[:, 2, 2])
+        if problem:
+            return None, problem
+        return to_display(mosaics.with_green(self.measured, self.filters, green, self.used)), ""
+
     @property
     def frequency(self) -> Array | None:
         """Of the zone plate's rings under the loupe, (fu, fv) in cycles/pixel; None on another picture."""
@@ -133,6 +163,16 @@ class DemosaicingView(View):
             **self._under_the_loupe(),
         }
 
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        figures, loupe = self.numbers(), self._under_the_loupe()
+        if "yours" in self.panels:
+            return {name: value for name, value in figures.items() if name not in loupe}
+        if "spectrum" not in self.panels:
+            figures.pop("carrier", None)
+        wanted = figures if "figures" in self.panels else ("false colour",)
+        return {name: value for name, value in figures.items() if name in wanted}
+
     def _under_the_loupe(self) -> dict[str, str]:
         if self.frequency is None:
             return {"loupe at": f"column {self.at[0]}, row {self.at[1]}"}
@@ -144,7 +184,7 @@ class DemosaicingView(View):
 
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
         blur = f"four spots {self.spots_px:g} px apart" if self.spots_px else "no blur before sampling"
         name = "a photograph" if self.photograph is not None else f"the {self.picture}"
         rings = f" up to {self.highest:g} cycles/px" if self.frequency is not None else ""
@@ -154,38 +194,61 @@ class DemosaicingView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 552, "paper"),
-                self._large_panel(photographs, draft),
-                self._loupe_panels(photographs),
-                self._spectrum_panel(photographs),
-                self._words(),
-            ]
-        )
-        return Picture(body, 960, 552, self.title, self.description(), photographs)
+        height = 480 if "yours" in self.panels else 552
+        body = [svg.rectangle(0, 0, 960, height, "paper"), self._large_panel(photographs, draft)]
+        if "yours" in self.panels:
+            body.append(self._your_panel(photographs, draft))
+        else:
+            body.append(self._loupe_panels(photographs))
+        if "spectrum" in self.panels:
+            body.append(self._spectrum_panel(photographs))
+        body.append(self._words())
+        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
 
     @cached_property
     def _panel(self) -> Panel:
         height, width = self.truth.shape[:2]
-        return image_panel("picture", 20, 34, _MAIN, width, height, tallest=_MAIN)
+        widest = _PAIRED if "yours" in self.panels else _MAIN
+        return image_panel("picture", 20, 34, widest, width, height, tallest=widest)
 
     def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
         height, width = self.truth.shape[:2]
-        marks = self._predicted() + self._frame()
-        label = "The picture; drag or press the arrow keys to move the loupe"
-        heading: dict[str, Any] = {"hint": "drag the loupe", "drag": "loupe", "label": label}
-        if self.show == "false colour":
-            error = self.measures.colour_error
-            coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
-            photographs |= {"picture": heat_map(coarse, 0, _WORST, "error"), "picture key": heat_key("error")}
-            return heat_panel(
-                self._panel, width, height, 0, _WORST, "ΔC", marks, title="What colour is false", **heading
+        if "yours" in self.panels:
+            marks, heading = self._predicted(), dict[str, Any]()
+        else:
+            marks, label = (
+                self._predicted() + self._frame(),
+                "The picture; drag or press the arrow keys to move the loupe",
             )
+            heading = {"hint": "drag the loupe", "drag": "loupe", "label": label}
+        if self.show == "false colour":
+            return self._map_of_errors(self._panel, self.measures.colour_error, photographs, draft, marks, **heading)
         pixels = to_display(mosaics.in_colour(self.measured, self.filters)) if self.show == "mosaic" else self.rebuilt
         title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
         photographs["picture"] = jpeg(pixels, 90)
         return self._panel.show(drawn(self._panel, "picture", width, height) + marks, title=title, **heading)
+
+    def _map_of_errors(
+        self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: str, **heading: Any
+    ) -> str:
+        height, width = self.truth.shape[:2]
+        coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
+        photographs |= {panel.name: heat_map(coarse, 0, _WORST, "error"), f"{panel.name} key": heat_key("error")}
+        heading = {"title": "What colour is false", **heading}
+        return heat_panel(panel, width, height, 0, _WORST, "ΔC", marks, **heading)
+
+    def _your_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
+        """The picture by the reader's green, or what is in the way of it."""
+        panel, (pixels, problem) = replace(self._panel, name="yours", x=_RIGHT), self.your_picture
+        height, width = self.truth.shape[:2]
+        if pixels is None:
+            return panel.show(svg.paragraph((16, 30), problem, panel.width - 32), title="With your green")
+        if self.show == "false colour":
+            error = mosaics.colour_error(pixels, self.truth)
+            title = "What colour is false in yours"
+            return self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
+        photographs["yours"] = jpeg(pixels, 90)
+        return panel.show(drawn(panel, "yours", width, height) + self._predicted(), title="With your green")
 
     def _rebuilt_by(self) -> str:
         return self.used if self.used == self.algorithm else f"{self.used} ({self.algorithm} is for Bayer's patterns)"
@@ -217,11 +280,12 @@ class DemosaicingView(View):
             "rebuilt": self.rebuilt[window],
             "truth": self.truth[window],
         }
+        places, wide = _LOUPES["spectrum" if "spectrum" in self.panels else ""]
         body = ""
-        for i, (name, pixels) in enumerate(seen.items()):
-            panel = Panel(f"loupe {name}", 560 + i * (_SMALL + 13), 34, _SMALL, _SMALL, 0, 1, 0, 1)
+        for (name, pixels), (x, y) in zip(seen.items(), places, strict=True):
+            panel = Panel(f"loupe {name}", x, y, wide, wide, 0, 1, 0, 1)
             photographs[panel.name] = png(np.ascontiguousarray(pixels))
-            content = svg.image(panel.name, 0, 0, _SMALL, _SMALL, style="image-rendering:pixelated")
+            content = svg.image(panel.name, 0, 0, wide, wide, style="image-rendering:pixelated")
             body += panel.show(content, title=name)
         return body
 
@@ -238,11 +302,27 @@ class DemosaicingView(View):
         return panel.show(content, title="Spectrum of the mosaic") + axes + "".join(listed)
 
     def _words(self) -> str:
-        rows = []
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((560, 454 + 21 * i), name, "note"))
-            rows.append(svg.text((654, 454 + 21 * i), value, "label"))
+        if "yours" in self.panels:
+            return self._two_lines_of_figures()
+        spectrum, rows = "spectrum" in self.panels, []
+        for i, (name, value) in enumerate(self._told().items()):
+            x, y = (560, 454 + 21 * i) if spectrum else (758, 270 + 44 * i)
+            rows.append(svg.text((x, y), name, "note"))
+            rows.append(svg.text((x + 94, y) if spectrum else (x, y + 19), value, "label"))
         return "".join(rows)
+
+    def _two_lines_of_figures(self) -> str:
+        """What the algorithm's picture and the reader's are worth, each below its picture."""
+        pixels, below = self.your_picture[0], self._panel.y + self._panel.height + 24
+        words = [svg.text((self._panel.x, below), self._worth(self.measures.psnr_db, self.measures.false_colour))]
+        if pixels is not None:
+            worth = self._worth(mosaics.psnr(pixels, self.truth), mosaics.false_colour(pixels, self.truth))
+            words.append(svg.text((_RIGHT, below), worth, "orange"))
+        return "".join(words)
+
+    @staticmethod
+    def _worth(psnr_db: float, false_colour: float) -> str:
+        return f"PSNR {psnr_db:.2f} dB, false colour ΔC = {false_colour:.1f} on average"
 
     # What can be dragged ---------------------------------------------------------------------------------------------
 
