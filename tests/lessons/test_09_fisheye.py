@@ -419,6 +419,8 @@ def test_before_the_lesson_one_lens_for_the_whole_horizon(says):
     assert side == reach.value
     assert spare == reach.value - horizon.value
     assert within == across.value
+
+
 def test_one_ray_by_hand_and_what_the_sliders_show(says):
     (f,) = says("the distance from the middle, here r = f θ with f = 150 px;")
     (more,) = says("The angle is more than 90°, because the point is behind the camera.")

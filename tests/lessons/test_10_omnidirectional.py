@@ -556,6 +556,8 @@ def test_before_the_lesson_anna_and_ben(says):
 def test_before_the_lesson_a_fisheye_that_looks_ahead(says):
     (across,) = says("It has a fisheye lens of 180°.")
     assert at_angle(across.value / 2 + 1)[2] < 0  # whatever is farther from the axis lies behind
+
+
 # By hand -------------------------------------------------------------------------------------------------------------
 
 
