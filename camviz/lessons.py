@@ -22,6 +22,7 @@ from typing import Any
 from camviz import glossary
 from camviz.notebooks import Cell, Notebook, exercise_cells, read, solution_code, tagged, write
 from camviz.pattern import complaints
+from camviz.teaching import plans
 
 _RANDOM_ID = re.compile(r"[0-9a-f]{8}")
 
@@ -224,9 +225,15 @@ def _run_fresh(given: argparse.Namespace) -> int:
 
 
 def _run_check(given: argparse.Namespace) -> int:
-    found = [f"{path.name}: {one}" for path in _paths(given.names) for one in complaints(read(path), path.name)]
+    found = [f"{path.name}: {one}" for path in _paths(given.names) for one in _complaints(path)]
     print("\n".join(found) or "every lesson follows the pattern")
     return 1 if found else 0
+
+
+def _complaints(path: Path) -> list[str]:
+    """What is to be mended in a lesson and in its teacher's plan."""
+    notebook, plan = read(path), plans.plan(path.name[:2])
+    return complaints(notebook, path.name) + (plans.complaints(plan, notebook) if plan else [])
 
 
 _COMMANDS = (

@@ -270,3 +270,14 @@ def test_the_map_has_two_numbers_a_pixel(says):
     maps = cv2.initUndistortRectifyMap(np.eye(3), np.zeros(4), np.eye(3), np.eye(3), (4, 3), cv2.CV_32FC1)
     assert two == np.stack(maps[:2], axis=-1).shape[-1]
     assert again == two.value
+
+
+def test_the_curve_that_a_teacher_draws_on_the_board(says):
+    strength, r_low, low, r_top, top, r_down, down, r_last = says(
+        "draw r_d = r − 0.3 r³ on the board: (0, 0), (0.5, 0.46), the top (1.05, 0.70), (1.4, 0.58), (1.83, 0)"
+    )
+    assert r_top == folds_at(-strength.value)
+    assert top == g(folds_at(-strength.value), -strength.value)
+    assert low == g(r_low.value, -strength.value)
+    assert down == g(r_down.value, -strength.value)
+    assert r_last == 1 / np.sqrt(strength.value)
