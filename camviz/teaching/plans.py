@@ -4,6 +4,8 @@
     network = "What to do when the network fails."
     machine = "What to do when a student's machine fails, or the teacher's."
 
+    notice = ["Straight lines bend."]  # optional: for each picture of the lesson, in order, what its slide is to say
+
     [[step]]                        # in the order of teaching
     at = "question grid"            # where it is in the lesson
     minutes = [8, 5]                # of the plan for 90 minutes, and of that for 45; 0 leaves the step out there
@@ -32,14 +34,16 @@ from typing import Any
 
 from camviz import notebooks, questions
 from camviz.exercises import exercises
+from camviz.teaching import markup, parts
 
 LONG, SHORT = 90, 45
 GUESS = "a guess"
 MOST_SENTENCES, MOST_WORDS = 3, 35
 """Of a step's text, and of one of its sentences: a teacher reads it while the class looks on."""
+MOST_NOTICED = 18
+"""Words over a picture."""
 
 _KINDS = ("header", "section", "question", "exercise", "quiz")
-_SENTENCE = re.compile(r"(?<=[.!?])[*”\"')]*\s+(?=[*“\"'(`]*[A-Z0-9])")
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,7 @@ class Plan:
     machine: str
     steps: tuple[Step, ...]
     votes: tuple[Votes, ...] = ()
+    notice: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("bring", "network", "machine"):
@@ -113,6 +118,11 @@ class Plan:
             total = sum(step.minutes[which] for step in self.steps)
             if total != length:
                 raise ValueError(f"plan of lesson {self.lesson}: the plan for {length} minutes adds up to {total}")
+        for text in self.notice:
+            if not isinstance(text, str) or not 0 < len(text.split()) <= MOST_NOTICED:
+                raise ValueError(
+                    f"plan of lesson {self.lesson}: what to notice has at most {MOST_NOTICED} words, got {text!r}"
+                )
         names = [one.question for one in self.votes]
         for name in names:
             if names.count(name) > 1:
@@ -153,10 +163,16 @@ def parse(lesson: str, toml: str) -> Plan:
         table = tomllib.loads(toml)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{where} is not TOML: {error}") from error
-    _shape(table, {"bring": str, "network": str, "machine": str, "step": list, "votes": list}, {"votes"}, where)
+    _shape(
+        table,
+        {"bring": str, "network": str, "machine": str, "step": list, "votes": list, "notice": list},
+        {"votes", "notice"},
+        where,
+    )
     steps = tuple(_made(Step, one, f"{where}, step {i}") for i, one in enumerate(table["step"], start=1))
     votes = tuple(_made(Votes, one, f"{where}, votes {i}") for i, one in enumerate(table.get("votes", []), start=1))
-    return Plan(lesson, table["bring"], table["network"], table["machine"], steps, votes)
+    notice = tuple(table.get("notice", []))
+    return Plan(lesson, table["bring"], table["network"], table["machine"], steps, votes, notice)
 
 
 def complaints(made: Plan, notebook: notebooks.Notebook) -> list[str]:
@@ -178,6 +194,9 @@ def complaints(made: Plan, notebook: notebooks.Notebook) -> list[str]:
         elif len(votes.split) != len(predict[votes.question].choices):
             choices = len(predict[votes.question].choices)
             found.append(f"the plan splits votes for {votes.question} in {len(votes.split)}, it has {choices} choices")
+    pictures = sum(bool(parts.pictures(cell)) for cell in notebook.cells)
+    if made.notice and len(made.notice) != pictures:
+        found.append(f"the plan says what to notice in {len(made.notice)} pictures, and the lesson shows {pictures}")
     asked = {step.name for step in made.steps if step.kind == "question"}
     found += [f"the plan never asks the predict question {name}" for name in predict if name not in asked]
     known = {votes.question for votes in made.votes}
@@ -224,7 +243,7 @@ def _shape(table: object, kinds: dict[str, type], optional: set[str], where: str
 
 def _brief(text: str) -> None:
     """Raises ValueError for a text that cannot be read at a glance."""
-    sentences = [one for one in _SENTENCE.split(text.strip()) if one]
+    sentences = markup.sentences(text)
     if not 1 <= len(sentences) <= MOST_SENTENCES:
         raise ValueError(f"a step's text has one to {MOST_SENTENCES} sentences, {text.strip()[:40]!r} {len(sentences)}")
     longest = max(sentences, key=lambda one: len(one.split()))
