@@ -25,7 +25,7 @@ Writes for each lesson, made from the very notebook that students get:
 The solutions carry nbgrader's marks, so that exercises can be handed out and graded. What you have changed in the
 folder is never overwritten. docs/teaching.md says how to run a lesson from it.
 """
-NEEDED = {"nbformat": "nbformat", "nbclient": "nbclient", "mistune": "mistune", "latex2mathml": "latex2mathml"}
+NEEDED = ("nbformat", "nbclient", "mistune", "latex2mathml")
 
 
 def add(commands: Any) -> None:
@@ -42,13 +42,13 @@ def teacher(options: argparse.Namespace) -> int:
     """Write the teacher's edition, and never over what a teacher has changed in it."""
     from camviz.lessons import lessons_folder
 
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        raise Refusal(f"{' and '.join(missing)} missing; `pip install 'camviz[lab]'` brings all of it.", LACKING)
     if options.out.exists() and (not options.out.is_dir() or options.out.samefile(lessons_folder())):
         raise Refusal(f"{options.out}: expected a folder of its own for the teacher's edition.")
     if edition(options.out) == "student":
         raise Refusal(f"{options.out}: expected a folder of its own, the students' lessons are in this one.")
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise Refusal(f"{', '.join(missing)} must be installed for this; `pip install 'camviz[lab]'` does it.", LACKING)
     from camviz.teaching.pack import write_pack
 
     with TemporaryDirectory() as made:

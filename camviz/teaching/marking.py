@@ -83,8 +83,8 @@ def _one_slip(exercise: Exercise, trials: list[Trial]) -> bool:
     actual = np.concatenate([part.ravel() for t in trials for part in t.actual])
     expected = np.concatenate([part.ravel() for t in trials for part in t.expected])
     usable = np.isfinite(actual) & np.isfinite(expected) & (np.abs(expected) > 1e-6)
-    ratios = actual[usable] / expected[usable]
-    scaled = len(ratios) > 2 and ratios[0] != 0 and np.allclose(ratios, ratios[0], rtol=1e-6, atol=0)
+    factor = np.median(actual[usable] / expected[usable]) if usable.any() else 0.0
+    scaled = usable.sum() > 2 and factor and np.allclose(actual, factor * expected, rtol=1e-6, equal_nan=True)
     return turned or bool(scaled)
 
 

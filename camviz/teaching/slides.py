@@ -215,7 +215,7 @@ def _equation(latex: str) -> str:
 
 def _width(line: str) -> int:
     """About how many letters wide a line is when it is set; a matrix as wide as its widest row, two letters a gap."""
-    text = _MATRIX.sub(lambda found: "x" * (4 + max(map(_letters, found[1].split(r"\\")))), line)
+    text = _MATRIX.sub(lambda found: "x" * (5 + max(map(_letters, found[1].split(r"\\")))), line)
     return _letters(text)
 
 
