@@ -37,6 +37,8 @@ def teacher_edition(notebook: Notebook) -> Notebook:
     plan = plans.plan(parts.number_of(notebook))
     beside = [(*_notes(one), *_keys(one, plan)) for one in edition.cells]
     cells = [cell for one, more in zip(edition.cells, beside, strict=True) for cell in (one, *more)]
+    if plan:
+        _anchored(cells, plan, parts.titles(notebook))
     edition.cells = [cells[0], *_planned(plan, notebook), *cells[1:]]
     edition.cells[0].source = re.sub(r"\A# (.*)", r"# \1 (teacher's edition)", edition.cells[0].source)
     for cell in edition.cells:
@@ -126,15 +128,16 @@ def _planned(plan: Plan | None, notebook: Notebook) -> list[Cell]:
 
 def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
     """The plan as a table of minutes, places, and what teacher and class do; then what to bring, and if it fails."""
-    long, short = ({id(step): f"{a}–{b}" for a, b, step in plan.times(length)} for length in (plans.LONG, plans.SHORT))
-    minutes = [f"{long.get(id(step), '–')} | {short.get(id(step), '–')}" for step in plan.steps]
-    rows = [
-        f"| {when} | {_linked(step, titles)} | {_one_line(step.teacher)} | {_one_line(step.students)} |"
-        for when, step in zip(minutes, plan.steps, strict=True)
-    ]
+    times = [{id(step): _minutes(a, b) for a, b, step in plan.times(length)} for length in (plans.LONG, plans.SHORT)]
+    rows = []
+    for step in plan.steps:
+        cells = [*(one.get(id(step), "–") for one in times), _linked(step, titles)]
+        rows.append(f"| {' | '.join([*cells, _one_line(step.teacher), _one_line(step.students)])} |")
     return "\n".join(
         [
             "## For the teacher: the plan",
+            "",
+            "Keep this file on your own screen, for it shows the keys. Project the slides and the students' lesson.",
             "",
             f"| {plans.LONG} min | {plans.SHORT} min | Where | You | The class |",
             "|---|---|---|---|---|",
@@ -158,9 +161,29 @@ def place(step: Step, titles: dict[str, str]) -> str:
 
 def _linked(step: Step, titles: dict[str, str]) -> str:
     words = _one_line(place(step, titles))
-    if step.kind in ("section", "exercise"):
-        return f"[{words}](#{titles.get(step.at, '').replace(' ', '-').replace('(', '%28').replace(')', '%29')})"
-    return f"[{words}](#key-{step.name})" if step.kind == "question" else words
+    anchor = f"key-{step.name}" if step.kind == "question" else _anchor(step.at)
+    return f"[{words}](#{anchor})" if step.at in titles or step.kind == "question" else words
+
+
+def _anchor(at: str) -> str:
+    """An address that every Markdown takes as it is: "plan-section-3"."""
+    return "plan-" + "-".join(re.findall(r"\w+", at)).lower()
+
+
+def _anchored(cells: list[Cell], plan: Plan, titles: dict[str, str]) -> None:
+    """Puts an address before each heading that the plan leads to: headings' own are not the same everywhere."""
+    wanted = {titles[step.at]: _anchor(step.at) for step in plan.steps if step.at in titles}
+    for cell in cells:
+        if cell.cell_type == "markdown":
+            lines = cell.source.split("\n")
+            anchors = [wanted.pop(line.lstrip("# "), "") if line.startswith("##") else "" for line in lines]
+            pairs = zip(anchors, lines, strict=True)
+            cell.source = "\n".join(f'<a id="{anchor}"></a>\n\n{line}' if anchor else line for anchor, line in pairs)
+
+
+def _minutes(begin: int, end: int) -> str:
+    """From when to when, and never broken into two lines."""
+    return f"{begin}\u2060–\u2060{end}"
 
 
 def _keys(cell: Cell, plan: Plan | None) -> list[Cell]:
