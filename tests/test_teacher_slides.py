@@ -78,7 +78,7 @@ def test_lesson_05_says_what_it_should():
     equation = next(one for one in found if one.kind == "equation")
     assert equation.body.count("<math") == 2
     page = deck.deck(notebooks.read(lesson))
-    assert "The left lens folds inside its own picture." in page
+    assert "The left lens folds inside its own picture</h2>" in page
 
 
 def test_a_pretest_is_asked_and_not_answered(monkeypatch):

@@ -18,7 +18,8 @@ from camviz.questions import Question
 from camviz.teaching import markup, parts
 from camviz.teaching.parts import Shown
 
-MOST_WORDS, HEADING_WORDS, LEAST_WORDS, RECAP_ROWS = 40, 18, 5, 3
+MOST_WORDS, HEADING_WORDS, LEAST_WORDS = 40, 18, 5
+RECAP_WORDS, RECAP_ROWS = 55, 3
 
 LONGEST_LINE, LONG_QUESTION = 60, 75
 _SIZES = (("large", 28, 4), ("medium", 42, 6), ("small", 60, 8))
@@ -88,7 +89,7 @@ def _of_code(cell: Cell, place: _Place, following: list[Cell]) -> Iterator[Slide
     for question in parts.asked(cell):
         yield from _question(question, place.part)
     for shown in parts.pictures(cell)[:1]:
-        noticed = prose.inline(place.notice.pop(0)) if place.notice else _to_notice(place, following)
+        noticed = prose.inline(place.notice.pop(0).rstrip(".")) if place.notice else _to_notice(place, following)
         yield _picture(shown, noticed, place.part)
     if "stub" in cell.metadata.get("tags", []):
         yield _exercise(cell, place)
@@ -254,11 +255,11 @@ def _claims(paragraph: str, part: str) -> Iterator[Slide]:
 
 
 def _recap(table: str, part: str) -> Iterator[Slide]:
-    """The recap's table, as many rows a slide as stay within RECAP_ROWS and MOST_WORDS."""
+    """The recap's table, as many rows a slide as stay within RECAP_ROWS and RECAP_WORDS."""
     head, _, *rows = table.splitlines()
     pages: list[list[str]] = [[]]
     for row in rows:
-        if pages[-1] and (len(pages[-1]) == RECAP_ROWS or markup.words(" ".join([*pages[-1], row])) > MOST_WORDS):
+        if pages[-1] and (len(pages[-1]) == RECAP_ROWS or markup.words(" ".join([*pages[-1], row])) > RECAP_WORDS):
             pages.append([])
         pages[-1].append(row)
     for number, few in enumerate(pages, start=1):
