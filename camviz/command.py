@@ -30,7 +30,7 @@ examples:
                                              take a picture through another lens
   camviz noise shots/                        measure a sensor from its frames: gain, noise, patterns, dark current
   camviz mtf photo.png --roi 300,200,80,120  measure sharpness from a slanted edge
-  camviz teacher for-me                      write the lessons with solutions and timings into ./for-me
+  camviz teacher for-me --slides             write the lessons with plans and keys, sheets and slides into ./for-me
 
 exit status:
   0    done

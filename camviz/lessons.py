@@ -1,4 +1,4 @@
-"""Tools for the lessons: what a lesson must have, its teacher's edition, and its saved outputs.
+"""Tools for the lessons: what a lesson must have, and its saved outputs.
 
 python -m camviz.lessons check            what departs from the pattern of a lesson
 python -m camviz.lessons refresh [05 …]   run and save with static outputs
@@ -10,18 +10,16 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-import os
 import re
-import shutil
 import sys
 from collections.abc import Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
 
 from camviz import glossary
-from camviz.notebooks import Cell, Notebook, exercise_cells, read, solution_code, tagged, write
+from camviz.notebooks import Cell, Notebook, execute, read, tagged, write
 from camviz.pattern import complaints
+from camviz.teaching import plans
 
 _RANDOM_ID = re.compile(r"[0-9a-f]{8}")
 
@@ -32,79 +30,6 @@ def lessons_folder() -> Path:
     return installed if installed.is_dir() else Path(__file__).parents[1] / "lessons"
 
 
-# The teacher's edition ----------------------------------------------------------------------------------------------
-
-
-def teacher_edition(notebook: Notebook) -> Notebook:
-    """The same lesson with its stubs solved, its solutions open and the teacher's notes beside the cells they speak of.
-
-    Solutions and hidden tests stand between nbgrader's marks, so that `nbgrader generate_assignment` takes them out.
-    """
-    edition = deepcopy(notebook)
-    for name, (stub, check, solution) in exercise_cells(edition).items():
-        stub.source = mark_solution(stub.source, solution_code(solution))
-        stub.metadata["nbgrader"] = _nbgrader(name, solution=True)
-        check.source = f"### BEGIN HIDDEN TESTS\nassert {check.source.strip()}\n### END HIDDEN TESTS\n{check.source}"
-        check.metadata["nbgrader"] = {**_nbgrader(f"{name}-check", grade=True), "points": 1}
-    for details in edition.cells:
-        if details.cell_type == "markdown":
-            details.source = details.source.replace("<details>", "<details open>")
-    edition.cells = [cell for one in edition.cells for cell in (one, *_notes(one))]
-    edition.cells[0].source = re.sub(r"\A# (.*)", r"# \1 (teacher's edition)", edition.cells[0].source)
-    for cell in edition.cells:
-        if cell.cell_type == "code":
-            cell.outputs, cell.execution_count = [], None
-    edition.metadata.get("camviz", {}).pop("source", None)
-    return edition
-
-
-def write_teacher_edition(source: Path, out: Path) -> list[Path]:
-    """Writes the teacher's edition of every lesson in `source` into `out`, under the same names, with their pictures.
-
-    Raises ValueError when `out` is the lessons' own folder.
-    """
-    if out.resolve() == source.resolve():
-        raise ValueError(f"the teacher's edition cannot be written over the lessons themselves, {source}")
-    out.mkdir(parents=True, exist_ok=True)
-    written = []
-    for path in sorted(source.glob("*.ipynb")):
-        write(teacher_edition(read(path)), out / path.name)
-        written.append(out / path.name)
-    for path in (*source.glob("images/*"), *source.glob("*.md")):
-        (out / path.relative_to(source)).parent.mkdir(exist_ok=True)
-        shutil.copyfile(path, out / path.relative_to(source))
-    return written
-
-
-def mark_solution(stub: str, solution: str) -> str:
-    """The solution with what differs from the stub between ### BEGIN SOLUTION and ### END SOLUTION."""
-    lines, given = solution.splitlines(), stub.splitlines()
-    same = 0
-    while same < min(len(lines), len(given)) and lines[same] == given[same]:
-        same += 1
-    if same == len(lines):
-        raise ValueError(f"a solution must differ from its stub: {solution[:60]!r}")
-    indent = re.match(r"\s*", next(line for line in lines[same:] if line.strip()))
-    margin = indent[0] if indent else ""
-    return "\n".join([*lines[:same], f"{margin}### BEGIN SOLUTION", *lines[same:], f"{margin}### END SOLUTION"])
-
-
-def _notes(cell: Cell) -> list[Cell]:
-    import nbformat
-
-    note = cell.metadata.get("camviz", {}).get("teacher")
-    if not note:
-        return []
-    made = nbformat.v4.new_markdown_cell(f"> **For the teacher:** {note.strip()}".replace("\n", "\n> "))
-    made.id, made.metadata["tags"] = f"teacher-{cell.id}"[:64], ["teacher"]
-    return [made]
-
-
-def _nbgrader(name: str, grade: bool = False, solution: bool = False) -> dict[str, Any]:
-    marks = {"grade": grade, "solution": solution, "locked": grade, "task": False}
-    return {"schema_version": 3, "grade_id": name.replace(".", "-"), **marks}
-
-
 # Saved outputs ------------------------------------------------------------------------------------------------------
 
 
@@ -113,26 +38,11 @@ def refresh(path: Path) -> None:
 
     Raises nbclient's CellExecutionError when a cell does; the file is left alone then.
     """
-    from nbclient import NotebookClient
-
     notebook = read(path)
     for cell in tagged(notebook, "glossary"):
         cell.source = glossary.markdown().rstrip("\n")
-    client = NotebookClient(
-        notebook,
-        timeout=120,
-        kernel_name="python3",
-        record_timing=False,
-        coalesce_streams=True,
-        resources={"metadata": {"path": str(path.parent)}},
-    )
-    client.execute(env={**os.environ, "PYTHONPATH": _python_path(), "CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "wire"})
+    execute(notebook, path.parent)
     write(tidied(notebook), path)
-
-
-def _python_path() -> str:
-    """Where the lesson's kernel, which runs in the lessons' folder, finds this very package."""
-    return os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 def tidied(notebook: Notebook) -> Notebook:
@@ -224,9 +134,15 @@ def _run_fresh(given: argparse.Namespace) -> int:
 
 
 def _run_check(given: argparse.Namespace) -> int:
-    found = [f"{path.name}: {one}" for path in _paths(given.names) for one in complaints(read(path), path.name)]
+    found = [f"{path.name}: {one}" for path in _paths(given.names) for one in _complaints(path)]
     print("\n".join(found) or "every lesson follows the pattern")
     return 1 if found else 0
+
+
+def _complaints(path: Path) -> list[str]:
+    """What is to be mended in a lesson and in its teacher's plan."""
+    notebook, plan = read(path), plans.plan(path.name[:2])
+    return complaints(notebook, path.name) + (plans.complaints(plan, notebook) if plan else [])
 
 
 _COMMANDS = (

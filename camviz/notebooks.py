@@ -9,6 +9,7 @@ A lesson's cells carry tags: `setup`, `build` (what exercises may rely on), `stu
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,6 +38,25 @@ def write(notebook: Notebook, path: Path) -> None:
     import nbformat
 
     path.write_text(nbformat.writes(notebook).rstrip("\n") + "\n", encoding="utf-8")
+
+
+def execute(notebook: Notebook, folder: Path) -> None:
+    """Runs a notebook in `folder`, with static, wireframe outputs, which it then holds.
+
+    Raises nbclient's CellExecutionError when a cell does, CellTimeoutError or DeadKernelError when one does not end.
+    """
+    from nbclient import NotebookClient
+
+    client = NotebookClient(
+        notebook,
+        timeout=120,
+        kernel_name="python3",
+        record_timing=False,
+        coalesce_streams=True,
+        resources={"metadata": {"path": str(folder)}},
+    )
+    package = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    client.execute(env={**os.environ, "PYTHONPATH": package, "CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "wire"})
 
 
 # What is in a lesson ------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import pytest
 from camviz import lessons, notebooks
 from camviz.exercises import exercises, lesson05
 from camviz.pattern import SETUP, complaints
+from camviz.teaching.edition import mark_solution, teacher_edition, write_teacher_edition
 
 ROOT = Path(__file__).parents[1]
 LESSONS = sorted((ROOT / "lessons").glob("*.ipynb"))
@@ -159,7 +160,7 @@ def test_every_solution_passes_its_checker_and_no_stub_does(lesson):
 
 
 def test_the_teacher_s_edition_has_solutions_in_place_notes_visible_and_hidden_tests(lesson):
-    edition = lessons.teacher_edition(lesson)
+    edition = teacher_edition(lesson)
     nbformat.validate(edition)
     stub = notebooks.stubs(edition)["05.fold_radius"]
     assert "### BEGIN SOLUTION" in stub
@@ -174,13 +175,13 @@ def test_the_teacher_s_edition_has_solutions_in_place_notes_visible_and_hidden_t
 
 def test_the_student_s_edition_shows_nothing_of_the_teacher_s(lesson):
     before = nbformat.writes(lesson)
-    lessons.teacher_edition(lesson)
+    teacher_edition(lesson)
     assert nbformat.writes(lesson) == before
     assert not any("Ask for hands" in cell.source or "BEGIN SOLUTION" in cell.source for cell in lesson.cells)
 
 
 def test_every_check_of_the_teacher_s_edition_holds_when_run_as_code(lesson):
-    edition, namespace = lessons.teacher_edition(lesson), {}
+    edition, namespace = teacher_edition(lesson), {}
     for cell in edition.cells:
         if {"setup", "stub", "check"} & set(cell.metadata.get("tags", [])):
             exec(cell.source, namespace)
@@ -195,20 +196,20 @@ def test_a_wrong_solution_makes_the_teacher_s_edition_fail(lesson):
 def test_what_stub_and_solution_share_stays_outside_the_solution_s_marks():
     stub = 'def f(x):\n    """Doubles."""\n    raise NotImplementedError'
     solution = 'def f(x):\n    """Doubles."""\n    y = 2 * x\n    return y'
-    marked = lessons.mark_solution(stub, solution)
+    marked = mark_solution(stub, solution)
     assert marked.splitlines()[:3] == ["def f(x):", '    """Doubles."""', "    ### BEGIN SOLUTION"]
     assert marked.splitlines()[-1] == "    ### END SOLUTION"
     exec(marked, namespace := {})
     assert namespace["f"](2) == 4
     with pytest.raises(ValueError, match="must differ from its stub"):
-        lessons.mark_solution(stub, stub)
+        mark_solution(stub, stub)
 
 
 def test_the_teacher_s_edition_is_never_written_over_the_lessons(tmp_path, lesson):
     notebooks.write(lesson, tmp_path / "05_distortion.ipynb")
     with pytest.raises(ValueError, match="over the lessons"):
-        lessons.write_teacher_edition(tmp_path, tmp_path / ".." / tmp_path.name)
-    (written,) = lessons.write_teacher_edition(tmp_path, tmp_path / "teacher")
+        write_teacher_edition(tmp_path, tmp_path / ".." / tmp_path.name)
+    (written,) = write_teacher_edition(tmp_path, tmp_path / "teacher")
     assert "BEGIN SOLUTION" in written.read_text(encoding="utf-8")
 
 
@@ -267,6 +268,7 @@ def test_a_file_that_is_no_notebook_is_named(tmp_path):
 
 def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp_path, lesson, monkeypatch, capsys):
     monkeypatch.setattr(lessons, "lessons_folder", lambda: tmp_path)
+    monkeypatch.setattr(lessons.plans, "plan", lambda number: None)
     notebooks.write(lesson, tmp_path / "05_distortion.ipynb")
     assert lessons.main(["check"]) == 0
     assert lessons.main(["fresh"]) == 1

@@ -23,6 +23,7 @@ import numpy as np
 
 from camviz import glossary, notebooks, questions
 from camviz.exercises import exercises
+from camviz.teaching import plans
 
 HERE = Path(__file__).parent
 LESSONS = HERE.parents[1] / "lessons"
@@ -73,7 +74,7 @@ def plain(text: str) -> str:
 
 @cache
 def passages(number: str) -> tuple[Passage, ...]:
-    """All prose of the lesson: its cells, questions, replies, hints and explanations; the glossary's in lesson 00."""
+    """All prose of the lesson: its cells, questions, replies, hints, explanations and plan; lesson 00: the glossary."""
     return tuple(Passage(where, plain(text)) for where, text in _texts(number))
 
 
@@ -94,6 +95,12 @@ def _texts(number: str) -> Iterator[tuple[str, str]]:
     for one in exercises(number).values():
         for text in (*one.hints, one.praise, *(known.explanation for known in one.misconceptions)):
             yield f"exercise {one.name}", _stated(text)
+    planned = plans.plan(number)
+    if planned:
+        for text in (planned.bring, planned.network, planned.machine, *planned.notice):
+            yield "the teacher's plan", _stated(text)
+        for step in planned.steps:
+            yield f"the teacher's plan at {step.at}", _stated(f"{step.teacher}\n\n{step.students}")
     if number == "00":
         for term in glossary.glossary().terms:
             yield f"glossary: {term.name}", _stated(term.sentence)

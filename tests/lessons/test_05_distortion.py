@@ -341,3 +341,14 @@ def test_before_the_lesson_a_low_error(says):
     r, f, k3, moved = says("At r = 0.8, with f = 900 px, even k3 = −0.05 moves a point by 9.4 px.")
     assert moved == f.value * (r.value - g(r.value, 0.0, 0.0, k3.value))
     assert r.about(wanted.value / f.value)
+
+
+def test_the_curve_that_a_teacher_draws_on_the_board(says):
+    strength, r_low, low, r_top, top, r_down, down, r_last = says(
+        "draw r_d = r − 0.3 r³ on the board: (0, 0), (0.5, 0.46), the top (1.05, 0.70), (1.4, 0.58), (1.83, 0)"
+    )
+    assert r_top == folds_at(-strength.value)
+    assert top == g(folds_at(-strength.value), -strength.value)
+    assert low == g(r_low.value, -strength.value)
+    assert down == g(r_down.value, -strength.value)
+    assert r_last == 1 / np.sqrt(strength.value)

@@ -1,0 +1,45 @@
+"""Slides as one HTML file that needs nothing else: no network, no server, and to scroll through not even a script."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+from importlib.resources import files
+
+from camviz.notebooks import Notebook
+from camviz.teaching import parts, plans
+from camviz.teaching.slides import Slide, slides
+
+# Not even by mistake does a page of slides load anything.
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+HELP = "→ or space: next · ←: back · 1–9: part · Home, End · z: enlarge · d: dark or light · f: full screen · p: print"
+
+
+def deck(notebook: Notebook) -> str:
+    """The slides of a lesson as a page."""
+    plan = plans.plan(parts.number_of(notebook))
+    made = slides(notebook, plan.notice if plan else ())
+    title = re.sub(r"<[^>]*>", "", made[0].heading)
+    body = "".join(_section(number, one, len(made)) for number, one in enumerate(made, start=1))
+    return (
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{title} · slides</title>'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{_file("deck.css")}</style></head>'
+        f'<body><main>{body}</main><p class="help" hidden>{escape(HELP)}</p>'
+        f"<script>{_file('deck.js')}</script></body></html>\n"
+    )
+
+
+def _section(number: int, slide: Slide, count: int) -> str:
+    part = re.match(r"(\d+) · ", slide.part)
+    jump = f' data-part="{part[1]}"' if part else ""
+    level = "h1" if slide.kind == "title" else "h2"
+    heading = f"<{level}>{slide.heading}</{level}>" if slide.heading else ""
+    return (
+        f'<section class="slide {slide.kind}" id="s{number}"{jump}><header>{escape(slide.part)}</header>'
+        f"<div class='idea'>{heading}{slide.body}</div><footer>{number} / {count}</footer></section>"
+    )
+
+
+def _file(name: str) -> str:
+    return (files(__package__) / name).read_text(encoding="utf-8")

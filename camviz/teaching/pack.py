@@ -1,0 +1,26 @@
+"""A teacher's folder: for each lesson its edition, its pages to print and its slides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from camviz.notebooks import read
+from camviz.teaching.deck import deck
+from camviz.teaching.edition import Say, lesson_paths, write_teacher_edition
+from camviz.teaching.sheets import sheets
+
+
+def write_pack(source: Path, out: Path, only: Sequence[str], *, run: bool, slides: bool, say: Say) -> None:
+    """Writes into `out` what belongs to the lessons in `source` with the numbers `only`, by default all.
+
+    Raises ValueError for a number that no lesson has, and when `out` is the lessons' own folder.
+    """
+    write_teacher_edition(source, out, run=run, only=only, say=say)
+    for path in lesson_paths(source, only):
+        lesson, number = read(path), path.name.partition("_")[0]
+        pages = sheets(lesson, number)
+        if slides:
+            pages["slides"] = deck(lesson)
+        for name, page in pages.items():
+            (out / f"{number}_{name}.html").write_text(page, encoding="utf-8")

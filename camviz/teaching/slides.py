@@ -1,0 +1,271 @@
+"""A lesson as slides: one idea each, taken from its own cells, with few words and large.
+
+What becomes a slide: the lesson's question; each picture, under a heading that names one thing to notice; each
+question, its key, and after a vote the reply to each wrong answer; display equations; misconceptions; bold claims;
+exercises; the recap.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from html import escape
+
+from camviz import prose
+from camviz.notebooks import Cell, Notebook, exercise_of
+from camviz.questions import Question
+from camviz.teaching import markup, parts
+from camviz.teaching.parts import Shown
+
+MOST_WORDS, HEADING_WORDS, LEAST_WORDS = 40, 18, 5
+RECAP_WORDS, RECAP_ROWS = 55, 3
+
+LONGEST_LINE, LONG_QUESTION = 60, 75
+_SIZES = (("large", 28, 4), ("medium", 42, 6), ("small", 60, 8))
+"""Sizes of equations in deck.css, each with the letters that fit across and the rows that fit down."""
+
+_NOTICE = re.compile(r"^(?:Notice|See|Note)(?: that)?,? ")
+_LOOK = re.compile(r"^(?:Look|Watch|Move|Drag|Turn|Follow|Compare|Take|Set|Choose|Open|Give|Put)\b")
+_MATRIX = re.compile(r"\\begin\{\w+\}(.*?)\\end\{\w+\}", re.DOTALL)
+_ELSEWHERE = re.compile(r"\b(?:above|below|here|recap|lesson|cell|this|these)\b|^\(", re.IGNORECASE)
+_ITEM = re.compile(r"^\* (.+?)(?=^\* |\n\s*\n|\Z)", re.MULTILINE | re.DOTALL)
+_MISCONCEPTION = re.compile(r"\A> \*\*Misconception: (?P<thought>.+?)\*\*\s*(?P<answer>.*)\Z", re.DOTALL)
+_CLAIM = re.compile(r"\*\*([^*]+ [^*]+ [^*]+?)\*\*")  # three words or more: one or two are the name of a control
+_EQUATION = re.compile(r"\$\$(.+?)\$\$", re.DOTALL)
+_QUIET = {"Recap", "Further reading", "Glossary"}
+
+
+@dataclass(frozen=True)
+class Slide:
+    """One idea. `kind` is its class on the page, `part` the heading it stands under, `body` HTML."""
+
+    kind: str
+    part: str
+    heading: str
+    body: str = ""
+
+
+@dataclass
+class _Place:
+    """Where the walk through the lesson is."""
+
+    part: str = ""
+    heading: str = ""
+    said: str = ""
+    notice: list[str] = field(default_factory=list)
+
+
+def slides(notebook: Notebook, notice: Sequence[str] = ()) -> list[Slide]:
+    """The slides of a lesson with saved outputs, in its order; without outputs, those that need none.
+
+    `notice` has what to notice in each picture, in their order, as the lesson's plan says it.
+    """
+    place, found = _Place(notice=list(notice)), [_title(notebook)]
+    for number, cell in enumerate(notebook.cells):
+        tags = set(cell.metadata.get("tags", []))
+        if cell.cell_type == "code":
+            found += _of_code(cell, place, notebook.cells[number + 1 :])
+        elif number and not tags & {"solution", "glossary"}:
+            for block in markup.blocks(cell.source):
+                found += _of_block(block, place)
+    return found
+
+
+def _title(notebook: Notebook) -> Slide:
+    source = notebook.cells[0].source
+    asked = re.search(r"\*\*([^*]+\?)\*\*", source)
+    title = markup.plain(source.splitlines()[0].lstrip("# "))
+    return Slide("title", "", escape(title), f"<p>{markup.inline(asked[1])}</p>" if asked else "")
+
+
+# Code cells: pictures, questions, exercises --------------------------------------------------------------------------
+
+
+def _of_code(cell: Cell, place: _Place, following: list[Cell]) -> Iterator[Slide]:
+    if parts.is_pretest(cell):
+        yield Slide("claim", place.part, "What do you think now?", "<p>Answer the first quiz. Its key comes later.</p>")
+        return
+    for question in parts.asked(cell):
+        yield from _question(question, place.part)
+    for shown in parts.pictures(cell)[:1]:
+        noticed = prose.inline(place.notice.pop(0).rstrip(".")) if place.notice else _to_notice(place, following)
+        yield _picture(shown, noticed, place.part)
+    if "stub" in cell.metadata.get("tags", []):
+        yield _exercise(cell, place)
+
+
+def _picture(shown: Shown, heading: str, part: str) -> Slide:
+    return Slide("picture", part, heading, f'<img alt="{shown.description}" src="{shown.source}">')
+
+
+def _to_notice(place: _Place, following: list[Cell]) -> str:
+    """One thing to notice: what the text after the picture says of it, or the text before; else the heading."""
+    after = markup.unlinked(_text_after(following))
+    items = [markup.sentences(one)[0] for one in _ITEM.findall(after)]
+    noticed = [one for one in items if _NOTICE.match(one)]
+    told = markup.sentences(next((one for one in markup.blocks(after) if one[0] not in "*|>#$"), ""))[:2]
+    before = markup.sentences(markup.unlinked(place.said))
+    asked = [one for one in before if _LOOK.match(one)]
+    for one in (*noticed, *asked, *told, *items, *before):
+        heading = _as_heading(one)
+        if heading and not _ELSEWHERE.search(markup.plain(one)):
+            return heading
+    return markup.inline(place.heading or place.part)
+
+
+def _text_after(following: list[Cell]) -> str:
+    """The Markdown up to the next code cell or heading."""
+    text = ""
+    for cell in following:
+        if cell.cell_type != "markdown":
+            break
+        text += f"\n\n{cell.source}"
+    return re.split(r"^#", text, maxsplit=1, flags=re.MULTILINE)[0]
+
+
+def _as_heading(sentence: str) -> str:
+    """A sentence as a heading: without "Notice that" and full stop, up to its colon; "" where it is too long."""
+    text = _NOTICE.sub("", sentence.strip())
+    for end in (None, ": ", "; ", " ("):
+        short = text if end is None else text.partition(end)[0]
+        balanced = short.count("**") % 2 == 0 and short.count("$") % 2 == 0
+        if balanced and LEAST_WORDS <= markup.words(short) <= HEADING_WORDS:
+            short = short.rstrip(" .:;,")
+            return markup.inline(re.sub(r"[^\W\d_]", lambda first: first[0].upper(), short, count=1))
+    return ""
+
+
+def _exercise(cell: Cell, place: _Place) -> Slide:
+    task = markup.opening(place.said, MOST_WORDS)
+    signature = next((line for line in cell.source.splitlines() if line.startswith("def ")), exercise_of(cell))
+    body = f"{f'<p>{markup.inline(task)}</p>' if task else ''}<pre>{escape(signature)}</pre>"
+    return Slide("exercise", place.part, markup.inline(place.heading), body)
+
+
+# Questions -----------------------------------------------------------------------------------------------------------
+
+
+def _question(question: Question, part: str) -> Iterator[Slide]:
+    """The question; its key, which a page hides until it is asked for; after a vote the reply to each wrong answer."""
+    part = part if question.kind == "predict" else "Exit quiz"
+    choices = "".join(f"<li>{prose.inline(choice.text)}</li>" for choice in question.choices)
+    words = sum(len(one.split()) for one in (question.text, *(choice.text for choice in question.choices)))
+    kind = "question long" if words > LONG_QUESTION else "question"
+    yield Slide(kind, part, "", f"{prose.to_html(question.text)}<ol type='a'>{choices}</ol>")
+    right = question.choices[question.answer]
+    yield Slide("key", part, f"{_letter(question.answer)} {prose.inline(right.text)}", prose.to_html(right.reply))
+    for number, choice in enumerate(question.choices if question.kind == "predict" else ()):
+        if not choice.correct:
+            thought = f"<p class='thought'>{prose.inline(choice.misconception)}</p>"
+            heading = f"{_letter(number)} {prose.inline(choice.text)}"
+            yield Slide("reply", part, heading, thought + prose.to_html(choice.reply))
+
+
+def _letter(number: int) -> str:
+    return f"<b class='letter'>({chr(ord('a') + number)})</b>"
+
+
+# Markdown: equations, misconceptions, claims, the recap --------------------------------------------------------------
+
+
+def _of_block(block: str, place: _Place) -> Iterator[Slide]:
+    heading = re.match(r"(#+) (.+)", block)
+    if heading:
+        place.heading, place.said = heading[2].strip(), ""
+        if len(heading[1]) == 2:
+            place.part = place.heading
+        block = block[heading.end() :].strip()
+    misconception = _MISCONCEPTION.match(block)
+    if place.heading == "Recap" and block.startswith("|"):
+        yield from _recap(block, place.part)
+    elif place.heading in _QUIET or not block:
+        return
+    elif misconception:
+        answer = re.sub(r"^> ?", "", misconception["answer"], flags=re.MULTILINE)
+        text = markup.opening(answer, MOST_WORDS)
+        yield Slide("misconception", place.part, markup.inline(misconception["thought"].rstrip(".")), _paragraph(text))
+    else:
+        for latex in _EQUATION.findall(block):
+            before = block.partition("$$")[0] or place.said
+            yield Slide("equation", place.part, _heading_of_equation(before, place), _equation(latex))
+        if not block.startswith(("|", ">", "*", "1.", "$$", "```")):
+            yield from _claims(block, place.part)
+            place.said = block
+
+
+def _heading_of_equation(before: str, place: _Place) -> str:
+    """The sentence that leads to the equation, or the heading it stands under."""
+    for sentence in reversed(markup.sentences(markup.unlinked(_EQUATION.sub("", before)))):
+        heading = _as_heading(re.sub(r"\s*\([^()]*\)", "", sentence.strip()))
+        if heading:
+            return heading
+    return markup.inline(place.heading)
+
+
+def _equation(latex: str) -> str:
+    """The equation as large as it fits: its parts one under the other, in the size that width and height allow."""
+    lines = [one.strip(" ,\n") for one in re.split(r"\\qquad(?![a-z])", latex) if one.strip(" ,\n")]
+    if any(_depth(line) for line in lines):
+        lines = [latex]
+    lines = [half for line in lines for half in _halves(line)]
+    wide, high = max(map(_width, lines)), sum(map(_height, lines))
+    size = next((name for name, across, down in _SIZES if wide <= across and high <= down), "tiny")
+    return f"<div class='{size}'>{''.join(markup.formula(line, display=True) for line in lines)}</div>"
+
+
+def _width(line: str) -> int:
+    """About how many letters wide a line is when it is set; a matrix as wide as its widest row, two letters a gap."""
+    text = _MATRIX.sub(lambda found: "x" * (5 + max(map(_letters, found[1].split(r"\\")))), line)
+    return _letters(text)
+
+
+def _letters(latex: str) -> int:
+    text = re.sub(r"\\(?:left|right|text|mathrm|mathbf|frac|tfrac|dfrac|hat|bar|quad|tag)(?![a-z])", "", latex)
+    text = re.sub(r"&|\\(?:Longrightarrow|sum|sqrt|cdot)(?![a-z])| [=+] ", "xxx", text)
+    return len(re.sub(r"[{}_^\\ ,;!]", "", re.sub(r"\\[a-zA-Z]+", "x", text)))
+
+
+def _height(line: str) -> int:
+    """About how many rows of text high a line is when it is set."""
+    rows = max((found.count(r"\\") + 1 for found in _MATRIX.findall(line)), default=1)
+    return rows + ("frac" in line or r"\sum" in line) + 2 * ("brace" in line)
+
+
+def _halves(line: str) -> list[str]:
+    """A line that is too long for a slide, broken before the operator nearest its middle."""
+    signs = [found.start() for found in re.finditer(r"(?<=\s)[+=−-](?=\s)|\\Longrightarrow", line)]
+    breaks = [at for at in signs if not _depth(line[:at])]
+    if _width(line) <= LONGEST_LINE or not breaks or "\\begin" in line:
+        return [line]
+    at = min(breaks, key=lambda at: abs(at - len(line) / 2))
+    return [line[:at], line[at:]]
+
+
+def _depth(latex: str) -> int:
+    """How many braces, brackets and environments are open at the end."""
+    opened = sum(map(latex.count, ("{", "(", "[", r"\begin", r"\left")))
+    return opened - sum(map(latex.count, ("}", ")", "]", r"\end", r"\right")))
+
+
+def _claims(paragraph: str, part: str) -> Iterator[Slide]:
+    for sentence in markup.sentences(_EQUATION.sub("", paragraph)):
+        if _CLAIM.search(sentence) and markup.words(sentence) <= MOST_WORDS:
+            yield Slide("claim", part, "", _paragraph(sentence))
+
+
+def _recap(table: str, part: str) -> Iterator[Slide]:
+    """The recap's table, as many rows a slide as stay within RECAP_ROWS and RECAP_WORDS."""
+    head, _, *rows = table.splitlines()
+    pages: list[list[str]] = [[]]
+    for row in rows:
+        if pages[-1] and (len(pages[-1]) == RECAP_ROWS or markup.words(" ".join([*pages[-1], row])) > RECAP_WORDS):
+            pages.append([])
+        pages[-1].append(row)
+    for number, few in enumerate(pages, start=1):
+        made = markup.html("\n".join([head, "|---" * (head.count("|") - 1) + "|", *few]))
+        yield Slide("recap", part, f"Recap ({number} of {len(pages)})" if len(pages) > 1 else "Recap", made)
+
+
+def _paragraph(markdown: str) -> str:
+    return f"<p>{markup.inline(markdown)}</p>" if markdown else ""

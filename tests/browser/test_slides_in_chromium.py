@@ -1,0 +1,144 @@
+"""Slides in a real browser: keys, clicks and swipes; no slide overflows; paper and no script show them all."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from camviz import notebooks
+from camviz.teaching.deck import deck
+
+pytestmark = pytest.mark.browser
+
+LESSONS = sorted((Path(__file__).parents[2] / "lessons").glob("*.ipynb"))
+DISTORTION = next(path for path in LESSONS if path.name.startswith("05"))
+WIDE, NARROW = {"width": 1920, "height": 1080}, {"width": 1024, "height": 768}
+OVERFLOWING = """() => [...document.querySelectorAll(".slide")].filter((slide) => {
+  const idea = slide.querySelector(".idea"), limits = slide.getBoundingClientRect();
+  const inside = [...idea.querySelectorAll("math, img, li, p, h2, td")].map((one) => one.getBoundingClientRect());
+  return idea.scrollHeight > idea.clientHeight + 1 || idea.scrollWidth > idea.clientWidth + 1
+    || inside.some((box) => box.right > limits.right || box.bottom > limits.bottom || box.top < limits.top);
+}).map((slide) => `${slide.id} ${slide.className}`)"""
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("slides") / "05_slides.html"
+    path.write_text(deck(notebooks.read(DISTORTION)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def opened(browser, written):
+    """The deck on a projector; whatever it asks for besides itself fails the test, as does an error of its script."""
+    page = browser.new_page(viewport=WIDE)
+    wrong = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda message: wrong.append(message.text))
+    page.on("request", lambda one: wrong.append(one.url) if not one.url.startswith(("file:", "data:")) else None)
+    page.goto(written.as_uri())
+    yield page
+    page.close()
+    assert wrong == []
+
+
+def now(page):
+    return page.evaluate(
+        "() => [...document.querySelectorAll('.slide')].filter((s) => s.offsetParent).map((s) => s.id)"
+    )
+
+
+def kinds(page):
+    return page.evaluate("() => [...document.querySelectorAll('.slide')].map((slide) => slide.classList[1])")
+
+
+def test_a_key_is_hidden_until_the_next_press(opened):
+    asked = kinds(opened).index("question")
+    for _ in range(asked):
+        opened.keyboard.press("ArrowRight")
+    assert now(opened) == [f"s{asked + 1}"]
+    assert not opened.locator(".key").first.is_visible()
+    opened.keyboard.press(" ")
+    assert opened.locator(".key").first.is_visible()
+    opened.keyboard.press("ArrowLeft")
+    assert now(opened) == [f"s{asked + 1}"]
+
+
+def test_keys_clicks_and_the_address_lead_to_slides(opened):
+    last = f"s{len(kinds(opened))}"
+    for key, slide in (("End", last), ("ArrowRight", last), ("Home", "s1"), ("ArrowLeft", "s1"), ("PageDown", "s2")):
+        opened.keyboard.press(key)
+        assert now(opened) == [slide], key
+    opened.keyboard.press("3")
+    assert opened.locator(".slide.now header").inner_text().startswith("3 · ")
+    here = now(opened)
+    opened.reload()
+    assert now(opened) == here
+    opened.mouse.click(1500, 500)
+    opened.mouse.click(100, 500)
+    assert now(opened) == here
+
+
+def test_a_swipe_turns_the_page(browser, written):
+    context = browser.new_context(viewport=NARROW, has_touch=True)
+    page = context.new_page()
+    page.goto(written.as_uri())
+    swipe = """([from, to]) => {
+      const touch = (x) => new Touch({ identifier: 1, target: document.body, clientX: x, clientY: 300 });
+      dispatchEvent(new TouchEvent("touchstart", { touches: [touch(from)], changedTouches: [touch(from)] }));
+      dispatchEvent(new TouchEvent("touchend", { touches: [], changedTouches: [touch(to)], cancelable: true }));
+    }"""
+    page.evaluate(swipe, [800, 300])
+    assert now(page) == ["s2"]
+    page.evaluate(swipe, [300, 800])
+    assert now(page) == ["s1"]
+    page.evaluate(swipe, [300, 320])
+    assert now(page) == ["s1"]
+    context.close()
+
+
+def test_a_picture_comes_nearer_and_the_light_can_be_turned(opened):
+    for _ in range(kinds(opened).index("picture")):
+        opened.keyboard.press("ArrowRight")
+    image = opened.locator(".slide.now img")
+    before = image.bounding_box()["width"]
+    opened.keyboard.press("z")
+    assert image.bounding_box()["width"] == pytest.approx(2 * before)
+    paper = "() => getComputedStyle(document.body).backgroundColor"
+    light = opened.evaluate(paper)
+    opened.keyboard.press("d")
+    assert opened.evaluate(paper) != light
+    opened.keyboard.press("d")
+    assert opened.evaluate(paper) == light
+
+
+def test_without_a_script_and_on_paper_all_slides_stand_one_below_the_other(browser, written):
+    context = browser.new_context(java_script_enabled=False, viewport=NARROW)
+    page = context.new_page()
+    page.goto(written.as_uri())
+    slides = page.locator(".slide")
+    assert all(slides.nth(number).is_visible() for number in range(slides.count()))
+    context.close()
+    page = browser.new_page()
+    page.goto(written.as_uri())
+    page.keyboard.press("ArrowRight")
+    pdf = page.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b", pdf)) == len(kinds(page))
+    page.goto(f"{written.as_uri()}?print")
+    assert len(now(page)) == len(kinds(page))
+    page.close()
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_nothing_leaves_its_slide(browser, tmp_path, path):
+    """On a projector, on an old one of 4:3, and on paper."""
+    written = tmp_path / "slides.html"
+    written.write_text(deck(notebooks.read(path)), encoding="utf-8")
+    page = browser.new_page(viewport=WIDE)
+    page.goto(f"{written.as_uri()}?print")
+    for size in (WIDE, NARROW):
+        page.set_viewport_size(size)
+        assert page.evaluate(OVERFLOWING) == []
+    page.emulate_media(media="print")
+    assert page.evaluate(OVERFLOWING) == []
+    page.close()

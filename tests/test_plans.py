@@ -1,0 +1,113 @@
+"""Plans by the minute: they add up, they stand at places that their lesson has, and a wrong one is refused in words."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from camviz import notebooks
+from camviz.teaching import plans
+
+LESSONS = {path.name[:2]: path for path in sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))}
+PLANNED = sorted(path.stem for path in Path(plans.__file__).parent.glob("*.toml"))
+EACH = pytest.mark.parametrize("number", PLANNED)
+
+PLAN = """
+bring = "A ruler."
+network = "Use the slides."
+machine = "Share one."
+[[step]]
+at = "header"
+minutes = [60, 45]
+teacher = "Ask the question."
+students = "They guess."
+[[step]]
+at = "question grid"
+minutes = [30, 0]
+teacher = "Let them vote."
+students = "They vote."
+[[votes]]
+question = "grid"
+split = [50, 30, 20, 0]
+source = "a guess"
+"""
+
+
+@EACH
+def test_a_plan_and_its_lesson_agree(number):
+    assert plans.complaints(plans.plan(number), notebooks.read(LESSONS[number])) == []
+
+
+@EACH
+def test_minutes_add_up_and_nobody_is_left_alone_when_something_fails(number):
+    """Read here from the plan's own steps, not from the total that the reader holds."""
+    made = plans.plan(number)
+    for length in (90, 45):
+        times = made.times(length)
+        assert times[0][0] == 0
+        assert times[-1][1] == length
+        assert all(before[1] == after[0] for before, after in pairwise(times))
+    assert min(len(made.network.split()), len(made.machine.split())) > 10
+
+
+def test_a_plan_knows_its_times_and_its_votes():
+    made = plans.parse("05", PLAN)
+    assert [(a, b, step.at) for a, b, step in made.times(90)] == [(0, 60, "header"), (60, 90, "question grid")]
+    assert [(a, b, step.at) for a, b, step in made.times(45)] == [(0, 45, "header")]
+    assert made.expected("05.grid").guessed
+    assert made.expected("05.far_rays") is None
+
+
+def test_a_lesson_without_a_plan_has_none():
+    assert plans.plan("99") is None
+    assert plans.plan("../05") is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("[60, 45]", "[50, 45]", "the plan for 90 minutes adds up to 80"),
+        ("[60, 45]", "[60, 44]", "the plan for 45 minutes adds up to 44"),
+        ("[60, 45]", "[60, 45, 1]", "step 1: minutes must be two whole numbers"),
+        ("[60, 45]", "[60.5, 45]", "step 1: minutes must be two whole numbers"),
+        ("[30, 0]", "[0, 0]", "step 2: minutes are 0 in both"),
+        ('"header"', '"heading"', "step 1: at must be"),
+        ('"header"', '"header 1"', "step 1: at must be"),
+        ('"question grid"', '"question"', "step 2: at must be"),
+        ("They vote.", " ", "has one to 3 sentences"),
+        ("They vote.", "They vote. They talk. They vote. They read.", "has one to 3 sentences"),
+        ("They vote.", "They vote " + "and vote " * 18, "at most 35 words"),
+        ("students", "class", "knows at, minutes, teacher, students, got class"),
+        ('network = "Use the slides."\n', "", "network must be given as str"),
+        ("Use the slides.", " ", "network must say something"),
+        ("[50, 30, 20, 0]", "[50, 30, 10, 0]", "votes 1: split must be whole percents that add up to 100"),
+        ('"a guess"', '""', "source must name a publication"),
+        ("[[step]]", "[step]", "is not TOML"),
+        ("bring =", "bring", "is not TOML"),
+    ],
+)  # fmt: skip
+def test_a_wrong_plan_is_refused_in_one_sentence(old, new, complaint):
+    assert old in PLAN
+    with pytest.raises(ValueError) as refused:
+        plans.parse("05", PLAN.replace(old, new))
+    assert complaint in str(refused.value)
+    assert "lesson 05" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ('"header"', '"section 99"', "no such section"),
+        ('"header"', '"exercise dance"', "no such exercise"),
+        ('"question grid"', '"question quiz_fold"', "no such question"),
+        ('"question grid"', '"quiz"', "never asks the predict question grid"),
+        ('question = "grid"', 'question = "grill"', "no such predict question"),
+        ('question = "grid"', 'question = "far_rays"', "expects no votes for grid"),
+        ("[50, 30, 20, 0]", "[50, 50]", "in 2, it has 4 choices"),
+    ],
+)
+def test_what_a_lesson_does_not_have_is_named(old, new, complaint):
+    assert old in PLAN
+    found = plans.complaints(plans.parse("05", PLAN.replace(old, new)), notebooks.read(LESSONS["05"]))
+    assert any(complaint in one for one in found), found

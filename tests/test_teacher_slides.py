@@ -1,0 +1,102 @@
+"""Slides: one idea each, every question before its key, few words, and nothing that has to be loaded."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from camviz import notebooks, questions
+from camviz.teaching import deck, parts, slides
+
+LESSONS = sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))
+EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+LONGEST = 130
+"""Words of a question with all its choices; everything else has far fewer."""
+
+
+@cache
+def made(path):
+    return slides.slides(notebooks.read(path))
+
+
+def words(slide):
+    text = re.sub(r"<math.*?</math>", " x ", f"{slide.heading} {slide.body}", flags=re.DOTALL)
+    return len(re.sub(r"<[^>]*>", " ", text).split())
+
+
+@EACH
+def test_every_question_is_followed_by_its_key(path):
+    found = made(path)
+    asked = [number for number, one in enumerate(found) if one.kind.startswith("question")]
+    assert len(asked) >= 1
+    known = [one for one in questions.questions(path.name[:2]).values() if getattr(one, "form", "") != "A"]
+    assert len(asked) == len(known)
+    for number in asked:
+        assert found[number + 1].kind == "key"
+        assert found[number - 1].kind != "key" or found[number - 1].part == "Exit quiz"
+    assert sum(one.kind == "key" for one in found) == len(asked)
+
+
+@EACH
+def test_a_slide_has_one_idea_in_few_words(path):
+    for one in made(path):
+        most = {"question": LONGEST, "key": 95, "reply": 95}.get(one.kind.split()[0], 70)
+        assert words(one) <= most, one
+        assert one.heading or one.body
+        if one.kind == "picture":
+            assert one.body.startswith("<img alt=")
+            assert 0 < len(re.sub(r"<math.*?</math>|<[^>]*>", " ", one.heading).split()) <= slides.HEADING_WORDS + 2
+
+
+@EACH
+def test_every_picture_of_a_lesson_is_on_a_slide_of_its_own(path):
+    cells = notebooks.read(path).cells
+    assert sum(one.kind == "picture" for one in made(path)) == sum(bool(parts.pictures(cell)) for cell in cells)
+
+
+@EACH
+def test_a_deck_loads_nothing_and_names_no_other_address(path):
+    page = deck.deck(notebooks.read(path))
+    assert "http" not in re.sub(r"http-equiv|https?://www\.w3\.org/\S+", "", re.sub(r'src="data:[^"]*"', "", page))
+    assert not re.findall(r'(?:src|href)="(?!data:)[^"]*"|url\((?!data:)|@import|<link', page)
+    assert "default-src 'none'" in page
+    assert page.count("<section class=") == len(made(path))
+    assert len(set(re.findall(r'<section[^>]* id="(s\d+)"', page))) == len(made(path))
+
+
+def test_lesson_05_says_what_it_should():
+    lesson = next(path for path in LESSONS if path.name.startswith("05"))
+    found = made(lesson)
+    assert "Why do straight walls come out bent" in found[0].body
+    kinds = [one.kind for one in found]
+    assert {"picture", "question", "key", "reply", "equation", "misconception", "claim", "exercise", "recap"} <= set(
+        kinds
+    )
+    assert "negative is barrel" in next(one.heading for one in found if one.kind == "misconception")
+    equation = next(one for one in found if one.kind == "equation")
+    assert equation.body.count("<math") == 2
+    page = deck.deck(notebooks.read(lesson))
+    assert "The left lens folds inside its own picture</h2>" in page
+
+
+def test_a_pretest_is_asked_and_not_answered(monkeypatch):
+    monkeypatch.setattr(parts, "is_pretest", lambda cell: cell.source.startswith("quiz("))
+    header = nbformat.v4.new_markdown_cell("# 05 · A\n\n**Why?**")
+    found = slides.slides(nbformat.v4.new_notebook(cells=[header, nbformat.v4.new_code_cell('quiz("05", "A")')]))
+    assert [one.heading for one in found] == ["05 · A", "What do you think now?"]
+
+
+def test_a_long_equation_is_broken_and_a_short_one_is_large():
+    assert "class='large'" in slides._equation("Z = f B / d")
+    long = " + ".join(f"u_{{{number}}} v_{{{number}}}" for number in range(16))
+    assert slides._equation(long).count("<math") == 2
+    matrix = r"\begin{bmatrix} a + b \\ c \end{bmatrix}" * 9
+    assert slides._equation(matrix).count("<math") == 1
+
+
+def test_a_heading_is_a_whole_thought_or_none():
+    assert slides._as_heading("Notice that *all* lines are straight: look.") == "<em>All</em> lines are straight: look"
+    assert slides._as_heading(f"One two three four five: {'word ' * 20}") == "One two three four five"
+    assert slides._as_heading("word " * 30) == ""
