@@ -1,247 +1,117 @@
-"""The teacher's edition of a lesson: its plan at the head, a key after every question, solutions in their places."""
+"""How much a class learned: Hake's normalised gain from answers given before and after a lesson.
+
+R. R. Hake, Interactive-engagement versus traditional methods, American Journal of Physics 66 (1998), 64–74.
+"""
 
 from __future__ import annotations
 
-import re
-import shutil
-from collections.abc import Callable, Iterable
-from copy import deepcopy
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from camviz import notebooks
-from camviz.lessons import tidied
-from camviz.notebooks import Cell, Notebook, exercise_cells, read, solution_code, write
-from camviz.questions import Question
-from camviz.teaching import parts, plans
-from camviz.teaching.plans import Plan, Step, Votes
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-Say = Callable[[str], None]
+from camviz.answers import Answer, read_answers
+from camviz.questions import quiz_questions
+
+Array = NDArray[np.float64]
 
 
-def teacher_edition(notebook: Notebook) -> Notebook:
-    """The same lesson with its stubs solved, its solutions open, and beside its cells what a teacher needs there.
+@dataclass(frozen=True)
+class Gain:
+    """The normalised gain of a class, and the interval that holds it with the `level` of confidence."""
 
-    Plan, keys and notes are cells tagged `plan`, `key` and `teacher`. Solutions and hidden tests stand between
-    nbgrader's marks, so that `nbgrader generate_assignment` takes them out.
+    gain: float
+    low: float
+    high: float
+    level: float
+    students: int
+
+    def __str__(self) -> str:
+        interval = f"{100 * self.level:g} %: {self.low:.2f} to {self.high:.2f}"
+        return f"g = {self.gain:.2f} ({interval}; {self.students} students)"
+
+
+@dataclass(frozen=True)
+class Scores:
+    """The share of right first choices of each student, before and after a lesson, in the order of `participants`.
+
+    `incomplete` counts those who left out a question at either end; their answers are in neither array.
     """
-    edition = deepcopy(notebook)
-    for name, (stub, check, solution) in exercise_cells(edition).items():
-        stub.source = mark_solution(stub.source, solution_code(solution))
-        stub.metadata["nbgrader"] = _nbgrader(name, solution=True)
-        check.source = f"### BEGIN HIDDEN TESTS\nassert {check.source.strip()}\n### END HIDDEN TESTS\n{check.source}"
-        check.metadata["nbgrader"] = {**_nbgrader(f"{name}-check", grade=True), "points": 1}
-    for details in edition.cells:
-        if details.cell_type == "markdown":
-            details.source = details.source.replace("<details>", "<details open>")
-    plan = plans.plan(parts.number_of(notebook))
-    beside = [(*_notes(one), *_keys(one, plan)) for one in edition.cells]
-    cells = [cell for one, more in zip(edition.cells, beside, strict=True) for cell in (one, *more)]
-    if plan:
-        _anchored(cells, plan, parts.titles(notebook))
-    edition.cells = [cells[0], *_planned(plan, notebook), *cells[1:]]
-    edition.cells[0].source = re.sub(r"\A# (.*)", r"# \1 (teacher's edition)", edition.cells[0].source)
-    for cell in edition.cells:
-        if cell.cell_type == "code":
-            cell.outputs, cell.execution_count = [], None
-    edition.metadata.get("camviz", {}).pop("source", None)
-    return edition
+
+    participants: tuple[str, ...]
+    before: Array
+    after: Array
+    incomplete: int
 
 
-def write_teacher_edition(
-    source: Path, out: Path, *, run: bool = False, only: Iterable[str] = (), say: Say = lambda sentence: None
-) -> list[Path]:
-    """Writes the teacher's edition of the lessons in `source` into `out`, under the same names, with their pictures.
+def normalised_gain(before: ArrayLike, after: ArrayLike, rng: np.random.Generator, level: float = 0.95) -> Gain:
+    """⟨g⟩ = (mean after − mean before) / (1 − mean before), with its interval by a bootstrap over students.
 
-    `only` are numbers of lessons, by default all. With `run` each lesson is run, and its outputs are in the file; one
-    that does not run is written without, and `say` gets a sentence about it. Raises ValueError when `out` is the
-    lessons' own folder.
+    `before` and `after` (n,) are shares of right answers between 0 and 1, the same student in the same place. The
+    interval is bias-corrected and accelerated (Efron 1987): students are drawn anew, each with both shares. Its ends
+    are NaN where students do not differ, or where a class so drawn can have had everything right before.
+
+    Raises ValueError for fewer than two students, shares outside 0 … 1, and a class that had everything right before,
+    which has nothing left to gain.
     """
-    if out.resolve() == source.resolve():
-        raise ValueError(f"the teacher's edition cannot be written over the lessons themselves, {source}")
-    out.mkdir(parents=True, exist_ok=True)
-    for path in (*source.glob("images/*"), *source.glob("*.md")):
-        (out / path.relative_to(source)).parent.mkdir(exist_ok=True)
-        shutil.copyfile(path, out / path.relative_to(source))
-    chosen = lesson_paths(source, only)
-    for count, path in enumerate(chosen, start=1):
-        edition = teacher_edition(read(path))
-        if run:
-            say(f"running {path.name} ({count} of {len(chosen)})")
-            edition = executed(edition, out, path.name, say)
-        write(edition, out / path.name)
-    return [out / path.name for path in chosen]
+    first, last = np.asarray(before, dtype=np.float64), np.asarray(after, dtype=np.float64)
+    if first.ndim != 1 or first.shape != last.shape or first.size < 2:
+        raise ValueError(f"before and after must be (n,) of at least 2 students, got {first.shape} and {last.shape}")
+    if not all(((shares >= 0) & (shares <= 1)).all() for shares in (first, last)):
+        raise ValueError("before and after must be shares between 0 and 1")
+    if first.mean() == 1:
+        raise ValueError("before must leave something to gain: every answer was right")
+    low, high = _interval(first, last, rng, level)
+    return Gain(float(_gain(first, last)), low, high, level, first.size)
 
 
-def lesson_paths(source: Path, only: Iterable[str] = ()) -> list[Path]:
-    """The lessons in a folder, or those with the numbers `only`. Raises ValueError for a number that none has."""
-    found = {path.name.partition("_")[0]: path for path in sorted(source.glob("*.ipynb"))}
-    for number in only:
-        if number not in found:
-            raise ValueError(f"there is no lesson {number}; the lessons are {', '.join(found)}")
-    return [path for number, path in found.items() if not list(only) or number in only]
+def class_scores(files: Iterable[Path], lesson: str) -> Scores:
+    """The scores of a class in a lesson, from the files that students exported.
+
+    A student counts whose file has a first choice for every question before and after. Files of other lessons are
+    passed over. Raises ValueError naming a file that cannot be read or was not exported, and two files of one code.
+    """
+    kept: dict[str, tuple[float, float]] = {}
+    incomplete = 0
+    for path in sorted(files):
+        answers = [one for one in read_answers(path) if one.lesson == lesson]
+        if any(one.correct is None for one in answers):
+            raise ValueError(f"{path.name} says not what is right: it is not an exported file")
+        for code in sorted({one.participant for one in answers}):
+            if code in kept:
+                raise ValueError(f"{path.name}: another file has the code {code}, too")
+            own = [one for one in answers if one.participant == code]
+            shares = _share(own, "before", lesson), _share(own, "after", lesson)
+            if np.isnan(shares).any():
+                incomplete += 1
+            else:
+                kept[code] = shares
+    pairs = np.array(list(kept.values()), dtype=np.float64).reshape(-1, 2)
+    return Scores(tuple(kept), pairs[:, 0], pairs[:, 1], incomplete)
 
 
-def executed(edition: Notebook, folder: Path, name: str, say: Say) -> Notebook:
-    """The notebook with its outputs; as it was when a cell fails, and `say` hears which."""
-    from jupyter_client.kernelspec import NoSuchKernel
-    from nbclient.exceptions import CellControlSignal, DeadKernelError
-
-    run = deepcopy(edition)
-    try:
-        notebooks.execute(run, folder)
-    except (CellControlSignal, DeadKernelError, NoSuchKernel, OSError) as error:
-        say(f"{name} could not be run ({_what_failed(error)}), so it is written without outputs.")
-        return edition
-    return tidied(run)
+def _share(answers: list[Answer], when: str, lesson: str) -> float:
+    """The share of right first choices; NaN unless every question of one form has one."""
+    first = [one for one in answers if one.when == when and one.attempt == 1]
+    asked = {one.form: {each.concept for each in quiz_questions(lesson, one.form)} for one in first}
+    complete = len(asked) == 1 and {one.concept for one in first} == next(iter(asked.values()))
+    return float(np.mean([one.correct for one in first])) if complete else np.nan
 
 
-def _what_failed(error: BaseException) -> str:
-    """One line: the exception in the cell where nbclient tells it, or what the error itself says last."""
-    from nbclient.exceptions import CellExecutionError
-
-    if isinstance(error, CellExecutionError):
-        return f"{error.ename}: {' '.join(str(error.evalue).split())[:200]}"
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return f"{type(error).__name__}: {lines[0][:200] if lines else 'no message'}"
+def _gain(before: Array, after: Array, axis: int = -1) -> Array:
+    room = 1 - np.mean(before, axis=axis)
+    risen = np.mean(after, axis=axis) - np.mean(before, axis=axis)
+    return np.divide(risen, room, out=np.full(np.shape(room), np.nan), where=room > 0)
 
 
-def mark_solution(stub: str, solution: str) -> str:
-    """The solution with what differs from the stub between ### BEGIN SOLUTION and ### END SOLUTION."""
-    lines, given = solution.splitlines(), stub.splitlines()
-    same = 0
-    while same < min(len(lines), len(given)) and lines[same] == given[same]:
-        same += 1
-    if same == len(lines):
-        raise ValueError(f"a solution must differ from its stub: {solution[:60]!r}")
-    indent = re.match(r"\s*", next(line for line in lines[same:] if line.strip()))
-    margin = indent[0] if indent else ""
-    return "\n".join([*lines[:same], f"{margin}### BEGIN SOLUTION", *lines[same:], f"{margin}### END SOLUTION"])
+def _interval(before: Array, after: Array, rng: np.random.Generator, level: float) -> tuple[float, float]:
+    from scipy.stats import bootstrap
 
-
-# What is put beside a lesson's cells ---------------------------------------------------------------------------------
-
-
-def _planned(plan: Plan | None, notebook: Notebook) -> list[Cell]:
-    return [_cell(plan_markdown(plan, parts.titles(notebook)), f"plan-{plan.lesson}", "plan")] if plan else []
-
-
-def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
-    """The plan as a table of minutes, places, and what teacher and class do; then what to bring, and if it fails."""
-    times = [{id(step): _minutes(a, b) for a, b, step in plan.times(length)} for length in (plans.LONG, plans.SHORT)]
-    rows = []
-    for step in plan.steps:
-        cells = [*(one.get(id(step), "–") for one in times), _linked(step, titles)]
-        rows.append(f"| {' | '.join([*cells, _one_line(step.teacher), _one_line(step.students)])} |")
-    return "\n".join(
-        [
-            "## For the teacher: the plan",
-            "",
-            "Keep this file on your own screen, for it shows the keys. Project the slides and the students' lesson.",
-            "",
-            f"| {plans.LONG} min | {plans.SHORT} min | Where | You | The class |",
-            "|---|---|---|---|---|",
-            *rows,
-            "",
-            "A step marked – is left out in that plan.",
-            "",
-            f"* **Bring.** {_one_line(plan.bring)}",
-            f"* **If the network fails.** {_one_line(plan.network)}",
-            f"* **If a machine fails.** {_one_line(plan.machine)}",
-        ]
-    )
-
-
-def place(step: Step, titles: dict[str, str]) -> str:
-    """Where a step is in the lesson, in words."""
-    if step.kind == "question":
-        return f"Question: {step.name.replace('_', ' ')}"
-    return titles.get(step.at, {"header": "The lesson's question", "quiz": "Exit quiz"}.get(step.kind, step.at))
-
-
-def _linked(step: Step, titles: dict[str, str]) -> str:
-    words = _one_line(place(step, titles))
-    anchor = f"key-{step.name}" if step.kind == "question" else _anchor(step.at)
-    return f"[{words}](#{anchor})" if step.at in titles or step.kind == "question" else words
-
-
-def _anchor(at: str) -> str:
-    """An address that every Markdown takes as it is: "plan-section-3"."""
-    return "plan-" + "-".join(re.findall(r"\w+", at)).lower()
-
-
-def _anchored(cells: list[Cell], plan: Plan, titles: dict[str, str]) -> None:
-    """Puts an address before each heading that the plan leads to: headings' own are not the same everywhere."""
-    wanted = {titles[step.at]: _anchor(step.at) for step in plan.steps if step.at in titles}
-    for cell in cells:
-        if cell.cell_type == "markdown":
-            lines = cell.source.split("\n")
-            anchors = [wanted.pop(line.lstrip("# "), "") if line.startswith("##") else "" for line in lines]
-            pairs = zip(anchors, lines, strict=True)
-            cell.source = "\n".join(f'<a id="{anchor}"></a>\n\n{line}' if anchor else line for anchor, line in pairs)
-
-
-def _minutes(begin: int, end: int) -> str:
-    """From when to when, and never broken into two lines."""
-    return f"{begin}\u2060–\u2060{end}"
-
-
-def _keys(cell: Cell, plan: Plan | None) -> list[Cell]:
-    asked = parts.asked(cell)
-    if not asked:
-        return []
-    text = "\n\n---\n\n".join(key_markdown(one, plan.expected(one.name) if plan else None) for one in asked)
-    return [_cell(text, f"key-{cell.id}", "key")]
-
-
-def key_markdown(question: Question, votes: Votes | None) -> str:
-    """The right choice, then for each choice its expected share, the thought behind it and the reply to it."""
-    name = question.name.partition(".")[2]
-    right = question.choices[question.answer]
-    lines = [
-        f'<a id="key-{name}"></a>',
-        f"> **Key.** Right is **({_letter(question.answer)})** {_markdown(right.text)}",
-    ]
-    for number, choice in enumerate(question.choices):
-        share = f", {votes.split[number]} % expected" if votes else ""
-        thought = f" The thought behind it: *{_markdown(choice.misconception)}*." if choice.misconception else ""
-        mark = "✓" if choice.correct else "✗"
-        lines.append(f"> * **({_letter(number)})** {mark}{share}.{thought} Reply: {_markdown(choice.reply)}")
-    if votes:
-        counted = "nobody has counted votes yet" if votes.guessed else votes.source
-        lines += [">", f"> The expected votes are {'a guess: ' if votes.guessed else 'from '}{_markdown(counted)}."]
-    return "\n".join([lines[0], "", lines[1], ">", *lines[2:]])
-
-
-def _notes(cell: Cell) -> list[Cell]:
-    note = cell.metadata.get("camviz", {}).get("teacher")
-    text = f"> **For the teacher:** {note.strip()}".replace("\n", "\n> ") if note else ""
-    return [_cell(text, f"teacher-{cell.id}", "teacher")] if note else []
-
-
-def _cell(text: str, name: str, tag: str) -> Cell:
-    import nbformat
-
-    made = nbformat.v4.new_markdown_cell(text)
-    made.id, made.metadata["tags"] = name[:64], [tag]
-    return made
-
-
-def _letter(number: int) -> str:
-    return chr(ord("a") + number)
-
-
-def _one_line(text: str) -> str:
-    """For a cell of a table, where a bar would end it."""
-    return _markdown(text).replace("|", r"\|")
-
-
-def _markdown(text: str) -> str:
-    """Prose with `code` and *emphasis* as Markdown on one line: what else would be markup there is escaped."""
-    pieces = re.split(r"(``.+?``|`[^`]+`)", " ".join(text.split()))
-    return "".join(one if one.startswith("`") else re.sub(r"([<$~])", r"\\\1", one) for one in pieces)
-
-
-def _nbgrader(name: str, grade: bool = False, solution: bool = False) -> dict[str, Any]:
-    marks = {"grade": grade, "solution": solution, "locked": grade, "task": False}
-    return {"schema_version": 3, "grade_id": name.replace(".", "-"), **marks}
+    pair = (before, after)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of students who do not differ: the ends are NaN then, and that is said
+        found = bootstrap(pair, _gain, paired=True, n_resamples=4999, confidence_level=level, method="BCa", rng=rng)
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
