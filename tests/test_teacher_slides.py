@@ -7,7 +7,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from camviz import notebooks, questions
+from camviz import notebooks, prose
 from camviz.teaching import deck, parts, slides
 
 LESSONS = sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))
@@ -31,10 +31,16 @@ def test_every_question_is_followed_by_its_key(path):
     found = made(path)
     asked = [number for number, one in enumerate(found) if one.kind.startswith("question")]
     assert len(asked) >= 1
-    known = [one for one in questions.questions(path.name[:2]).values() if getattr(one, "form", "") != "A"]
+    cells = [cell for cell in notebooks.read(path).cells if not parts.is_pretest(cell)]
+    known = [one for cell in cells for one in parts.asked(cell)]
     assert len(asked) == len(known)
-    for number in asked:
-        assert found[number + 1].kind == "key"
+    for number, question in zip(asked, known, strict=True):
+        right = question.choices[question.answer]
+        key = found[number + 1]
+        assert key.kind == "key"
+        assert key.heading.startswith(f"<b class='letter'>({'abcdefgh'[question.answer]})</b>")
+        assert key.heading.endswith(prose.inline(right.text))
+        assert key.body == prose.to_html(right.reply)
         assert found[number - 1].kind != "key" or found[number - 1].part == "Exit quiz"
     assert sum(one.kind == "key" for one in found) == len(asked)
 
