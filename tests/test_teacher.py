@@ -75,7 +75,7 @@ def test_the_plan_stands_below_the_header_and_its_links_lead_somewhere():
     links = re.findall(r"\]\(#([^)]+)\)", plan)
     assert len(links) == len([step for step in plans.plan("05").steps if step.kind not in ("header", "quiz")])
     assert set(links) <= set(re.findall(r'<a id="([^"]+)">', text))
-    assert '<a id="plan-section-3"></a>\n\n## 3 · Where the model breaks' in text
+    assert '<a id="plan-section-2"></a>\n\n## 2 · Where the model breaks' in text
     assert all(word in plan for word in ("Bring", "If the network fails", "If a machine fails"))
 
 
