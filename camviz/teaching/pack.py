@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from camviz.notebooks import read
+from camviz.notebooks import Notebook, read
 from camviz.teaching.deck import deck
 from camviz.teaching.edition import Say, lesson_paths, write_teacher_edition
 from camviz.teaching.sheets import sheets
@@ -21,6 +21,15 @@ def write_pack(source: Path, out: Path, only: Sequence[str], *, run: bool, slide
         lesson, number = read(path), path.name.partition("_")[0]
         pages = sheets(lesson, number)
         if slides:
-            pages["slides"] = deck(lesson)
+            pages["slides"] = deck(_with_solved_pictures(lesson, read(out / path.name)))
         for name, page in pages.items():
             (out / f"{number}_{name}.html").write_text(page, encoding="utf-8")
+
+
+def _with_solved_pictures(lesson: Notebook, edition: Notebook) -> Notebook:
+    """The lesson with what its edition shows, where that has been run: the pictures that a solved function makes."""
+    solved = {cell.id: cell.outputs for cell in edition.cells if cell.cell_type == "code" and cell.outputs}
+    for cell in lesson.cells:
+        if cell.id in solved:
+            cell.outputs = solved[cell.id]
+    return lesson
