@@ -67,7 +67,9 @@ def without_noise(programs: dict[str, Measure]) -> None:
 
 def with_noise(programs: dict[str, Measure]) -> None:
     print(f"\n{100 * NOISE:g} % noise, an edge at 5°:\n")
-    row(["blur", "rows", *(f"{name}: off by" for name in programs), "camviz: its standard error", "within 3 %", "worst"])
+    row(
+        ["blur", "rows", *(f"{name}: off by" for name in programs), "camviz: its standard error", "within 3 %", "worst"]
+    )
     row(["---"] * (5 + len(programs)))
     for blur, size in NOISY:
         truth = true_mtf50(blur, size, 5)

@@ -213,7 +213,7 @@ class SlantedEdge:
     def mtf50_error(self) -> float:
         """The standard error of MTF50, cycles per pixel, that the pixels' noise leaves; NaN where there is no MTF50.
 
-        To first order. The transform is S(f) = Σ_j m_j s_j(f), linear in the bins' means m_j, whose variance is σ_j²/n_j.
+        To first order. The transform S(f) = Σ_j m_j s_j(f) is linear in the bins' means m_j, of variance σ_j²/n_j.
         So ln MTF changes by Re(s_j(f) / S(f)) - s_j(0) / S(0) with m_j, and MTF50 by that over the slope of ln MTF.
         Noise is taken to be independent from pixel to pixel, which demosaicing and sharpening make untrue.
         """
