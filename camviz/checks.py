@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import log10
 from typing import Any, Literal
 
 import numpy as np
@@ -126,10 +127,16 @@ def _unsolved(exercise: Exercise) -> Verdict:
         if exercise.bug
         else "Replace the stub by your own lines,"
     )
-    demand = "True or False" if exercise.yes_or_no else f"right to {exercise.tolerance:g} of 1 + |answer|"
+    demand = "True or False" if exercise.yes_or_no else f"right to {_digits(exercise.tolerance)}"
     test = f"It is tried on fresh random numbers, and its answers must be {demand}."
     hint = f"""Stuck? `check.hint("{exercise.name}")` gives the first of three hints."""
     return Verdict(exercise.name, "unsolved", f"{begin} then run this cell again. {test} {hint}")
+
+
+def _digits(tolerance: float) -> str:
+    """A tolerance of 1 + |answer| in words."""
+    digits = round(-log10(tolerance))
+    return f"{100 * tolerance:g} %" if digits < 3 else f"about {digits} digits"
 
 
 def _wrong(exercise: Exercise, message: str, attempt: int) -> Verdict:

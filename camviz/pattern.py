@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from camviz import glossary, notebooks, questions
+from camviz import glossary, notebooks, questions, reading
 from camviz.exercises import exercises
 
 Notebook = Any
@@ -24,7 +24,10 @@ LONGEST_CELL = 30
 
 WORDS_A_MINUTE, MINUTES_A_QUESTION, MINUTES_AN_EXERCISE = 200, 3, 8
 
-_DRAWING = re.compile(r"\bplt\.|\bmatplotlib\b|\bpyvista\b|\bset_xlabel\b")
+MOST_DRAWING = 8
+"""Lines that plot, in one cell: what a reader would write, and not more than shows the result."""
+
+_DRAWING = re.compile(r"\b(?:plt|ax|axes|figure|plotter)\b[.\[]|^for \w+, .* in zip\(axes")
 _WORD = re.compile(r"[^\W\d_]+(?:[’'][^\W\d_]+)?")
 _NOT_READ = re.compile(r"\]\([^)]*\)|\$\$.*?\$\$|\$[^$\n]*\$", re.DOTALL)  # addresses; formulas
 _PATIENT = re.compile(r"ward\[\d+\]")
@@ -51,6 +54,8 @@ def complaints(notebook: Notebook, file_name: str) -> list[str]:
     found = [*_header(notebook, number), *_setup(notebook), *_cells(notebook), *_links(notebook)]
     if number != "00":
         found += [*_questions(notebook, number), *_exercises(notebook, number), *_ending(notebook)]
+        if any("attempt(" in cell.source for cell in notebook.cells):  # a lesson of the second edition
+            found += [*_own_functions(notebook), *_reads_well(notebook, number)]
     return found
 
 
@@ -84,9 +89,9 @@ def _cells(notebook: Notebook) -> list[str]:
         lines = cell.source.splitlines()
         if len(lines) > LONGEST_CELL:
             found.append(f"cell {number} has {len(lines)} lines of code, more than {LONGEST_CELL}: {lines[0]}")
-        drawing = _DRAWING.search(cell.source)
-        if drawing:
-            found.append(f"cell {number} draws by itself ({drawing[0]}): drawing belongs in camviz.views")
+        drawn = sum(bool(_DRAWING.search(line)) for line in lines)
+        if drawn > MOST_DRAWING:
+            found.append(f"cell {number} has {drawn} lines that draw, more than {MOST_DRAWING}: {lines[0]}")
     if not notebooks.tagged(notebook, "nbval-check-output"):
         found.append("no cell is tagged nbval-check-output, so no number of this lesson is held")
     return found
@@ -135,6 +140,31 @@ def _exercises(notebook: Notebook, number: str) -> list[str]:
             found.append(f"the solution of {name} is its stub")
     closed = [cell for cell in notebooks.tagged(notebook, "solution") if "<details>" not in cell.source]
     return [*found, *(f"a solution is not folded by <details>: {cell.source[:40]!r}" for cell in closed)]
+
+
+def _own_functions(notebook: Notebook) -> list[str]:
+    """What the reader wrote is what the lesson goes on with: under sliders, and in a plot of its own."""
+    names = [name.split(".")[1] for name in notebooks.stubs(notebook)]
+    rest = [
+        cell.source
+        for cell in notebook.cells
+        if cell.cell_type == "code" and not {"stub", "check"} & set(cell.metadata.get("tags", []))
+    ]
+    run = [name for name in names if any(re.search(rf"\b{name}\b", source) for source in rest)]
+    found = [] if len(run) >= 2 else [f"at least two of the reader's functions must run in the lesson, {run} do"]
+    if not any("yours=" in source and "explore(" in source for source in rest):
+        found.append("no visualizer runs a function of the reader's: explore(…View(…, yours=…))")
+    if not any("attempt(" in source and "plt." in source for source in rest):
+        found.append("nothing of the reader's own is plotted: attempt(…) and plt")
+    return found
+
+
+def _reads_well(notebook: Notebook, number: str) -> list[str]:
+    found = [
+        f"cell {one.cell} has {long}" for one in reading.main_line(notebook) for long in reading.too_long(one.text)
+    ]
+    links = [f"the first use of {name!r} should link to the glossary" for name in reading.unlinked(notebook, number)]
+    return [*found, *links]
 
 
 def _ending(notebook: Notebook) -> list[str]:

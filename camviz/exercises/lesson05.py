@@ -601,4 +601,4 @@ def bent_about_the_corner(width, height, f, k1):
     return f * distort(np.stack([u, v], axis=-1) / f, k1, 0, 0)
 
 
-EXERCISES = (DISTORT, TANGENTIAL, FOLD, UNDISTORT, UNDISTORT_MAP)
+EXERCISES = (DISTORT, FOLD, UNDISTORT_MAP, UNDISTORT, TANGENTIAL)

@@ -1,7 +1,11 @@
-"""The distortion visualizer: one lens seen four ways, as picture, displacement field, radial curve and bent frustum."""
+"""The distortion visualizer: one lens seen as picture, displacement field, radial curve and bent frustum.
+
+A reader's own function can bend a picture beside the right one.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import atan, atan2, cos, degrees, hypot, inf, isfinite, pi, sin, tan
@@ -23,11 +27,18 @@ from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
+from camviz.yours import tried
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
 _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
-_WIDTH, _TALLEST = 380, 300
+_SLOTS = {  # where panels stand, (x, y, width, tallest), by how many there are
+    1: ((20, 34, 680, 510),),
+    2: ((20, 34, 380, 300), (420, 34, 380, 300)),
+    4: ((20, 34, 380, 300), (420, 34, 380, 300), (20, 370, 470, 180), (545, 370, 255, 180)),
+}
+_HEIGHTS = {1: 564, 2: 354, 4: 602}
+_COLUMN = 822  # where the numbers stand
 
 
 @dataclass(frozen=True)
@@ -36,6 +47,8 @@ class DistortionView(View):
 
     The coefficients are those of Brown and Conrady in OpenCV's order; with `lens` set, that lens is shown instead.
     With `photograph` (height, width, 3) uint8 the camera's picture is that photograph, else it is the virtual scene.
+    `panels` names what is drawn: one, two or four of picture, field, yours, curve and rays. `yours` is a reader's
+    function of (xy, k1, k2, k3), ideal points (..., 2) to distorted ones, in focal lengths; what it does is orange.
     """
 
     title: ClassVar[str] = "Lens distortion"
@@ -54,10 +67,18 @@ class DistortionView(View):
     s4: float = slider(0.0, **_SIDE, help="thin prism: r⁴ in y")
     show: str = choice("distorted", "undistorted", help="the camera's picture, or that picture straightened")
     hide_fold: bool = switch(True, label="hide what folds", help="leave out what the model maps twice")
+    panels: str = "picture field curve rays"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 90))
     lens: Lens | None = None
     photograph: np.ndarray | None = field(default=None, compare=False, repr=False)
     eye: Eye = Eye(target=(0.0, 0.0, 0.45), distance=2.5, yaw_deg=-35, pitch_deg=25)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        wanted = self.panels.split()
+        if len(wanted) not in _SLOTS or not set(wanted) <= {"picture", "field", "yours", "curve", "rays"}:
+            raise ValueError(f"panels must be one, two or four of picture, field, yours, curve, rays, got {wanted}")
 
     @classmethod
     def of(cls, camera: Camera, photograph: np.ndarray | None = None) -> DistortionView:
@@ -92,6 +113,13 @@ class DistortionView(View):
             "fold": self._fold_in_words() if folds else _none_but(pole),
             "farthest a ray lands": f"r = {np.hypot(*self._fold_rim(1)[0]):.4f}" if folds else "no limit",
         }
+
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of: the fold's only where the curve or the rays show it."""
+        figures = self.numbers()
+        if {"curve", "rays"} & set(self.panels.split()):
+            return figures
+        return {name: figures[name] for name in ("image corner", "corner moves")}
 
     def _widest(self) -> str:
         """The angle of the ray that arrives at the corner farthest from the axis."""
@@ -130,23 +158,26 @@ class DistortionView(View):
 
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
         return f"{self._name()}: {figures}. Picture shown {self.show}."
 
     def figure(self, *, draft: bool = False) -> Picture:
-        lens_panel, photographs = self._frustum_panel(draft)
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 602, "paper"),
-                self._picture_panel(draft),
-                self._field_panel(draft),
-                self.curve_panel(70, 370, 420, 180),
-                lens_panel,
-                self._numbers_column(),
-            ]
-        )
-        photographs["camera"] = jpeg(self.image(draft=draft))
-        return Picture(body, 960, 602, self.title, self.description(), photographs)
+        names = self.panels.split()
+        draw = {
+            "picture": self._picture_panel,
+            "field": self._field_panel,
+            "yours": self._your_panel,
+            "curve": self._curve_with_axes,
+            "rays": self._frustum_panel,
+        }
+        height = _HEIGHTS[len(names)]
+        body, photographs = [svg.rectangle(0, 0, 960, height, "paper")], dict[str, bytes]()
+        for name, slot in zip(names, _SLOTS[len(names)], strict=True):
+            content, attached = draw[name](*slot, draft=draft)
+            body.append(content)
+            photographs |= attached
+        body.append(self._numbers_column(names))
+        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
 
     def _name(self) -> str:
         if self.lens:
@@ -164,20 +195,25 @@ class DistortionView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def image(self, *, draft: bool) -> np.ndarray:
-        small = Camera(self.intrinsics.within(garden.DRAFT if draft else garden.FINE), self.camera.lens)
-        if self.photograph is None:
-            picture = garden.glimpse(small) if draft else snapshot(textured_scene(), small)
-        else:
-            picture = cv2.resize(
-                self.photograph, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA
-            )
-        return picture if self.show == "distorted" else self._straightened(picture, small)
+        small = self._small_camera(draft)
+        picture = self._taken(small, draft)
+        return picture if self.show == "distorted" else self._fetched(picture, small, self._bend)
 
-    def _straightened(self, picture: np.ndarray, camera: Camera) -> np.ndarray:
-        """Undistorting an image evaluates the forward model at every output pixel."""
+    def _small_camera(self, draft: bool) -> Camera:
+        return Camera(self.intrinsics.within(garden.DRAFT if draft else garden.FINE), self.camera.lens)
+
+    def _taken(self, camera: Camera, draft: bool) -> np.ndarray:
+        """What the camera takes: the given photograph in its size, or a picture of the virtual scene."""
+        if self.photograph is None:
+            return garden.glimpse(camera) if draft else snapshot(textured_scene(), camera)
+        size = (camera.intrinsics.width, camera.intrinsics.height)
+        return cv2.resize(self.photograph, size, interpolation=cv2.INTER_AREA)
+
+    def _fetched(self, picture: np.ndarray, camera: Camera, bend: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """The straight picture: undistorting evaluates the forward model at every output pixel."""
         xy = camera.intrinsics.from_pixels(camera.intrinsics.grid())
-        uv = camera.intrinsics.to_pixels(self._bend(xy)).astype(np.float32)
-        return cv2.remap(picture, np.nan_to_num(uv, nan=-9), None, cv2.INTER_LINEAR, borderValue=(38, 44, 54))
+        uv = np.nan_to_num(camera.intrinsics.to_pixels(bend(xy)), nan=-9, posinf=-9, neginf=-9).astype(np.float32)
+        return cv2.remap(picture, uv, None, cv2.INTER_LINEAR, borderValue=(38, 44, 54))
 
     def _bend(self, xy: np.ndarray) -> np.ndarray:
         """Distorted lens coordinates (..., 2) of ideal ones: the lens, or its bare polynomial where folds are shown."""
@@ -185,15 +221,50 @@ class DistortionView(View):
             return self.camera.lens.project(on_plane(xy))
         return self.camera.lens.distort(xy)
 
-    def _picture_panel(self, draft: bool) -> str:
-        width, height = self.intrinsics.width, self.intrinsics.height
-        panel = image_panel("picture", 20, 34, _WIDTH, width, height, tallest=_TALLEST)
+    def _picture_panel(
+        self, x: float, y: float, width: float, tallest: float, *, draft: bool
+    ) -> tuple[str, dict[str, bytes]]:
+        panel = self._image_panel("picture", x, y, width, tallest)
         straight = _grid_lines(self.intrinsics, 33 if draft else 65)
         lines = self._bend(straight) if self.show == "distorted" else straight
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "yellow thin")
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
-        seen = photograph(panel, "camera", width, height)
-        return panel.show(seen + drawn + self._fold_circle(panel, bent=self.show == "distorted"), title=title)
+        shown = self._photograph(panel, "camera") + drawn + self._fold_circle(panel, bent=self.show == "distorted")
+        return panel.show(shown, title=title), {"camera": jpeg(self.image(draft=draft))}
+
+    def _image_panel(self, name: str, x: float, y: float, width: float, tallest: float) -> Panel:
+        return image_panel(name, x, y, width, self.intrinsics.width, self.intrinsics.height, tallest=tallest)
+
+    def _photograph(self, panel: Panel, attached: str) -> str:
+        return photograph(panel, attached, self.intrinsics.width, self.intrinsics.height)
+
+    # The reader's own function ---------------------------------------------------------------------------------------
+
+    def _your_bend(self, xy: np.ndarray) -> tuple[np.ndarray, str]:
+        """Where the reader's function puts ideal points (..., 2), and what is wrong with it."""
+        if self.yours is None:
+            return np.full(xy.shape, np.nan), "No function of yours has been given."
+        return tried(self.yours, (xy, self.k1, self.k2, self.k3), xy)
+
+    def _your_panel(
+        self, x: float, y: float, width: float, tallest: float, *, draft: bool
+    ) -> tuple[str, dict[str, bytes]]:
+        """The same picture by the reader's function: its grid over the photograph, or the photograph straightened."""
+        panel = self._image_panel("yours", x, y, width, tallest)
+        lines, problem = self._your_bend(_grid_lines(self.intrinsics, 33 if draft else 65))
+        if problem:
+            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="With your function"), {}
+        straight = self.show == "undistorted"
+        right = _grid_lines(self.intrinsics, 33 if draft else 65)
+        drawn = svg.path(panel.place(self.intrinsics.to_pixels(right if straight else lines)), "orange thin")
+        title = "Straightened by your function" if straight else "The same, bent by your function"
+        return panel.show(self._photograph(panel, "yours") + drawn, title=title), {"yours": self._your_picture(draft)}
+
+    def _your_picture(self, draft: bool) -> bytes:
+        if self.show == "distorted":
+            return jpeg(self.image(draft=draft))
+        small = self._small_camera(draft)
+        return jpeg(self._fetched(self._taken(small, draft), small, lambda xy: self._your_bend(xy)[0]))
 
     def _fold_circle(self, panel: Panel, *, bent: bool) -> str:
         """Where the radial curve turns back, among ideal points or, `bent`, where the lens puts them."""
@@ -211,9 +282,10 @@ class DistortionView(View):
     def _distorted(self, uv: np.ndarray) -> np.ndarray:
         return self.intrinsics.to_pixels(self._bend(self.intrinsics.from_pixels(uv)))
 
-    def _field_panel(self, draft: bool) -> str:
-        width, height = self.intrinsics.width, self.intrinsics.height
-        panel = image_panel("field", 420, 34, _WIDTH, width, height, tallest=_TALLEST)
+    def _field_panel(
+        self, x: float, y: float, width: float, tallest: float, *, draft: bool
+    ) -> tuple[str, dict[str, bytes]]:
+        panel = self._image_panel("field", x, y, width, tallest)
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
@@ -223,7 +295,7 @@ class DistortionView(View):
             + self._contours(panel, 33 if draft else 65)
             + self._fold_circle(panel, bent=False)
         )
-        return panel.show(content, title="Where each point goes", note="contours: shift in px")
+        return panel.show(content, title="Where each point goes", note="contours: shift in px"), {}
 
     def _contours(self, panel: Panel, samples: int) -> str:
         uv = _pixel_grid(self.intrinsics, samples)
@@ -245,6 +317,11 @@ class DistortionView(View):
 
     # The radial curve ------------------------------------------------------------------------------------------------
 
+    def _curve_with_axes(
+        self, x: float, y: float, width: float, tallest: float, *, draft: bool
+    ) -> tuple[str, dict[str, bytes]]:
+        return self.curve_panel(x + 50, y, width - 50, min(tallest, 240)), {}
+
     def curve_panel(self, x: float, y: float, width: float, height: float, *, equation: bool = True) -> str:
         """The radial curve g(r), where it folds and where the picture ends; `x` and `y` are its plot's corner."""
         corner = distortion.image_corner_radius(self.intrinsics) or 1.0  # a single pixel on the axis has none
@@ -259,15 +336,22 @@ class DistortionView(View):
             + plot.curve(panel, r, r, "muted dashed")
             + plot.curve(panel, r, curve, "blue thick")
             + plot.curve(panel, r, beyond, "red thick dotted")
+            + self._your_curve(panel, r)
             + svg.line(panel.place([(corner, 0), (corner, corner), (0, corner)]), "green dashed")
         )
         return plot.axes(panel, "r, ideal (tangent of the ray's angle)", "r, distorted") + panel.show(
             lines
             + self._fold_mark(panel, fold)
             + svg.text(panel.place((corner, 0)) + (-6, -8), "image corner", "green end halo"),
-            title="The radial curve",
+            title="Radial curve",
             note=self.equation() if equation else "",
         )
+
+    def _your_curve(self, panel: Panel, r: np.ndarray) -> str:
+        if self.yours is None:
+            return ""
+        distorted, _ = self._your_bend(np.stack([r, np.zeros_like(r)], axis=-1))
+        return plot.curve(panel, r, distorted[..., 0], "orange dashed")
 
     def _radial(self, r: np.ndarray) -> np.ndarray:
         lens = self.camera.lens
@@ -285,13 +369,14 @@ class DistortionView(View):
 
     # The frustum -----------------------------------------------------------------------------------------------------
 
-    def _frustum_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
-        panel = space_panel("frustum", 545, 370, 255, 180)
+    def _frustum_panel(
+        self, x: float, y: float, width: float, tallest: float, *, draft: bool
+    ) -> tuple[str, dict[str, bytes]]:
+        panel = space_panel("frustum", x, y, width, tallest)
         content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
-        return panel.show(
-            content, title="Its rays in space", hint="drag to turn", drag="orbit", label=label
-        ), photographs
+        shown = panel.show(content, title="Its rays in space", hint="drag to turn", drag="orbit", label=label)
+        return shown, photographs
 
     def _bent_frustum(self) -> list[Item]:
         """The rays of a grid of pixels, a metre long, beside those of a pinhole with the same intrinsics."""
@@ -315,15 +400,19 @@ class DistortionView(View):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers_column(self) -> str:
-        x = 822
-        rows = [svg.text((x, 26), "This lens", "title")]
-        for i, (name, value) in enumerate(self._coefficients().items()):  # the lens's own, where one is given
+    def _numbers_column(self, panels: list[str]) -> str:
+        """The coefficients and key figures: all of them beside four panels, else those that the panels speak of."""
+        coefficients = self._coefficients()
+        if len(panels) < 4:
+            coefficients = {name: value for name, value in coefficients.items() if value or name == "k1"}
+        rows = [svg.text((_COLUMN, 26), "This lens", "title")]
+        for i, (name, value) in enumerate(coefficients.items()):  # the lens's own, where one is given
             class_ = "number" if value else "number faint"
-            rows.append(svg.text((x, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
-        for i, (name, figure) in enumerate(self.numbers().items()):
-            rows.append(svg.text((x, 296 + 40 * i), name, "note"))
-            rows.append(svg.text((x, 313 + 40 * i), figure, "label"))
+            rows.append(svg.text((_COLUMN, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
+        top = 80 + 18 * len(coefficients)
+        for i, (name, figure) in enumerate(self._told().items()):
+            rows.append(svg.text((_COLUMN, top + 40 * i), name, "note"))
+            rows.append(svg.text((_COLUMN, top + 17 + 40 * i), figure, "label"))
         return "".join(rows)
 
 

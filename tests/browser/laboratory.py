@@ -39,6 +39,8 @@ RUN_ALL = """async (limit) => {
   const late = async () => { await hands.pause(limit); throw new Error(`still running after ${limit} ms`); };
   return Promise.race([run(), late()]);
 }"""
+# The kernel is idle before the page has drawn its last widget.
+ALL_SHOWN = "(made) => document.querySelectorAll('.camviz-explorer').length >= made"
 
 
 @contextmanager
@@ -91,6 +93,7 @@ class Notebook:
     def run_all(self) -> list[dict[str, Any]]:
         """Run every cell, wait until the kernel and all visualizers rest, and return the cells as they are now."""
         cells: list[dict[str, Any]] = self.page.evaluate(RUN_ALL, 180_000)
+        self.page.wait_for_function(ALL_SHOWN, arg=sum(map(_shows_explorer, cells)), timeout=60_000)
         for explorer in self.page.query_selector_all(".camviz-explorer"):
             explorer.evaluate("root => hands.settled(root)")
         return cells
@@ -105,6 +108,10 @@ class Notebook:
         """Close the page and its kernel."""
         self.page.evaluate("() => jupyterapp.shell.currentWidget.sessionContext.shutdown()")
         self.page.close()
+
+
+def _shows_explorer(cell: dict[str, Any]) -> bool:
+    return any("A still picture: run this cell" in str(out.get("data")) for out in cell.get("outputs", []))
 
 
 def _private(home: Path) -> dict[str, str]:

@@ -50,12 +50,31 @@ def test_a_barrel_draws_corners_in_most(says):
 
 def test_a_point_moves_along_its_line_to_the_centre_by_what_r_alone_says(says):
     says("a line through the centre stays straight whatever you do: points move along the line to the centre")
-    says("how far a point moves depends on its distance from the centre alone")
+    says("The factor depends on r alone, so one curve says everything")
     angle = np.linspace(0, 2 * np.pi, 12)
     circle = 0.7 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     bent = bend(circle, -0.28, 0.07, 0.0, 0.0)
     np.testing.assert_allclose(circle[:, 0] * bent[:, 1], circle[:, 1] * bent[:, 0], atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(bent - circle, axis=-1), 0.7 - g(0.7, -0.28, 0.07), atol=1e-12)
+
+
+def test_one_point_by_hand(says):
+    k1, k2 = says("Put in one point, with k1 = −0.28 and k2 = 0.07:")
+    says("The point moved towards the centre, and it stayed on its line through the centre.")
+    point = np.array([[0.5, 0.25]])
+    bent = bend(point, k1.value, k2.value, 0.0, 0.0)
+    r = np.hypot(0.5, 0.25)
+    np.testing.assert_allclose(bent, point * g(r, k1.value, k2.value) / r, atol=1e-12)
+    assert np.linalg.norm(bent) < r
+    assert bent[0, 0] * 0.25 == pytest.approx(bent[0, 1] * 0.5)
+
+
+def test_the_last_digits_agree(says):
+    (limit,) = says("a difference below 1e-15")
+    radii = np.linspace(0, 1.25, 26)
+    points = np.stack([radii, 0 * radii], axis=-1)
+    by_hand = points * (1 - 0.28 * radii**2 + 0.07 * radii**4)[:, None]
+    assert np.abs(by_hand - bend(points, -0.28, 0.07, 0.0, 0.0)).max() < limit.value
 
 
 def test_where_k1_alone_folds(says):
@@ -122,19 +141,20 @@ def test_in_the_corners_the_mirror_image_lies_outside_the_dashed_circle(says):
 
 
 def test_the_ways_to_straighten_the_photograph(says):
-    (f,) = says("which kept its focal length of 286 px: we have lost what was near the border")
+    k1, k2 = says("through a lens with k1 = −0.28 and k2 = 0.07.")
+    (f,) = says("the photograph has f = 286 px")
     assert f == 240 / np.tan(np.radians(40))
     K = np.array([[f.value, 0, 239.5], [0, f.value, 179.5], [0, 0, 1]])
-    coefficients = np.array([-0.28, 0.07, 0, 0])
-    fx, fy = says("to fill the frame it scales columns and rows separately: fx = 219 px, fy = 250 px")
+    coefficients = np.array([k1.value, k2.value, 0, 0])
+    fx, fy = says("To fill the frame it scales columns and rows separately: fx = 219 px, fy = 250 px.")
     new, _ = cv2.getOptimalNewCameraMatrix(K, coefficients, (480, 360), 0.0)
     assert fx == new[0, 0]
     assert fy == new[1, 1]
-    (kept,) = says("it keeps every pixel of the photograph, f = 206 px, at the price of black borders")
+    (kept,) = says("alpha = 1 keeps every pixel of the photograph, f = 206 px, at the price of black borders.")
     new, _ = cv2.getOptimalNewCameraMatrix(K, coefficients, (480, 360), 1.0)
     assert kept == new[0, 0]
     assert kept == new[1, 1]
-    says("A barrel-shaped photograph reaches farther than the straight picture")
+    says("loses what was near the border: a barrel-shaped photograph reaches farther")
     border = np.array([[[479.0, 179.5]]])
     seen = cv2.undistortPoints(border, K, coefficients, criteria=(3, 100, 1e-12))[0, 0, 0]
     assert seen > 239.5 / f.value
@@ -166,7 +186,7 @@ def test_flipping_the_sign_of_k1_is_not_the_inverse(says):
 
 
 def test_the_published_stereo_calibration_folds_inside_its_images(says):
-    width, height = says("Look at both lenses out to the corners of their 640 × 480 images:")
+    width, height = says("Look at both lenses out to the corners of their 640 × 480 images.")
     folds, reaches, nearest, corners = {}, {}, {}, {}
     for name, ((f, cx, cy), coefficients) in (("left", LEFT), ("right", RIGHT)):
         folds[name] = folds_at(*coefficients)
@@ -205,10 +225,11 @@ def test_one_of_the_two_goes_out_and_then_in(says):
 
 
 def test_the_value_that_the_calibration_of_the_chessboard_published(says, samples):
-    pictures, k1 = says("with the value that a calibration of all 13 pictures published: k1 = −0.27")
+    pictures, k1, f = says("A calibration of all 13 pictures published k1 = −0.27 for this lens, at f = 536 px.")
     file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
     assert k1 == file.getNode("distortion_coefficients").mat()[0, 0]
     assert pictures == file.getNode("nframes").real()
+    assert f == file.getNode("camera_matrix").mat()[0, 0]
 
 
 def test_the_quiz_about_the_fold(says):
