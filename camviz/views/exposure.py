@@ -220,7 +220,8 @@ class ExposureView(View):
         points, problem = "", ""
         if self.yours is not None:
             values, problem = tried(self.yours, (r[::3], FOCAL_MM), r[::3])
-            points = svg.dots(panel.place(np.stack([r[::3], np.clip(values, -1, 3)], axis=-1)), "orange", 6)
+            places = panel.place(np.stack([r[::3], np.clip(values, -1, 3)], axis=-1))
+            points = svg.line(places, "orange") + svg.dots(places, "orange", 6)
         entries = [("ink thick", "now"), ("blue dashed", "cos⁴"), ("purple dashed", "rim")]
         entries += [("orange thick", "yours")] if self.yours else []
         content = plot.grid(panel) + curves + points + plot.legend(panel, entries, "bottom left")

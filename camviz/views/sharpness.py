@@ -141,7 +141,7 @@ class SharpnessView(View):
         lights = [self._light(spectrum * square, across, down, channel) for channel in self._channels()]
         u, v = ((_MARGIN_UM + np.arange(self.pitch_um / 2, side, self.pitch_um)) / step - 0.5 for side in FIELD_UM)
         places = np.meshgrid(u.astype(np.float32), v.astype(np.float32))
-        sampled = [cv2.remap(light, *places, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP) for light in lights]
+        sampled = [cv2.remap(light, *places, cv2.INTER_CUBIC, borderMode=cv2.BORDER_WRAP) for light in lights]
         return np.stack(sampled * (3 // len(sampled)), axis=-1)
 
     def _channels(self) -> tuple[int, ...]:
@@ -216,7 +216,8 @@ class SharpnessView(View):
             return "", ""
         f = np.linspace(0, TOP_PER_MM, 53)
         values, problem = tried(self.yours, (f, self.f_number, 1e-6 * self.wavelength(), self.pitch_um / 1000), f)
-        return svg.dots(panel.place(np.stack([f, np.clip(values, -1, 2)], axis=-1)), "orange", 6), problem
+        points = panel.place(np.stack([f, np.clip(values, -1, 2)], axis=-1))
+        return svg.line(points, "orange") + svg.dots(points, "orange", 6), problem
 
     def _legend(self) -> str:
         """Below the picture, where it stands in no curve's way."""
@@ -249,7 +250,8 @@ def _target(step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     target = _paint(step)
     height, width = target.shape
     across, down = np.meshgrid(np.fft.rfftfreq(width, step / 1000), np.fft.fftfreq(height, step / 1000))
-    return np.fft.rfft2(target), across, down
+    box = np.sinc(across * step / 1000) * np.sinc(down * step / 1000)  # each sample is the mean over a step
+    return np.fft.rfft2(target) / box, across, down
 
 
 def _paint(step: float) -> np.ndarray:
