@@ -18,9 +18,24 @@ from test_slanted_edge import photograph, true_mtf50
 
 from camviz.optics import SlantedEdge
 
-EDGES = [("pixel", 0.0), ("gauss", 0.3), ("gauss", 0.5), ("gauss", 1.0), ("gauss", 2.0), ("disc", 1.5), ("disc", 3.0)]
+EDGES = [
+    ("pixel", 0.0),
+    ("gauss", 0.3),
+    ("gauss", 0.5),
+    ("gauss", 1.0),
+    ("gauss", 2.0),
+    ("disc", 1.5),
+    ("disc", 3.0),
+    ("airy", 0.5),
+    ("airy", 2.0),
+]
 NOISY = [("pixel", 0.0), ("disc", 1.5), ("gauss", 1.0), ("gauss", 2.0)]
-WORDS = {"pixel": "the pixel alone", "gauss": "a Gaussian, σ = {:g} px", "disc": "a disc of radius {:g} px"}
+WORDS = {
+    "pixel": "the pixel alone",
+    "gauss": "a Gaussian, σ = {:g} px",
+    "disc": "a disc of radius {:g} px",
+    "airy": "diffraction, λN = {:g} px",
+}
 ANGLES_DEG = (2, 3, 5, 7, 10, 12, 15)
 NOISE, SHOTS = 0.02, 100
 

@@ -33,14 +33,14 @@ def test_every_end_of_every_control_draws_and_changes_what_is_seen(name, end):
     ],
 )
 def test_the_edge_in_the_picture_has_the_mtf_of_the_curve(state):
-    """Measured like any photograph of a slanted edge, within 4 %: the wide feet of an Airy disc are cut off."""
+    """Measured like any photograph of a slanted edge, within 5 %: the wide feet of an Airy disc are cut off."""
     view = SharpnessView(**state)
     light = view.image()[..., 1]
     left = int(140 / view.pitch_um)  # the edge alone
     edge = SlantedEdge.of(light[:, :left])
-    assert edge.mtf50 == pytest.approx(view.mtf50_per_mm * view.pitch_um / 1000, rel=0.04)
+    assert edge.mtf50 == pytest.approx(view.mtf50_per_mm * view.pitch_um / 1000, rel=0.05)
     frequency = np.linspace(0.02, 0.4, 20)
-    np.testing.assert_allclose(edge.mtf(frequency), view.system(frequency / view.pitch_um * 1000), atol=0.03)
+    np.testing.assert_allclose(edge.mtf(frequency), view.system(frequency / view.pitch_um * 1000), atol=0.045)
 
 
 def test_the_numbers_are_those_of_the_optics():
