@@ -25,7 +25,7 @@ BLURS = [
 
 
 def second_antiderivative(blur: str, size: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Of the profile of a sharp edge blurred by a Gaussian (σ), disc (radius), diffraction (λN) or nothing, in pixels."""
+    """Of the profile of an edge blurred by a Gaussian (σ), disc (radius), diffraction (λN) or nothing, in pixels."""
     if blur == "airy":
         return _of_airy(size)
     if blur == "pixel":
