@@ -75,7 +75,7 @@ class ExposureView(View):
             light = light * unvignetted_share(angle, FOCAL_MM / self.f_number, RIM_MM, RIM_DISTANCE_MM)
         return light
 
-    @property
+    @cached_property
     def shutter_stops(self) -> float:
         """The exposure time in stops: the one set, or the one that brings the mean to 18 % and the compensation."""
         if self.metering == "manual":
@@ -110,7 +110,14 @@ class ExposureView(View):
 
     def recorded(self, *, draft: bool) -> np.ndarray:
         """What the sensor records (height, width, 3), 0 to 1 of its largest number."""
-        side = garden.DRAFT if draft else garden.FINE
+        return self._draft if draft else self._recorded(garden.FINE)
+
+    @cached_property
+    def _draft(self) -> np.ndarray:
+        """The coarse picture, which the figures are read from."""
+        return self._recorded(garden.DRAFT)
+
+    def _recorded(self, side: int) -> np.ndarray:
         light = _light(self.subject, side) * self._falloff_at(side)[..., None]
         dn = exposed(self.sensor, self.electrons_of_white * light, 1.0, 20.0, _draw(light.shape))
         return (dn - self.sensor.offset_dn) / (2**BITS - 1 - self.sensor.offset_dn)
@@ -123,6 +130,10 @@ class ExposureView(View):
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
+        return self._numbers
+
+    @cached_property
+    def _numbers(self) -> dict[str, str]:
         recorded = self.recorded(draft=True)
         grey = GREY * self.electrons_of_white
         corner = float(np.log2(self.falloff(np.array(_CORNER_MM))))
@@ -193,13 +204,13 @@ class ExposureView(View):
             "ISO gain": (self.iso, "fill-purple"),
         }
         whole = sum(value for value, _ in parts.values())
-        panel = plot.plot_panel("stops", 540, 34, 220, 150, (-13, 13), (0, 5))
+        panel = plot.plot_panel("stops", 540, 34, 220, 150, (-14, 20), (0, 5))
         rows = [*((name, *one) for name, one in parts.items()), ("together", whole, "fill-muted")]
         drawn = [
             svg.polygon(panel.place([(0, 4.2 - i), (value, 4.2 - i), (value, 4.8 - i), (0, 4.8 - i)]), class_)
             for i, (_, value, class_) in enumerate(rows)
         ]
-        ticks = [(-10.0, "−10"), (-5.0, "−5"), (0.0, "0"), (5.0, "+5"), (10.0, "+10")]
+        ticks = [(-10.0, "−10"), (0.0, "0"), (10.0, "+10")]
         names = [(4.5 - i - 0.05, name) for i, (name, _, _) in enumerate(rows)]
         values = [
             svg.text(

@@ -76,8 +76,8 @@ def test_a_leaning_edge_is_sampled_within_a_pixel(says):
 
 def test_the_photograph_s_mtf50_and_its_error(says, edge):
     value, error, period = says(
-        "For this camera it is 0.145 ± 0.002 cycles per pixel: stripes that repeat every 6.9 pixels keep half of their "
-        "contrast."
+        "For the camera of OpenCV's photograph it is 0.145 ± 0.002 cycles per pixel: stripes that repeat every 6.9 "
+        "pixels keep half of their contrast."
     )
     measured = SlantedEdge.of(edge)
     assert value == measured.mtf50
