@@ -21,7 +21,7 @@ MTF = """\
 Measures how sharp a camera is from a photograph of one straight edge between dark and bright, leaning by about 5
 degrees against the pixels' rows or columns (ISO 12233): the modulation transfer function, and MTF50, the frequency at
 which half of a grating's contrast is left. Its standard error is what the pixels' noise leaves: it falls with the root
-of the edge's length.
+of the edge's length. It knows nothing of JPEG, sharpening or an edge that a lens has bent.
 
 PHOTO, or the part of it that --roi names, shows the edge and nothing else: PNG, JPEG or TIFF. Numbers of 8 bits are
 taken for sRGB and made linear; those of 16 bits and more are taken as linear. --linear and --srgb say otherwise.

@@ -93,6 +93,17 @@ def test_the_photograph_s_mtf50_and_its_error(says, edge):
     assert measured.mtf(np.linspace(begin.value, 0.5, 50)).max() < 0.1
 
 
+def test_two_halves_of_the_edge_differ_by_more_than_their_errors(says, edge):
+    rows, upper, again, lower = says("The upper 16 rows of this edge alone give 0.137, the lower 16 give 0.151")
+    says("they differ by four standard errors")
+    assert again == rows.value
+    halves = [SlantedEdge.of(part) for part in (edge[: int(rows.value)], edge[-int(rows.value) :])]
+    assert upper == halves[0].mtf50
+    assert lower == halves[1].mtf50
+    error = np.hypot(halves[0].mtf50_error, halves[1].mtf50_error)
+    assert (lower.value - upper.value) / error == pytest.approx(4, abs=0.6)
+
+
 def test_four_times_the_rows_halve_the_error(says):
     says("It falls with the root of the edge's length: four times the rows, half the error.")
     rng = np.random.default_rng(2)
