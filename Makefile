@@ -23,6 +23,7 @@ bench:
 	$(BIN)/python benchmarks/lightfield.py
 	$(BIN)/python benchmarks/mosaics.py
 	$(BIN)/python benchmarks/noise.py
+	$(BIN)/python benchmarks/mtf.py
 	$(BIN)/python benchmarks/browser.py
 
 # Newest versions that pyproject.toml allows, for every platform and Python, with hashes and without naming any host.

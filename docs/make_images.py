@@ -20,6 +20,7 @@ from camviz.views.noise import PhotonTransferView
 from camviz.views.omnidirectional import OmnidirectionalView
 from camviz.views.pinhole import PinholeView
 from camviz.views.rectification import RectificationView
+from camviz.views.sharpness import SharpnessView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(
@@ -43,6 +44,7 @@ PICTURES = {
     "light_field": LightFieldView(),
     "noise": PhotonTransferView(),
     "omnidirectional": OmnidirectionalView(),
+    "sharpness": SharpnessView(f_number=2.8, defocus_um=20.0),
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 

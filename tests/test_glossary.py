@@ -44,7 +44,7 @@ def test_an_entry_is_one_sentence(one):
 @ALL
 def test_an_entry_says_which_lessons_use_it_and_those_exist_in_the_course(one):
     assert one.lessons
-    assert all(number in [f"{n:02d}" for n in range(17)] for number in one.lessons)
+    assert all(number in [f"{n:02d}" for n in range(18)] for number in one.lessons)
     assert list(one.lessons) == sorted(one.lessons)
 
 

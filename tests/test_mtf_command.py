@@ -1,6 +1,7 @@
 """`camviz mtf`: an edge measured, in words, as JSON and as a page; everything else refused in one sentence."""
 
 import json
+import re
 
 import cv2
 import numpy as np
@@ -26,6 +27,7 @@ def test_the_figures_are_printed_and_are_those_of_the_edge(edge):
     assert done.returncode == 0, done.stderr
     assert "an edge of 100 × 200 pixels, sRGB, made linear" in done.stdout
     assert f"{true_mtf50('gauss', 0.8, 5):.2f}" in done.stdout
+    assert re.search(r"standard error of MTF50 +\S+ cycles/pixel", done.stdout)
 
 
 def test_json_is_strict_and_has_the_curve(edge, capsys):
@@ -33,6 +35,7 @@ def test_json_is_strict_and_has_the_curve(edge, capsys):
     said = json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(name))
     assert said["mtf50_cycles_per_pixel"] == pytest.approx(true_mtf50("gauss", 0.8, 5), rel=0.02)
     assert said["angle_deg"] == pytest.approx(5, abs=0.1)
+    assert 0 < said["mtf50_standard_error"] < 0.01 * said["mtf50_cycles_per_pixel"]
     values = [one["mtf"] for one in said["curve"]]
     assert values == sorted(values, reverse=True)
 
@@ -69,6 +72,7 @@ def test_the_page_is_written_whole_and_shows_the_figures(edge, capsys):
     assert main(["mtf", str(edge), "--report", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
     assert "MTF50" in text
+    assert "standard error of MTF50" in text
     assert "http://" not in text.replace("http://www.w3.org", "")
     assert "open it in a browser" in capsys.readouterr().out
 

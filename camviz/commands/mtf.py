@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 MTF = """\
 Measures how sharp a camera is from a photograph of one straight edge between dark and bright, leaning by about 5
 degrees against the pixels' rows or columns (ISO 12233): the modulation transfer function, and MTF50, the frequency at
-which half of a grating's contrast is left.
+which half of a grating's contrast is left. Its standard error is what the pixels' noise leaves: it falls with the root
+of the edge's length. It knows nothing of JPEG, sharpening or an edge that a lens has bent.
 
 PHOTO, or the part of it that --roi names, shows the edge and nothing else: PNG, JPEG or TIFF. Numbers of 8 bits are
 taken for sRGB and made linear; those of 16 bits and more are taken as linear. --linear and --srgb say otherwise.
@@ -111,6 +112,7 @@ def figures(edge: SlantedEdge) -> dict[str, float]:
     """The figures by name: cycles per pixel, pixels, degrees, and the MTF at a quarter and half a cycle per pixel."""
     return {
         "mtf50_cycles_per_pixel": edge.mtf50,
+        "mtf50_standard_error": edge.mtf50_error,
         "mtf10_cycles_per_pixel": edge.frequency_at(0.1),
         "mtf_at_quarter_cycle": float(edge.mtf(0.25)),
         "mtf_at_half_cycle": float(edge.mtf(0.5)),

@@ -1,6 +1,15 @@
 """Optics: what a hole, a thin lens and a row of real lens elements do to light. Millimetres, nanometres, seconds."""
 
 from camviz.optics.elements import COOKE_TRIPLET, TELEPHOTO, Prescription, free_space, ideal_lens, refraction
+from camviz.optics.modulation import (
+    cutoff_per_mm,
+    diffraction_transfer,
+    disc_transfer,
+    exposure_value,
+    lens_transfer,
+    pixel_transfer,
+    unvignetted_share,
+)
 from camviz.optics.pinhole import (
     AIRY,
     BALANCE,
@@ -45,7 +54,11 @@ __all__ = [
     "airy_radius_um",
     "best_hole_mm",
     "circle_of_confusion_mm",
+    "cutoff_per_mm",
     "diffraction_blur_mm",
+    "diffraction_transfer",
+    "disc_transfer",
+    "exposure_value",
     "f_number",
     "far_limit_mm",
     "field_of_view_deg",
@@ -55,14 +68,17 @@ __all__ = [
     "hyperfocal_mm",
     "ideal_lens",
     "image_distance_mm",
+    "lens_transfer",
     "magnification",
     "near_limit_mm",
     "object_distance_mm",
     "pinhole_blur_mm",
     "pinhole_kernel",
     "pinhole_spread",
+    "pixel_transfer",
     "refraction",
     "relative_illumination",
     "sunny_exposure",
+    "unvignetted_share",
     "working_f_number",
 ]

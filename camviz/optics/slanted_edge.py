@@ -119,8 +119,8 @@ class SlantedEdge:
         return np.asarray((u - slope * v - intercept) * np.cos(np.arctan(slope)))
 
     @cached_property
-    def edge_spread(self) -> tuple[Array, Array]:
-        """The edge's profile: places (n,) in pixels from it, and values (n,) from 0 to 1."""
+    def binned(self) -> tuple[Array, Array, Array]:
+        """Bins along the normal: places (n,) of their middles in pixels, their pixels' number and mean value (n,)."""
         reach = np.floor(np.abs(self.distance).max() * OVERSAMPLING) / OVERSAMPLING
         borders = np.arange(-reach, reach + 0.5 / OVERSAMPLING, 1 / OVERSAMPLING)
         counts, _ = np.histogram(self.distance, borders)
@@ -129,6 +129,12 @@ class SlantedEdge:
         where, _ = np.histogram(self.distance, borders, weights=self.distance)
         some = counts > 0  # a bin's pixels lie somewhat beside its middle
         means = np.interp(places, where[some] / counts[some], sums[some] / counts[some])
+        return places, counts.astype(np.float64), means
+
+    @cached_property
+    def edge_spread(self) -> tuple[Array, Array]:
+        """The edge's profile: places (n,) in pixels from it, and values (n,) from 0 to 1."""
+        places, _, means = self.binned
         dark = np.median(self.image[:, : self.image.shape[1] // 6])
         return places, (means - dark) / self.contrast
 
@@ -145,9 +151,13 @@ class SlantedEdge:
         """The derivative of the profile: places (n,) in pixels, and the light (n,) per pixel, faded out far away."""
         places, values = self.edge_spread
         x, change = (places[:-1] + places[1:]) / 2, np.diff(values) * OVERSAMPLING
+        return x, change * self._fade(x)
+
+    def _fade(self, x: Array) -> Array:
+        """What counts as the edge: 1 near it, falling to 0 far away (a Tukey window), at places (n,) in pixels."""
         flat = max(RISES * self.rise, NARROWEST)
         fade = np.clip((2 * flat - np.abs(x)) / flat, 0, 1)
-        return x, change * 0.5 * (1 - np.cos(np.pi * fade))
+        return np.asarray(0.5 * (1 - np.cos(np.pi * fade)))
 
     # What is left of a grating ---------------------------------------------------------------------------------------
 
@@ -182,3 +192,44 @@ class SlantedEdge:
     def mtf50(self) -> float:
         """MTF50, cycles per pixel: where half of a grating's contrast is left."""
         return self.frequency_at(0.5)
+
+    # How far chance may have moved it --------------------------------------------------------------------------------
+
+    @cached_property
+    def residual_noise(self) -> Array:
+        """The standard deviation (n,) of a pixel about the profile, bin by bin, from the pixels within a pixel of it.
+
+        Dark and bright pixels differ in noise, and so each part of the profile has its own.
+        """
+        places, counts, means = self.binned
+        residual = self.image - np.interp(self.distance, places, means)
+        inside = np.clip(np.searchsorted(places, self.distance.ravel()), 0, len(places) - 1)
+        squares = np.bincount(inside, residual.ravel() ** 2, len(places))
+        near = np.ones(2 * OVERSAMPLING + 1)
+        freedom = np.convolve(np.maximum(counts - 2 / 3, 0), near, "same")  # a line between two means takes 2/3
+        return np.sqrt(np.convolve(squares, near, "same") / np.maximum(freedom, 1))
+
+    @cached_property
+    def mtf50_error(self) -> float:
+        """The standard error of MTF50, cycles per pixel, that the pixels' noise leaves; NaN where there is no MTF50.
+
+        To first order. The transform S(f) = Σ_j m_j s_j(f) is linear in the bins' means m_j, of variance σ_j²/n_j.
+        So ln MTF changes by Re(s_j(f) / S(f)) - s_j(0) / S(0) with m_j, and MTF50 by that over the slope of ln MTF.
+        Noise is taken to be independent from pixel to pixel, which demosaicing and sharpening make untrue.
+        """
+        f = self.mtf50
+        if not np.isfinite(f):
+            return float("nan")
+        x, light = self.line_spread
+        wave = np.exp(-2j * np.pi * f * x)
+        change = self._weights(wave) / np.sum(light * wave) - self._weights(np.ones_like(x)) / np.sum(light)
+        _, counts, _ = self.binned
+        variance = np.sum(change.real**2 * self.residual_noise**2 / np.maximum(counts, 1)) / self.contrast**2
+        step = 2 / PADDED * OVERSAMPLING
+        slope = (self.mtf(f + step) - self.mtf(f - step)) / (2 * step) / 0.5
+        return float(np.sqrt(variance) / abs(slope))
+
+    def _weights(self, wave: Array) -> Array:
+        """How much the transform changes with each bin's mean (n,), the wave given between bins (n - 1,)."""
+        faded = OVERSAMPLING * self._fade(self.line_spread[0]) * wave
+        return -np.diff(faded, prepend=0, append=0)

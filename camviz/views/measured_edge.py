@@ -18,6 +18,7 @@ from camviz.views.base import View
 
 _WORDS = {
     "mtf50_cycles_per_pixel": ("MTF50", "{:.3f} cycles/pixel"),
+    "mtf50_standard_error": ("standard error of MTF50", "{:.2g} cycles/pixel"),
     "mtf10_cycles_per_pixel": ("MTF10", "{:.3f} cycles/pixel"),
     "mtf_at_quarter_cycle": ("MTF at 0.25 cycles/pixel", "{:.3f}"),
     "mtf_at_half_cycle": ("MTF at 0.5 cycles/pixel", "{:.3f}"),
@@ -52,6 +53,7 @@ class MeasuredEdgeView(View):
         edge = self.edge
         figures = {
             "mtf50_cycles_per_pixel": edge.mtf50,
+            "mtf50_standard_error": edge.mtf50_error,
             "rise_10_90_pixels": edge.rise,
             "angle_deg": abs(edge.angle_deg),
         }
@@ -87,6 +89,6 @@ class MeasuredEdgeView(View):
             content += svg.line(at, "orange dashed") + svg.dots(at[1:2], "orange", 6)
         nyquist = panel.place((0.5, 1.1))
         content += svg.text((nyquist[0] + 5, 14), "Nyquist", "note halo")
-        note = f"MTF50: {edge.mtf50:.3f}" if isfinite(edge.mtf50) else ""
+        note = f"MTF50: {edge.mtf50:.3f} ± {edge.mtf50_error:.3f}" if isfinite(edge.mtf50) else ""
         shown = panel.show(content, title="Contrast that is left", note=note)
         return shown + plot.axes(panel, "cycles per pixel", "MTF")

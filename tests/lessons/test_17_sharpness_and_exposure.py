@@ -1,0 +1,439 @@
+"""Lesson 17: how sharp a camera is and why, colours, dark corners, exposure and metering."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import j1
+
+from camviz.optics import SlantedEdge
+from camviz.scenes import to_linear
+from camviz.views.exposure import ExposureView
+from camviz.views.sharpness import SharpnessView
+
+EXCEPTIONS: dict[str, str] = {
+    "near 0.1 to 0.2 cycles per pixel": "where phones put the peak of their sharpening, as a rule",
+}
+
+GREEN = 550e-6  # mm
+
+
+def lens(f, N, c=0.0, wavelength=GREEN):
+    """A perfect round lens with rays' disc c, by SciPy's quadrature over the overlap of the pupil with its copy."""
+    s = f * wavelength * N
+    if s >= 1:
+        return 0.0
+    return 4 / np.pi * quad(lambda x: np.sqrt(1 - (x + s) ** 2) * np.cos(np.pi * f * c * x), 0, 1 - s, limit=200)[0]
+
+
+def mtf50(N, c, pitch):
+    f = np.linspace(1, 250, 60)
+    values = np.array([abs(lens(one, N, c) * np.sinc(one * pitch)) for one in f])
+    after = int(np.argmax(values < 0.5))
+    return brentq(lambda one: abs(lens(one, N, c) * np.sinc(one * pitch)) - 0.5, f[after - 1], f[after])
+
+
+def kept_by_a_rim(x, aperture, rim, distance):
+    """The share of an aperture that a rim leaves open for light of slope x, counted point by point."""
+    v, u = np.meshgrid(np.linspace(-1, 1, 1201), np.linspace(-1, 1, 1201))
+    disc = u**2 + v**2 <= 1
+    seen = np.hypot(u * aperture / 2 - distance * x, v * aperture / 2) <= rim / 2
+    return (disc & seen).sum() / disc.sum()
+
+
+@pytest.fixture(scope="module")
+def edge(samples):
+    photograph = cv2.imread(str(samples / "left06.jpg"), cv2.IMREAD_GRAYSCALE)
+    return to_linear(photograph[287:317, 559:583].astype(float) / 255)
+
+
+def plain_mtf(light):
+    """Rows' steepest places give the line; quarter-pixel strips, differences, NumPy's transform; nothing of camviz."""
+    change = np.diff(light, axis=1)
+    rows, columns = np.arange(len(light)), np.arange(light.shape[1] - 1) + 0.5
+    middle = (change * columns).sum(axis=1) / change.sum(axis=1)
+    slope, intercept = np.polyfit(rows, middle, 1)
+    v, u = np.indices(light.shape)
+    d = (u - slope * v - intercept) * np.cos(np.arctan(slope))
+    borders = np.arange(-6, 6.1, 0.25)
+    profile = np.histogram(d, borders, weights=light)[0] / np.histogram(d, borders)[0]
+    f = np.fft.rfftfreq(512, 0.25)
+    spread = np.diff(profile)
+    return f, np.abs(np.fft.rfft(spread, 512)) / spread.sum()
+
+
+def test_a_leaning_edge_is_sampled_within_a_pixel(says):
+    (lean,) = says("Then you lean it by 5°.")
+    at, again, step = says("At 5° the edge moves on by tan 5° = 0.087 px from row to row, so a dozen rows sample")
+    assert lean == at.value
+    assert again == at.value
+    assert step == np.tan(np.radians(at.value))
+    assert 1 / np.tan(np.radians(at.value)) == pytest.approx(12, abs=0.6)
+    (phone,) = says("leaning by about 5°, without flash")
+    assert 2 < phone.value < 10  # between these, ISO 12233's rows neither repeat too soon nor blur the edge
+
+
+def test_the_photograph_s_mtf50_and_its_error(says, edge):
+    value, error, period = says(
+        "For the camera of OpenCV's photograph it is 0.145 ± 0.002 cycles per pixel: stripes that repeat every 6.9 "
+        "pixels keep half of their contrast."
+    )
+    measured = SlantedEdge.of(edge)
+    assert value == measured.mtf50
+    assert error == measured.mtf50_error
+    assert period == 1 / measured.mtf50
+    f, plain = plain_mtf(edge)
+    after = int(np.argmax(plain < 0.5))
+    assert np.interp(-0.5, -plain[after - 1 : after + 1], f[after - 1 : after + 1]) == pytest.approx(
+        value.value, abs=0.01
+    )
+    (begin,) = says("From 0.3 cycles per pixel to the Nyquist frequency less than a tenth is left")
+    assert plain[(f >= begin.value) & (f <= 0.5)].max() < 0.1
+    assert measured.mtf(np.linspace(begin.value, 0.5, 50)).max() < 0.1
+
+
+def test_two_halves_of_the_edge_differ_by_more_than_their_errors(says, edge):
+    rows, upper, again, lower = says("The upper 16 rows of this edge alone give 0.137, the lower 16 give 0.151")
+    says("they differ by four standard errors")
+    assert again == rows.value
+    halves = [SlantedEdge.of(part) for part in (edge[: int(rows.value)], edge[-int(rows.value) :])]
+    assert upper == halves[0].mtf50
+    assert lower == halves[1].mtf50
+    error = np.hypot(halves[0].mtf50_error, halves[1].mtf50_error)
+    assert (lower.value - upper.value) / error == pytest.approx(4, abs=0.6)
+
+
+def test_four_times_the_rows_halve_the_error(says):
+    says("It falls with the root of the edge's length: four times the rows, half the error.")
+    rng = np.random.default_rng(2)
+    errors = []
+    for rows in (80, 320):
+        v, u = np.indices((rows, 160))
+        light = 1 / (1 + np.exp(-(u - 80 - 0.087 * (v - rows / 2)) / 0.6))
+        found = [SlantedEdge.of(light + rng.normal(0, 0.02, light.shape)).mtf50 for _ in range(80)]
+        errors.append(np.std(found))
+    assert errors[0] / errors[1] == pytest.approx(2, abs=0.5)  # each known to 8 %
+
+
+def test_what_the_strips_blur(says):
+    (factor,) = says("a factor of 0.987 at half a cycle")
+    eighth = np.sin(np.pi / 16) / (np.pi / 16)
+    assert factor == eighth**2  # a mean over a strip, and a difference of strips
+
+
+def test_how_long_an_edge_must_be(says):
+    noise, rows, within, sharp_rows = says(
+        "At 2 % noise, 80 rows are within 3 % nearly always for a lens of usual sharpness. A very sharp one needs 200 "
+        "rows."
+    )
+    rng = np.random.default_rng(4)
+    for length, spread, share in ((rows.value, 0.6, 0.93), (sharp_rows.value, 0.12, 0.93), (rows.value, 0.12, 0.0)):
+        v, u = np.meshgrid(np.arange(int(length)), np.arange(100), indexing="ij")
+        fine = [1 / (1 + np.exp(-(u + o - 50 - 0.087 * v) / spread)) for o in (np.arange(16) - 7.5) / 16]
+        light = np.mean(fine, axis=0)  # over the pixel's width
+        truth = SlantedEdge.of(light).mtf50
+        shots = [SlantedEdge.of(light + rng.normal(0, noise.value / 100, light.shape)).mtf50 for _ in range(60)]
+        inside = np.mean(np.abs(np.array(shots) / truth - 1) < within.value / 100)
+        assert inside >= share
+        if not share:
+            assert inside < 0.93
+
+
+def test_the_question_about_stopping_down(says):
+    off, pitch, widest, narrowest = says(
+        "the sensor stands 40 µm behind the sharp image. Its pixels are 4 µm wide. You go through all f-numbers from "
+        "f/1.4 to f/32."
+    )
+    best = max(
+        np.arange(widest.value, narrowest.value, 0.8), key=lambda N: mtf50(N, off.value / N / 1000, pitch.value / 1000)
+    )
+    assert widest.value < 4 < best < 8 < narrowest.value
+    (open_,) = says("At f/1.4: a wide opening has the least diffraction.")
+    (closed,) = says("At f/32: the smaller the opening, the deeper the sharpness.")
+    assert (open_.value, closed.value) == (widest.value, narrowest.value)
+    again, N, cone = says("Out of focus by 40 µm, the cone of f/1.4 is 29 µm wide on the sensor: seven pixels.")
+    assert cone == again.value / N.value
+    assert cone.value / pitch.value == pytest.approx(7, abs=0.3)
+    disc, airy, equal, wavelength = says(
+        "The disc of the rays is 40 µm / N wide, the Airy disc 2.44 λ N. They are equally wide at N = 5.5, for green "
+        "light of 550 nm."
+    )
+    assert disc == off.value
+    assert airy == 2 * brentq(j1, 3, 4.5) / np.pi
+    assert equal == np.sqrt(disc.value / (airy.value * wavelength.value / 1000))
+    N, rays, airy = says("At f/32 the rays' disc is only 1.3 µm wide, and the Airy disc 43 µm.")
+    assert rays == off.value / N.value
+    assert airy == 2.44 * 0.55 * N.value
+    (nyquist,) = says("Half a cycle per pixel is 125 cycles per mm here.")
+    assert nyquist == 0.5 / (pitch.value / 1000)
+
+
+def test_the_table_of_f_numbers_is_that_of_the_integral():
+    view = SharpnessView(defocus_um=40.0, pitch_um=4.0)
+    for N in (1.4, 2.8, 5.6, 8, 11, 32):
+        assert view.but(f_number=N).mtf50_per_mm == pytest.approx(mtf50(N, 0.04 / N, 0.004), rel=2e-3)
+
+
+def test_the_star_reverses_beyond_the_first_zero(says):
+    (wide,) = says("f/1.4. The picture shows a bit of its sensor as the pixels record it")
+    assert wide.value == 1.4
+    (spokes,) = says("a star of 36 spokes")
+    N, pitch = says("Go to f/2.8, with pixels of 2 µm, and look at the star. Inside a grey ring the spokes come back")
+    c = 0.04 / N.value
+    zero = brentq(lambda f: lens(f, N.value, c), 60, 140)
+    assert lens(1.2 * zero, N.value, c) < 0  # bright and dark have changed places
+    ring_um = 1000 * spokes.value / (2 * np.pi * zero)
+    assert 30 < ring_um < 78  # inside the star
+    assert zero < 0.5 / (pitch.value / 1000)
+    assert 2 * j1(np.pi * c * zero) / (np.pi * c * zero) < 0  # the rays' disc alone reverses sooner
+
+
+def test_the_star_aliases_on_wide_pixels(says):
+    N, pitch = says("Set defocus to 0, f-number to 2, and make the pixels 12 µm wide.")
+    nyquist = 0.5 / (pitch.value / 1000)
+    coarsest = 36 / (2 * np.pi * 0.078)  # at the star's rim
+    assert coarsest > nyquist
+    assert abs(lens(1.5 * coarsest, N.value) * np.sinc(1.5 * coarsest * pitch.value / 1000)) > 0.1
+
+
+def test_one_frequency_by_hand(says):
+    f, N, pitch = says("One frequency by hand, 100 cycles per mm at f/8, green light and pixels of 4 µm:")
+    assert lens(f.value, N.value) == pytest.approx(0.458, abs=5e-4)
+    pixel = quad(lambda x: np.cos(2 * np.pi * f.value * x), 0, pitch.value / 2000)[0] / (pitch.value / 2000)
+    assert pixel == pytest.approx(0.757, abs=5e-4)
+    assert lens(f.value, N.value) * pixel == pytest.approx(0.347, abs=5e-4)
+
+
+def test_diffraction_and_defocus_do_not_multiply(says):
+    (off,) = says("their product is wrong: by up to 0.22 at half a wave of defocus")
+    N = 8.0
+    c = 8 * N * 0.5 * GREEN
+    f = np.linspace(1, 220, 110)
+    exact = np.array([lens(one, N, c) for one in f])
+    product = np.array([lens(one, N) for one in f]) * 2 * j1(np.pi * f * c) / (np.pi * f * c)
+    assert off == np.abs(exact - product).max()
+    at = SharpnessView(f_number=8.0, defocus_um=1000 * c * N).system(f)
+    np.testing.assert_allclose(at, np.abs(exact * np.sinc(f * 0.004)), atol=1e-6)
+
+
+def test_half_a_wave_is_a_path_difference_of_c_over_8_n(says):
+    says("at the rim, by W = c/(8N) more than in the middle")
+    N, dz = 8.0, 0.02
+    focal, radius = 50.0, 50.0 / 16
+    to_image, to_sensor = focal, focal + dz  # spheres about the image and about the sensor, touching in the middle
+    sag = radius**2 / 2 / to_image - radius**2 / 2 / to_sensor
+    assert sag == pytest.approx((dz / N) / (8 * N), rel=1e-3)
+
+
+def test_the_spilled_colours(says):
+    (N,) = says("Drag the f-number up to 11: they nearly go.")
+    wide, narrow = (SharpnessView(f_number=n, axial_um=40.0).image() for n in (2.8, N.value))
+    fringe = [np.abs(one[..., 1] - one[..., [0, 2]].mean(axis=-1))[:, :40].max() for one in (wide, narrow)]
+    assert fringe[1] < 0.35 * fringe[0]
+    row = wide[30]
+    dark = int(np.argmax(row[:, 1] > 0.5)) - 2  # the dark side of the edge
+    assert row[dark, 0] > row[dark, 1]
+    assert row[dark, 2] > row[dark, 1]
+    assert row[dark + 4, 1] > row[dark + 4, 0]
+    (aside,) = says("Set axial to 0 and lateral to 6 µm.")
+    sides = [SharpnessView(f_number=n, lateral_um=aside.value).image() for n in (2.8, N.value)]
+    fringe = [np.abs(one[..., 0] - one[..., 2])[:, :40].max() for one in sides]
+    assert fringe[1] > 0.6 * fringe[0]
+
+
+def test_the_foci_of_a_lens_of_crown_glass(says):
+    focal, abbe, apart = says(
+        "A lens of 50 mm made of ordinary crown glass (N-BK7, V = 64) has its blue and red foci 0.77 mm apart."
+    )
+
+    def index(um):  # Schott's Sellmeier coefficients of N-BK7
+        B, C = (1.03961212, 0.231792344, 1.01046945), (0.00600069867, 0.0200179144, 103.560653)
+        return np.sqrt(1 + sum(b * um**2 / (um**2 - c) for b, c in zip(B, C, strict=True)))
+
+    red, yellow, blue = index(0.6563), index(0.5876), index(0.4861)
+    assert abbe == (yellow - 1) / (blue - red)
+    assert apart == focal.value * (yellow - 1) * (1 / (red - 1) - 1 / (blue - 1))
+
+
+def test_the_corners(says):
+    focal, rim, distance = says(
+        "Here is the garden through a lens of 35 mm on full frame, wide open. A rim of the barrel, 32 mm wide, stands "
+        "20 mm in front of the aperture."
+    )
+    slope = np.hypot(36, 24) / 2 / focal.value
+    free, wide, corner, narrow, stays = says(
+        "from f/5.6 on, the barrel covers nothing any more. The blue one stays. At f/1.4 the corner gets 31 % of the "
+        "light in the middle, and at f/8 it still gets only 52 %."
+    )
+
+    def open_share(N):
+        return kept_by_a_rim(slope, focal.value / N, rim.value, distance.value)
+
+    assert open_share(free.value) == 1
+    assert open_share(4.0) < 0.99
+    cos4 = np.cos(np.arctan(slope)) ** 4
+    assert corner == 100 * cos4 * open_share(wide.value)
+    assert stays == 100 * cos4 * open_share(narrow.value)
+    drawn = ExposureView(f_number=1.4, vignetting="cos⁴ and rim").falloff(np.array(np.hypot(18, 12)))
+    assert drawn == pytest.approx(corner.value / 100, abs=5e-3)
+    open_, closed = says("At f/1.4 the corners of your pictures are much darker than the middle. You stop down to f/8")
+    assert open_share(open_.value) < open_share(closed.value)
+    (angle,) = says("at 45° a quarter of the light is left")
+    assert np.cos(np.radians(angle.value)) ** 4 == pytest.approx(0.25)
+
+
+def test_the_sunny_16_rule(says):
+    N, time, ev, name, other, shorter = says(
+        "In full sun f/16 at 1/125 s is right for ISO 100: EV 15, the sunny 16 rule. f/8 at 1/500 s lets in the same "
+        "light."
+    )
+    assert ev == np.log2(N.value**2 * time.value)
+    assert name == N.value
+    assert other.value**2 * shorter.value == pytest.approx(N.value**2 * time.value)
+
+
+def test_dusk_is_black_and_the_shutter_gives_more_light_than_the_gain(says):
+    (dusk,) = says("Set light to 9")
+    (grey,) = says("with ISO alone. Compare 18 % grey and its signal / noise.")
+    assert grey == 18
+    black = ExposureView(light_ev=dusk.value)
+    assert black.recorded(draft=True).mean() < 0.01
+    longer, gain = black.but(shutter=-3.0), black.but(iso=6.0)
+    assert longer.recorded(draft=True).mean() == pytest.approx(gain.recorded(draft=True).mean(), rel=0.02)
+    electrons = [0.18 * view.electrons_of_white for view in (longer, gain)]
+    assert electrons[0] / electrons[1] == pytest.approx(2**6)
+
+
+def test_equal_brightness_at_a_quarter_of_the_light(says):
+    says("Four pictures of equal brightness, each with a quarter of the light of the one before:")
+    views = [ExposureView(iso=float(iso), shutter=-9.0 - iso) for iso in (0, 2, 4, 6)]
+    means = [view.recorded(draft=True).mean() for view in views]
+    assert np.ptp(means) < 0.01
+    for view, electrons, ratio in zip(views, (5400, 1350, 338, 84), (73, 37, 18, 9), strict=True):
+        free = 0.18 * 30_000 * 2.0 ** (15 - np.log2(8.0**2 * 2.0**-view.shutter))
+        assert free == pytest.approx(electrons, abs=0.5)
+        assert free / np.sqrt(free + 9) == pytest.approx(ratio, abs=0.5)
+        assert view.numbers()["18 % grey"] == f"{electrons:,} electrons"
+        assert view.numbers()["its signal / noise"] == str(ratio)
+
+
+def test_iso_frees_no_electrons(says):
+    (low,) = says("You turn ISO from 100 to 1600. What happens to the number of electrons")
+    views = [ExposureView(iso=float(np.log2(iso / 100))) for iso in (low.value, 1600)]
+    assert views[0].electrons_of_white == pytest.approx(views[1].electrons_of_white)
+    assert views[1].sensor.gain_dn_per_e / views[0].sensor.gain_dn_per_e == pytest.approx(16)
+
+
+def test_the_shutter_s_stops(says):
+    one, other = says("from f/8 to f/16, how much longer?")
+    assert (other.value / one.value) ** 2 == 4
+    factor, *numbers = says("A stop is a factor of √2 in N: 2, 2.8, 4, 5.6.")
+    for k, number in enumerate(numbers):
+        assert number.about(2 * np.sqrt(factor.value) ** k, 0.015)  # as lenses are engraved
+    N, time = says("A picture is right at f/4, 1/60 s and ISO 400.")
+    (same, again), (right, longer), (larger, also) = (
+        says("f/8, 1/60 s, ISO 800"), says("f/8, 1/30 s, ISO 800"), says("f/2.8, 1/30 s, ISO 400"),
+    )  # fmt: skip
+
+    def brightness(N, time, iso):
+        return iso / time / N**2
+
+    wanted = brightness(N.value, time.value, 400)
+    assert brightness(right.value, longer.value, 800) == pytest.approx(wanted)
+    assert brightness(same.value, again.value, 800) == pytest.approx(wanted / 2)
+    assert brightness(larger.value, also.value, 400) == pytest.approx(4 * wanted, rel=0.03)
+    first, second = says("From f/4 to f/8 is half the diameter and a quarter of the area: two stops.")
+    assert (first.value, second.value) == (N.value, right.value)
+    (wider,) = says(
+        "f/2.8 is the larger opening: a stop more, and the shutter gives another. This picture is four times as"
+    )
+    assert wider.value == larger.value
+
+
+def test_the_meter_s_constants(says):
+    mean, heading = says("18 %, or 12.8 %?")
+    assert mean == 18
+    metered, saturated, share, grey, white = says(
+        "so that a surface metered as the mean comes out at 10/78 = 12.8 % of saturation. 18 % of a white surface at "
+        "100 % would be half a stop more"
+    )
+    assert share == 100 * metered.value / saturated.value
+    assert heading == share.value
+    assert np.log2(grey.value / 100 / (share.value / white.value)) == pytest.approx(0.5, abs=0.02)
+    factor, base, K = says("A meter reads the luminance L = 0.125 · 2^EV cd/m² at ISO 100 (its constant K is 12.5).")
+    assert factor == K.value / 100  # ISO 2720: N²/t = L S / K
+    ev, sun, room, times = says(
+        "Full sun is EV 15, or 4096 cd/m². The room at EV 7.6 is 170 times darker, and your eyes have hardly noticed."
+    )
+    assert sun == factor.value * base.value**ev.value
+    assert room == np.log2(1.8**2 * 60)
+    assert times.about(base.value ** (ev.value - np.log2(1.8**2 * 60)), 0.02)
+
+
+def test_middle_grey_and_snow(says):
+    (metered,) = says("the camera makes the mean of the picture 18 % of white")
+    grey, stops, bits, number, snow, more = says(
+        "Middle grey, 18 % of white, is 2.5 stops below white. In an 8-bit sRGB picture it is the number 118. Fresh "
+        "snow reflects about 90 % of the light, five times as much as middle grey, and so it wants 2.3 stops more than "
+        "the meter says."
+    )
+    assert metered == grey.value
+    assert stops == -np.log2(grey.value / 100)
+    linear = grey.value / 100
+    assert number == (2**bits.value - 1) * (1.055 * linear ** (1 / 2.4) - 0.055)  # IEC 61966-2-1
+    assert snow.value / grey.value == 5
+    assert more == np.log2(snow.value / grey.value)
+
+
+def test_snow_and_coal_come_out_as_the_same_grey(says):
+    (mean,) = says("it makes the mean of the picture 18 % of white")
+    (reply,) = says(
+        "Yes: 18 % of white, whatever it is. Snow needs more exposure than the meter says, by two stops and more"
+    )
+    (shortened,) = says("But the meter shortens the exposure until the mean is 18 %")
+    (recap,) = says("it makes everything 18 % grey")
+    for subject in ("garden", "snow", "coal"):
+        recorded = ExposureView(subject=subject, metering="average").recorded(draft=True)
+        assert mean == 100 * recorded.mean()
+    assert reply.value == shortened.value == recap.value == mean.value
+    snow = ExposureView(subject="snow", metering="average")
+    assert snow.but(compensation=2.3).recorded(draft=True).mean() > 0.7
+    needed = brentq(lambda c: snow.but(compensation=c).electrons_of_white - 30_000, 0, 4)  # white is white
+    assert 2 < needed < 2.5
+
+
+def test_the_quiz_about_an_mtf(says):
+    left, frequency = says("A camera's MTF is 0.3 at 0.25 cycles per pixel.")
+    (share,) = says("Stripes that repeat every four pixels come out with 30 % of their contrast.")
+    assert share == 100 * left.value
+    again, kept = says("Yes: 0.25 cycles per pixel is one cycle in four pixels, and 0.3 of its contrast is left.")
+    assert (again.value, kept.value) == (frequency.value, left.value)
+    assert 1 / again.value == 4
+    (sharp,) = says("30 % of the pixels are sharp.")
+    assert sharp == share.value
+
+
+def test_the_quiz_about_two_causes(says):
+    lens_leaves, pixel = says(
+        "a lens leaves 0.6 of the contrast of some grating, and the pixel by itself would leave 0.5"
+    )
+    (weaker,), (product,), (mean,) = (
+        says("0.5: the weaker of the two decides."),
+        says("0.3: they come one after the other"),
+        says("0.55, their mean."),
+    )  # fmt: skip
+    one, other = says("Yes: 0.6 times 0.5.")
+    assert product == one.value * other.value
+    assert mean == (lens_leaves.value + pixel.value) / 2
+    assert weaker == min(lens_leaves.value, pixel.value)
+    assert (one.value, other.value) == (lens_leaves.value, pixel.value)
+
+
+def test_the_replies_of_the_exercises(says):
+    (airy,) = says("The 1.22 belongs to the Airy disc's dark ring.")
+    assert airy == brentq(j1, 3, 4.5) / np.pi
+    (two,) = says("Without the 2/π your lens is π/2 at frequency 0.")
+    assert np.arccos(0) == pytest.approx(np.pi / two.value)
+    (place,) = says("for the places x = step · 0, 1, 2 …")
+    assert place.value == 2
