@@ -42,6 +42,20 @@ def attempt(function: Function, *arguments: Any, like: Any) -> Any:
     return answer
 
 
+def attempt_each(function: Function, *arguments: Any, like: Any) -> Any:
+    """As `attempt`, for a function of one case and arguments that each hold n of them; says once what is wrong.
+
+    >>> attempt_each(lambda x, y: x + y, [1.0, 2.0], [10.0, 20.0], like=np.zeros(2))
+    array([11., 22.])
+    """
+    cases = zip(*arguments, like, strict=True)
+    answers = [tried(function, tuple(given), np.asarray(one)) for *given, one in cases]
+    problems = [problem for _, problem in answers if problem]
+    if problems:
+        print(problems[0])
+    return np.stack([answer for answer, _ in answers])
+
+
 def tried(function: Function, arguments: tuple[Any, ...], like: Any) -> tuple[Any, str]:
     """As `attempt`, for a view: the answer and, instead of printing it, the sentence; "" where all is well."""
     wanted = like if isinstance(like, tuple) else (like,)

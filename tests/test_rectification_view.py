@@ -296,3 +296,34 @@ def test_without_worth_nothing_is_said_about_the_error_of_a_depth():
         assert words not in silent.body
     assert VIEW.equation() in silent.body
     assert VIEW.interval() not in silent.description
+
+
+# The reader's own depth ----------------------------------------------------------------------------------------------
+
+
+def test_the_readers_depth_colours_the_second_map():
+    view = RectificationView(rectify=0.5, yours=lambda d, f, B, doffs: f * B / (d + doffs))
+    found = view.disparity_map(draft=True)
+    depth, problem = view.your_depth(draft=True)
+    assert problem == ""
+    known = np.isfinite(found) & (found + view.stage.doffs > 0)
+    np.testing.assert_allclose(depth[known], view.stage.depth(found)[known])
+    pictures = view.figure(draft=True).photographs
+    wrong = view.but(yours=lambda d, f, B, doffs: f * B / (d + 10)).figure(draft=True).photographs
+    assert wrong["second"] != pictures["second"]
+    assert wrong["disparity"] == pictures["disparity"]
+
+
+def test_a_function_without_a_depth_leaves_the_map_empty_and_says_why():
+    picture = RectificationView(yours=lambda d, f, B, doffs: None).figure(draft=True)
+    assert "returns nothing yet" in picture.body
+    image = cv2.imdecode(np.frombuffer(picture.photographs["second"], np.uint8), cv2.IMREAD_UNCHANGED)
+    assert (image[..., 3] == 0).all()
+
+
+def test_the_first_view_leaves_out_depths():
+    picture = RectificationView(panels="disparity", worth=False).figure(draft=True)
+    assert "Z =" not in picture.body + picture.description
+    assert "second" not in picture.photographs
+    with pytest.raises(ValueError, match="got \\['nonsense'\\]"):
+        RectificationView(panels="nonsense")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camviz.yours import MID_GREY, attempt, tried
+from camviz.yours import MID_GREY, attempt, attempt_each, tried
 
 WANTED = np.zeros((2, 3))
 
@@ -95,3 +95,17 @@ def test_whoever_stops_a_function_that_never_ends_is_heard():
 
     with pytest.raises(KeyboardInterrupt):
         attempt(endless, 1.0, like=0.0)
+
+
+def test_a_function_of_one_case_is_called_for_each_and_complains_once(capsys):
+    def half(row, offset):
+        return row / 2 + offset
+
+    rows = np.arange(6.0).reshape(3, 2)
+    np.testing.assert_array_equal(attempt_each(half, rows, [1.0] * 3, like=rows), rows / 2 + 1)
+    assert capsys.readouterr().out == ""
+
+    def stub(row, offset): ...
+
+    assert np.isnan(attempt_each(stub, rows, [1.0] * 3, like=rows)).all()
+    assert capsys.readouterr().out.count("returns nothing yet") == 1

@@ -321,7 +321,7 @@ def _rectified_cases(rng: np.random.Generator) -> Iterator[Arguments]:
 
 
 RECTIFIED = Exercise(
-    name="08.rectified",
+    name="08.rectified_pixels",
     reference=rectified,
     cases=_rectified_cases,
     tolerance=1e-8,
@@ -807,4 +807,4 @@ def nothing_dropped(d_left, d_right, tolerance):
     return d_left
 
 
-EXERCISES = (DEPTH, BASELINE, RECTIFIED, METRIC_DEPTH, LEFT_RIGHT)
+EXERCISES = (RECTIFIED, LEFT_RIGHT, BASELINE, DEPTH, METRIC_DEPTH)

@@ -1,8 +1,12 @@
-"""The rectification visualizer: two pictures turned until matching points share a row, and the depth that follows."""
+"""The rectification visualizer: two pictures turned until matching points share a row, and the depth that follows.
+
+A reader's own function can make the depths beside the right ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
@@ -22,6 +26,7 @@ from camviz.views.base import View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
+from camviz.yours import tried
 
 _WIDTH, _TALLEST = 385, 289
 _MAP_WIDTH, _MAP_TALLEST = 236, 177
@@ -41,7 +46,9 @@ class RectificationView(View):
 
     (column, row) is a pixel of the *rectified* left picture and `disparity` a shift from there to the right one; both
     marks stay on their rays while the cameras turn. Matching runs along the rows of the pictures as they are at that
-    moment. `source` is the garden, or a pair of photographs.
+    moment. `source` is the garden, or a pair of photographs. `panels` names what stands below the two pictures: the
+    disparity map, the second map, and the wedge with its depth. `yours` is a reader's function of (d, f, B, doffs) that
+    gives Z; then the first map shows the right depths, and the second those of that function.
     """
 
     title: ClassVar[str] = "Rectification, disparity and depth"
@@ -58,6 +65,17 @@ class RectificationView(View):
     show: str = choice("depth", "true depth", "error", label="second map", help="what the second map shows")
     worth: bool = switch(True, label="show the error", help="what an error of the disparity makes of the depth")
     source: Source = _GARDEN
+    panels: str = "disparity second wedge"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self._shown <= {"disparity", "second", "wedge"}:
+            raise ValueError(f"panels must be some of disparity, second, wedge, got {sorted(self._shown)}")
+
+    @property
+    def _shown(self) -> set[str]:
+        return set(self.panels.split())
 
     @classmethod
     def of(
@@ -168,17 +186,17 @@ class RectificationView(View):
         f = now.left.intrinsics.fx
         shifted = abs(now.doffs) > 0.05
         second = f"{now.doffs:.1f} px".replace("-", "−") if shifted else f"{now.pair.baseline:.3f} m"
-        figures = {
-            "f, doffs" if shifted else "f, B": f"{f:.0f} px, {second}",
-            "rows differ by": f"{self.rows_apart():.1f} px",
-            "chosen, rectified": self._in_words(self.disparity, self.depth()),
-            "measured at the mark": self._with_depth(self._at_mark(found)),
-        }
+        figures = {"f, doffs" if shifted else "f, B": f"{f:.0f} px, {second}"}
+        figures["rows differ by"] = f"{self.rows_apart():.1f} px"
+        if "wedge" in self._shown:
+            figures["chosen, rectified"] = self._in_words(self.disparity, self.depth())
+            figures["measured at the mark"] = self._with_depth(self._at_mark(found))
         if not score.compared:
             return {**figures, "no disparity": f"{100 * np.isnan(found).mean():.0f} % of the pixels"}
+        if "wedge" in self._shown:
+            figures["true at the mark"] = self._with_depth(self._at_mark(self.true_disparity_map(draft=draft)))
         return {
             **figures,
-            "true at the mark": self._with_depth(self._at_mark(self.true_disparity_map(draft=draft))),
             "no disparity": f"{100 * score.missing:.0f} % of the pixels",
             f"off by more than {WRONG:g} px": f"{100 * (score.bad - score.missing):.1f} %",
             "mean error": f"{score.mean_error:.2f} px" if np.isfinite(score.mean_error) else "none found",
@@ -211,8 +229,10 @@ class RectificationView(View):
         way = way if self.rectify else "as taken"
         figures = "; ".join(f"{name} {value}" for name, value in numbers.items())
         matched = f"{self.method}, blocks of {self.block_size:g} px, {self.disparities:g} disparities"
-        depth = f"{self.equation()}; {self.interval()}" if self.worth else self.equation()
-        return f"The pair {way}. {figures}. Matched by {matched}. {depth}."
+        said = f"The pair {way}. {figures}. Matched by {matched}."
+        if "wedge" not in self._shown:
+            return said
+        return f"{said} {self.equation()}; {self.interval()}." if self.worth else f"{said} {self.equation()}."
 
     # Hands -----------------------------------------------------------------------------------------------------------
 
@@ -241,15 +261,14 @@ class RectificationView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         numbers = self.numbers(draft=draft)
         left, right = _photographs(*self._key(draft))
-        disparity_png, second_png = _maps(*self._matching(draft), self.show)
-        attached = {
-            "left": left, "right": right, "disparity": disparity_png, "second": second_png,
-            "disparity key": heat_key("disparity"), "second key": heat_key(self._second[0]),
-        }  # fmt: skip
+        attached = {"left": left, "right": right}
         panels = [self._picture_panel(self._left_panel), self._picture_panel(self._right_panel)]
-        body = "".join([
-            svg.rectangle(0, 0, 960, 590, "paper"), *panels, self._maps_block(), self._wedge_panel(), _column(numbers),
-        ])  # fmt: skip
+        maps, more = self._maps_block() if self.yours is None else self._your_maps_block(draft)
+        if self.yours is None:
+            more |= dict(zip(("disparity", "second"), _maps(*self._matching(draft), self.show), strict=True))
+        wedge = self._wedge_panel() if "wedge" in self._shown else ""
+        body = "".join([svg.rectangle(0, 0, 960, 590, "paper"), *panels, maps, wedge, _column(numbers)])
+        attached |= {name: data for name, data in more.items() if f"attached:{name}" in maps}
         return Picture(body, 960, 590, self.title, self._described(numbers), attached)
 
     # The two pictures ------------------------------------------------------------------------------------------------
@@ -309,23 +328,60 @@ class RectificationView(View):
         low, high = stereo_pair.depth_limits(self.source)
         return "depth", "Depth" if self.show == "depth" else "True depth", low, high, "m"
 
-    def _maps_block(self) -> str:
+    def _map_panels(self) -> tuple[Panel, Panel]:
         size = self.stage.left.intrinsics
         left, right = (
             image_panel(name, x, 374, _MAP_WIDTH, size.width, size.height, tallest=_MAP_TALLEST)
             for name, x in (("disparity", 20), ("second", 325))
         )
+        return left, right
+
+    def _maps_block(self) -> tuple[str, dict[str, bytes]]:
+        size = self.stage.left.intrinsics
+        left, right = self._map_panels()
         _, title, low, high, unit = self._second
         note = "" if self.source.photographs is None or self.source.distances is not None else "truth unknown"
         formula = "Z = fB / (d + doffs)" if abs(self.stage.doffs) > 0.05 else "Z = fB / d"
         marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
-        return "".join([
-            heat_panel(left, size.width, size.height, 0, self.disparities, "px", marks[0],
-                       title="Disparity", note=self.method),
-            heat_panel(right, size.width, size.height, low, high, unit, marks[1],
-                       title=title, note=formula if self.show == "depth" else note),
-            svg.text((20, left.y + left.height + 18), "hatched: no disparity", "note"),
-        ])  # fmt: skip
+        maps = {
+            "disparity": heat_panel(left, size.width, size.height, 0, self.disparities, "px", marks[0],
+                                    title="Disparity", note=self.method),
+            "second": heat_panel(right, size.width, size.height, low, high, unit, marks[1],
+                                 title=title, note=formula if self.show == "depth" else note),
+        }  # fmt: skip
+        hatched = svg.text((20, left.y + left.height + 18), "hatched: no disparity", "note")
+        keys = {"disparity key": heat_key("disparity"), "second key": heat_key(self._second[0])}
+        return "".join(drawn for name, drawn in maps.items() if name in self._shown) + hatched, keys
+
+    def your_depth(self, *, draft: bool = False) -> tuple[np.ndarray, str]:
+        """What the reader's function makes of the disparity map, and what is wrong with it."""
+        found, now = self.disparity_map(draft=draft), self.stage
+        if self.yours is None:
+            return np.full(found.shape, np.nan), ""
+        given = (found.astype(float), now.left.intrinsics.fx, now.pair.baseline, now.doffs)
+        return tried(self.yours, given, found.astype(float))
+
+    def _your_maps_block(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+        """The right depths, and beside them those of the reader's function."""
+        size, (left, right), limits = self.stage.left.intrinsics, self._map_panels(), self._limits
+        depth, problem = self.your_depth(draft=draft)
+        marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
+        right_map = heat_panel(left, size.width, size.height, *limits, "m", marks[0], title="Depth")
+        words = svg.paragraph((right.x, right.y + right.height + 18), problem or self._at_your_mark(depth), 300,
+                              "note" if problem else "label orange")  # fmt: skip
+        your_map = heat_panel(right, size.width, size.height, *limits, "m", marks[1], title="With your function")
+        true = self.stage.depth(self.disparity_map(draft=draft))
+        images = {"disparity": heat_map(_small(true), *limits, "depth")}
+        images["second"] = heat_map(_small(depth), *limits, "depth")
+        return right_map + your_map + words, images | dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
+
+    def _at_your_mark(self, depth: np.ndarray) -> str:
+        at_mark = self._at_mark(depth)
+        return f"your Z at the mark: {metres(at_mark)}" if not np.isnan(at_mark) else "no Z of yours at the mark"
+
+    @property
+    def _limits(self) -> tuple[float, float]:
+        return stereo_pair.depth_limits(self.source)
 
     def _wedge_panel(self) -> str:
         farthest = stereo_pair.depth_limits(self.source)[1]

@@ -146,6 +146,8 @@ def test_half_of_the_mistakes_are_in_a_strip_that_only_the_left_camera_sees(says
     hidden = there - d > 5
     beside_the_globe = [u for u in np.flatnonzero(hidden) if 300 < u < 345]
     assert wide == len(beside_the_globe)
+    (around,) = says("Around column 330, to the left of the globe, it should drop the strip")
+    assert around.value in beside_the_globe
     assert wide == beside_the_globe[-1] - beside_the_globe[0] + 1
     assert d[beside_the_globe[-1] + 1] > 30  # the globe begins there
     says("as wide in pixels as the two disparities differ")
@@ -281,6 +283,52 @@ def test_a_phone_and_a_car(says):
         "To know 50 m to 10 cm, with f = 1500 px and a quarter of a pixel, `…` gives 4.2 m: wider than a car."
     )
     assert wide == Z.value**2 * 0.25 / (f.value * cm.value / 100)
+
+
+def test_the_left_right_check_by_hand(says):
+    column, d, again, minus, partner = says(
+        "The left pixel in column 100 has found disparity 20. Its partner is column 100 − 20 = 80."
+    )
+    assert partner == column.value - d.value
+    assert (again.value, minus.value) == (column.value, d.value)
+    there, found, back = says("The right pixel in column 80 has found 20 as well: it points back to column 100.")
+    assert back == there.value + found.value == column.value
+    wrong, elsewhere = says("Had the right pixel found 37, it would point to column 117.")
+    assert elsewhere == there.value + wrong.value != column.value
+
+
+def test_a_turned_camera_moves_a_pixel_by_hand(says):
+    (turn,) = says("One pixel, by hand, for a camera that turns 3° to the right:")
+    says("The pixel goes to the left, because the camera turned to the right. It also changes its row")
+    K = np.array([[400.0, 0, 240], [0, 400, 180], [0, 0, 1]])
+    R = Rotation.from_euler("Y", turn.value, True).inv().as_matrix()
+    u, v, w = K @ R @ np.linalg.inv(K) @ (340, 100, 1)
+    assert u / w < 330
+    assert abs(v / w - 100) > 0.5
+
+
+def test_a_length_and_a_percentage_ask_for_baselines_that_cross(says):
+    f, cm, percent = says(
+        "With your function, f = 1500 px and a quarter of a pixel: how wide must a stereo camera be to know a depth to "
+        "10 cm, or to 1 % of itself?"
+    )
+    Z = cm.value / 100 / (percent.value / 100)  # where both ask for the same
+    assert pytest.approx(10) == Z
+    assert Z**2 * 0.25 / (f.value * 0.1) == pytest.approx(1 / 6)
+
+
+def test_the_doffs_of_the_motorcycle(says):
+    """The published cx of the two cameras are 1244.772 px and 1369.115 px, in pictures 2964 px wide."""
+    (doffs,) = says("at 0 your function is given doffs = 15.5 px, at 1 it is given 0")
+    assert doffs == (1369.115 - 1244.772) * 370 / 2964
+
+
+def test_time_of_flight(says):
+    there_and_back, ps = says("Z = c Δt / 2. A centimetre of depth is 67 picoseconds.")
+    MHz, far = says("At f_mod = 20 MHz the phase repeats after 7.5 m")
+    c = 299_792_458.0
+    assert ps == there_and_back.value * 0.01 / c * 1e12
+    assert far == c * 2 * np.pi / (4 * np.pi * MHz.value * 1e6)
 
 
 def test_twice_as_far_takes_four_times_the_baseline(says):
@@ -434,8 +482,8 @@ def test_a_turn_about_x_can_nearly_stand_in_for_a_principal_point(says, rig):
     lower, tilt = says("A principal point 15 px lower looks much like a camera turned by 1.6°.")
     assert tilt == np.degrees(np.arctan(lower.value / rig["K"]["right"][1, 1]))
     row, turn, forced, free = says(
-        "If one insists on row 234 for the right camera too, the calibration answers with a turn of 1.2° the other way "
-        "about x, and the corners fit worse: 0.27 px RMS instead of 0.22 px."
+        "One can insist on row 234 for the right camera too. Then the calibration answers with a turn of 1.2° the "
+        "other way about x, and the corners fit worse: 0.27 px RMS instead of 0.22 px."
     )
     K_right = rig["K"]["right"].copy()
     K_right[1, 2] = row.value
