@@ -166,7 +166,7 @@ class FaultLabView(View):
         names = [(float(i), f"{i}") for i in x.tolist()]
         return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
 
-    def _your_bars(self, panel: Panel, x: Array) -> str:
+    def _your_bars(self, panel: Panel, x: np.ndarray) -> str:
         """The reader's own bars beside the right ones; each that lies above the panel ends at its edge."""
         if self.yours is None:
             return ""
