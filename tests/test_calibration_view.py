@@ -237,3 +237,41 @@ def test_poses_of_boards_left_out_are_fitted_to_them_alone():
     true, found = view.cam_from_board[3], view.estimated_poses[3]
     np.testing.assert_allclose(found.translation, true.translation, atol=1e-4)
     assert (found.rotation * true.rotation.inv()).magnitude() < 1e-3
+
+
+def from_one_homography(H, centre):
+    """fx and fy by Zhang's two conditions, written out."""
+    (p, q, r), (s, t, w) = (np.array([[1, 0, -centre[0]], [0, 1, -centre[1]], [0, 0, 1]]) @ H)[:, :2].T
+    return 1 / np.sqrt(np.linalg.solve([[p * s, q * t], [p * p - s * s, q * q - t * t]], [-r * w, w * w - r * r]))
+
+
+def test_each_picture_alone_gives_the_true_focal_lengths_where_corners_are_exact():
+    exact = CalibrationView(noise=0.0, panels="picture yours", yours=from_one_homography)
+    np.testing.assert_allclose(exact.each.right, np.tile([545.0, 543.0], (8, 1)), atol=0.02)
+    np.testing.assert_allclose(exact.each.yours, exact.each.right, atol=0.02)
+    assert not exact.each.problem
+
+
+def test_a_reader_s_function_is_drawn_beside_the_right_one_whatever_it_does():
+    view = CalibrationView(panels="picture yours")
+    for function, words in (
+        (from_one_homography, "by your function: fx 542.7, fy 542.6"),
+        (lambda H, centre: from_one_homography(H, centre)[::-1], "by your function: fx 542.6, fy 542.7"),
+        (lambda H, centre: None, "returns nothing yet"),
+        (lambda H, centre: 1 / 0, "ZeroDivisionError"),
+    ):
+        drawn = view.but(yours=function).figure().svg()
+        assert words in drawn
+        assert "board 1 alone: fx 542.7, fy 542.6" in drawn
+
+
+def test_the_view_opens_with_the_fit_alone():
+    few = CalibrationView(panels="picture fit", tilt=2.0)
+    drawn = few.figure().svg()
+    assert "774.2" in drawn
+    assert "0.267 px" in drawn
+    for later in ("not seen", "correlation", "±", "5.2 px"):
+        assert later not in drawn
+        assert later not in few.description()
+    with pytest.raises(ValueError, match="panels must be one of"):
+        CalibrationView(panels="picture space")

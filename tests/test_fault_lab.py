@@ -192,3 +192,25 @@ def test_the_implied_rotation_is_that_of_the_difference_map():
     R = lesson16.implied_rotation(*rays)
     np.testing.assert_allclose(R, map_.second_from_first.rotation.as_matrix(), atol=1e-3)
     assert np.degrees(np.arccos((np.trace(R) - 1) / 2)) == pytest.approx(np.degrees(np.arctan(12 / grid.fx)), rel=0.15)
+
+
+def test_a_reader_s_functions_are_shown_beside_the_right_ones_whatever_they_do():
+    lab = FaultLabView(fault="column off", strength=0.2, seed=5, panels="bars picture")
+    right = lab.but(yours=lesson16.view_rms, verdict=lesson16.triage).figure().svg()
+    assert "2, a row or a column is off" in right
+    assert "fill-orange" in right
+    wrong = lab.but(yours=lambda residuals: None, verdict=lambda residuals: 7).figure().svg()
+    assert "returns nothing yet" in wrong
+    assert "7, which is none of 0 to 3" in wrong
+    broken = lab.but(yours=lambda residuals: residuals, verdict=lambda residuals: 1 / 0).figure().svg()
+    assert "answers in shape" in broken
+    assert "ZeroDivisionError" in broken
+
+
+def test_the_lab_opens_with_the_fit_alone():
+    few = FaultLabView(fault="warped board", panels="bars picture")
+    for later in ("is off by", "What the clinic finds", "less the truth"):
+        assert later not in few.figure().svg()
+        assert later not in few.description()
+    with pytest.raises(ValueError, match="panels must be one of"):
+        FaultLabView(panels="bars")

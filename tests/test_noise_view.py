@@ -145,3 +145,26 @@ def test_a_measurement_is_shown_with_its_figures_and_without_those_it_lacks():
     body = view.figure().body
     assert "NaN" not in body
     assert "exposure (ms)" in body
+
+
+def test_a_reader_s_noise_is_drawn_beside_the_right_one_whatever_it_does():
+    view = PhotonTransferView(prnu=2.0, dsnu_e=0.0, dark_current=0.0, fit=False, panels="picture curve")
+
+    def right(electrons, read_noise, prnu):
+        return np.sqrt(read_noise**2 + electrons + (prnu * electrons) ** 2)
+
+    drawn = view.but(yours=right).figure(draft=True).svg()
+    assert "orange thick" in drawn
+    wrong = view.but(yours=lambda electrons, read_noise, prnu: read_noise + electrons).figure(draft=True).svg()
+    assert wrong != drawn
+    assert "returns nothing yet" in view.but(yours=lambda *_: None).figure(draft=True).svg()
+    assert "ZeroDivisionError" in view.but(yours=lambda *_: 1 / 0).figure(draft=True).svg()
+
+
+def test_the_view_opens_without_the_histogram_and_most_numbers():
+    few = PhotonTransferView(panels="picture curve", fit=False)
+    for later in ("Histogram", "mostly from", "gain K"):
+        assert later not in few.figure(draft=True).svg()
+        assert later not in few.description()
+    with pytest.raises(ValueError, match="panels must be one of"):
+        PhotonTransferView(panels="curve")

@@ -327,7 +327,138 @@ def coordinates_added(residuals, rows, columns):
     return np.median(lengths, axis=1), np.median(lengths, axis=0)
 
 
-# 4: what a turn explains ---------------------------------------------------------------------------------------------
+# 4: triage -----------------------------------------------------------------------------------------------------------
+
+
+def triage(residuals: Array) -> int:
+    """What is wrong with views (views, rows, columns, 2): 0 nothing, 1 a corner, 2 a line of corners, 3 a whole view.
+
+    A corner is off beyond 6 σ, σ being robust; a line or a view when at least half of its corners are.
+    """
+    return _triage(residuals)
+
+
+def _triage(residuals, sigma=robust_sigma, times=6.0, share=0.5, rows=True, columns=True):
+    off = np.linalg.norm(residuals, axis=-1) > times * sigma(residuals)
+    if (off.mean(axis=(1, 2)) >= share).any():
+        return 3
+    if (columns and (off.mean(axis=1) >= share).any()) or (rows and (off.mean(axis=2) >= share).any()):
+        return 2
+    return int(off.any())
+
+
+def _triage_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Nothing, a corner, whole lines and views, lines and views of which most is off, and lines of which little is."""
+    marks = (
+        (slice(0), slice(0), slice(0)),
+        (3, 2, 4),
+        (1, 2, slice(None)),
+        (2, slice(None), 7),
+        (5, slice(None), slice(None)),
+        (4, 3, slice(1, 8)),
+        (6, slice(2, 6), 3),
+        (0, slice(None), slice(2, 8)),
+        (7, 1, slice(0, 3)),
+        (3, slice(1, 3), 5),
+        (slice(None), 2, slice(None)),
+    )
+    for mark in rng.permutation(np.array(marks, dtype=object)):
+        residuals = np.clip(rng.normal(0, 1, (8, 6, 9, 2)), -3, 3)
+        residuals[7, 5, 8] = 3.2, -3.2  # 4.5 σ: far, and not off
+        residuals *= rng.uniform(0.1, 0.4)
+        residuals[tuple(mark)] += rng.uniform(15, 40) * np.array([np.cos(a := rng.uniform(0, 6.3)), np.sin(a)])
+        yield (residuals,)
+
+
+TRIAGE = Exercise(
+    name="16.triage",
+    reference=triage,
+    cases=_triage_cases,
+    hints=(
+        "First decide which corners are off: a mask (views, rows, columns). Then ask for the largest thing first: a "
+        "view, a line, a corner.",
+        "The mean of a mask is a share. Over both axes of the board it is the share of bad corners in a view; over the "
+        "rows (axis 1) that in each column, over the columns (axis 2) that in each row.",
+        "`off = lengths > ___ * np.median(lengths) / np.sqrt(2 * np.log(2))`",
+    ),
+    praise="That is the first thing the clinic does with every set of corners.",
+)
+
+
+@TRIAGE.right
+def by_counting(residuals):
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    off = lengths > 6 * np.median(lengths) / np.sqrt(np.log(4))
+    _, rows, columns = off.shape
+    if np.any(np.sum(off, axis=(1, 2)) * 2 >= rows * columns):
+        return 3
+    lines = np.any(off.sum(axis=1) * 2 >= rows) or np.any(off.sum(axis=2) * 2 >= columns)
+    return 2 if lines else 1 if off.any() else 0
+
+
+@TRIAGE.right
+def view_by_view_by_hand(residuals):
+    lengths = np.linalg.norm(residuals, axis=-1)
+    limit, worst = 6 * np.median(lengths) / np.sqrt(2 * np.log(2)), 0
+    for view in lengths > limit:
+        lines = [*view, *view.T]
+        found = 3 if view.mean() >= 0.5 else 2 if max(line.mean() for line in lines) >= 0.5 else int(view.any())
+        worst = max(worst, found)
+    return worst
+
+
+@TRIAGE.wrong("Columns, corners and views are found; a bad *row* goes as single corners.")
+def without_rows(residuals):
+    return _triage(residuals, rows=False)
+
+
+@TRIAGE.wrong("Rows, corners and views are found; a bad *column* goes as single corners.")
+def without_columns(residuals):
+    return _triage(residuals, columns=False)
+
+
+@TRIAGE.wrong("Your σ is the ordinary standard deviation. A bad view makes it so large that nothing is beyond 6 σ.")
+def by_standard_deviation(residuals):
+    return _triage(residuals, sigma=np.std)
+
+
+@TRIAGE.wrong("A bad view is called a bad line. It has bad lines, all of them: ask for the view first.")
+def lines_before_views(residuals):
+    return min(triage(residuals), 2)
+
+
+@TRIAGE.wrong("Healthy or not is told right. The number should say *what* is off.")
+def healthy_or_not(residuals):
+    return int(triage(residuals) > 0)
+
+
+@TRIAGE.wrong("You ask for *all* corners of a line or a view. Half of them is enough: a line may be partly right.")
+def all_corners_of_a_line(residuals):
+    return _triage(residuals, share=1.0)
+
+
+@TRIAGE.wrong("You ask for *any* corner of a line or a view. One wrong corner does not make its row wrong: half does.")
+def any_corner_of_a_line(residuals):
+    return _triage(residuals, share=1e-9)
+
+
+@TRIAGE.wrong(
+    "Beyond 3 σ lies one corner in ninety of a perfectly healthy camera: a length in the plane is longer than one "
+    "number. The limit here is 6 σ."
+)
+def three_sigma(residuals):
+    return _triage(residuals, times=3.0)
+
+
+@TRIAGE.wrong(
+    "Each view is compared with its own σ. A view that is off as a whole is normal by its own standard: take σ from "
+    "all views together."
+)
+def each_view_by_itself(residuals):
+    return max(_triage(view[None]) for view in residuals)
+
+
+# 5: what a turn explains ---------------------------------------------------------------------------------------------
 
 
 def implied_rotation(rays_first: Array, rays_second: Array) -> Array:
@@ -460,135 +591,4 @@ def stretch_kept(rays_first, rays_second):
     return rays_second.T @ rays_first / len(rays_first)
 
 
-# 5: triage -----------------------------------------------------------------------------------------------------------
-
-
-def triage(residuals: Array) -> int:
-    """What is wrong with views (views, rows, columns, 2): 0 nothing, 1 a corner, 2 a line of corners, 3 a whole view.
-
-    A corner is off beyond 6 σ, σ being robust; a line or a view when at least half of its corners are.
-    """
-    return _triage(residuals)
-
-
-def _triage(residuals, sigma=robust_sigma, times=6.0, share=0.5, rows=True, columns=True):
-    off = np.linalg.norm(residuals, axis=-1) > times * sigma(residuals)
-    if (off.mean(axis=(1, 2)) >= share).any():
-        return 3
-    if (columns and (off.mean(axis=1) >= share).any()) or (rows and (off.mean(axis=2) >= share).any()):
-        return 2
-    return int(off.any())
-
-
-def _triage_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """Nothing, a corner, whole lines and views, lines and views of which most is off, and lines of which little is."""
-    marks = (
-        (slice(0), slice(0), slice(0)),
-        (3, 2, 4),
-        (1, 2, slice(None)),
-        (2, slice(None), 7),
-        (5, slice(None), slice(None)),
-        (4, 3, slice(1, 8)),
-        (6, slice(2, 6), 3),
-        (0, slice(None), slice(2, 8)),
-        (7, 1, slice(0, 3)),
-        (3, slice(1, 3), 5),
-        (slice(None), 2, slice(None)),
-    )
-    for mark in rng.permutation(np.array(marks, dtype=object)):
-        residuals = np.clip(rng.normal(0, 1, (8, 6, 9, 2)), -3, 3)
-        residuals[7, 5, 8] = 3.2, -3.2  # 4.5 σ: far, and not off
-        residuals *= rng.uniform(0.1, 0.4)
-        residuals[tuple(mark)] += rng.uniform(15, 40) * np.array([np.cos(a := rng.uniform(0, 6.3)), np.sin(a)])
-        yield (residuals,)
-
-
-TRIAGE = Exercise(
-    name="16.triage",
-    reference=triage,
-    cases=_triage_cases,
-    hints=(
-        "First decide which corners are off: a mask (views, rows, columns). Then ask for the largest thing first: a "
-        "view, a line, a corner.",
-        "The mean of a mask is a share. Over both axes of the board it is the share of bad corners in a view; over the "
-        "rows (axis 1) that in each column, over the columns (axis 2) that in each row.",
-        "`off = lengths > ___ * np.median(lengths) / np.sqrt(2 * np.log(2))`",
-    ),
-    praise="That is the first thing the clinic does with every set of corners.",
-)
-
-
-@TRIAGE.right
-def by_counting(residuals):
-    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
-    off = lengths > 6 * np.median(lengths) / np.sqrt(np.log(4))
-    _, rows, columns = off.shape
-    if np.any(np.sum(off, axis=(1, 2)) * 2 >= rows * columns):
-        return 3
-    lines = np.any(off.sum(axis=1) * 2 >= rows) or np.any(off.sum(axis=2) * 2 >= columns)
-    return 2 if lines else 1 if off.any() else 0
-
-
-@TRIAGE.right
-def view_by_view_by_hand(residuals):
-    lengths = np.linalg.norm(residuals, axis=-1)
-    limit, worst = 6 * np.median(lengths) / np.sqrt(2 * np.log(2)), 0
-    for view in lengths > limit:
-        lines = [*view, *view.T]
-        found = 3 if view.mean() >= 0.5 else 2 if max(line.mean() for line in lines) >= 0.5 else int(view.any())
-        worst = max(worst, found)
-    return worst
-
-
-@TRIAGE.wrong("Columns, corners and views are found; a bad *row* goes as single corners.")
-def without_rows(residuals):
-    return _triage(residuals, rows=False)
-
-
-@TRIAGE.wrong("Rows, corners and views are found; a bad *column* goes as single corners.")
-def without_columns(residuals):
-    return _triage(residuals, columns=False)
-
-
-@TRIAGE.wrong("Your σ is the ordinary standard deviation. A bad view makes it so large that nothing is beyond 6 σ.")
-def by_standard_deviation(residuals):
-    return _triage(residuals, sigma=np.std)
-
-
-@TRIAGE.wrong("A bad view is called a bad line. It has bad lines, all of them: ask for the view first.")
-def lines_before_views(residuals):
-    return min(triage(residuals), 2)
-
-
-@TRIAGE.wrong("Healthy or not is told right. The number should say *what* is off.")
-def healthy_or_not(residuals):
-    return int(triage(residuals) > 0)
-
-
-@TRIAGE.wrong("You ask for *all* corners of a line or a view. Half of them is enough: a line may be partly right.")
-def all_corners_of_a_line(residuals):
-    return _triage(residuals, share=1.0)
-
-
-@TRIAGE.wrong("You ask for *any* corner of a line or a view. One wrong corner does not make its row wrong: half does.")
-def any_corner_of_a_line(residuals):
-    return _triage(residuals, share=1e-9)
-
-
-@TRIAGE.wrong(
-    "Beyond 3 σ lies one corner in ninety of a perfectly healthy camera: a length in the plane is longer than one "
-    "number. The limit here is 6 σ."
-)
-def three_sigma(residuals):
-    return _triage(residuals, times=3.0)
-
-
-@TRIAGE.wrong(
-    "Each view is compared with its own σ. A view that is off as a whole is normal by its own standard: take σ from "
-    "all views together."
-)
-def each_view_by_itself(residuals):
-    return max(_triage(view[None]) for view in residuals)
-
-
-EXERCISES = (VIEW_RMS, ROBUST_SIGMA, LINES, ROTATION, TRIAGE)
+EXERCISES = (VIEW_RMS, ROBUST_SIGMA, LINES, TRIAGE, ROTATION)

@@ -39,7 +39,7 @@ Placed = tuple[int, tuple[float, ...], tuple[float, ...]]  # which board, its t 
 
 @dataclass(frozen=True)
 class BoardPictures(View):
-    """Boards before a camera whose truth is known, their corners with noise, and the calibration that follows.
+    """Boards in front of a camera whose truth is known, their corners with noise, and the calibration that follows.
 
     Board i is tilted by `tilt` away from parallel to the image, about an axis of its own, and stands about `distance`
     metres away, wherever in the picture there is room; `placed` are boards put elsewhere by hand. Corners are found

@@ -1,10 +1,14 @@
-"""The calibration visualizer: boards before a camera, what is estimated from their corners, and how far to trust it."""
+"""The calibration visualizer: boards in front of a camera, the estimate from their corners, and how far to trust it.
+
+A reader's own function can find the focal lengths of each picture beside the right ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -18,6 +22,7 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
 from camviz.views.chessboard import outline, rim, squares
+from camviz.views.one_board import FromEach, from_each, panel_of_each
 
 _MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 _CELLS = (16, 12)  # of the coverage map
@@ -26,15 +31,29 @@ _REACH = 300.0  # pixels at the ends of the strip
 _LOW, _HIGH = 0.05, 50.0  # pixels at the ends of the bars
 _NORMAL = 0.07  # metres, the length of the handle that tilts a board
 _PIXELS = ("fx", "fy", "cx", "cy")
+_EVERYTHING = "picture space estimate errors"
+_HEIGHTS = {"picture fit": 400, "picture yours": 430, _EVERYTHING: 660}  # of the picture, by the panels it has
 
 
 @dataclass(frozen=True)
 class CalibrationView(BoardPictures):
-    """Corners and their residuals, the boards in space, the estimate ± σ against the truth, and two kinds of error."""
+    """Corners and their residuals, the boards in space, the estimate ± σ against the truth, and two kinds of error.
+
+    `panels` says what is drawn: everything; "picture fit", the corners with the estimate and its RMS error alone; or
+    "picture yours", the corners and the focal lengths that each picture gives alone. `yours` is a reader's function of
+    (H, centre) for those, a homography (3, 3) and (cx, cy) to (fx, fy); what it answers is orange.
+    """
 
     title: ClassVar[str] = "Calibration"
 
+    panels: str = _EVERYTHING
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     eye: Eye = Eye(distance=1.2, yaw_deg=-58, pitch_deg=26)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.panels not in _HEIGHTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
 
     # Words -----------------------------------------------------------------------------------------------------------
 
@@ -57,8 +76,21 @@ class CalibrationView(BoardPictures):
         if self.seen is None:
             boards += f" tilted by {self.tilt:g}° about {self.distance:g} m away, corners found to {self.noise:g} px"
         left_out = f", without board {self.index + 1}" if self.leave_out else ""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
         return f"{boards}{left_out}; solved for {self.free}. {figures}."
+
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels show."""
+        figures = self.numbers()
+        if self.panels == _EVERYTHING or self.adjustment is None:
+            return figures
+        if self.panels == "picture yours":
+            fx, fy = self.each.right[self.index]
+            return {f"from board {self.index + 1} alone": f"fx {fx:.1f}, fy {fy:.1f}"}
+        estimated = {
+            name: figures[name].replace(f" ± {_spread(name, self.estimates[name][1])}", "") for name in FREE[self.free]
+        }
+        return {**estimated, "RMS": figures["RMS"]}
 
     def _written(self, name: str) -> str:
         value, sigma = self.estimates[name]
@@ -69,10 +101,17 @@ class CalibrationView(BoardPictures):
 
     def figure(self, *, draft: bool = False) -> Picture:
         view = self.but(coarse=True) if draft else self
-        space, attached = view._space(draft)
-        photographs = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
-        body = svg.rectangle(0, 0, 960, 660, "paper") + view._image() + space + view._estimates() + view._errors()
-        return Picture(body, 960, 660, self.title, view.description(), attached | photographs)
+        attached = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
+        height = _HEIGHTS[self.panels]
+        body = svg.rectangle(0, 0, 960, height, "paper") + view._image()
+        if self.panels == "picture fit":
+            body += view._fit()
+        elif self.panels == "picture yours":
+            body += panel_of_each(view.each, view._known, self.index, (540, 34, 400, 290), self.yours is not None)
+        else:
+            space, photographs = view._space(draft)
+            body, attached = body + space + view._estimates() + view._errors(), attached | photographs
+        return Picture(body, 960, height, self.title, view.description(), attached)
 
     # What the camera saw ---------------------------------------------------------------------------------------------
 
@@ -165,7 +204,7 @@ class CalibrationView(BoardPictures):
         return self.cam_from_board if self.truth else self.estimated_poses
 
     def _items(self) -> list[Item]:
-        camera = self.truth or self.camera or self._true_camera
+        camera = self._known
         items: list[Item] = [*camera_body(camera, 0.09, colour="blue", name="")]
         shown = transform_each(self._poses_shown, outline(self.board))
         items += [rim(corners, "muted", 1.2) for corners in np.delete(shown, self.index, axis=0)]
@@ -177,7 +216,45 @@ class CalibrationView(BoardPictures):
         items.append(Label(picked[0], str(self.index + 1), "label orange"))
         return items
 
+    # What each picture says alone ------------------------------------------------------------------------------------
+
+    @property
+    def _known(self) -> Camera:
+        """The camera whose lens and principal point are taken as known: the true one, or that which was estimated."""
+        return self.truth or self.camera or self._true_camera
+
+    @cached_property
+    def each(self) -> FromEach:
+        """fx and fy from every picture alone, and by the reader's function."""
+        return from_each(self.corners, self.board, self._known, self.yours)
+
     # The estimate ----------------------------------------------------------------------------------------------------
+
+    def _fit(self) -> str:
+        """The estimated numbers against the truth, and the error of the fit: what a report of a calibration says."""
+        x = (510, 640, 750)
+        heads = ("", "true" if self.truth else "", "estimate")
+        parts = [svg.text((x[0], 26), "The estimate" + (", against the truth" if self.truth else ""), "title")]
+        parts += [svg.text((at, 54), words, "note end") for at, words in zip(x, heads, strict=True)]
+        for row, name in enumerate(FREE[self.free] if self.estimates else ()):
+            y = 80 + 24 * row
+            true = _number(name, self.true[name]) if self.truth else ""
+            words = (true, _number(name, self.estimates[name][0]))
+            parts.append(svg.text((x[0], y), name, "number"))
+            parts += [svg.text((at, y), one, "number end") for at, one in zip(x[1:], words, strict=True)]
+        if self.adjustment is None:
+            return "".join(parts) + svg.text((x[0], 80), "No board is seen: nothing to estimate from", "note")
+        return "".join(parts) + self._bar(
+            x[0], 80 + 24 * len(FREE[self.free]) + 20, "RMS error of all its corners", self.adjustment.rms, "fill-blue"
+        )
+
+    def _bar(self, x: float, y: float, words: str, value: float, class_: str) -> str:
+        """An error in pixels as a bar, with its name above it and its number at its end."""
+        return (
+            svg.text((x, y + 10), words, "note halo")
+            + svg.rectangle(x, y + 16, 230 * _share(value), 14, class_, rx=2)
+            + svg.text((x + 6 + 230 * _share(value), y + 28), f"{_digits(value)} px", "number halo")
+        )
 
     def _estimates(self) -> str:
         x = (20, 128, 218, 300)
@@ -241,7 +318,7 @@ class CalibrationView(BoardPictures):
     @cached_property
     def _pixels_per(self) -> dict[str, float]:
         """How far, in pixels, the image's corner moves when a coefficient changes by 1; 1 for fx, fy, cx and cy."""
-        camera = self.truth or self.camera or self._true_camera
+        camera = self._known
         at = camera.intrinsics.from_pixels((-0.5, -0.5))
         ray = camera.lens.unproject(at)
         ideal = ray[:2] / ray[2] if np.isfinite(ray).all() else at  # the corner may lie beyond a fold
@@ -257,11 +334,7 @@ class CalibrationView(BoardPictures):
         bars = [("on the boards it was fitted to", self.adjustment.rms, "fill-blue")]
         bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
         parts = [svg.text((650, 402), "Two kinds of error", "title")]
-        for i, (words, value, class_) in enumerate(bars):
-            y = 416 + 44 * i
-            parts.append(svg.text((650, y + 10), words, "note halo"))
-            parts.append(svg.rectangle(650, y + 16, 230 * _share(value), 14, class_, rx=2))
-            parts.append(svg.text((656 + 230 * _share(value), y + 28), f"{_digits(value)} px", "number halo"))
+        parts += [self._bar(650, 416 + 44 * i, *bar) for i, bar in enumerate(bars)]
         return self._noise_mark() + "".join(parts) + self._per_board() + self._facts()
 
     def _noise_mark(self) -> str:

@@ -1,10 +1,14 @@
-"""The fault lab: one virtual camera, one fault of any strength, and everything that moves when it is solved again."""
+"""The fault lab: one virtual camera, one fault of any strength, and everything that moves when it is solved again.
+
+A reader's own functions can measure every view and name what is off, beside the right answers.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -16,11 +20,15 @@ from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.marks import arrows
+from camviz.yours import tried
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
 _MOST = 4  # findings that have room
 _FAR = 4.0  # standard deviations
 _LONGEST = 90.0  # picture units of an arrow
+_EVERYTHING = "bars picture estimates findings"
+_HEIGHTS = {"bars picture": 424, _EVERYTHING: 684}  # of the picture, by the panels it has
+_VERDICTS = ("0, nothing is off", "1, a corner is off", "2, a row or a column is off", "3, a whole view is off")
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,10 @@ class FaultLabView(View):
     Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
     boards and noise. Arrows lead from a detected corner of the chosen view to its projection. A click on a bar
     chooses its view.
+
+    `panels` says what is drawn: everything, or "bars picture", the errors of the fit alone. `yours` is a reader's
+    function of residuals (views, corners, 2) to the RMS (views,) of every view, and `verdict` one of residuals (views,
+    rows, columns, 2) to 0 … 3, for nothing, a corner, a line or a whole view; what they answer is orange.
     """
 
     title: ClassVar[str] = "Fault lab"
@@ -40,6 +52,15 @@ class FaultLabView(View):
     seed: int = slider(1, 1, 20, 1, label="camera", help="another camera, other boards, other noise")
     view: int = slider(1, 1, VIEWS, 1, label="view", help="whose residuals are shown; or click its bar")
     told: bool = switch(True, label="show the findings", help="hide them to make a diagnosis of your own")
+
+    panels: str = _EVERYTHING
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+    verdict: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.panels not in _HEIGHTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
 
     @cached_property
     def experiment(self) -> Experiment:
@@ -66,8 +87,10 @@ class FaultLabView(View):
 
     def description(self) -> str:
         """The state in words and numbers."""
-        told = self._diagnosis() if self.told else "Findings hidden."
         cause = f"{self.fault}, strength {self.strength:g}: {self.experiment.words}; " if self.told else ""
+        if self.panels != _EVERYTHING:
+            return f"{cause}error of the fit {self.numbers()['error of the fit']}."
+        told = self._diagnosis() if self.told else "Findings hidden."
         numbers = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
         estimates = "; ".join(
             f"{k} {'+' if e > 0 else '−'}{figures(abs(e))} ± {figures(s)} px"
@@ -82,31 +105,40 @@ class FaultLabView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 684, "paper"),
-                self._headline(),
-                self._bars_panel(),
-                self._image_panel(),
-                self._estimates_panel(),
-                self._findings(draft),
-            ]
-        )
+        height = _HEIGHTS[self.panels]
+        body = svg.rectangle(0, 0, 960, height, "paper") + self._headline() + self._bars_panel() + self._image_panel()
+        if self.panels == _EVERYTHING:
+            body += self._estimates_panel() + self._findings(draft)
         words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
-        return Picture(body, 960, 684, self.title, words)
+        return Picture(body, 960, height, self.title, words)
 
     def _headline(self) -> str:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
                 "is off by": "against the true camera"}  # fmt: skip
         parts = []
-        for i, (name, value) in enumerate(self.numbers().items()):
+        shown = 3 if self.panels == _EVERYTHING else 1
+        for i, (name, value) in enumerate(list(self.numbers().items())[:shown]):
             x = 20 + 316 * i
             parts.append(svg.text((x, 22), name, "title"))
             parts.append(svg.text((x, 52), value, f"label{' red' if i == 2 and self._astray else ''}",
                                   style="font-size:26px;font-weight:600"))  # fmt: skip
             parts.append(svg.text((x + 8 + 8 * len(name), 22), told[name], "note"))
         words = f"In this calibration, {self.experiment.words}." if self.strength else "A healthy calibration."
-        return "".join(parts) + svg.text((20, 78), words if self.told else "What is wrong here?", "label")
+        parts.append(svg.text((20, 78), words if self.told else "What is wrong here?", "label"))
+        return "".join(parts) + self._your_verdict()
+
+    def _your_verdict(self) -> str:
+        """What the reader's triage says of all residuals together."""
+        if self.verdict is None:
+            return ""
+        residuals = self.experiment.residuals.reshape(VIEWS, BOARD.rows, BOARD.columns, 2)
+        answer, problem = tried(self.verdict, (residuals,), 0.0)
+        if problem:
+            return svg.paragraph((490, 22), problem, 450)
+        known = answer in range(len(_VERDICTS))
+        words = _VERDICTS[int(answer)] if known else f"{answer:g}, which is none of 0 to {len(_VERDICTS) - 1}"
+        large = {"style": "font-size:20px;font-weight:600"}
+        return svg.text((490, 22), "Your verdict on all views", "title") + svg.text((490, 50), words, "orange", **large)
 
     @property
     def _astray(self) -> bool:
@@ -116,14 +148,17 @@ class FaultLabView(View):
     @property
     def _bars(self) -> Panel:
         tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
-        return plot.plot_panel("bars", 66, 116, 394, 152, (0.5, VIEWS + 0.5), (0, tallest))
+        height = 152 if self.panels == _EVERYTHING else 250
+        return plot.plot_panel("bars", 66, 116, 394, height, (0.5, VIEWS + 0.5), (0, tallest))
 
     def _bars_panel(self) -> str:
         panel, errors = self._bars, self.experiment.errors
         x = np.arange(1, VIEWS + 1)
         content = plot.grid(panel, xticks=[])
-        for mask, class_ in ((x != self.index + 1, "fill-blue"), (x == self.index + 1, "fill-orange")):
-            content += plot.bars(panel, x - 0.38, x + 0.38, np.where(mask, errors, np.nan), class_)
+        right, chosen = (0.38, "fill-orange") if self.yours is None else (0.0, "fill-sky")
+        for mask, class_ in ((x != self.index + 1, "fill-blue"), (x == self.index + 1, chosen)):
+            content += plot.bars(panel, x - 0.38, x + right, np.where(mask, errors, np.nan), class_)
+        content += self._your_bars(panel, x)
         median = float(np.nanmedian(errors))
         content += svg.line(panel.place([(panel.left, median), (panel.right, median)]), "ink dashed")
         label = "One bar per view; click, drag or press the arrow keys to choose a view"
@@ -131,10 +166,21 @@ class FaultLabView(View):
         names = [(float(i), f"{i}") for i in x.tolist()]
         return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
 
+    def _your_bars(self, panel: Panel, x: np.ndarray) -> str:
+        """The reader's own bars beside the right ones; each that lies above the panel ends at its edge."""
+        if self.yours is None:
+            return ""
+        answer, problem = tried(self.yours, (self.experiment.residuals,), self.experiment.errors)
+        if problem:
+            return svg.paragraph((10, 18), problem, panel.width - 20, "note halo")
+        names = [("blue thick", "RMS of the view"), ("orange thick", "yours")]
+        return plot.bars(panel, x, x + 0.38, answer, "fill-orange") + plot.legend(panel, names)
+
     def _image_panel(self) -> str:
         made, i = self.experiment, self.index
         k = made.camera.intrinsics
-        panel = image_panel("picture", 20, 322, 440, k.width, k.height, tallest=340)
+        x, y, width, tallest = (20, 322, 440, 340) if self.panels == _EVERYTHING else (500, 116, 440, 290)
+        panel = image_panel("picture", x, y, width, k.width, k.height, tallest=tallest)
         seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
         starts = panel.place(seen)
         along = panel.place(seen - scale * residuals) - starts

@@ -1,11 +1,15 @@
-"""The photon-transfer visualizer: where a picture's noise comes from, and the gain that falls out of it."""
+"""The photon-transfer visualizer: where a picture's noise comes from, and the gain that its frames alone tell.
+
+A reader's own function can draw the curve beside the right one.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import isfinite, log10
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +23,7 @@ from camviz.sensors.frozen import Draw, exposed
 from camviz.sensors.statistics import slope_through_origin
 from camviz.views import garden
 from camviz.views.base import View, slider, switch
+from camviz.yours import tried
 
 FULL_WELL_E = 15_000.0
 WHITE_E_PER_S = 10_000.0  # electrons that a white surface frees in a second
@@ -26,6 +31,8 @@ CARD = 0.4  # of white: the even grey card that the noise is measured on
 LEVELS = np.geomspace(2.0**-12, 8.0, 32)  # seconds: half a stop apart, and as many
 _WIDTH, _HEIGHT = 640, 480
 _CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
+_EVERYTHING = "picture histogram curve"
+_HEIGHTS = {"picture curve": 486, _EVERYTHING: 606}  # of the picture, by the panels it has
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,9 @@ class PhotonTransferView(View):
     `exposure` is in stops: 0 is one second, each step halves or doubles. At `gain` 1 the converter reaches its end as
     the well does, at 15 000 electrons; more gain gives more DN per electron, and less room. With `difference` the
     noise is that of the difference of two frames over √2, else what varies over the pixels of one. Without `fit` it is
-    not told which gain these points give.
+    not told which gain these points give. `panels` says what is drawn: everything, or "picture curve", which leaves out
+    the histogram and most numbers. `yours` is a reader's function of (electrons, read_noise, prnu) to the noise of one
+    frame, in electrons (...) and a fraction; its curve is orange.
     """
 
     title: ClassVar[str] = "Photon transfer"
@@ -53,9 +62,13 @@ class PhotonTransferView(View):
     difference: bool = switch(False, label="difference of two frames", help="take the fixed pattern out")
     brighten: bool = switch(True, help="show dim pictures as bright as others")
     fit: bool = switch(True, label="fit K", help="read the gain K off the points: variance over signal")
+    panels: str = _EVERYTHING
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.panels not in _HEIGHTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
         for name in ("gain", "frames", "bits"):
             if not getattr(self, name) >= 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -177,25 +190,30 @@ class PhotonTransferView(View):
 
     def description(self, pixels: int = 3000) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers(pixels).items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told(pixels).items())
         how = "the difference of two frames" if self.difference else "one frame"
         return f"Noise of {how}, {self.bits} bits, {self.temperature_c:g} °C, {self.frames} averaged: {figures}."
+
+    def _told(self, pixels: int) -> dict[str, str]:
+        """The figures that stand beside the panels."""
+        figures = self.numbers(pixels)
+        if self.panels == _EVERYTHING:
+            return figures
+        kept = ("exposure", "on the card", "signal / noise", "K from the curve")
+        return {name: figures[name] for name in kept if name in figures}
 
     # What it looks like -----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
         pixels = 1500 if draft else 3000
         dn = self.image(draft=draft)
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 606, "paper"),
-                self._picture_panel(),
-                self._histogram_panel(dn),
-                self._transfer_panel(pixels),
-                self._numbers_column(pixels),
-            ]
-        )
-        return Picture(body, 960, 606, self.title, self.description(pixels), {"camera": jpeg(self._developed(dn))})
+        height = _HEIGHTS[self.panels]
+        body = svg.rectangle(0, 0, 960, height, "paper") + self._picture_panel() + self._transfer_panel(pixels)
+        if self.panels == _EVERYTHING:
+            body += self._histogram_panel(dn) + self._numbers_column(pixels, 490, 448) + self._legend(764, 454)
+        else:
+            body += self._numbers_column(pixels, 20, 352) + self._legend(250, 366)
+        return Picture(body, 960, height, self.title, self.description(pixels), {"camera": jpeg(self._developed(dn))})
 
     def image(self, *, draft: bool) -> np.ndarray:
         """What the camera records of the garden with the card in it, DN (height, width)."""
@@ -259,18 +277,37 @@ class PhotonTransferView(View):
         parts = self.parts(signal / K)
         lines = [
             plot.curve(panel, np.log10(signal), np.log10(parts[name]), class_)
-            for name, (class_, _) in _STYLES.items()
+            for name, (class_, _) in self._styles().items()
             if name in parts and parts[name].max() > 0
         ]
         whole = np.sqrt(sum(part**2 for part in parts.values()))
-        return "".join(lines) + plot.curve(panel, np.log10(signal), np.log10(whole), "ink")
+        curves = "".join(lines) + plot.curve(panel, np.log10(signal), np.log10(whole), "ink")
+        return curves + self._your_curve(panel, signal / K)
 
-    def _legend(self) -> str:
+    def _your_curve(self, panel: Panel, electrons: np.ndarray) -> str:
+        """The reader's own noise over the signal, or what is wrong with the function."""
+        if self.yours is None:
+            return ""
+        answer, problem = tried(self.yours, (electrons, self.read_noise_e, self.prnu / 100), electrons)
+        if problem:
+            return svg.paragraph((14, 24), problem, panel.width - 28, "note halo")
+        K = self.sensor.gain_dn_per_e
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return plot.curve(panel, np.log10(K * electrons), np.log10(K * answer), "orange thick")
+
+    def _styles(self) -> dict[str, tuple[str, str]]:
+        """How each kind of noise is drawn; orange is the reader's where there is a function of theirs."""
+        return _STYLES if self.yours is None else {**_STYLES, "photons": ("yellow dashed", "½")}
+
+    def _legend(self, x: float, y: float) -> str:
         """Beside the numbers: wherever it stood among the curves, some gain would lead one through it."""
         parts = self.parts(np.array([self.card_e]))
-        drawn = [(_STYLES[name], name) for name in _STYLES if name in parts and parts[name].max() > 0]
+        styles = self._styles()
+        drawn = [(styles[name], name) for name in styles if name in parts and parts[name].max() > 0]
         named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
-        return svg.group(plot.legend(self._plot, [("ink", "all together"), *named]), transform="translate(764 454)")
+        named += [("orange thick", "yours")] if self.yours else []
+        content = plot.legend(self._plot, [("ink", "all together"), *named])
+        return svg.group(content, transform=f"translate({x:g} {y:g})")
 
     def _points(self, panel: Panel, pixels: int) -> str:
         """What frames of the card say, and the exposure of the picture."""
@@ -283,12 +320,12 @@ class PhotonTransferView(View):
         here = svg.dots([panel.place((at, log10(max(whole, 1e-9))))], "yellow", 13)
         return plot.upright(panel, at, "yellow dashed") + here + svg.dots(points, "blue", 6)
 
-    def _numbers_column(self, pixels: int) -> str:
-        rows = [svg.text((490, 448), "On the card", "title")]
-        for i, (name, value) in enumerate(self.numbers(pixels).items()):
-            rows.append(svg.text((490, 472 + 20 * i), name, "note"))
-            rows.append(svg.text((600, 472 + 20 * i), value, "label"))
-        return "".join([*rows, self._legend()])
+    def _numbers_column(self, pixels: int, x: float, y: float) -> str:
+        rows = [svg.text((x, y), "On the card", "title")]
+        for i, (name, value) in enumerate(self._told(pixels).items()):
+            rows.append(svg.text((x, y + 24 + 20 * i), name, "note"))
+            rows.append(svg.text((x + 110, y + 24 + 20 * i), value, "label"))
+        return "".join(rows)
 
     # The exposure is dragged along the curve --------------------------------------------------------------------------
 

@@ -187,6 +187,18 @@ def test_a_corner_finder_s_noise_is_the_rms_error(says):
     assert len(flat.uv) == 8
 
 
+def test_three_corners_by_hand(says):
+    numbers = says(
+        "The first corner was found 0.3 px to the right of where the camera should see it, and 0.4 px below. The "
+        "second was found in its place. The third was found 0.6 px to the left and 0.8 px below:"
+    )
+    du, dv, left, below = (one.value for one in numbers)
+    assert cv2.norm(np.array([du, dv])) == pytest.approx(0.5)
+    assert cv2.norm(np.array([left, below])) == pytest.approx(1.0)
+    (bar,) = says("The blue bar had 0.267 px.")
+    assert bar == calibrated(tilt=2.0).rms
+
+
 def test_fx_is_far_off_with_boards_held_flat_and_another_throw_says_another_thing(says):
     found, true = says("The focal length is 774 pixels. The truth is 545.")
     (wrong,) = says("The fit is as good as the corners are, and fx is wrong by more than 200 pixels.")
@@ -370,7 +382,7 @@ def test_parallel_boards_and_boards_that_lean_about_a_row(says):
     says("tilt it about a row or a column and one is")
     assert rank([(25, 20, 0)], F_ALONE, centre=(0, 0)) == 2
     assert rank([(25, 0, 0)], F_ALONE, centre=(0, 0)) == rank([(0, 25, 0)], F_ALONE, centre=(0, 0)) == 1
-    says("the equations hold for any f: they know no more than fx/fy")
+    says("If some fx and fy solve the equations, so do twice and three times these")
     c, s, fx, fy = np.cos(0.3), np.sin(0.3), 545.0, 543.0
     h1, h2 = np.array([fx * c, fy * s, 0]), np.array([-fx * s, fy * c, 0])
     for times in (1.0, 2.0):
@@ -386,6 +398,63 @@ def test_cholesky_s_factor_of_B_is_K_inverted_and_transposed(says):
     np.testing.assert_allclose(np.linalg.cholesky(7 * inverse.T @ inverse), np.sqrt(7) * inverse.T, atol=1e-12)
 
 
+def from_one_picture(view, board):
+    """fx of one picture by SciPy: the fx and fy at which K⁻¹h₁ and K⁻¹h₂ are perpendicular and equally long."""
+    k, lens = view.truth.intrinsics, view.truth.lens
+    coefficients = np.array([lens.k1, lens.k2, lens.p1, lens.p2])
+    straight = cv2.undistortPoints(view.corners[board][:, None], k.K, coefficients)[:, 0]  # in focal lengths
+    H = cv2.findHomography(view.board.corners[:, :2], straight)[0] * np.array([[k.fx], [k.fy], [1]])
+
+    def conditions(log_f):
+        a, b = (H[:, :2] / np.array([*np.exp(log_f), 1])[:, None]).T
+        return [a @ b, a @ a - b @ b]
+
+    found = least_squares(conditions, np.log([k.fx, k.fy]), xtol=1e-14, ftol=1e-14)
+    return np.exp(found.x[0]) if found.cost < 1e-12 else np.nan
+
+
+def test_each_picture_alone_needs_a_tilt_about_a_slanting_axis(says):
+    steep, flat = says("Take **tilt** from 30° to 2°.")
+    (enough,) = says("Below about 5° the dots leave the line, and some leave the plot or vanish: no focal length fits.")
+    (worst,) = says("Look at board 4: it is worse than the others, because it leans about a column of the picture")
+
+    def errors(tilt):
+        view = CalibrationView(tilt=tilt)
+        return np.nan_to_num(np.abs([from_one_picture(view, i) - 545 for i in range(8)]), nan=np.inf)
+
+    by_tilt = {tilt: errors(tilt) for tilt in (flat.value, enough.value, 10.0, steep.value)}
+    others = np.arange(8) != worst.value - 1
+    assert np.median(by_tilt[flat.value][others]) > 100
+    assert np.median(by_tilt[enough.value][others]) < 50
+    assert by_tilt[steep.value][others].max() < 25
+    assert not others[by_tilt[10.0].argmax()]
+    assert not others[by_tilt[steep.value].argmax()]
+    axis = CalibrationView(tilt=30.0).cam_from_board[int(worst.value) - 1].rotation.as_matrix()[:, 2]
+    assert abs(axis[1]) < 0.15 * abs(axis[0])  # its normal turns in a row's plane: it leans about a column
+    says("Put **noise** to 0: all the dots come to lie on the line, at any tilt above zero.")
+    for tilt in (1.0, 30.0):
+        exact = CalibrationView(tilt=tilt, noise=0.0)
+        assert all(abs(exact.each.right[i, 0] - 545) < 0.1 for i in range(8))
+
+
+def test_rows_of_several_pictures(says):
+    numbers = says("n pictures give 2n rows, a matrix V (2n, 6) with V b = 0.")
+    K = CalibrationView().truth.intrinsics.K
+    h1, h2 = (K @ Rotation.from_rotvec((0.3, -0.2, 0.5)).as_matrix()[:, :2]).T
+    rows = np.array([products(h1, h2), products(h1, h1) - products(h2, h2)])
+    assert all(one.value in rows.shape for one in numbers)
+    B = np.linalg.inv(K @ K.T)
+    np.testing.assert_allclose(rows @ B[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]], 0, atol=1e-12)
+
+
+def test_the_first_board_s_place(says):
+    x, y, z = says("The truth is t = (−0.100, −0.124, 0.581) m.")
+    held = CalibrationView().cam_from_board[0].translation
+    assert (x, y, z) == tuple(held)
+    (factor,) = says("Every second H is given with the factor −1.")
+    assert factor == -1
+
+
 # 3: how sure? --------------------------------------------------------------------------------------------------------
 
 
@@ -393,6 +462,10 @@ def test_pretending_to_know_the_poses(says):
     says("Pretending to know the poses makes σ sixteen times too small, with boards that are well tilted.")
     tilted, flat = calibrated(), calibrated(tilt=2.0)
     assert tilted.sigma("fx") / tilted.sigma_of_fx_with_the_poses_known == pytest.approx(16, abs=0.5)
+    (parameters,) = says("Now with the Jacobian of the refinement, all 53 parameters together.")
+    assert parameters == len(tilted.solution.x)
+    (ones,) = says("so J is a column of ones and JᵀJ is 5")
+    assert ones == np.ones(5) @ np.ones(5)
     pretended, sigma = says("With the flat ones of part 1 it would be ± 0.1 px in place of ± 91 px.")
     assert pretended == flat.sigma_of_fx_with_the_poses_known
     assert sigma == flat.sigma("fx")
@@ -495,7 +568,16 @@ def test_place_your_own_boards(says):
     assert (np.diff(by_tilt) < 0).all()
 
 
-# 6: your turn --------------------------------------------------------------------------------------------------------
+def test_a_marked_board_names_its_corners(says):
+    (last,) = says("The corners are numbered from 0 to 53, row by row")
+    marked = cv2.aruco.CharucoBoard((10, 7), 0.025, 0.018, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50))
+    places = marked.getChessboardCorners()
+    assert last == len(places) - 1
+    assert places[1][0] > places[0][0]  # along a row
+    assert places[1][1] == places[0][1]
+
+
+# Exercises --------------------------------------------------------------------------------------------------------
 
 
 def test_the_rms_over_u_and_v(says):
@@ -505,7 +587,7 @@ def test_the_rms_over_u_and_v(says):
     ratio = np.sqrt(np.mean(np.sum(errors**2, axis=1))) / np.sqrt(np.mean(errors**2))
     assert np.sqrt(two.value) == pytest.approx(ratio)
     assert again == two.value
-    (numbers,) = says("The RMS error of corners `found` against corners `projected`, both (..., 2).")
+    (numbers,) = says("the RMS error of corners `found` against corners `projected`, both (..., 2).")
     assert numbers == CalibrationView().corners.shape[-1]
 
 

@@ -8,6 +8,7 @@ from scipy.constants import physical_constants
 
 from camviz import notebooks
 from camviz.exercises import lesson15
+from camviz.scenes import to_display
 from camviz.sensors import decibel
 from camviz.sensors.correction import NoiseModel, merged
 from camviz.sensors.measurement import Level, Measurement
@@ -67,9 +68,8 @@ def test_nothing_tells_an_answer_before_its_question():
 
 def test_the_first_picture(says):
     (part,) = says("Here is the garden in 1/256 s.")
-    dark, most = says(
-        "Go to −8 stops. Switch **photon noise** off, and on; then take **read noise** to 0 and to 40. Which of "
-        "the two spoils this picture? Ask the same at 0 stops."
+    dark, most = says("Go to −8 stops.") + says(
+        "to 0 and to 40. Which of the two spoils this picture? Ask the same at 0 stops."
     )
     assert part == 2.0**-dark.value
     assert most == PhotonTransferView.controls()["read_noise_e"].high
@@ -169,7 +169,7 @@ def test_the_difference_of_two_frames_has_the_gain(says):
 
 
 def test_our_own_sensor_gives_back_what_was_put_in(says):
-    (K,) = says("By hand, on the frames of our own sensor, whose K is 0.25:")
+    (K,) = says("By hand, on the frames of our own sensor, whose K is 0.25.")
     (read,) = says("the read noise above was put in as 8")
     rng = np.random.default_rng(6)
     response = 1 + 0.015 * rng.standard_normal((200, 300))
@@ -331,8 +331,16 @@ def test_the_published_ratios_have_the_decibels_of_the_standard(says):
     for saturation, dark_noise in cases(lesson15.DECIBELS):
         expected = decibel(saturation / (dark_noise + 0.5))
         np.testing.assert_allclose(lesson15.dynamic_range_db(saturation, dark_noise), expected)
-    (wrong,) = says("A published result file of a real camera claims a dynamic range of 142 dB.")
+    signals, claimed, range_of, wrong = says(
+        "That file claims a largest signal to noise ratio of 118.2, or 95.45 dB, and a dynamic range of 1220.7, or "
+        "142.14 dB."
+    )
     assert wrong == 20 * np.log(ratio)
+    assert range_of == ratio
+    assert claimed == 20 * np.log(118.205880802)
+    assert signals == 118.205880802
+    (ten,) = says("A ratio of ten should be 20 dB.")
+    assert ten == decibel(10.0)
     (times,) = says("Every figure was 2.3026 times too large")
     assert times == np.log(10)
 
@@ -561,3 +569,47 @@ def test_before_the_lesson_eight_bits(says):
     assert few.value == enough.value == 8
     noise = 60.3 + 0.5 * np.random.default_rng(19).standard_normal(400_000)  # in steps of 8 bits
     assert np.round(noise).var() - 1 / 12 == pytest.approx(0.25, rel=0.03)
+# One case by hand -----------------------------------------------------------------------------------------------------
+
+
+def test_one_count_one_pixel_and_one_bracket_by_hand(says):
+    electrons, reading, percent = says("A card of 400 electrons, read noise 8, PRNU 2 %:")
+    drawn = np.random.default_rng(15)
+    answer = 1 + percent.value / 100 * drawn.standard_normal(1_000_000)
+    counts = drawn.poisson(electrons.value * answer) + reading.value * drawn.standard_normal(1_000_000)
+    assert counts.std() == pytest.approx(22.98, rel=0.005)  # what the cell below it prints; a σ is 0.07 %
+    raw, dark, lit, mean = says(
+        "A pixel reads 330 DN. In the dark it reads 120, and 1300 under the even light, where the mean pixel rises by "
+        "1200 above its dark:"
+    )
+    share = (lit.value - dark.value) / mean.value  # this pixel's answer, beside that of the mean one
+    assert dark.value + 213.6 * share == pytest.approx(raw.value, abs=0.05)
+    noise, few, short, many, long = says("With σ_d = 6 a pixel counts 30 electrons in 0.01 s and 2,000 in 0.64 s.")
+    x = (few.value + many.value) / (short.value + long.value)
+    deviations = [np.hypot(noise.value, np.sqrt(x * t)) / t for t in (short.value, long.value)]
+    assert (deviations[0] / deviations[1]) ** 2 == pytest.approx(135, abs=0.5)
+
+
+def test_the_response_curve(says):
+    """Held against sRGB after IEC 61966-2-1, on other pictures than the lesson's, by the lesson's own cell."""
+    (bits,) = says("A finished 8-bit picture has been bent by a **response curve** f")
+    many, last, half = says(
+        "This is linear in the 256 numbers g(0) … g(255) and in the ln E of the chosen pixels"
+    ) + says("and g(128) = 0, as the scale is free")
+    assert many == 2**bits.value
+    assert last == many.value - 1
+    assert half == many.value / 2
+    low, high = says("Between the values 30 and 230 both curves are within a twentieth of a stop of the truth.")
+    values = np.arange(256) / 255
+    true = np.log2(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4) + 1e-9)
+    (path,) = LESSONS.glob("15_*.ipynb")
+    cell = next(one for one in notebooks.read(path).cells if one.source.startswith("stops = np.arange"))
+    rng = np.random.default_rng(3)
+    names = {
+        "np": np, "cv2": cv2, "to_display": to_display, "window": np.linspace(0.02, 1, 160)[None] ** 2,
+        "light": 0.9 * rng.uniform(0.1, 1, (120, 160)),
+    }  # fmt: skip
+    exec(cell.source, names)
+    for curve in (names["g"], names["opencv_g"]):
+        off = (curve - curve[128]) - (true - true[128])
+        assert np.abs(off[int(low.value) : int(high.value) + 1]).max() < 1 / 20

@@ -98,7 +98,7 @@ class Lesson:
     def __init__(self, path) -> None:
         notebook = notebooks.read(path)
         self.stubs, self.cells, self.shown, self.before = {}, [], [], []
-        solutions, namespace = notebooks.solutions(notebook), {"__name__": "__main__"}
+        solutions, namespace = notebooks.solutions(notebook), {"__name__": "__main__", "display": print}
         for cell in notebook.cells:
             tags = set(cell.metadata.get("tags", []))
             if cell.cell_type != "code" or "check" in tags or "raises-exception" in tags:
