@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from camviz.exercises import exercises
 from camviz.lightfields import LightField
 from camviz.scenes import to_display, to_linear
 from camviz.views import garden_field
@@ -184,3 +185,31 @@ def test_the_description_states_the_state():
 
 def test_the_sky_is_infinitely_far_away_and_not_as_far_as_its_slope_is_rounded():
     assert LightFieldView(column=159).numbers()["in truth"].endswith(" px, ∞")
+
+
+WITH_YOURS = "picture slice depth yours"
+
+
+def test_a_right_function_of_the_reader_s_makes_the_same_picture():
+    right = exercises("11")["11.disparity"].reference
+    for slope in (-3.0, 0.0, 1.04, 3.4):
+        attached = LightFieldView(panels=WITH_YOURS, yours=right, slope=slope).figure().photographs
+        assert attached["yours"] == attached["picture"]
+
+
+def test_a_wrong_one_makes_another_and_none_leaves_a_sentence():
+    for known in exercises("11")["11.disparity"].misconceptions:
+        picture = LightFieldView(panels=WITH_YOURS, yours=known.function, slope=-1.24).figure(draft=True)
+        assert picture.photographs.get("yours") != picture.photographs["picture"], known.explanation
+    picture = LightFieldView(panels=WITH_YOURS, yours=lambda z, b, f, z_f: None).figure(draft=True)
+    assert "returns nothing yet" in picture.body
+    assert "yours" not in picture.photographs
+
+
+def test_few_panels_tell_only_their_own_figures():
+    views, slice_ = (LightFieldView(panels=panels).figure(draft=True) for panels in ("picture views", "picture slice"))
+    assert "slope at" not in views.body
+    assert "sensor" not in views.body + slice_.body
+    assert "slice" not in views.photographs
+    with pytest.raises(ValueError, match="panels must be one of"):
+        LightFieldView(panels="picture")

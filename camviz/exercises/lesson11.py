@@ -639,4 +639,4 @@ def focal_length_not_inverted(z, f, z_f):
     return (f - 1 / z_f) / (f - 1 / np.asarray(z))
 
 
-EXERCISES = (SUB_APERTURE, DISPARITY, REFOCUSED, SLOPE, ALPHA)
+EXERCISES = (SUB_APERTURE, DISPARITY, REFOCUSED, ALPHA, SLOPE)

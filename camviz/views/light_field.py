@@ -1,10 +1,15 @@
-"""The light field visualizer: rays on microlenses, all views, one slice, and a picture focused where you click."""
+"""The light field visualizer: rays on microlenses, all views, one slice, and a picture focused where you click.
+
+A reader's own slope of a depth can draw the line in the slice, the curve, and a picture beside the right one.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,9 +24,31 @@ from camviz.views import garden_field, microlens_diagram
 from camviz.views.base import Control, View, choice, slider, switch
 from camviz.views.depth_wedge import metres
 from camviz.views.marks import on_photograph, ring
+from camviz.yours import tried
 
 PITCH = 0.002  # metres between microlenses, of the camera that would record the garden's field
 _LOW, _HIGH = garden_field.SLOPES
+_ALL = "picture slice rays views sensor depth"
+_SLOTS: dict[str, tuple[dict[str, tuple[float, float, float, float]], int]] = {  # panels' places; the figure's height
+    "picture views": ({"picture": (20, 34, 440, 330), "views": (500, 34, 440, 330)}, 400),
+    "picture slice": ({"picture": (20, 34, 440, 330), "slice": (500, 34, 440, 198)}, 384),
+    _ALL: (
+        {"picture": (20, 34, 420, 315), "slice": (20, 388, 420, 99), "rays": (500, 34, 440, 170),
+         "views": (500, 240, 212, 159), "sensor": (728, 240, 212, 159), "depth": (556, 440, 384, 126)},
+        618,
+    ),
+    "picture slice depth yours": (
+        {"picture": (20, 34, 420, 315), "yours": (500, 34, 420, 315), "slice": (20, 392, 420, 144),
+         "depth": (556, 392, 384, 144)},
+        610,
+    ),
+}  # fmt: skip
+_TOLD = {  # the figures that few panels speak of
+    "picture views": ("focused at", "views summed"),
+    "picture slice": ("focused at", "slope at the mark", "in truth"),
+    "picture slice depth yours": ("focused at", "slope at the mark"),
+}
+_STEEPEST = 40.0  # pixels a view: a shear beyond it leaves the picture
 
 
 @dataclass(frozen=True)
@@ -32,7 +59,9 @@ class LightFieldView(View):
     the middle view; (u, v) is one of the views, counted from 0 at the top left. `opening` is the width of each place of
     the lens that a view looks through, over the distance between places: 0 is a pinhole, sharp at all distances, and at
     1 the openings fill the lens and each view blurs what moves by d pixels over |d| pixels. Slopes are measured in the
-    pinholes' views. `field` takes the place of the garden; its slopes lie within `limits`.
+    pinholes' views. `field` takes the place of the garden; its slopes lie within `limits`. `panels` names what is
+    drawn: "picture views", "picture slice", "picture slice depth yours" or all. `yours` is a reader's function of
+    (z, b, f, z_f), depths (...) to slopes (...); what it does is orange.
     """
 
     title: ClassVar[str] = "Light field"
@@ -50,9 +79,13 @@ class LightFieldView(View):
     show: str = choice("refocused", "slopes", help="the picture, or the slope measured at every pixel")
     field: LightField | None = None
     limits: tuple[float, float] = garden_field.SLOPES
+    panels: str = _ALL
+    yours: Callable[..., Any] | None = dataclass_field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.panels not in _SLOTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
         for name, size in zip(("v", "u", "row", "column"), self.views.shape, strict=False):
             value = getattr(self, name)
             if int(value) != value or not 0 <= value < size:
@@ -132,9 +165,20 @@ class LightFieldView(View):
             "each picture": f"{width} × {height} px",
         }
 
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        figures = self.numbers()
+        return {name: figures[name] for name in _TOLD.get(self.panels, figures) if name in figures}
+
+    def _has(self, panel: str) -> bool:
+        return panel in self.panels.split()
+
+    def _slot(self, name: str) -> tuple[float, float, float, float]:
+        return _SLOTS[self.panels][0][name]
+
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
         shown = (
             "the slope of every pixel" if self.show == "slopes" else f"the picture for slope {_signed(self.slope)} px"
         )
@@ -146,38 +190,44 @@ class LightFieldView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        attached = {
-            "views": garden_field.all_views(self.light_field),
-            "slice": png(_bytes(self.light_field.views[self.v, :, self._slice_row])),
-            "sensor": png(self._under_the_microlenses()),
-        }
-        picture = self._picture_panel(attached)
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 618, "paper"),
-                picture,
-                self._slice_panel(),
-                microlens_diagram.drawn(500, 34, self.slope_here, self.slope, self.mask[self.v], self.u, self.opening),
-                self._views_panel(),
-                self._sensor_panel(),
-                self._depth_panel(),
-                self._numbers_block(),
-            ]
-        )
-        return Picture(body, 960, 618, self.title, self.description(), attached)
+        attached: dict[str, bytes] = {}
+        height = _SLOTS[self.panels][1]
+        body = [svg.rectangle(0, 0, 960, height, "paper"), self._picture_panel(attached)]
+        if self._has("slice"):
+            attached["slice"] = png(_bytes(self.light_field.views[self.v, :, self._slice_row]))
+            body.append(self._slice_panel())
+        if self._has("rays"):
+            x, y, _, _ = self._slot("rays")
+            given = (self.slope_here, self.slope, self.mask[self.v], self.u, self.opening)
+            body.append(microlens_diagram.drawn(x, y, *given))
+        if self._has("views"):
+            attached["views"] = garden_field.all_views(self.light_field)
+            body.append(self._views_panel())
+        if self._has("sensor"):
+            attached["sensor"] = png(self._under_the_microlenses())
+            body.append(self._sensor_panel())
+        if self._has("depth"):
+            body.append(self._depth_panel())
+        if self._has("yours"):
+            body.append(self._your_panel(attached))
+        body.append(self._numbers_block())
+        return Picture("".join(body), 960, height, self.title, self.description(), attached)
 
     # The picture and its slice ---------------------------------------------------------------------------------------
 
     @cached_property
     def _image_panel(self) -> Panel:
         height, width = self.views.shape[2:4]
-        return image_panel("picture", 20, 34, 420, width, height, tallest=315)
+        x, y, across, tallest = self._slot("picture")
+        return image_panel("picture", x, y, across, width, height, tallest=tallest)
 
     def _picture_panel(self, attached: dict[str, bytes]) -> str:
         panel, (height, width) = self._image_panel, self.views.shape[2:4]
         across = panel.place([(panel.left, self.row), (panel.right, self.row)])
         here = panel.place((self.column, self.row))
-        marks = on_photograph([across], "yellow thin") + ring(here, "yellow", 7) + self._row_handle(across[0])
+        marks = ring(here, "yellow", 7)
+        if self._has("slice"):
+            marks = on_photograph([across], "yellow thin") + marks + self._row_handle(across[0])
         label = "The picture; click or press the arrow keys to focus on what is there"
         heading = {"hint": "click: focus there", "drag": "focus", "label": label}
         if self.show == "slopes":
@@ -205,8 +255,9 @@ class LightFieldView(View):
 
     def _slice_panel(self) -> str:
         width, columns = self.views.shape[3], self.views.shape[1]
-        full = self._image_panel
-        panel = Panel("slice", full.x, 388, full.width, 99, -0.5, width - 0.5, -0.5, columns - 0.5)
+        x, y, across, height = self._slot("slice")
+        across = min(across, self._image_panel.width)
+        panel = Panel("slice", x, y, across, height, -0.5, width - 0.5, -0.5, columns - 0.5)
         seen = svg.image("slice", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
         u = np.array([-0.5, columns - 0.5])
         steps = u - (columns - 1) / 2
@@ -214,9 +265,12 @@ class LightFieldView(View):
             panel.place(np.stack([self.column - slope * steps, u], axis=-1)) for slope in (self.slope_here, self.slope)
         )
         lines = on_photograph([found], "yellow") + on_photograph([sheared], "red dashed")
+        if self.yours:
+            own = panel.place(np.stack([self.column - self._your_slope * steps, u], axis=-1))
+            lines += on_photograph([own], "orange thick dotted")
         chosen = panel.place([(-0.5, self.u), (2.5, self.u)])
         title = f"Slice: row {self._slice_row}, v = {self.v}"
-        note = "line: the mark's; dashed: the shear"
+        note = "line: mark; dashed: shear; dotted: yours" if self.yours else "line: the mark's; dashed: the shear"
         return panel.show(seen + lines + svg.line(chosen, "purple thick"), title=title, note=note)
 
     # The views -------------------------------------------------------------------------------------------------------
@@ -224,7 +278,8 @@ class LightFieldView(View):
     @cached_property
     def _mosaic_panel(self) -> Panel:
         rows, columns, height, width = self.views.shape[:4]
-        return image_panel("views", 500, 240, 212, columns * width, rows * height, tallest=159)
+        x, y, across, tallest = self._slot("views")
+        return image_panel("views", x, y, across, columns * width, rows * height, tallest=tallest)
 
     def _views_panel(self) -> str:
         panel = self._mosaic_panel
@@ -254,9 +309,8 @@ class LightFieldView(View):
 
     def _sensor_panel(self) -> str:
         down, across = self._window()
-        panel = Panel(
-            "sensor", 728, 240, 212, 159, across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5
-        )
+        place = self._slot("sensor")
+        panel = Panel("sensor", *place, across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5)
         seen = svg.image("sensor", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
         upright = [[(x - 0.5, panel.top), (x - 0.5, panel.bottom)] for x in range(across.start, across.stop)]
         level = [[(panel.left, y - 0.5), (panel.right, y - 0.5)] for y in range(down.start, down.stop)]
@@ -271,7 +325,7 @@ class LightFieldView(View):
 
     @cached_property
     def _plot(self) -> Panel:
-        return plot.plot_panel("depth", 556, 440, 384, 126, self.limits, (1.0, 12.0))
+        return plot.plot_panel("depth", *self._slot("depth"), self.limits, (1.0, 12.0))
 
     def _depth_panel(self) -> str:
         panel, field = self._plot, self.light_field
@@ -281,7 +335,7 @@ class LightFieldView(View):
         if np.isnan(field.baseline * field.focal_length):
             curve = svg.text((panel.width / 2, 60), "baseline and focal length are not known", "note middle")
         here, now = panel.place([within(self.slope_here), within(self.slope)])
-        marks = curve + ring(here, "yellow", 8) + svg.dots([now], "red", 10)
+        marks = curve + self._your_curve(panel) + ring(here, "yellow", 8) + svg.dots([now], "red", 10)
         label = "Depth against slope; drag or press the arrow keys to change the slope"
         content = self._exact_range() + plot.grid(panel) + plot.upright(panel, self.slope, "red dashed") + marks
         named = plot.axes(panel, "slope d, pixels a view", "depth, m")
@@ -307,13 +361,74 @@ class LightFieldView(View):
         return f"d = {field.baseline * field.focal_length:.1f} px·m (1/z − 1/{field.focus_distance:.4g} m)"
 
     def _numbers_block(self) -> str:
-        parts = [svg.text((20, 515), "This picture", "title")]
+        left, top = {"picture views": (20, 388), "picture slice": (500, 274)}.get(self.panels, (20, 515))
+        if self.panels in _TOLD:
+            left, top = (20, 588) if self._has("yours") else (left, top)
+            step = (0, 24) if self.panels == "picture slice" else (300, 0)
+            return self._words(self._told(), left, top, step)
+        parts = [svg.text((left, top), "This picture", "title")]
         figures = self.numbers()
         figures = {name: figures[name] for name in sorted(figures, key="a view blurs".__eq__)}
         for i, (name, value) in enumerate(figures.items()):
-            x, y = 20 + 255 * (i // 4), 538 + 22 * (i % 4)
+            x, y = left + 255 * (i // 4), top + 23 + 22 * (i % 4)
             parts += [svg.text((x, y), name, "note"), svg.text((x + (112 if i < 4 else 96), y), value, "label")]
         return "".join(parts)
+
+    def _words(self, figures: dict[str, str], x: float, y: float, step: tuple[float, float]) -> str:
+        rows = [
+            svg.text((x + i * step[0], y + i * step[1]), name, "note")
+            + svg.text((x + i * step[0] + 118, y + i * step[1]), value, "label")
+            for i, (name, value) in enumerate(figures.items())
+        ]
+        if self.yours:
+            own = f"{_signed(self._your_slope)} px" if np.isfinite(self._your_slope) else "–"
+            at = (x + len(rows) * step[0], y)
+            rows += [svg.text(at, "your slope for this depth", "note"), svg.text((at[0] + 165, y), own, "orange")]
+        return "".join(rows)
+
+    # The reader's own function ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def _your_slopes(self) -> tuple[Array, Array, str]:
+        """Depths (n,), at last where the picture is focused; the reader's slopes; what is wrong with them."""
+        field = self.light_field
+        depths = np.append(np.geomspace(1.3, 60, 80), field.depth(self.slope))
+        given = (depths, field.baseline, field.focal_length, field.focus_distance)
+        if self.yours is None:
+            return depths, np.full(depths.shape, np.nan), "No function of yours has been given."
+        return (depths, *tried(self.yours, given, depths))
+
+    @property
+    def _your_slope(self) -> float:
+        return float(self._your_slopes[1][-1])
+
+    def _your_curve(self, panel: Panel) -> str:
+        if not self.yours:
+            return ""
+        depths, slopes, _ = self._your_slopes
+        lines = [("blue thick", "right"), ("orange dashed", "yours")]
+        drawn = np.stack([np.clip(slopes[:-1], -99, 99), depths[:-1]], axis=-1)
+        return svg.line(panel.place(drawn), "orange thick dashed") + plot.legend(panel, lines, "top right")
+
+    def _your_panel(self, attached: dict[str, bytes]) -> str:
+        """The picture once more, sheared by the slope that the reader's function gives for the same depth."""
+        x, y, across, tallest = self._slot("yours")
+        height, width = self.views.shape[2:4]
+        panel = image_panel("yours", x, y, across, width, height, tallest=tallest)
+        problem, slope = self._your_slopes[2], self._your_slope
+        if not problem and not abs(slope) < _STEEPEST:
+            problem = (
+                "Your slope for this depth is not a number."
+                if np.isnan(slope)
+                else (
+                    f"Your slope for this depth is {slope:.4g} px a view. So steep a shear leaves the picture."
+                ).replace("-", "−")
+            )
+        if problem:
+            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Focused by your slope")
+        attached["yours"] = jpeg(to_display(refocus(self.light_field, slope, self.mask)), quality=90)
+        note = f"sheared by {_signed(slope)} px"
+        return panel.show(photograph(panel, "yours", width, height), title="Focused by your slope", note=note)
 
     # Under the pointer -----------------------------------------------------------------------------------------------
 

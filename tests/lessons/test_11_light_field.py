@@ -35,7 +35,7 @@ def test_the_views_of_the_lens(says):
     assert abs(PLACES * B - 0.5) < 0.01
     (millimetres,) = says("So far every view came through a pinhole, 56 mm from the next")
     assert millimetres == 1000 * B
-    n, again = says("The virtual camera's has 9 × 9 pixels under each microlens")
+    n, again = says("The virtual camera's sensor has 9 × 9 pixels under each microlens.")
     assert n.value == again.value == PLACES
     (views,) = says("One of the 81 views is shown")
     (agree,) = says("keep the one at which the 81 views agree best")
@@ -52,8 +52,14 @@ def test_the_fence_and_the_focus(says):
     assert blur == abs(slope(away.value))
     says("What the main lens had in focus, at $z_f = 4$ m, stands upright")
     assert slope(Z_F) == 0
-    (bf,) = says("Here b f = 13.0 px·m")
+    b, f, bf, globe = says(
+        "The views of the garden are b = 0.056 m apart, and f = 232.3 px. So b f = 13.0 px·m. Take the "
+        "globe, 3.03 m away:"
+    )
+    assert b == B
+    assert f == F
     assert bf == B * F
+    assert slope(globe.value) == pytest.approx(1.04, abs=0.01)  # as printed
 
 
 def test_what_is_nearer_leans_to_the_left(says):
@@ -323,3 +329,79 @@ def test_before_the_lesson_a_wire_in_front_of_a_coin(says):
     (all_,) = says("Nine of the 49 views show wire at that place")
     assert one_of.value == all_.value == views.value
     assert (light.sum(), (1 - light).sum()) == (40, 9)
+# By hand -------------------------------------------------------------------------------------------------------------
+
+
+def test_one_pixel_of_the_sensor(says):
+    says("Under the microlens in row y and column x begin the rows 9y and the columns 9x.")
+    says("The light that came through the place (v, u) of the lens is in row 9y + v and column 9x + u:")
+    sensor = np.arange(3 * PLACES * 2 * PLACES).reshape(3 * PLACES, 2 * PLACES)
+    views = from_microlens_image(sensor[..., None], PLACES, PLACES)
+    assert views[4, 7, 2, 1, 0] == sensor[9 * 2 + 4, 9 * 1 + 7]
+
+
+def test_one_view_is_moved_by_four_columns(says):
+    d, middle, mark, steps, column, more, there = says(
+        "The globe has d = 1.04, nearly 1. In the middle view, u = 4, its mark is in column 118. In the leftmost view, "
+        "u = 0, it is 4 steps away and so in column 118 + 4 = 122."
+    )
+    (back,) = says("To bring it back, move this view by 4 columns to the left.")
+    assert d == slope(3.03)
+    assert middle == (PLACES - 1) / 2
+    assert steps == middle.value
+    assert (column.value, more.value) == (mark.value, steps.value)
+    at_u_0 = mark.value - round(d.value) * (0 - middle.value)  # x(u) = x0 - d u
+    assert there == at_u_0
+    assert back == at_u_0 - mark.value
+    (between,) = says("A shift by 1.04 pixels needs interpolation.")
+    assert between.value == d.value
+    far, z_far, near, z_near = says("from d = −1 px (5.78 m) to d = +1 px (3.06 m)")
+    assert z_far == depth(far.value)
+    assert z_near == depth(near.value)
+
+
+def test_one_film_by_hand(says):
+    pitch, microlenses, globe = says(
+        "Let the microlenses be p = 2 mm apart. Then the sensor is 232.3 of them behind the main lens. The thin lens "
+        "equation 1/f = 1/z + 1/v first tells the focal length of the main lens, for which $z_f = 4$ m is sharp on the "
+        "sensor. Then it tells the place of the film for the globe at 3.03 m:"
+    )
+    assert microlenses == F
+    v = microlenses.value * pitch.value / 1000
+    f = 1 / (1 / Z_F + 1 / v)
+    film = 1 / (1 / f - 1 / globe.value)
+    assert 1 - v / film == pytest.approx(slope(globe.value) * pitch.value / 1000 / B, rel=1e-3)  # Ng's equation
+
+
+def test_one_slope_by_hand_and_your_slopes_along_a_row(says):
+    *one, a, b, c = says(
+        "Let three neighbours in a view be 10, 20, 30, and the same pixels 14, 24, 34 in the next view."
+    )
+    along, across, num, den, d = says(
+        "Along x the brightness grows by 10 a pixel, so $L_x = 10$. From view to view it grows by 4, so $L_u = 4$. The "
+        "slope is 4/10 = 0.4 px a view."
+    )
+    epi = np.array([[said.value for said in one], [a.value, b.value, c.value]])
+    L_u, L_x = np.gradient(epi)
+    assert along == L_x.mean()
+    assert across == L_u.mean()
+    assert (num.value, den.value) == (across.value, along.value)
+    assert d == np.mean(L_u) / np.mean(L_x)
+    row, views, pixels = says(
+        "So the slice at row 48 is sheared first, by one pixel a view, which makes the globe stand almost still. Then "
+        "your `slope` measures a window of 3 views and 13 pixels around each column."
+    )
+    code = "\n".join(cell.source for cell in notebooks.read(LESSONS / "11_light_field.ipynb").cells)
+    assert f"field.views[4, :, {row.value:.0f}]" in code
+    window = np.arange(9 * 160).reshape(9, 160)[3:6, 10 - 6 : 10 + 7]
+    assert "still[3:6, x - 6 : x + 7]" in code
+    assert window.shape == (views.value, pixels.value)
+
+
+def test_your_picture_of_a_pair_lies_half_a_slope_to_the_left(says):
+    says("(Your pictures lie d/2 to the left.")
+    d, x0 = 8, 100
+    left, right = np.zeros(200), np.zeros(200)
+    left[x0], right[x0 - d] = 1, 1
+    yours = exercise("11.refocused").reference(np.stack([left, right])[None, :, None], d)[0]
+    assert yours.argmax() == x0 - d / 2 - d / 2  # where the right view has it; in the middle between them it is at -d/2
