@@ -1,5 +1,7 @@
 """The depth-of-field visualizer shows what the lens does, and its controls do what they are named for."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -49,6 +51,48 @@ def test_the_airy_disc_spreads_on_its_way_to_the_sensor():
     assert near.numbers()["Airy disc"] == "6.7 µm across"
     far = DepthOfFieldView(focal_mm=100, f_number=4, focus_m=1e6)
     assert far.airy_mm == pytest.approx(2.44 * 550e-6 * 4, rel=1e-3)
+
+
+def by_a_reader(f, N, s, u):
+    return f**2 / (N * (s - f)) * np.abs(u - s) / u
+
+
+def reader_s_limits(f, N, s, c):
+    H = f**2 / (N * c) + f
+    return s * (H - f) / (H + s - 2 * f), np.where(s < H, s * (H - f) / np.abs(H - s), np.inf)
+
+
+def test_a_reader_s_blur_and_limits_are_drawn_over_the_right_ones():
+    view = DepthOfFieldView(f_number=5.6, focus_m=3.0, diffraction=False, panels="photograph blur", yours=by_a_reader)
+    body = view.but(your_limits=reader_s_limits).figure(draft=True).body
+    curves = [re.findall(rf'<path d="([^"]*)" class="{colour}"', body)[0] for colour in ("blue thick", "orange dashed")]
+    assert curves[0] == curves[1]
+    near, far = view.limits_m
+    lines = [float(x) for x in re.findall(r'<path d="M([\d.]+),[^"]*" class="orange"', body)[:2]]
+    assert lines == pytest.approx([view._plot.place((np.log10(end), 0))[0] for end in (near, far)], abs=0.06)
+    wrong = view.but(yours=lambda f, N, s, u: f * N + 0 * u).figure(draft=True).body
+    assert re.findall(r'<path d="([^"]*)" class="orange dashed"', wrong)[0] != curves[0]
+
+
+def test_a_reader_s_function_that_stops_is_told_of_and_draws_nothing():
+    view = DepthOfFieldView(panels="photograph blur", yours=lambda *_: None, your_limits=lambda *_: 1 / 0)
+    body = view.figure(draft=True).body
+    assert "returns nothing" in body
+    assert "ZeroDivisionError" in body
+    assert "nan" not in body.lower().replace("nance", "")
+    assert re.findall(r'<path d="([^"]*)" class="orange', body)[2:] == []  # two samples of lines in the legend
+    assert view.image(16).shape == (240, 320, 3)
+
+
+def test_a_view_with_fewer_panels_says_only_what_they_show():
+    rays, blur = (DepthOfFieldView(panels=panels) for panels in ("rays photograph", "photograph blur"))
+    assert "depth of field" not in rays.description()
+    assert "Blur against distance" not in rays.figure(draft=True).body
+    assert "depth of field" not in blur.description()
+    assert "depth of field" in blur.but(your_limits=reader_s_limits).description()
+    assert "At the sensor" not in blur.figure(draft=True).body
+    with pytest.raises(ValueError, match="panels"):
+        DepthOfFieldView(panels="rays")
 
 
 def test_a_reader_who_is_to_predict_diffraction_is_shown_none():

@@ -717,4 +717,4 @@ def always_fifty(surfaces):
     return 50.0
 
 
-EXERCISES = (IMAGE, VIEW, BLUR, LIMITS, ELEMENTS)
+EXERCISES = (IMAGE, BLUR, LIMITS, VIEW, ELEMENTS)

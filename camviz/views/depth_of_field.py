@@ -1,8 +1,12 @@
-"""The depth-of-field visualizer: a lens and its rays, the photograph those rays make, and how sharp it can be where."""
+"""The depth-of-field visualizer: a lens and its rays, the photograph those rays make, and how sharp it can be where.
+
+A reader's own blur and their own limits of the depth of field can be drawn beside the right ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
@@ -12,12 +16,13 @@ from camviz import optics
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.plot import Ticks, axes, band, curve, logarithmic, plot_panel, upright
+from camviz.draw.plot import Ticks, axes, band, curve, legend, logarithmic, plot_panel, upright
 from camviz.poses import RigidTransform
 from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera
 from camviz.views import lens_diagram
 from camviz.views.base import View, choice, slider, switch
+from camviz.yours import tried
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = 64, 256  # points of the lens
@@ -25,6 +30,7 @@ GLOBE_Z = 3.3  # of the globe in the world, towards which the camera looks along
 STAND = (0.58, 0.45)  # x and y of the camera
 GLOBE_M = 0.54  # the globe's diameter
 LIGHT_N = 4.0  # the f-number for which a fixed exposure is right
+_HEIGHTS = {"rays photograph blur": 636, "rays photograph": 432, "photograph blur": 470}
 _DEPTHS, _BLURS = (0.5, 40.0), (0.002, 20.0)  # the plot's range: m and mm
 _SHAPES = {"disc": ("disc", 6), "hexagon": ("polygon", 6), "ring": ("ring", 6), "heart": ("heart", 6)}
 
@@ -38,6 +44,11 @@ class DepthOfFieldView(View):
     is traced through the aperture's shape, of which a half may be covered. `match_exposure` exposes for as long as the
     f-number needs; otherwise as f/4 needs. A covered half is never made up for. Without `diffraction` the view says
     nothing of the Airy disc, for readers who are to predict what it does.
+
+    `panels` is "rays photograph blur" or two of the three words, the photograph among them; the figures are those that
+    the panels speak of. `yours` is a reader's blur(f, N, s, u) for points u (...), and `your_limits` a reader's
+    limits(f, N, s, c) for focus distances s (...), two arrays, all in millimetres; both are drawn in orange over the
+    blur, and without the rays the depth of field appears with `your_limits` only.
     """
 
     title: ClassVar[str] = "Lens and depth of field"
@@ -52,9 +63,14 @@ class DepthOfFieldView(View):
     covered: str = choice("nothing", "left half", "upper half", label="cover", help="black card before the lens")
     match_exposure: bool = switch(True, label="match exposure", help="expose as long as the f-number needs")
     diffraction: bool = True
+    panels: str = "rays photograph blur"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+    your_limits: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.panels not in _HEIGHTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
         for name in ("focal_mm", "f_number", "focus_m", "distance_m"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
@@ -152,13 +168,29 @@ class DepthOfFieldView(View):
             "light": f"{_percent(self.brightness)} of a correct exposure",
         }
 
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        left_out = set()
+        if self.panels != "rays photograph blur":
+            left_out |= {"field of view", "globe on the sensor"}
+        if "blur" not in self.panels:
+            left_out |= {"blur of the globe", "Airy disc"}
+        if "blur" not in self.panels or not self._bounded:
+            left_out |= {"depth of field", "hyperfocal distance"}
+        return {name: figure for name, figure in self.numbers().items() if name not in left_out}
+
+    @property
+    def _bounded(self) -> bool:
+        """True where the depth of field is drawn."""
+        return "rays" in self.panels or self.your_limits is not None
+
     def equation(self) -> str:
         """The lens equation, with this state's numbers."""
         return f"1/{self.focal_mm:g} = 1/{1000 * self.focus_m:.0f} + 1/{self.lens.image_mm:.2f}"
 
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
         return (
             f"A lens of {self.focal_mm:g} mm at f/{self.f_number:.3g}, focused at {self.focus_m:.2f} m, "
             f"{self.distance_m:.2f} m from the globe, {self.sensor} sensor, aperture {self.aperture}, "
@@ -173,19 +205,14 @@ class DepthOfFieldView(View):
     # What it looks like ----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 636, "paper"),
-                self._ray_panel(),
-                self._loupe_panel(),
-                self._aperture_panel(),
-                self._photograph_panel(),
-                self._blur_panel(),
-                self._numbers(),
-            ]
-        )
-        photographs = {"lens": jpeg(self.image(DRAFT, rough=True) if draft else self.image())}
-        return Picture(body, 960, 636, self.title, self.description(), photographs)
+        height = _HEIGHTS[self.panels]
+        body = [svg.rectangle(0, 0, 960, height, "paper"), self._photograph_panel(), self._numbers()]
+        if "rays" in self.panels:
+            body += [self._ray_panel(), self._loupe_panel(), self._aperture_panel()]
+        if "blur" in self.panels:
+            body.append(self._blur_panel())
+        photographs = {"lens": _photographed(self, DRAFT, True) if draft else _photographed(self, FINE, False)}
+        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
 
     @cached_property
     def _rays(self) -> Panel:
@@ -224,7 +251,8 @@ class DepthOfFieldView(View):
 
     @cached_property
     def _plot(self) -> Panel:
-        return plot_panel("blur", 74, 446, 506, 140, _logs(_DEPTHS), _logs(_BLURS))
+        top, height = (446, 140) if "rays" in self.panels else (34, 380)
+        return plot_panel("blur", 74, top, 506, height, _logs(_DEPTHS), _logs(_BLURS))
 
     def _blur_panel(self) -> str:
         panel, (near, far) = self._plot, self.limits_m
@@ -233,17 +261,19 @@ class DepthOfFieldView(View):
         blur = np.maximum(self.blur_mm(depth), 1e-6)
         far_x = min(np.log10(far), panel.right)
         lines, names = self._levels(panel)
+        bounds = band(panel, np.log10(near), far_x, "fill-green") if self._bounded else ""
         here = panel.place(_logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), _BLURS[0]))))
         xticks, yticks = logarithmic(*_logs(_DEPTHS)), _micrometres()
         content = (
             _grid(panel, xticks, yticks)
-            + band(panel, np.log10(near), far_x, "fill-green")
+            + bounds
             + lines
             + curve(panel, np.log10(depth), np.log10(blur), "blue thick")
             + upright(panel, np.log10(self.focus_m), "red thin")
             + names
-            + svg.dots([here], "orange", 10)
-            + svg.text(here + (8, -8), "globe", "orange halo")
+            + svg.dots([here], "blue", 10)
+            + svg.text(here + (8, -8), "globe", "blue halo")
+            + self._your_part(panel, depth)
         )
         label = "Blur against distance; drag or press the arrow keys to change the focus"
         shown = panel.show(content, title="Blur against distance", hint="drag to focus", drag="focus", label=label)
@@ -257,7 +287,7 @@ class DepthOfFieldView(View):
         near, far = self.limits_m
         right_is_free = near < 1.8 and far < 14  # of the depth of field; the left is not
         allowed = f"allowed: c = {1000 * self.circle_mm:.0f} µm"
-        levels = [(self.circle_mm, allowed, "green", "dashed", 14, right_is_free)]
+        levels = [(self.circle_mm, allowed, "green", "dashed", 14, right_is_free)] if self._bounded else []
         if self.diffraction:
             levels.append((self.airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free))
         lines = names = ""
@@ -268,11 +298,31 @@ class DepthOfFieldView(View):
             names += svg.text(place, name, f"{colour} halo{end}")
         return lines, names
 
+    def _your_part(self, panel: Panel, depth_m: np.ndarray) -> str:
+        """The reader's blur over distance, their limits, the names of both, and what is wrong with either."""
+        drawn, entries, problems = "", [], []
+        state = (self.focal_mm, self.f_number)
+        if self.yours:
+            blur, problem = tried(self.yours, (*state, 1000 * self.focus_m, 1000 * depth_m), depth_m)
+            drawn += curve(panel, np.log10(depth_m), _log10(np.maximum(blur, 1e-6)), "orange dashed")
+            entries, problems = [("blue", "right"), ("orange dashed", "your blur")], [problem]
+        if self.your_limits:
+            focus = np.array([1000 * self.focus_m])
+            limits, problem = tried(self.your_limits, (*state, focus, self.circle_mm), (focus, focus))
+            ends = np.minimum(_log10(np.concatenate(limits) / 1000), panel.right)
+            drawn += "".join(upright(panel, float(end), "orange") for end in ends if np.isfinite(end))
+            entries, problems = [*entries, ("orange", "your limits")], [*problems, problem]
+        words = "\n".join(filter(None, problems))
+        drawn += legend(panel, entries, "bottom left") if entries else ""
+        return drawn + (svg.paragraph((12, 22), words, panel.width - 24) if words else "")
+
     def _numbers(self) -> str:
         rows = [svg.text((606, 326), "This lens", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
+        for i, (name, value) in enumerate(self._told().items()):
             rows.append(svg.text((606, 352 + 23 * i), name, "note"))
             rows.append(svg.text((736, 352 + 23 * i), value, "label"))
+        if self.panels != "rays photograph blur":
+            return "".join(rows)
         rows.append(svg.text((606, 574), "lens equation, 1/f = 1/s + 1/v, in mm:", "note"))
         rows.append(svg.text((606, 596), self.equation(), "label"))
         return "".join(rows)
@@ -299,6 +349,12 @@ class DepthOfFieldView(View):
         return self._moved("focus_m", self.focus_m * 1.05 ** (-step if handle == "sensor" else step))
 
 
+@lru_cache(maxsize=4)
+def _photographed(view: DepthOfFieldView, samples: int, rough: bool) -> bytes:
+    """The view's photograph as JPEG, which no reader's function changes."""
+    return jpeg(view.image(samples, rough=rough))
+
+
 @lru_cache(maxsize=1)
 def _garden() -> Scene:
     """The garden with a garland of lamps before its wall: points of light, which show the aperture's shape."""
@@ -313,6 +369,11 @@ def _garden() -> Scene:
 def _logs(pair: tuple[float, float]) -> tuple[float, float]:
     low, high = np.log10(pair)
     return float(low), float(high)
+
+
+def _log10(values: np.ndarray) -> np.ndarray:
+    """NaN for what has no logarithm."""
+    return np.log10(np.where(values > 0, values, np.nan))
 
 
 def _grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:

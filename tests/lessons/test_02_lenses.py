@@ -76,7 +76,9 @@ def through(surfaces):
 
 
 def test_the_lens_in_the_garden(says):
-    f, wide, focus = says("It has a focal length of 50 mm, is as wide as 36 mm, and is focused at 1.3 m")
+    f, wide, focus = says(
+        "Its [focal length](00_start_here.ipynb#focal-length) is 50 mm and its width 36 mm. It is focused at 1.3 m"
+    )
     assert wide == f.value / 1.4
     (points,) = says("The picture is the sum of 256 pictures")
     assert points.value == len(DepthOfFieldView(f_number=1.4, focus_m=focus.value).lens.points(256)[0])
@@ -116,14 +118,43 @@ def test_behind_the_lamps(says):
 # 2: blur -------------------------------------------------------------------------------------------------------------
 
 
-def test_a_disc_s_variance(says):
-    points, parts = says(
-        "from 64 points of the lens through the plane in focus. A disc of diameter D has the variance D²/16"
+def test_a_point_by_hand(says):
+    f, u = says("Take f = 50 mm and a point 1 m in front of the lens:")
+    assert image(f.value, 1000 * u.value) == pytest.approx(52.63, abs=0.005)
+    focal, near = says(
+        "a little behind the focal point at 50 mm, because the light from 1 m away still spreads a little"
     )
+    assert focal == f.value
+    assert near == u.value
+    assert image(f.value, 1000 * near.value) > focal.value
+
+
+def test_the_image_moves_away_and_then_is_virtual(says):
+    (f,) = says("Here is your function beside camviz's, for a lens of 50 mm.")
+    says("As the object comes nearer, its image moves away from the lens.")
+    (pole,) = says("At u = 50 mm the image is infinitely far away")
+    assert pole.value == f.value
+    assert image(50, 60) > image(50, 100) > image(50, 1000)
+    assert image(50, 50 + 1e-9) > 1e9
+    assert image(50, 40) < 0
+
+
+def test_the_blur_of_the_globe_by_hand(says):
+    f, N, s, u = says(
+        "In the garden the lens has f = 50 mm and N = 1.4, and it is focused at s = 1.3 m. The globe is at u = 2.3 m:"
+    )
+    assert blur(f.value, N.value, 1000 * s.value, 1000 * u.value) == pytest.approx(0.621, abs=5e-4)
+    view = DepthOfFieldView(f_number=N.value, focus_m=s.value)
+    assert (view.focal_mm, view.distance_m) == (f.value, u.value)
+
+
+def test_a_disc_s_variance(says):
+    (points,) = says("by tracing rays from 64 points of the lens through the plane in focus")
+    (parts,) = says("A disc of diameter D has the variance D²/16 along either axis.")
     y, x = np.mgrid[-1:1:401j, -1:1:401j]
     inside = x**2 + y**2 <= 1
     assert parts == 2**2 / np.var(x[inside])
-    assert points.value == 64  # cell 10 asks for them
+    assert points.value == 64  # the cell asks for them
 
 
 # 3: sharp enough -----------------------------------------------------------------------------------------------------
@@ -135,7 +166,14 @@ def test_the_usual_circle(says):
 
 
 def test_from_half_of_h_to_infinity(says):
-    says("focus on H, and everything from H/2 to infinity is sharp enough")
+    says("Focus on H or beyond, and there is no far limit.")
+    says("Focus on H, and everything from H/2 to infinity is sharp enough.")
+    f, N, s = says("Take one lens by hand: 50 mm at f/8, focused at 3 m.")
+    near, far = limits(f.value, N.value, 1000 * s.value, 0.03)
+    assert near == pytest.approx(2338, abs=0.5)
+    assert far == pytest.approx(4185, abs=0.5)
+    f, N = says("Here are your limits over all focus distances, for 50 mm at f/8:")
+    assert (f.value, N.value) == (50, 8)
     H = hyperfocal(50, 8, 0.03)
     assert pytest.approx(10466.67, abs=0.01) == H
     assert blur(50, 8, H, 1e12) == pytest.approx(0.03)
@@ -146,7 +184,7 @@ def test_from_half_of_h_to_infinity(says):
 
 
 def test_more_of_the_depth_lies_behind_the_focus(says):
-    says("Notice that more of it lies behind the focus than in front of it.")
+    says("Notice that more of the green band lies behind the focus than in front of it.")
     near, far = limits(35, 5.6, 3000, FULL_FRAME / 1500)
     assert far - 3000 > 2 * (3000 - near)
     says("The blur grows faster towards the lens, so the far limit is the farther one.")
@@ -186,7 +224,7 @@ def test_the_airy_disc_on_the_sensor(says):
     assert all(one == FIRST_DARK_RING / 2 for one in radii)
     (diameter,) = says("until the Airy disc, 2.44 λ N (1 + m), is wider than the pixels or the circle")
     assert diameter == FIRST_DARK_RING
-    says("Nearer subjects have v = f (1 + m)")
+    says("There v = f (1 + m)")
     assert image(100, 500) == pytest.approx(100 * (1 + image(100, 500) / 500))
 
 
@@ -270,6 +308,12 @@ def test_internal_focusing_can_widen_the_view(says):
     assert near_over_far(30, 3, -50.0) > 1.005
 
 
+def test_what_the_usual_formula_leaves_out(says):
+    f, width = says("Look at what it says about a lens of 100 mm and a sensor 36 mm wide:")
+    near, far = (view_deg(width.value, image(f.value, s)) for s in (150, 10_000))
+    assert near < 0.4 * far < far < view_deg(width.value, f.value)
+
+
 # 5: perspective and what is held -------------------------------------------------------------------------------------
 
 
@@ -336,6 +380,71 @@ def test_the_telephoto_lens(says):
     assert "600" in LensElementsView(lens="telephoto").description()
 
 
+def test_the_entrance_pupil_of_the_triplet(says):
+    """By rays out of the middle of the stop and from its rim, through the two elements in front of it, backwards."""
+    stop, pupil, wider = says(
+        "In the triplet the stop lies 10.3 mm behind the first surface. Seen through the two elements in front of it, "
+        "it appears at 11.5 mm, and 1.32 times as wide."
+    )
+    surfaces = optics.COOKE_TRIPLET.surfaces[:4]
+    assert stop == sum(distance for _, distance, _ in surfaces[:-1])
+    back = np.linalg.inv(through(surfaces))
+    height, slope = back @ [0.0, 0.1]
+    assert pupil == -height / slope
+    rim = back @ [1.0, 0.0]
+    assert wider == rim[0] + rim[1] * pupil.value
+
+
+def test_the_telecentric_lens(says):
+    f, s, behind, tall = says(
+        "Compare a thin lens of 50 mm, focused at 200 mm, with its stop at the lens and with its stop at 50 mm behind "
+        "it. It looks at a thing of 30 mm:"
+    )
+    sensor = image(f.value, s.value)
+    lens = np.array([[1, 0], [-1 / f.value, 1]])
+
+    def at_sensor(u, stop):
+        """Where the ray from `tall` above the axis at u, through the middle of the stop, meets the sensor."""
+        to_stop = np.array([[1, stop], [0, 1]]) @ lens @ [[1, u], [0, 1]]
+        slope = -to_stop[0, 0] * tall.value / to_stop[0, 1]
+        return (np.array([[1, sensor], [0, 1]]) @ lens @ [[1, u], [0, 1]] @ [tall.value, slope])[0]
+
+    step, error = says(
+        "A step of 10 mm makes an error of 5 % with the ordinary lens and none with the telecentric one."
+    )
+    ordinary, telecentric = (
+        [at_sensor(u, stop) for u in (s.value, s.value - step.value)] for stop in (0.0, behind.value)
+    )
+    assert error == 100 * (ordinary[1] / ordinary[0] - 1)
+    assert telecentric[1] == pytest.approx(telecentric[0])
+    assert telecentric[0] == pytest.approx(ordinary[0])
+
+
+def test_a_tilted_lens(says):
+    """Points of a tilted sensor, each taken back through the lens, lie in one tilted plane."""
+    f, metres, v, ratio, tilt, tilted = says(
+        "For f = 50 mm and u = 2 m, v is 51.3 mm and u/v is 39: tilt the lens by 1°, and the plane in focus tilts by "
+        "34°."
+    )
+    u, at = 1000 * metres.value, image(f.value, 1000 * metres.value)
+    assert v == at
+    assert ratio == u / at
+
+    def in_focus(tau, at, heights):
+        z = at + heights * np.tan(np.radians(tau))
+        away = np.array([image(f.value, one) for one in z])  # the equation is its own inverse
+        return away, -heights * away / z
+
+    z, y = in_focus(tilt.value, at, np.array([-5.0, 0.0, 5.0]))
+    slopes = np.diff(z) / np.diff(y)
+    assert slopes[0] == pytest.approx(slopes[1])
+    assert tilted == np.degrees(np.arctan(abs(slopes[0])))
+    assert abs(z[1] / slopes[0]) == pytest.approx(at / np.tan(np.radians(tilt.value)))  # one line with the sensor
+    height, again, angle = says("From a height of 1.25 m this takes v/tan τ = 1250 mm, a tilt of 2.3°.")
+    assert again == 1000 * height.value
+    assert angle == np.degrees(np.arctan(f.value / again.value))
+
+
 def test_rounded_indices_change_the_focal_length(says):
     (change,) = says("Our table has its indices to three decimals, and rounding them may change f by up to 8 mm.")
     table, total = np.array(optics.TELEPHOTO.surfaces), 0.0
@@ -345,7 +454,7 @@ def test_rounded_indices_change_the_focal_length(says):
         total += abs(1 / through(rounded)[1, 0] - 1 / through(table)[1, 0])
     assert change == total
     assert abs(-1 / through(table)[1, 0] - 600) < total
-    (across, down) = says("every surface acts on a ray (height y, slope y′) as a 2 × 2 matrix")
+    (across, down) = says("Near the axis every surface acts on (y, y′) as a 2 × 2 matrix.")
     assert (across.value, down.value) == through(table).shape
 
 
@@ -376,7 +485,11 @@ def test_between_its_principal_planes_a_thick_lens_is_thin(says):
 
 
 def test_the_signs_of_c(says):
-    numbers = [*says("so f = −1/C"), *says("This is C itself, and with its sign. The focal length is −1/C.")]
+    numbers = [
+        *says("So for a lens in air f = −1/C."),
+        *says("so f = −1/C"),
+        *says("This is C itself, and with its sign. The focal length is −1/C."),
+    ]
     numbers += says("−A/C. The focal length is −1/C, counted from a principal plane")
     C = through(optics.COOKE_TRIPLET.surfaces)[1, 0]
     assert C < 0
@@ -454,6 +567,20 @@ def test_the_phone(says):
     assert at == H / 1000
     assert near == limits(f.value, number.value, H * (1 + 1e-9), c)[0] / 1000
     assert wide == f.value / number.value
+
+
+def test_the_phone_against_full_frame(says):
+    (s,) = says("Both are focused at 1 m, and each blur is divided by its own sensor's diagonal")
+    large, small, times = says(
+        "The full-frame camera's blur is larger by nearly the ratio of the apertures, 14.4 mm to 3.2 mm: about 4.6 "
+        "times."
+    )
+    assert large == 26 / 1.8
+    assert small == 5.7 / 1.8
+    shares = [
+        blur(f, 1.8, 1000 * s.value, 5000) / wide for f, wide in ((5.7, FULL_FRAME * 5.7 / 26), (26.0, FULL_FRAME))
+    ]
+    assert times.about(shares[1] / shares[0], 0.02)
 
 
 # The quiz ------------------------------------------------------------------------------------------------------------
