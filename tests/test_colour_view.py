@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 import warnings
 
@@ -11,9 +12,10 @@ import pytest
 
 from camviz.colour import balance, spectra
 from camviz.colour.spaces import to_srgb
+from camviz.exercises import lesson13
 from camviz.photographs import photograph
 from camviz.scenes.light import to_display, to_encoded, to_linear
-from camviz.views.colour import LAMPS, ColourView
+from camviz.views.colour import LAMPS, LAYOUTS, PARTS, ColourView
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -167,3 +169,60 @@ def test_a_photograph_given_is_shown_and_kept_in_its_shape():
     given = to_display(to_linear(np.full((300, 200, 3), 0.5)))
     assert ColourView(picture=given).image(draft=False).shape == (300, 200, 3)
     assert ColourView(picture=given).image(draft=True).shape[0] == 208
+
+
+BESIDE = "chart photograph yours"
+
+
+def nothing_yet(*given):
+    """Not written yet."""
+
+
+@pytest.mark.parametrize(
+    ("part", "function", "state"),
+    [
+        ("gains", lesson13.grey_world, {"light": "daylight", "kelvin": 6500, "method": "grey world"}),
+        ("develop", lesson13.develop, {"light": "daylight", "kelvin": 12000, "method": "chosen patch", "patch": 18}),
+    ],
+)
+def test_a_right_function_of_the_readers_makes_the_views_own_chart_and_photograph(part, function, state):
+    view = ColourView(panels=BESIDE, part=part, yours=function, **state)
+    rgb, problem = view.your_chart
+    assert problem == ""
+    np.testing.assert_allclose(rgb, np.clip(view.chart, 0, 1) if part == "develop" else view.chart, atol=1e-9)
+    right, own = (
+        cv2.imdecode(np.frombuffer(view.figure().photographs[name], np.uint8), cv2.IMREAD_COLOR)
+        for name in ("photograph", "your photograph")
+    )
+    assert np.abs(right.astype(int) - own).max() <= 8  # what rounding leaves after JPEG
+    assert f">{view.errors.mean():.2f}</text>" in view.figure().body
+
+
+def test_a_matrix_of_the_readers_is_fitted_in_every_light():
+    view = ColourView(panels=BESIDE, method="chosen patch", patch=18, matrix="for daylight", yours=lesson13.fit_matrix)
+    for kelvin in (2500.0, 4000.0, 9000.0):
+        lit = view.but(part="matrix", kelvin=kelvin)
+        balanced = lit.shot.raw_chart * lit.gains
+        fitted = np.linalg.lstsq(balanced, to_srgb(lit.shot.true_chart), rcond=None)[0]
+        np.testing.assert_allclose(lit.your_chart[0], balanced @ fitted, atol=1e-9)
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("function", [nothing_yet, lambda *given: 1 / 0, lambda *given: np.ones(7), None])
+def test_a_function_without_an_answer_leaves_an_empty_panel_and_a_sentence(part, function):
+    view = ColourView(panels=BESIDE, part=part, yours=function)
+    figure = view.figure()
+    assert "your photograph" not in figure.photographs
+    assert view.your_chart[1].split()[0] in html.unescape(figure.body)
+    assert view.errors.mean() == ColourView().errors.mean()
+
+
+def test_a_view_opens_with_the_panels_that_are_asked_for():
+    few, everything = (ColourView(panels=one).figure() for one in list(LAYOUTS)[:2])
+    assert "counted (raw)" not in few.body
+    assert "sensitivity" not in few.body
+    assert "chosen patch" not in few.body
+    assert {"counted (raw)", "sensitivity", "chosen patch"} <= set(re.findall(r">([^<>]+)</text>", everything.body))
+    for bad in ({"panels": "chart"}, {"part": "gamma"}):
+        with pytest.raises(ValueError, match=next(iter(bad))):
+            ColourView(**bad)

@@ -254,7 +254,7 @@ def first_axis_only(raw):
     return mean[..., 1:2] / mean
 
 
-# 3: find the bug in developing ---------------------------------------------------------------------------------------
+# 4: find the bug in developing ---------------------------------------------------------------------------------------
 
 
 def develop(raw: Array, gains: Array, matrix: Array) -> Array:
@@ -374,7 +374,7 @@ def without_gains(raw, gains, matrix):
     return np.clip(raw @ matrix.T, 0, 1) ** (1 / 2.2)
 
 
-# 4: the matrix -------------------------------------------------------------------------------------------------------
+# 3: the matrix -------------------------------------------------------------------------------------------------------
 
 
 def fit_matrix(raw: Array, target: Array) -> Array:
@@ -608,4 +608,4 @@ def weights_alone(change, sensor):
     return np.linalg.solve(sensor.T @ sensor, sensor.T @ change)
 
 
-EXERCISES = (RESPONSE, GREY_WORLD, DEVELOP, FIT_MATRIX, UNSEEN)
+EXERCISES = (RESPONSE, GREY_WORLD, FIT_MATRIX, DEVELOP, UNSEEN)

@@ -1,10 +1,14 @@
-"""The colour visualizer: light × surface × sensor, and what white balance and a matrix make of it."""
+"""The colour visualizer: light × surface × sensor, and what white balance and a matrix make of it.
+
+A reader's own balance, matrix or development can make a second chart and a second photograph below the first.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -21,9 +25,14 @@ from camviz.photographs import photograph
 from camviz.scenes.light import to_display, to_linear
 from camviz.views import swatches
 from camviz.views.base import Control, View, choice, slider, switch
+from camviz.yours import tried
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
+LAYOUTS = {"chart photograph": 326, "spectra chart photograph steps": 640, "chart photograph yours": 626}
+"""What is drawn, and how tall it is."""
+PARTS = ("develop", "gains", "matrix")
 _DRAFT, _FINE = 208, 416  # pixels on the photograph's longer side
+_CHART, _PHOTOGRAPH, _COLUMN = 20, 430, 780  # where they begin, from left to right
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,12 @@ class ColourView(View):
 
     `patch` (0 … 23) is the one chosen on the chart. The photograph's surfaces are the smoothest that look like it in
     daylight; with `picture` (height, width, 3) uint8 sRGB it is the reader's own. The automatic balances judge by the
-    photograph, as a camera does.
+    photograph, as a camera does. `panels` is one of LAYOUTS.
+
+    `yours` is a reader's function, and `part` says which part of the development it takes over: "develop", from raw
+    colours (..., 3), gains (3,) and matrix (3, 3) to colours encoded by the power 1/2.2; "gains", from the photograph's
+    raw colours (height, width, 3) to gains (3,); "matrix", from balanced raw colours (24, 3) and their targets (24, 3)
+    in linear sRGB to a matrix (3, 3).
     """
 
     title: ClassVar[str] = "White balance and colour"
@@ -41,7 +55,7 @@ class ColourView(View):
     kelvin: float = slider(
         2850, 2000, 12000, 50, label="temperature", unit="K", help="of the Planckian or daylight, not of a lamp"
     )
-    tint: float = slider(0.0, -1, 1, 0.05, help="a filter before the light: green above zero, magenta below")
+    tint: float = slider(0.0, -1, 1, 0.05, help="a filter in front of the light: green above zero, magenta below")
     camera: str = choice(*spectra.CAMERAS, help="the last sees exactly as the eye")
     method: str = choice(
         "none", "grey world", "white patch", "chosen patch", "by hand", label="white balance", help="what is made grey"
@@ -55,12 +69,18 @@ class ColourView(View):
         "coffee", "astronaut", "chelsea", "rocket", label="photograph", help="what stands beside the chart"
     )
     patch: int = 13
+    panels: str = "spectra chart photograph steps"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+    part: str = "develop"
     picture: np.ndarray | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if isinstance(self.patch, bool) or self.patch not in range(24):
             raise ValueError(f"patch must be a whole number 0 … 23, got {self.patch!r}")
+        for name, known in (("panels", LAYOUTS), ("part", PARTS)):
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, got {getattr(self, name)!r}")
 
     def offered(self) -> dict[str, Control]:
         """Daylight begins at 4000 K."""
@@ -136,6 +156,47 @@ class ColourView(View):
             return _surfaces(self.scene, side)
         return to_linear(_within(self.picture, side))
 
+    # The reader's own function ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def your_chart(self) -> tuple[np.ndarray, str]:
+        """The chart (24, 3) in linear sRGB as the reader's function makes it, and what is wrong with that."""
+        return self.your_way(self.shot.raw_chart)
+
+    def your_way(self, raw: np.ndarray) -> tuple[np.ndarray, str]:
+        """Linear sRGB (..., 3) of raw colours (..., 3) with the reader's part in it; NaN and a sentence without."""
+        if self.yours is None:
+            return np.full(raw.shape, np.nan), "No function of yours has been given."
+        gains, matrix = self.gains, self.correction
+        if self.part == "develop":
+            encoded, problem = tried(self.yours, (raw, gains, matrix), raw)
+            return np.clip(encoded, 0, 1) ** 2.2, problem
+        if self.part == "gains":
+            gains, problem = tried(self.yours, (self._surfaces(_DRAFT) @ self.shot.raw_from_srgb.T,), gains)
+        else:
+            balanced, target = self.shot.raw_chart * gains, to_srgb(self.shot.true_chart)
+            matrix, problem = tried(self.yours, (balanced, target), matrix)
+        return developed(raw, gains, matrix, encoded=self.gamma != "at the end"), problem
+
+    def _your_row(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+        """The chart and the photograph by the reader's function, below those above."""
+        rgb, problem = self.your_chart
+        panel = replace(self._chart_panel, name="your chart", y=348)
+        if problem:
+            words = svg.paragraph((16, 30), problem, panel.width - 32)
+            return panel.show(words, title="With your function"), {}
+        shown = swatches.chart(panel, rgb, self.shot.true_chart, self._off(rgb), self.patch)
+        surfaces = self._surfaces(_DRAFT if draft else _FINE)
+        image = to_display(self.your_way(surfaces @ self.shot.raw_from_srgb.T)[0])
+        body = panel.show(shown, title="With your function") + self._photograph_panel(image, "your photograph", 348)
+        body += svg.text((_COLUMN, 366), "mean ΔE2000, yours", "note")
+        body += svg.text((_COLUMN, 384), f"{self._off(rgb).mean():.2f}", "orange")
+        return body, {"your photograph": jpeg(image)}
+
+    def _off(self, rgb: np.ndarray) -> np.ndarray:
+        """ΔE2000 (24,) of a chart; no number where there is no colour."""
+        return errors(np.nan_to_num(rgb), self.shot.true_chart)
+
     # Words and numbers ------------------------------------------------------------------------------------------------
 
     def numbers(self) -> dict[str, str]:
@@ -150,6 +211,13 @@ class ColourView(View):
             "chosen patch": f"{spectra.patch_names()[self.patch]}, ΔE {self.errors[self.patch]:.2f}",
         } | self._metamer_in_words()
 
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        figures = self.numbers()
+        if "steps" in self.panels:
+            return figures
+        return {name: figures[name] for name in ("light", "gains", "mean ΔE2000", "largest ΔE2000")}
+
     def _metamer_in_words(self) -> dict[str, str]:
         if not self.metamer:
             return {}
@@ -159,7 +227,7 @@ class ColourView(View):
 
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
         words = f"{self.camera} in {self._light_in_words()}, white balance {self.method}, matrix {self.matrix}"
         return f"{words}, gamma {self.gamma}: {figures}."
 
@@ -170,26 +238,29 @@ class ColourView(View):
     # The picture ------------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        image = self.image(draft=draft)
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 640, "paper"),
-                self._light_panel(),
-                self._surface_panel(),
-                self._sensor_panel(),
-                self._chart_panel.show(
-                    swatches.chart(self._chart_panel, self.chart, self.shot.true_chart, self.errors, self.patch),
-                    title="The chart, and ΔE2000 of each patch",
-                    hint="click a patch",
-                    drag="chart",
-                    label="Choose a patch of the chart: click it or press the arrow keys",
-                ),
-                self._photograph_panel(image),
-                self._numbers_column(),
-                self._steps(),
-            ]
-        )
-        return Picture(body, 960, 640, self.title, self.description(), {"photograph": jpeg(image)})
+        image, height = self.image(draft=draft), LAYOUTS[self.panels]
+        photographs = {"photograph": jpeg(image)}
+        body = [svg.rectangle(0, 0, 960, height, "paper")]
+        if "spectra" in self.panels:
+            body += [self._light_panel(), self._surface_panel(), self._sensor_panel()]
+        body += [
+            self._chart_panel.show(
+                swatches.chart(self._chart_panel, self.chart, self.shot.true_chart, self.errors, self.patch),
+                title="The chart, and ΔE2000 of each patch",
+                hint="click a patch",
+                drag="chart",
+                label="Choose a patch of the chart: click it or press the arrow keys",
+            ),
+            self._photograph_panel(image),
+            self._numbers_column(),
+        ]
+        if "yours" in self.panels:
+            below, attached = self._your_row(draft)
+            body.append(below)
+            photographs |= attached
+        if "steps" in self.panels:
+            body.append(self._steps())
+        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The photograph as developed, uint8 sRGB."""
@@ -229,18 +300,23 @@ class ColourView(View):
 
     @property
     def _chart_panel(self) -> Panel:
-        return Panel("chart", 20, 262, 390, 262, 0, 6, 0, 4)
+        return Panel("chart", _CHART, self._top, 390, 262, 0, 6, 0, 4)
 
-    def _photograph_panel(self, image: np.ndarray) -> str:
+    @property
+    def _top(self) -> float:
+        """Where the chart begins: below the spectra, where there are any."""
+        return 262 if "spectra" in self.panels else 34
+
+    def _photograph_panel(self, image: np.ndarray, name: str = "photograph", top: float | None = None) -> str:
         height, width = image.shape[:2]
-        panel = image_panel("photograph", 430, 262, 330, width, height, tallest=262)
-        return panel.show(photograph_panel(panel, "photograph", width, height), title="Developed in the same way")
+        panel = image_panel(name, _PHOTOGRAPH, self._top if top is None else top, 330, width, height, tallest=262)
+        return panel.show(photograph_panel(panel, name, width, height), title="Developed in the same way")
 
     def _numbers_column(self) -> str:
-        rows = [svg.text((780, 254), "In numbers", "title")]
-        for i, (name, figure) in enumerate(self.numbers().items()):
-            rows.append(svg.text((780, 276 + 42 * i), name, "note"))
-            rows.append(svg.text((780, 292 + 42 * i), figure, "label", style="font-size:12px"))
+        rows, top = [svg.text((_COLUMN, self._top - 8), "In numbers", "title")], self._top
+        for i, (name, figure) in enumerate(self._told().items()):
+            rows.append(svg.text((_COLUMN, top + 14 + 42 * i), name, "note"))
+            rows.append(svg.text((_COLUMN, top + 30 + 42 * i), figure, "label", style="font-size:12px"))
         return "".join(rows)
 
     def _steps(self) -> str:

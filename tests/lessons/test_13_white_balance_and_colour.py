@@ -148,7 +148,9 @@ def test_a_bulb_s_raw_picture_is_yellow(says):
 
 
 def test_the_chart_of_twenty_four(says):
-    (patches,) = says("Below is what comes of it for the 24 patches of a chart.")
+    (patches,) = says("Below are the 24 patches of a chart in the light of a bulb")
+    (raw,) = says("and the mean of its 24 raw colours")
+    assert raw.value == len(shot(BULB)[0])
     (found,) = says("OpenCV can find the chart of 24 patches in a photograph")
     assert patches == len(CHART)
     assert found == len(CHART)
@@ -223,6 +225,31 @@ def test_the_grid_of_wavelengths(says):
     np.testing.assert_array_equal(spectra.WAVELENGTHS_NM, NM)
 
 
+def test_bradfords_matrix_and_cielab_are_as_published(says):
+    """Lam's matrix, and the CIE's formula, as colour-science has them."""
+    entries = says(
+        r"$$B = \\begin{pmatrix} 0.8951 & 0.2664 & -0.1614 \\\\ -0.7502 & 1.7135 & 0.0367 \\\\ 0.0389 & -0.0685 "
+        r"& 1.0296 \\end{pmatrix}$$"
+    )
+    published = np.abs(colour.adaptation.CHROMATIC_ADAPTATION_TRANSFORMS["Bradford"]).ravel()
+    assert [entry.value for entry in entries] == pytest.approx(published)
+    (light_,) = says("$L^*$ is the lightness, 0 for black and 100 for the white.")
+    assert light_.value == pytest.approx(lab(D65)[0])
+    assert lab(0 * D65)[0] == pytest.approx(0)
+    for xyz in (np.array([0.4, 0.3, 0.2]), 0.004 * D65):
+        t = xyz / D65
+        f = np.where(t > (6 / 29) ** 3, np.cbrt(t), (29 / 6) ** 2 * t / 3 + 4 / 29)
+        by_formula = [116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])]
+        np.testing.assert_allclose(by_formula, lab(xyz), atol=1e-9)
+
+
+def test_one_sum_by_hand_is_the_chart_s():
+    cells = notebooks.read(LESSONS / "13_white_balance_and_colour.ipynb").cells
+    printed = "".join(out.get("text", "") for cell in cells for out in cell.get("outputs", []))
+    share = counted(planckian(BULB), NIKON)[NAMES.index("cyan"), 0] / counted(planckian(BULB), NIKON, np.ones(81))[0]
+    assert f"as a share: {share:.3f}" in printed
+
+
 # Part 3 --------------------------------------------------------------------------------------------------------------
 
 
@@ -251,7 +278,7 @@ def test_grey_world_takes_the_coffee_for_brown_light(says):
 
 def test_white_patch_needs_a_white(says):
     light = daylight(6500.0)
-    better, worse = says("white patch does better with the coffee: 2.89 in place of 20.36")
+    better, worse = says("white patch (upper row) does better with the coffee: 2.89 in place of 20.36")
     assert better == chart_off(white_patch(photographed("coffee", light))).mean()
     assert worse == chart_off(grey_world(photographed("coffee", light))).mean()
     (off,) = says("The brightest things beside the rocket are yellow lamps, and the chart is off by 13.39.")
@@ -347,6 +374,7 @@ def test_daylight_lies_beside_the_line_of_black_bodies(says):
 
 
 def test_the_count_of_equations(says):
+    says("Three of the equations are those of one patch")
     patches, equations, unknowns = says(
         "takes the balanced colours of the 24 patches as near as possible to the truth: 72 equations, 9 unknowns, "
         "least squares"
@@ -399,6 +427,9 @@ def test_gains_on_encoded_values(says):
     assert root.about(np.log(0.2) / np.log(encoded(0.2)), 0.05)
     assert before == delta((raw * gains) @ matrix.T, truth).mean()
     assert after == delta(decoded((encoded(raw) * gains) @ matrix.T), truth).mean()
+    cut, whole = says("Its mean ΔE is 1.06 where the upper row has 0.96")
+    assert cut == delta(np.clip((raw * gains) @ matrix.T, 0, 1), truth).mean()
+    assert whole == before.value
     says("Too strong a correction: the greys become bluish, and the brightest blues are cut off.")
     saved = encoded(raw) * gains
     assert (lab(decoded(saved) @ SRGB.matrix_RGB_to_XYZ.T)[GREYS, 2] < -5).all()
@@ -437,7 +468,7 @@ def test_a_camera_that_sees_as_the_eye_leaves_nothing(says):
 
 def test_the_null_space(says):
     sums, unknowns, left = says(
-        "it lies in the null space of 3 equations in 81 unknowns. Of those, 78 dimensions are left"
+        "what it does not notice lies in the null space of 3 equations in 81 unknowns, and 78 dimensions are left"
     )
     sensor = planckian(BULB)[:, None] * NIKON
     assert (unknowns.value, sums.value) == sensor.shape
@@ -463,6 +494,62 @@ def test_metamers_are_equal_to_the_sensor_and_far_apart_to_the_eye(says):
     for bits in (sixteen.value, eight.value):
         digital = np.rint(view.shot.raw(twins) * (2**bits - 1))
         np.testing.assert_array_equal(digital[0], digital[1])
+
+
+def test_the_twin_of_a_grey_card(says):
+    share, apart = says("A right twin counts 0.5 in all three channels, to the last digit. The eye sees it at ΔE 4.7")
+    sensor, wavy = planckian(BULB)[:, None] * NIKON, np.sin(np.linspace(0, 6 * np.pi, 81))
+    basis = np.linalg.qr(sensor)[0]
+    black = wavy - basis @ (basis.T @ wavy)
+    twin = 0.5 + 0.3 * black / np.abs(black).max()
+    np.testing.assert_allclose(twin @ sensor / sensor.sum(axis=0), share.value, rtol=1e-12)
+    one, other = (lab(xyz) for xyz in seen(planckian(BULB), np.stack([np.full(81, 0.5), twin])))
+    assert apart == colour.delta_E(one, other, method="CIE 2000")
+
+
+# Part 7 --------------------------------------------------------------------------------------------------------------
+
+
+def test_without_an_ir_cut_filter_colours_fade(says):
+    """Planck's law and Kodak's four figures of the KAF-0400, red, green and blue as clear as at 550 nm."""
+    low, high, table_end = says("From 785 to 1000 nm all three channels count alike")[:2] + says(
+        "Each patch reflects there as it does at 780 nm."
+    )
+    nm = np.arange(low.value, high.value + 1, 5)
+    assert table_end == NM[-1]
+    (thousands,) = says("that Kodak published of the KAF-0400")
+    assert thousands.about(768 * 512 / 1000, 0.03)  # of pixels: what its name says
+    bulb, clear = planckian(BULB), np.interp(nm, (400, 550, 700, 1000), (0.03, 0.33, 0.40, 0.08)) * nm / (0.33 * 550)
+    glow = colour.sd_blackbody(BULB, colour.SpectralShape(low.value, high.value, 5)).values
+    scale = bulb[NM == 560] / colour.sd_blackbody(BULB, colour.SpectralShape(560, 561, 1)).values[0]
+    infrared = np.sum(scale * glow * clear)
+    truth = seen(bulb)
+    off = {}
+    for name, extra in (("filter", 0.0), ("none", infrared)):
+        shares = (bulb * CHART) @ NIKON + extra * CHART[:, -1:]
+        shares = shares / (bulb @ NIKON + extra)
+        matrix = fitted(shares, truth @ SRGB.matrix_XYZ_to_RGB.T, np.ones(3), np.ones(3))
+        off[name] = delta(shares @ matrix.T, truth)
+    without, with_it = says("the mean ΔE stays at 10.3, where the filter allows 0.9")
+    assert without == off["none"].mean()
+    assert with_it == off["filter"].mean()
+    (foliage,) = says("Foliage, which reflects much infrared, is off by 35.6.")
+    assert foliage == off["none"][NAMES.index("foliage")]
+    assert off["none"].argmax() == NAMES.index("foliage")
+    assert CHART[NAMES.index("foliage"), -1] > 2 * CHART[NAMES.index("foliage")].min()
+    (red,) = says("comes out as a middle grey, 0.53 of white in red")
+    cloth = (0.04 * (bulb @ NIKON) + 0.6 * infrared) / (bulb @ NIKON + infrared)
+    assert red == cloth[0]
+    says("A bulb has most of its light in the infrared")
+    every = colour.sd_blackbody(BULB, colour.SpectralShape(300, 4000, 5))
+    assert every.values[every.wavelengths > 780].sum() > every.values.sum() / 2
+    end, seen_to = says("Silicon counts photons up to 1100 nm; the eye sees nearly nothing beyond 700.")
+    assert end.about(1239.84 / 1.12, 0.02)  # the band gap of silicon in eV
+    eye = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    assert eye.values[eye.wavelengths > seen_to.value, 1].sum() < 0.002 * eye.values[:, 1].sum()
+    (beyond,) = says("A white LED emits next to nothing beyond 780 nm")
+    led = colour.SDS_ILLUMINANTS["LED-B3"]
+    assert led[beyond.value] < 0.02 * led.values.max()
 
 
 # Exercises, real data, quiz ------------------------------------------------------------------------------------------
@@ -555,8 +642,8 @@ def test_the_factor_on_encoded_values(says):
 
 def test_grey_world_on_the_three_photographs(says):
     says(
-        "The cup turns bluish, the astronaut's background greenish, and the evening sky over the rocket loses "
-        "half its blue."
+        "With right gains the cup turns bluish, the astronaut's background greenish, and the evening sky over the "
+        "rocket loses half its blue."
     )
     looked_at = {"coffee": np.s_[45:60, 300:330], "astronaut": np.s_[60:100, 330:360], "rocket": np.s_[20:120, 250:400]}
     changed = {}
