@@ -329,6 +329,8 @@ def test_before_the_lesson_a_wire_in_front_of_a_coin(says):
     (all_,) = says("Nine of the 49 views show wire at that place")
     assert one_of.value == all_.value == views.value
     assert (light.sum(), (1 - light).sum()) == (40, 9)
+
+
 # By hand -------------------------------------------------------------------------------------------------------------
 
 

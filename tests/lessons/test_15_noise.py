@@ -569,6 +569,8 @@ def test_before_the_lesson_eight_bits(says):
     assert few.value == enough.value == 8
     noise = 60.3 + 0.5 * np.random.default_rng(19).standard_normal(400_000)  # in steps of 8 bits
     assert np.round(noise).var() - 1 / 12 == pytest.approx(0.25, rel=0.03)
+
+
 # One case by hand -----------------------------------------------------------------------------------------------------
 
 

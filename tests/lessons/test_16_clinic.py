@@ -469,6 +469,8 @@ def test_before_the_lesson_a_turn_explains_most_of_cy(says):
     before, after = (p[..., :2] / p[..., 2:] for p in (points @ K.T, points @ turn.T @ K.T))
     steps = (after - before)[..., 1]
     assert np.abs(steps + moved.value).max() < 0.2 * moved.value
+
+
 def test_hand_and_eye(says):
     """Least squares of AX = XB over all six numbers of X, begun at nothing; where OpenCV has its own, that too."""
     from quoting import LESSONS
