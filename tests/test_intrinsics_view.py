@@ -226,3 +226,39 @@ def test_a_loaded_camera_keeps_its_numbers():
 def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
         IntrinsicsView().but(**bad)
+
+
+def by_a_reader(uv, K):
+    towards = np.concatenate([uv, np.ones_like(uv[..., :1])], axis=-1) @ np.linalg.inv(K).T
+    return towards / np.linalg.norm(towards, axis=-1, keepdims=True)
+
+
+def orange_lines(body):
+    return re.findall(r'<path d="([^"]*)" class="orange', body)
+
+
+def test_a_reader_s_rays_run_to_the_frame_of_the_right_ones():
+    view = IntrinsicsView(cx=200.0, skew=40.0, yours=by_a_reader)
+    body = view.figure(draft=True).body
+    (right, *spokes, yours), _ = view._your_rays()
+    np.testing.assert_allclose(yours.points, right.points, atol=1e-9)
+    corners = [spoke.points[1] for spoke in spokes]
+    np.testing.assert_allclose(view.camera.project(corners), view.intrinsics.border(1), atol=1e-6)
+    wrong = view.but(yours=lambda uv, K: by_a_reader(uv, K.T)).figure(draft=True).body
+    assert orange_lines(wrong) != orange_lines(body)
+
+
+def test_a_reader_s_function_that_stops_draws_no_rays_and_is_told_of():
+    none = orange_lines(IntrinsicsView().figure(draft=True).body)
+    body = IntrinsicsView(yours=lambda *_: None).figure(draft=True).body
+    assert "returns nothing" in body
+    assert len(orange_lines(body)) <= len(none)
+
+
+def test_fewer_panels_leave_out_k():
+    view = IntrinsicsView(panels="picture space")
+    body = view.figure(draft=True).body
+    assert "Its pixels" not in body
+    assert "% in sight" in body
+    with pytest.raises(ValueError, match="panels"):
+        IntrinsicsView(panels="matrices")

@@ -1,8 +1,12 @@
-"""The intrinsics visualizer: K beside the picture it numbers, the rays it picks out, and what no K can show."""
+"""The intrinsics visualizer: K beside the picture it numbers, the rays it picks out, and what no K can show.
+
+A reader's own rays can be drawn beside the right ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
@@ -19,12 +23,15 @@ from camviz.poses import RigidTransform
 from camviz.scenes import render, to_display
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, balloon_rim, balloon_scene, towards_balloon
 from camviz.views.base import Control, View, choice, slider, switch
+from camviz.yours import tried
 
 GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the camera stands before it on the z axis
 BINS = 4
 _NEAREST, _FARTHEST = 1.5, 12.0  # metres between camera and globe
 _FOCAL: dict[str, Any] = {"low": 150.0, "high": 2000.0, "step": 1.0, "unit": "px"}
 _LEAN_DRAWN = 3  # times
+_YOURS_M = 2.8  # as deep as a reader's rays are drawn, twice as deep as the camera's own pyramid
+_HEIGHTS = {"picture space": 440, "picture space matrices": 604}
 
 
 @dataclass(frozen=True)
@@ -34,6 +41,9 @@ class IntrinsicsView(View):
     The camera looks along z, `distance` metres in front of the globe. `focal_px`, `focal_mm` and `aspect` are no state
     of their own: they are read from fx, fy and the pixel pitch, and setting them with `but` sets fx and fy. Without
     `millimetres` the readings leave out what K alone cannot know.
+
+    `panels` is "picture space matrices", or "picture space" for a question that needs no K. `yours` is a reader's
+    function of (uv, K), pixels (..., 2) to unit rays (..., 3) in camera coordinates; its rays are orange.
     """
 
     title: ClassVar[str] = "Intrinsics"
@@ -54,6 +64,13 @@ class IntrinsicsView(View):
     height: int = 480
     millimetres: bool = True
     eye: Eye = Eye(distance=20.5, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
+    panels: str = "picture space matrices"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.panels not in _HEIGHTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
 
     @classmethod
     def of(cls, camera: Camera, **state: Any) -> Self:
@@ -195,9 +212,13 @@ class IntrinsicsView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         picture = self.image(draft=draft)
         space, photographs = self._space_panel(draft)
-        body = svg.rectangle(0, 0, 960, 604, "paper") + self._picture_panel() + space + self._matrices(20, 414)
-        body += self._lattice_panel() + self._numbers_column(724, 398)
-        return Picture(body, 960, 604, self.title, self.description(), {**photographs, "camera": jpeg(picture)})
+        height = _HEIGHTS[self.panels]
+        body = svg.rectangle(0, 0, 960, height, "paper") + self._picture_panel() + space
+        if "matrices" in self.panels:
+            body += self._matrices(20, 414) + self._lattice_panel() + self._numbers_column(724, 398)
+        else:
+            body += self._numbers_row(20, 398)
+        return Picture(body, 960, height, self.title, self.description(), {**photographs, "camera": jpeg(picture)})
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The picture (height, width, 3); a crop is shown within the whole, so it shows the picture as taken."""
@@ -282,7 +303,9 @@ class IntrinsicsView(View):
         target = (0.0, 0.2, float(BALLOON[2] - 0.49 * span))
         eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
         scenery = scene_items(balloon_scene(), "wire")
-        content, photographs = draw_space(panel, items, eye, draft=draft, renderer="wire", scenery=scenery)
+        yours, words = self._your_rays() if self.yours else ([], "")
+        content, photographs = draw_space(panel, items + yours, eye, draft=draft, renderer="wire", scenery=scenery)
+        content += words
         label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
         drawn = panel.show(content, title="The rays it picks out", hint="drag to turn", drag="orbit", label=label)
         return drawn, photographs
@@ -292,11 +315,28 @@ class IntrinsicsView(View):
         corners = self.intrinsics.border(1)
         items += [Line(_ray(self.camera, corner, 7.5), "blue faint", 1.0) for corner in corners]
         centre = np.array([self.intrinsics.cx, self.intrinsics.cy])
-        items.append(Line(_ray(self.camera, centre, 2.2), "orange", 1.8, head=True))
+        items.append(Line(_ray(self.camera, centre, 2.2), "ink" if self.yours else "orange", 1.8, head=True))
         if self.operation == "cropped":
             whole = Camera(self.taken, world_from_cam=self._pose)
             items += [Line(_ray(whole, corner, 1.4), "muted dashed", 1.0) for corner in self.taken.border(1)]
         return items
+
+    def _your_rays(self) -> tuple[list[Item], str]:
+        """The rays of the picture's corners and border by the reader's function, as long as right ones to one depth,
+        which are blue, and what is wrong with it."""
+        assert self.yours is not None
+        uv = self.intrinsics.border(4)
+        right = self.camera.unproject(uv)
+        rays, problem = tried(self.yours, (uv, self.intrinsics.K), right)
+        name = svg.text((14, 322), "orange: your rays of the corners and the border", "orange halo")
+        length = _YOURS_M / right[:, 2:]
+        rim = self.camera.centre + length * right
+        frame: list[Item] = [Line(np.vstack([rim, rim[:1]]), "blue", 3.4)]
+        if problem:
+            return frame, svg.paragraph((14, 24), problem, 430)
+        ends = self.camera.centre + length * rays
+        spokes = [Line(np.array([self.camera.centre, ends[i]]), "orange", 1.8) for i in range(0, len(uv), len(uv) // 4)]
+        return [*frame, *spokes, Line(np.vstack([ends, ends[:1]]), "orange", 1.8)], name
 
     def _line_of_sight(self) -> list[Item]:
         """To the balloon: broken where something stands in the way."""
@@ -354,6 +394,15 @@ class IntrinsicsView(View):
         for i, (name, value) in enumerate(self.numbers().items()):
             rows.append(svg.text((x, y + 40 * i), name, "note"))
             rows.append(svg.text((x, y + 17 + 40 * i), value, "label"))
+        return "".join(rows)
+
+    def _numbers_row(self, x: float, y: float) -> str:
+        """The figures that need no K, side by side under the pictures."""
+        figures = self.numbers()
+        rows = []
+        for i, name in enumerate(("field of view", "camera to globe", "red balloon")):
+            rows.append(svg.text((x + 230 * i, y), name, "note"))
+            rows.append(svg.text((x + 230 * i, y + 19), figures[name], "label"))
         return "".join(rows)
 
     # The hands -------------------------------------------------------------------------------------------------------

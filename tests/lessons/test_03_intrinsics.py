@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from camviz.photographs import photograph
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, towards_balloon
 from camviz.scenes.standard import textured_scene
 from camviz.views.intrinsics import GLOBE, GLOBE_RADIUS, IntrinsicsView
@@ -179,9 +180,7 @@ def test_k_holds_the_place_of_the_sensor_at_the_focus_setting(says):
 
 
 def test_the_field_of_view_of_a_centred_camera_and_the_half_pixel_at_its_edges(says):
-    (two,) = says(
-        "With the principal point in the middle it is 2 atan(width / 2f). Otherwise it is the sum of two unequal angles"
-    )
+    (two,) = says("With the principal point in the middle it is 2 atan(width / 2f).")
     (again,) = says("This is 2 atan(width / 2f), which holds when the principal point is in the middle.")
     low, high = says("With centres at integers the edges lie at −0.5 and width − 0.5.")
     (begins,) = says("the picture begins at −0.5, half a pixel before column 0")
@@ -258,7 +257,7 @@ def test_what_the_exercise_about_resizing_says_of_a_row_of_640(says):
 
 
 def test_binning_is_resizing(says):
-    n, s = says("Notice that binned by 4 and resized by 0.25 leave the same K.")
+    n, s = says("Notice that binned by 4 and resized by 0.25 leave the same K;")
     first_block = np.arange(n.value).mean()  # the middle of the first n pixels becomes pixel 0
     assert resized(first_block, s.value) == pytest.approx(0)
     assert s == 1 / n.value
@@ -267,8 +266,45 @@ def test_binning_is_resizing(says):
     assert resized(640 - high.value, s.value) == 160 - high.value
 
 
+def test_the_middle_of_the_globe_by_hand(says):
+    right, below, away = says(
+        "The middle of the globe is 0.68 m to the right of the axis, 0.36 m below it and 3 m away."
+    )
+    np.testing.assert_allclose([right.value, below.value], GLOBE[:2])
+    K = matrix(600, 580, 330, 250)
+    np.testing.assert_allclose(pixels([right.value, below.value, away.value], K)[0], [466.0, 319.6], atol=0.05)
+
+
+def test_the_view_is_widest_with_the_principal_point_in_the_middle(says):
+    (width,) = says("Here is your answer for pictures 640 pixels wide")
+    says("The angle is largest with the principal point in the middle.")
+    views = [
+        cv2.calibrationMatrixValues(matrix(600, 600, cx + 0.5), (int(width.value), 480), 1, 1)[0]
+        for cx in np.arange(-640, 1280, 0.5)
+    ]
+    assert np.arange(-640, 1280, 0.5)[np.argmax(views)] == (width.value - 1) / 2
+
+
+def test_the_eye_in_the_portrait(says):
+    """By finding it: the darkest spot near the place, in the whole portrait and in the binned region."""
+    x0, y0, n, m = says("a region that begins at (160, 60), binned 4 × 4")
+    u, v = says("One eye is at pixel (202, 100) of the whole portrait.")
+    assert n.value == m.value
+    grey = cv2.GaussianBlur(photograph("astronaut").mean(axis=-1), (0, 0), 2)
+    around = grey[90:111, 190:215]
+    row, column = np.unravel_index(around.argmin(), around.shape)
+    assert np.hypot(column + 190 - u.value, row + 90 - v.value) < 3
+    place = (np.array([u.value - x0.value, v.value - y0.value]) + 0.5) / n.value - 0.5  # edges stay where they are
+    small = grey[60:260, 160:360].reshape(50, 4, 50, 4).mean(axis=(1, 3))
+    row, column = np.unravel_index(small[7:13, 7:14].argmin(), (6, 7))
+    assert np.hypot(column + 7 - place[0], row + 7 - place[1]) < 1
+
+
 def test_cv2_resize_follows_the_half_pixel_rule(says):
-    says("the last one is shifted by a quarter of a pixel in both directions")
+    quarter, error = says(
+        "Without the half-pixel term, the principal point of a picture resized by 0.25 is wrong by 0.375 px."
+    )
+    assert error == abs(resized(255.5, quarter.value) - quarter.value * 255.5)
     s, ramp = 0.5, np.tile(np.arange(16, dtype=np.float32), (16, 1))
     small = cv2.resize(ramp, (8, 8), interpolation=cv2.INTER_LINEAR)
     columns = np.arange(8)
@@ -304,7 +340,7 @@ def test_the_teacher_s_four_squares(says):
 
 
 def test_the_shape_of_any_number_of_pixels(says):
-    (two,) = says("For pixels of any shape (..., 2) and any K, skew included.")
+    (two,) = says("for pixels of any shape (..., 2) and any K")
     rows, columns = says("Write each as a 3×3 matrix: what is done first stands nearest to K.")
     assert two.value == len(["u", "v"])
     assert (rows.value, columns.value) == matrix().shape
