@@ -32,7 +32,7 @@ LEVELS = np.geomspace(2.0**-12, 8.0, 32)  # seconds: half a stop apart, and as m
 _WIDTH, _HEIGHT = 640, 480
 _CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
 _EVERYTHING = "picture histogram curve"
-_HEIGHTS = {"picture curve": 486, _EVERYTHING: 606}  # of the picture, by the panels it has
+_HEIGHTS = {"picture curve": 506, _EVERYTHING: 606}  # of the picture, by the panels it has
 
 
 @dataclass(frozen=True)

@@ -580,6 +580,9 @@ def test_one_count_one_pixel_and_one_bracket_by_hand(says):
     answer = 1 + percent.value / 100 * drawn.standard_normal(1_000_000)
     counts = drawn.poisson(electrons.value * answer) + reading.value * drawn.standard_normal(1_000_000)
     assert counts.std() == pytest.approx(22.98, rel=0.005)  # what the cell below it prints; a σ is 0.07 %
+    (rounding,) = says("rounding adds 0.29 DN there, which your function does not know")
+    even = np.linspace(0, 50, 100_001)
+    assert rounding == np.std(even - np.rint(even))
     raw, dark, lit, mean = says(
         "A pixel reads 330 DN. In the dark it reads 120, and 1300 under the even light, where the mean pixel rises by "
         "1200 above its dark:"
