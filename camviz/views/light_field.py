@@ -417,13 +417,8 @@ class LightFieldView(View):
         panel = image_panel("yours", x, y, across, width, height, tallest=tallest)
         problem, slope = self._your_slopes[2], self._your_slope
         if not problem and not abs(slope) < _STEEPEST:
-            problem = (
-                "Your slope for this depth is not a number."
-                if np.isnan(slope)
-                else (
-                    f"Your slope for this depth is {slope:.4g} px a view. So steep a shear leaves the picture."
-                ).replace("-", "−")
-            )
+            steep = f"{_signed(slope)} px a view: so steep a shear leaves the picture."
+            problem = f"Your slope for this depth is {steep if np.isfinite(slope) else 'not a finite number.'}"
         if problem:
             return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Focused by your slope")
         attached["yours"] = jpeg(to_display(refocus(self.light_field, slope, self.mask)), quality=90)
