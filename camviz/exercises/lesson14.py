@@ -1,4 +1,4 @@
-"""Lesson 14, image sensors: electrons from lux, row times from a lamp's stripes, decibels, a leaky bucket brigade."""
+"""Lesson 14, image sensors: row times from a lamp's stripes, a leaky bucket brigade, electrons from lux, decibels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from camviz.checks import SHAPES, Arguments, Array, Exercise
 PHOTONS_PER_LUX = 4091.0  # of 555 nm, per second and µm²: 1/683 W/m² over h c / λ
 
 
-# 1: electrons from lux -----------------------------------------------------------------------------------------------
+# 3: electrons from lux -----------------------------------------------------------------------------------------------
 
 
 def expected_electrons(lux: Array, f_number: float, pitch_um: float, exposure_s: float, efficiency: float) -> Array:
@@ -126,7 +126,7 @@ def exposure_in_milliseconds(lux, f_number, pitch_um, exposure_s, efficiency):
     return expected_electrons(lux, f_number, pitch_um, exposure_s / 1000, efficiency)
 
 
-# 2: a lamp's stripes -------------------------------------------------------------------------------------------------
+# 1: a lamp's stripes -------------------------------------------------------------------------------------------------
 
 
 def row_time(stripes: Array, rows: int, mains_hz: float) -> Array:
@@ -232,7 +232,7 @@ def gaps_between_rows(stripes, rows, mains_hz):
     return np.asarray(stripes) / (2 * mains_hz) / (rows - 1)
 
 
-# 3: find the bug in the decibels --------------------------------------------------------------------------------------
+# 4: find the bug in the decibels --------------------------------------------------------------------------------------
 
 
 def dynamic_range_db(saturation_e: Array, dark_noise_e: Array) -> Array:
@@ -351,7 +351,7 @@ def difference_for_ratio(saturation_e, dark_noise_e):
     return 20 * np.log10(np.asarray(saturation_e) - (np.asarray(dark_noise_e) + 0.5))
 
 
-# 4: what arrives in its own packet -----------------------------------------------------------------------------------
+# 2: what arrives in its own packet -----------------------------------------------------------------------------------
 
 
 def arriving(electrons: Array, efficiency: float) -> Array:
@@ -468,4 +468,4 @@ def with_the_trails(electrons, efficiency):
     return np.array(arrived)
 
 
-EXERCISES = (EXPECTED_ELECTRONS, ROW_TIME, DYNAMIC_RANGE_DB, ARRIVING)
+EXERCISES = (ROW_TIME, ARRIVING, EXPECTED_ELECTRONS, DYNAMIC_RANGE_DB)

@@ -1,12 +1,17 @@
-"""The image sensor visualizer: which photons become electrons, how many a pixel holds, and what becomes of a shot."""
+"""The image sensor visualizer: which photons become electrons, how many a pixel holds, and what becomes of a shot.
+
+A reader's own count of electrons in green light can stand beside the right one.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from scipy import constants
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
@@ -20,9 +25,13 @@ from camviz.sensors import DigitalCamera, Sensor, decibel
 from camviz.sensors.digital_camera import Shot
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
 from camviz.views.base import View, choice, slider
+from camviz.yours import tried
 
 SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
 SCENE_LUX = 1000.0
+F_NUMBER = 4.0
+GREEN_NM = 555.0
+PHOTONS_PER_LUX = GREEN_NM * 1e-9 / (683 * constants.h * constants.c) * 1e-12  # of green light, per second and µm²
 CHANNELS = (("red", "red"), ("green", "green"), ("blue", "blue"))
 _MODELS: dict[str, PublishedSensor] = {
     "IMX174: 77 % at 525 nm": IMX174,
@@ -40,6 +49,9 @@ class ImageSensorView(View):
     wavelengths, for want of others. `fill_factor` is the share of the pixel that catches light, beyond what the
     published figure includes. Pitch and read noise are the published sensor's too. The gain is such that the converter
     ends just where the well is full, so the full well is the saturation capacity here. It opens as the IMX174 does.
+
+    With `green` there are two more bars: an unfiltered pixel under green light of 555 nm, and the same by `yours`, a
+    reader's function of lux on the wall, f-number, pitch in µm, exposure in s and efficiency.
     """
 
     title: ClassVar[str] = "Image sensor"
@@ -54,6 +66,8 @@ class ImageSensorView(View):
         32_700.0, 300.0, _MOST_E, 100.0, label="full well", unit="e⁻", help="what a pixel can hold"
     )
     bits: float = slider(16.0, 2.0, 16.0, 1.0, unit="bits", help="of the converter")
+    green: bool = False
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,6 +102,26 @@ class ImageSensorView(View):
         camera = self.camera(4)
         lux = camera.scene_lux * camera.transmittance / (4 * camera.f_number**2)
         return camera.channels.electrons * lux * camera.pitch_um**2 * self.exposure_ms / 1000
+
+    @cached_property
+    def green_e(self) -> float:
+        """Electrons that the same white wall frees in an unfiltered pixel under green light of 555 nm."""
+        lux, efficiency, pitch_um = SCENE_LUX / (4 * F_NUMBER**2), self._efficiency, _MODELS[self.model].pitch_um
+        return float(efficiency * PHOTONS_PER_LUX * lux * pitch_um**2 * self.exposure_ms / 1000)
+
+    @property
+    def _efficiency(self) -> float:
+        """Electrons per photon of 555 nm, the fill factor included."""
+        return float(self.sensor.efficiency(GREEN_NM))
+
+    @cached_property
+    def your_e(self) -> tuple[float, str]:
+        """The same by the reader's function, NaN without an answer, and what is wrong with it."""
+        if self.yours is None:
+            return np.nan, "No function of yours has been given."
+        pitch_um, exposure_s = _MODELS[self.model].pitch_um, self.exposure_ms / 1000
+        answer, problem = tried(self.yours, (SCENE_LUX, F_NUMBER, pitch_um, exposure_s, self._efficiency), 0.0)
+        return float(answer), problem
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
@@ -148,23 +182,43 @@ class ImageSensorView(View):
     def _electrons(self) -> str:
         """Electrons of each channel beside the full well and the threshold, on a logarithmic scale."""
         low, high = 0.0, float(np.log10(3 * _MOST_E))
-        panel = plot_panel("electrons", 70, 330, 480, 200, (0.4, 5.9), (low, high))
+        freed = dict(zip(("red", "green", "blue", "ink"), self.white_e, strict=True))
+        names = ["red", "green", "blue", "no filter"]
+        if self.green:
+            freed |= {"muted": self.green_e, "orange": self.your_e[0]}
+            names += ["555 nm", "yours"]
+        panel = plot_panel("electrons", 70, 330, 480, 200, (0.4, len(names) + 1.9), (low, high))
         yticks = logarithmic(low, high)
-        xticks = [(i + 1.0, name) for i, name in enumerate(("red", "green", "blue", "no filter"))]
+        xticks = [(i + 1.0, name) for i, name in enumerate(names)]
         content = grid(panel, xticks=[], yticks=yticks)
-        for i, class_ in enumerate(("red", "green", "blue", "ink")):
-            top = np.log10(np.maximum(np.array([self.white_e[i], min(self.white_e[i], self.full_well)]), 1))
+        for i, (class_, electrons) in enumerate(freed.items()):
+            top = np.log10(np.maximum(np.array([electrons, min(electrons, self.full_well)]), 1))
             left, right = np.array([i + 0.68]), np.array([i + 1.32])
+            if np.isnan(electrons):
+                continue
             content += bars(panel, left, right, top[:1], f"{class_} dotted")
             content += bars(panel, left, right, top[1:], f"wash fill-{class_}") + bars(
                 panel, left, right, top[1:], class_
             )
+        content += self._in_words(panel, len(names))
         floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
         content += self._level(panel, self.full_well, f"full well {self.full_well:,.0f} e⁻", "orange", -6)
         content += self._level(panel, floor_e, f"threshold {floor_e:.1f} e⁻", "purple", -6)
         return axes(panel, "pixels of a white wall", "electrons", xticks, yticks) + panel.show(
             content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux"
         )
+
+    def _in_words(self, panel: Panel, bar: int) -> str:
+        """The two counts in green light above their bars, or what is in the way of the reader's."""
+        if not self.green:
+            return ""
+        electrons, problem = self.your_e
+        words = svg.paragraph((16, 118), problem, 0.6 * panel.width, "note halo") if problem else ""
+        for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
+            if np.isfinite(one):
+                below = panel.place((bar - 1 + i, np.log10(np.clip(min(one, self.full_well), 4, 1e6)))) + (0, 18)
+                words += svg.text(below, f"{float(f'{one:.3g}'):,.0f}", f"{class_} halo middle")
+        return words
 
     def _level(self, panel: Panel, electrons: float, words: str, class_: str, above: float) -> str:
         y = float(panel.place((0, np.log10(max(electrons, 1))))[1])

@@ -1,10 +1,14 @@
-"""The read-out visualizer: one exposure leaves the sensor, bucket by bucket or row by row, while the world moves on."""
+"""The read-out visualizer: one exposure leaves the sensor, bucket by bucket or row by row, while the world moves on.
+
+Before a wall in the light of a lamp, a reader's own row time can be drawn beside the sensor's.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -19,13 +23,17 @@ from camviz.lenses.base import Array
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors.readout import bucket_brigade, row_times
 from camviz.views.base import View, choice, slider
+from camviz.yours import tried
 
 ROWS = 480  # of the sensor: what the row time counts
 LARGE = (320, 240)  # pixels of a fine picture
-SMALL = {"fan": (128, 96), "view from a train": (80, 60)}  # of a draft: the train is ray-traced
+SMALL = {"fan": (128, 96), "view from a train": (80, 60), "wall under a lamp": (128, 96)}  # the train is ray-traced
 BUCKETS = (16, 12)  # of the brigade drawn, columns and rows
 BLADES = 5
 EXPOSURE_S = 1e-3
+MAINS_HZ = 50.0  # of the lamp, which is bright twice in each period
+LAYOUTS = {"pictures": 292, "pictures time": 590, "pictures charge time": 590}
+"""What is drawn, and how tall it is."""
 _DIM = 0.16  # of what has not been read
 _FOV_DEG = 60.0
 _ROW_TICKS = [(float(row), str(row)) for row in range(0, ROWS + 1, 120)]
@@ -42,7 +50,9 @@ class ReadoutView(View):
     """A sensor of 480 rows being read out, `time` percent of the way through one frame.
 
     A CCD, and a CMOS sensor with a global shutter, expose all rows at once and read them later; a rolling shutter
-    exposes each row just before it is read. The fan makes `speed` turns per second, the train `speed` metres.
+    exposes each row just before it is read. The fan makes `speed` turns per second, the train `speed` metres; the lamp
+    over the wall hangs on the mains, 50 Hz. `panels` is one of LAYOUTS. `yours` is a reader's function from the stripes
+    that the lamp leaves in a frame, its rows and the mains frequency to the seconds from row to row.
     """
 
     title: ClassVar[str] = "Read-out"
@@ -50,10 +60,14 @@ class ReadoutView(View):
     readout: str = choice(
         "CMOS, rolling shutter", "CMOS, global shutter", "CCD", label="sensor", help="how charge is exposed and read"
     )
-    subject: str = choice("fan", "view from a train", label="scene", help="what moves while the sensor is read")
+    subject: str = choice(
+        "fan", "view from a train", "wall under a lamp", label="scene", help="what moves while the sensor is read"
+    )
     time: float = slider(55.0, 0.0, 100.0, 1.0, label="time", unit="%", help="how much of the frame has been read")
     speed: float = slider(12.0, 0.0, 40.0, 0.5, label="speed", unit="turns/s or m/s", help="of the fan, or the train")
     row_us: float = slider(64.0, 2.0, 120.0, 1.0, label="row time", unit="µs", help="from one row to the next")
+    panels: str = "pictures charge time"
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -61,6 +75,8 @@ class ReadoutView(View):
             raise ValueError(f"row_us must be positive, got {self.row_us}")
         if not 0 <= self.time <= 100:
             raise ValueError(f"time must be a share of the frame, 0 to 100 %, got {self.time}")
+        if self.panels not in LAYOUTS:
+            raise ValueError(f"panels must be one of {', '.join(map(repr, LAYOUTS))}, got {self.panels!r}")
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -95,6 +111,19 @@ class ReadoutView(View):
         row_s = self.frame_s / height if self.rolling else 0.0
         return _seen(self.subject, self.speed, self.now_s, row_s, width, height)
 
+    @property
+    def stripes(self) -> float:
+        """How often the lamp over the wall is bright while a rolling shutter reads one frame."""
+        return 2 * MAINS_HZ * self.frame_s
+
+    @cached_property
+    def your_row_s(self) -> tuple[float, str]:
+        """The seconds from row to row by the reader's function, NaN without an answer, and what is wrong with it."""
+        if self.yours is None:
+            return np.nan, "No function of yours has been given."
+        answer, problem = tried(self.yours, (self.stripes, ROWS, MAINS_HZ), 0.0)
+        return float(answer), problem
+
     @cached_property
     def lean_px(self) -> float:
         """How far the world has moved on between the first and the last row, in pixels of a 640 px row.
@@ -110,18 +139,31 @@ class ReadoutView(View):
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
+        frame = {"frame": f"{ROWS} rows · {self.row_us:g} µs = {1e3 * self.frame_s:.1f} ms"}
+        read = {"read so far": f"{self.read_rows} of {ROWS} rows"}
+        if self.subject == "wall under a lamp":
+            stripes = f"{self.stripes:.2f} in a frame" if self.rolling else "none"
+            return frame | {"stripes of the lamp": stripes} | self._your_figure() | read
         unit = "turns/s" if self.subject == "fan" else "m/s"
         what = "a blade's tip" if self.subject == "fan" else "a thing at 3 m"
-        return {
-            "frame": f"{ROWS} rows · {self.row_us:g} µs = {1e3 * self.frame_s:.1f} ms",
-            "speed": f"{self.speed:g} {unit}",
-            "between first and last row's exposure": f"{what} moves {self.lean_px:.0f} px",
-            "read so far": f"{self.read_rows} of {ROWS} rows",
-        }
+        apart = {"between first and last row's exposure": f"{what} moves {self.lean_px:.0f} px"}
+        return frame | {"speed": f"{self.speed:g} {unit}"} | apart | read
+
+    def _your_figure(self) -> dict[str, str]:
+        """What the reader's function makes of the stripes."""
+        row_s, problem = self.your_row_s
+        if self.yours is None or problem:
+            return {}
+        return {"row time, yours": f"{1e6 * row_s:.4g} µs"}
+
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        figures = self.numbers()
+        return figures if "time" in self.panels else {name: figures[name] for name in ("frame", "read so far")}
 
     def description(self) -> str:
         """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
         how = {
             "CCD": "All rows were exposed at once; their charge moves row by row into a register and along it.",
             "CMOS, global shutter": "All rows were exposed at once; each is then read through its columns' amplifiers.",
@@ -136,15 +178,18 @@ class ReadoutView(View):
         read = round(size[1] * self.time / 100)
         partial = whole.copy()
         partial[read:] = (_DIM * whole[read:]).astype(np.uint8)
+        height = LAYOUTS[self.panels]
         body = (
-            svg.rectangle(0, 0, 960, 590, "paper")
+            svg.rectangle(0, 0, 960, height, "paper")
             + self._photo("scene", 20, "The scene at this moment", size, "moves on")
             + self._photo("read", 350, "The picture, as far as it is read", size)
-            + self._buckets(whole)
-            + self._timing()
             + self._numbers()
         )
-        return Picture(body, 960, 590, self.title, self.description(), {"scene": jpeg(now), "read": jpeg(partial)})
+        if "charge" in self.panels:
+            body += self._buckets(whole)
+        if "time" in self.panels:
+            body += self._timing()
+        return Picture(body, 960, height, self.title, self.description(), {"scene": jpeg(now), "read": jpeg(partial)})
 
     def _photo(self, name: str, x: float, title: str, size: tuple[int, int], note: str = "") -> str:
         panel = image_panel(name, x, 34, 310, *size)
@@ -194,7 +239,8 @@ class ReadoutView(View):
     @cached_property
     def _clock(self) -> Panel:
         span = 1e3 * (self.frame_s + EXPOSURE_S)
-        return plot_panel("timing", 400, 326, 260, 186, (-1e3 * EXPOSURE_S, span), (ROWS, 0))
+        left = 400 if "charge" in self.panels else 70
+        return plot_panel("timing", left, 326, 660 - left, 186, (-1e3 * EXPOSURE_S, span), (ROWS, 0))
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> ReadoutView:
         moved = 100 * dx / (1e3 * self.frame_s * self._clock.scale[0])
@@ -216,6 +262,7 @@ class ReadoutView(View):
             + upright(panel, 1e3 * self.now_s, "ink")
             + svg.text((panel.width - 8, 18), "exposed", "blue halo end")
             + svg.text((panel.width - 8, 36), "read", "orange halo end")
+            + self._your_line(panel)
         )
         return axes(panel, "time [ms]", "row", yticks=_ROW_TICKS) + panel.show(
             content,
@@ -225,12 +272,24 @@ class ReadoutView(View):
             label="Time of the read-out; drag or press the arrow keys",
         )
 
+    def _your_line(self, panel: Panel) -> str:
+        """When each row is read if the reader's row time is right, or what is in the way of that."""
+        if self.yours is None or self.subject != "wall under a lamp":
+            return ""
+        row_s, problem = self.your_row_s
+        if problem:
+            return svg.paragraph((36, panel.height - 52), problem, 0.36 * panel.width)
+        rows = np.linspace(0, ROWS, 13)
+        marks = svg.dots(panel.place(np.stack([1e3 * row_s * rows, rows], axis=-1)), "orange", 9)
+        return marks + svg.text((panel.width - 8, 54), "dots: read, by your row time", "orange halo end")
+
     def _numbers(self) -> str:
         rows = [svg.text((690, 26), "This read-out", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
+        for i, (name, value) in enumerate(self._told().items()):
             rows.append(svg.text((690, 50 + 44 * i), name, "note"))
-            rows.append(svg.text((690, 69 + 44 * i), value, "label"))
-        rows.append(svg.paragraph((690, 340), _WORDS[self.readout], 250, "label", 19))
+            rows.append(svg.text((690, 69 + 44 * i), value, "orange" if "yours" in name else "label"))
+        if "time" in self.panels:
+            rows.append(svg.paragraph((690, 340), _WORDS[self.readout], 250, "label", 19))
         return "".join(rows)
 
 
@@ -256,8 +315,8 @@ def fan(u: ArrayLike, v: ArrayLike, turns: ArrayLike) -> Array:
 def _seen(subject: str, speed: float, now_s: float, row_s: float, width: int, height: int) -> np.ndarray:
     """The picture whose rows are `row_s` apart, and the scene at `now_s`: sRGB bytes (2, height, width, 3)."""
     times = np.concatenate([row_times(height, row_s), np.full(height, now_s)])
-    draw = _fan_rows if subject == "fan" else _train_rows
-    both = to_display(draw(speed * times, width, height)).reshape(2, height, width, 3)
+    draw = {"fan": _fan_rows, "view from a train": _train_rows}.get(subject, _wall_rows)
+    both = to_display(draw(times if draw is _wall_rows else speed * times, width, height)).reshape(2, height, width, 3)
     both.flags.writeable = False
     return both
 
@@ -267,6 +326,12 @@ def _fan_rows(turns: Array, width: int, height: int) -> Array:
     u = (np.arange(width) - (width - 1) / 2) / (height / 2)
     v = (np.arange(len(turns)) % height - (height - 1) / 2) / (height / 2)
     return fan(u, v[:, None], turns[:, None])
+
+
+def _wall_rows(times_s: Array, width: int, height: int) -> Array:
+    """Rows (n, width, 3) of a white wall in the light of a lamp that is bright twice in each period of the mains."""
+    light = 0.04 + 0.7 * np.sin(2 * np.pi * MAINS_HZ * times_s) ** 2
+    return np.broadcast_to(light[:, None, None] * np.array([1.0, 0.97, 0.9]), (len(times_s), width, 3))
 
 
 def _train_rows(way_m: Array, width: int, height: int) -> NDArray[np.float32]:

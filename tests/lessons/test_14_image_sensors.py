@@ -11,6 +11,7 @@ from scipy.stats import nbinom
 
 from camviz import notebooks
 from camviz.exercises import lesson14
+from camviz.photographs import photograph
 from camviz.sensors import PUBLISHED, SHUTTERS, Sensor, decibel, smeared, transferred
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, KAF_3200ME
 from camviz.views.image_sensor import ImageSensorView
@@ -26,6 +27,7 @@ CMV4000_SHEET = {"η × fill factor": 60, "nm": 550, "fill factor": 42}
 KAF_0400_CURVE = {400: 3, 550: 33, 700: 40}  # percent
 KAF_3200ME_MEASURED = {"η": 79, "noise": 12.6, "saturation": 70_000}
 KAF_50100_SHEET = {"rows": 6132, "transfer": 0.999999}
+ASI294MM_CURVE = {"low gain": 6, "high gain": 2}  # ZWO's curve, as S. Bellavia reads it on cloudynights.com
 REFERENCE = {"K": 0.280769, "η": 0.45136, "σ_d": 10.898, "photons": 30_957}  # of the emva1288 project's result file
 
 NOISE, FULL = IMX174_MEASURED["noise"], 6000.0
@@ -133,6 +135,16 @@ def test_what_a_bucket_brigade_loses(says):
     assert poor.value**rows.value < 1e-20
     rows, c = says("This is why a CCD of 6000 rows needs a transfer efficiency of 0.999999.")
     assert c.value**rows.value > 0.99 > (1 - 10 * (1 - c.value)) ** rows.value
+
+
+def test_twenty_shifts_by_hand(says):
+    row, arrived, sent = says("Row 19 needs twenty shifts, and 818 of its 1000 electrons arrive in their own packet.")
+    column = np.zeros(60)
+    column[int(row.value)] = sent.value
+    assert arrived == lesson14.arriving(column, 0.99)[int(row.value)]
+    assert arrived == sent.value * nbinom.pmf(0, 20, 0.99)
+    (rows,) = says("now reads a photograph of 512 rows, with the register above its first row")
+    assert rows == len(photograph("camera"))
 
 
 def test_a_packet_arrives_with_a_trail_after_the_negative_binomial_law(says):
@@ -264,6 +276,8 @@ def test_photons_of_a_lux(says):
     efficacy, nm = says("A lux is 1/683 W/m² of green light of 555 nm")
     assert efficacy == constants.physical_constants["luminous efficacy"][0]
     assert nm == 1e9 * constants.c / 540e12
+    (bar,) = says("an unfiltered pixel in green light of 555 nm")
+    assert bar.value == nm.value
     (green,) = says("The light is green, with 4091 photons per lux, second and µm².")
     per_lux = 1e-12 / efficacy.value / (constants.h * constants.c / 555e-9)
     assert green == per_lux
@@ -359,7 +373,7 @@ def test_more_bits_give_little(says):
 
 
 def test_what_six_bits_are_worth_by_the_formula(says):
-    bits, count = says("Why 6 bits are more than 36 dB, and less")
+    bits, count = says("why 6 bits are more than 36 dB")
     steps, again, said = says(
         "Six bits count 63 steps: from one step to full scale that is 36 dB. The table says 46.4 dB."
     )
@@ -434,6 +448,39 @@ def test_how_much_noise_a_converter_needs(says):
     assert noise == np.sqrt(bright.value)
     assert noise.value > step_of(6) / 2
     assert pixels_seen(bright.value, 6).mean() == pytest.approx(bright.value, rel=0.01)
+
+
+def test_iso_and_dual_conversion_gain(says):
+    """The lesson's model: 1 V of swing, 120 µV of noise before the amplifier, 300 µV after it; 30 or 120 µV/e⁻."""
+    says("at ISO 200 at half as many as at ISO 100")
+    most, widest = says("only the large capacitance holds all 33,333 electrons, and the range is 69.4 dB")
+    full, small, large, small_db, large_db = says(
+        "both modes saturate at 8333 electrons, but the small capacitance has 2.7 e⁻ of noise in place of 4.7: 68.3 dB "
+        "in place of 64.1"
+    )
+
+    def of(iso, microvolts):
+        """Saturation and noise in electrons when the amplifier brings ISO 100's 33,333 electrons down by ISO / 100."""
+        saturation = 1e6 / 30 * 100 / iso
+        amplifier = 1e6 / (saturation * microvolts)
+        return saturation, np.sqrt(120**2 + (300 / amplifier) ** 2) / microvolts
+
+    at_100, at_400, in_high = of(100, 30), of(400, 30), of(400, 120)
+    assert of(200, 30)[0] == at_100[0] / 2
+    assert most == at_100[0]
+    assert most.value > 1e6 / 120  # what the small capacitance holds
+    assert widest == db(at_100[0] / (at_100[1] + 0.5))
+    assert full == at_400[0] == pytest.approx(in_high[0])
+    assert small == in_high[1]
+    assert large == at_400[1]
+    assert small_db == db(in_high[0] / (in_high[1] + 0.5))
+    assert large_db == db(at_400[0] / (at_400[1] + 0.5))
+    says("At the same exposure the noise in electrons falls as ISO rises.")
+    for microvolts in (30, 120):
+        assert (np.diff([of(iso, microvolts)[1] for iso in (400, 800, 1600, 3200)]) < 0).all()
+    before, after = says("falls from over 6 e⁻ to below 2 at one setting of its gain")
+    assert before == ASI294MM_CURVE["low gain"]
+    assert after == ASI294MM_CURVE["high gain"]
 
 
 # 5: the exercises -----------------------------------------------------------------------------------------------------
