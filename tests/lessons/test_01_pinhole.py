@@ -459,3 +459,15 @@ def test_before_the_lesson_a_walk_does_not_move_a_vanishing_point(says):
     shift = [np.ptp(opencv_s([[0, 1.6, Z], [-walk.value, 1.6, Z]])[:, 0]) for Z in (10, 100, 1e4, 1e9)]
     assert all(np.diff(shift) < 0)
     assert shift[-1] < 1e-3
+
+
+def test_the_curve_that_a_teacher_draws_on_the_board(says):
+    depth, narrow, high, lowest, low, wide, up, last = says(
+        "For a box 50 mm deep draw the blur over the hole's width, both in mm: (0.1, 0.68), (0.26, 0.37), (0.5, 0.52), "
+        "(1, 1.00)."
+    )
+    assert lowest == best(depth.value)
+    assert low == blur(best(depth.value), depth.value)
+    assert high == blur(narrow.value, depth.value)
+    assert up == blur(wide.value, depth.value)
+    assert last == blur(1.0, depth.value)
