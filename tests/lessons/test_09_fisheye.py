@@ -483,3 +483,15 @@ def test_the_equidistant_map_nearly_straightens_the_published_lens(says):
     apart = F[0] / 2 * np.abs(g(theta) - theta)
     assert off == apart.max()
     assert apart.argmax() == len(apart) - 1
+
+
+def test_what_a_teacher_draws_and_shows(says):
+    middle, side, tangent, half_tan, two, angle, at_90, half_sin, also, sine = says(
+        "At 60° and 90° they are: perspective 1.73 and ∞, stereographic 1.15 and 2, equidistant 1.05 and 1.57, "
+        "equisolid 1.00 and 1.41, orthographic 0.87 and 1."
+    )
+    at_60, right = ([r(np.radians(one.value)) for r in RADIUS.values()] for one in (middle, side))
+    assert at_60 == [tangent, half_tan, angle, half_sin, sine]
+    assert right[1:] == [two, at_90, also, 1]
+    says("the lens of the lesson's first picture sees both hands")
+    assert 150 * np.pi / 2 < 239.5

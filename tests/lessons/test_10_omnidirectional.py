@@ -621,3 +621,29 @@ def test_every_twelfth_pixel_and_the_dots_above_the_lines(says):
         near, far = (2 * np.arctan2(beside, Z - along) / (2 * beside / Z) for Z in (0.6, 20.0))
         assert near > 1.05
         assert far == pytest.approx(1, abs=0.02)
+
+
+def test_the_half_circle_that_a_teacher_draws_on_the_board(says):
+    *given, first, second, third = says(
+        "rays that come straight down, 0.2, 0.5 and 0.8 from its axis. They are reflected, and prolonged behind the "
+        "mirror they cross the axis at 0.51, 0.58 and 0.83 from the centre"
+    )
+    x = np.array([one.value for one in given])
+    down = np.tile([0.0, -1.0], (3, 1))
+    on = np.stack([x, np.sqrt(1 - x**2)], axis=-1)
+    out = reflected(down, on)
+    assert [first, second, third] == list(on[:, 1] - x * out[:, 1] / out[:, 0])
+    says("Behind a parabola they all cross at one.")
+    on = np.stack([x, 1 - x**2], axis=-1)
+    out = reflected(down, np.stack([2 * x, np.ones(3)], axis=-1))
+    np.testing.assert_allclose(on[:, 1] - x * out[:, 1] / out[:, 0], 0.75)
+
+
+def test_the_double_sphere_with_the_bug_is_right_in_the_very_middle_only(says):
+    says("The given function is right in the very middle only.")
+    xi, alpha, x = -0.075, 0.744, np.linspace(0, 2, 11)
+    d1 = np.hypot(x, 1)
+    z = 1 + xi * d1
+    apart = np.abs(x / (alpha * d1 + (1 - alpha) * z) - x / (alpha * np.hypot(x, z) + (1 - alpha) * z))
+    assert apart[0] == 0
+    assert (402.5 * apart[1:] > 4).all()
