@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from typing import Any
 
@@ -58,8 +59,7 @@ def complaints(notebook: Notebook, file_name: str) -> list[str]:
     found = [*_header(notebook, number), *_setup(notebook), *_cells(notebook), *_links(notebook)]
     if number != "00":
         found += [*_questions(notebook, number), *_exercises(notebook, number), *_ending(notebook)]
-        if any("attempt(" in cell.source for cell in notebook.cells):  # a lesson of the second edition
-            found += [*_own_functions(notebook), *_reads_well(notebook, number)]
+        found += [*_own_functions(notebook), *_reads_well(notebook, number)]
     return found
 
 
@@ -164,7 +164,8 @@ def _own_functions(notebook: Notebook) -> list[str]:
         for cell in notebook.cells
         if cell.cell_type == "code" and not {"stub", "check"} & set(cell.metadata.get("tags", []))
     ]
-    run = [name for name in names if any(re.search(rf"\b{name}\b", source) for source in rest)]
+    used = {node.id for source in rest for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name)}
+    run = [name for name in names if name in used]
     found = [] if len(run) >= 2 else [f"at least two of the reader's functions must run in the lesson, {run} do"]
     if not any("yours=" in source and "explore(" in source for source in rest):
         found.append("no visualizer runs a function of the reader's: explore(…View(…, yours=…))")

@@ -69,6 +69,8 @@ def lesson():
         code('ask("05.undistort")'),
         code("print(round((1 / 0.9) ** 0.5, 3))", "nbval-check-output"),
         *(cell for name in exercises("05") for cell in exercise_cells(name)),
+        code('explore(DistortionView(yours=distort), "k1")'),
+        code("turn = attempt(fold_radius, -0.3, like=0.0)\nplt.plot(turn, 0.7, 'o')"),
         code('quiz("05")'),
         text(ENDING),
     ]
@@ -143,6 +145,11 @@ def drop_notes(notebook):
         (replace("<details>", "<div>"), "not folded"),
         (drop_notes, "note for the teacher"),
         (quiz_last, "above the recap"),
+        (replace("(fold_radius, -0.3", "(distort, -0.3"), "at least two of the reader's functions"),
+        (replace("yours=distort", "k2=0"), "no visualizer runs a function of the reader's"),
+        (replace("plt.plot(turn", "print(turn"), "nothing of the reader's own is plotted"),
+        (replace("## Recap", "The fold comes first.\n## Recap"), "the first use of 'Fold' should link"),
+        (replace("## Recap", "Word" + " word" * 35 + ".\n\n## Recap"), "a sentence of 36 words"),
     ],
 )  # fmt: skip
 def test_each_departure_from_the_pattern_is_named(lesson, change, complaint):
