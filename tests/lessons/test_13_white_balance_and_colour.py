@@ -743,3 +743,9 @@ def test_before_the_lesson_a_matrix_has_nine_numbers(says):
     rows, columns_ = says("The maker of a camera has measured a 3 × 3 matrix")
     says("the best translation that nine numbers can give")
     assert rows.value * columns_.value == shot(BULB)[2].size == 9
+
+
+def test_the_sum_that_a_teacher_does_on_the_board(says):
+    middle, *change = says("a sensor whose only curve is 1, 2, 1 does not notice a change by 0.5, −0.2, −0.1")
+    curve = np.array([1, middle.value, 1])
+    assert curve @ [one.value for one in change] == pytest.approx(0, abs=1e-12)
