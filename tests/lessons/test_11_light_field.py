@@ -155,9 +155,9 @@ def test_the_published_benchmark(says):
 
 def test_what_views_cost_in_pixels(says):
     sensor, n, again = says(
-        "A light field camera has a sensor of 40 million pixels and 9 × 9 of them under each microlens."
+        "A light field camera has a sensor of 40 million pixels and 10 × 10 of them under each microlens."
     )
-    total, views, millions, width, height = says("Yes: 40 / 81 = 0.49 million, a picture of about 700 × 700 pixels.")
+    total, views, millions, width, height = says("Yes: 40 / 100 = 0.40 million, a picture of about 630 × 630 pixels.")
     assert total.value == sensor.value
     assert views == n.value * again.value
     assert millions == sensor.value / views.value
@@ -165,12 +165,14 @@ def test_what_views_cost_in_pixels(says):
     assert height.value == width.value
     (all_of_them,) = says("40 million: every pixel of the sensor takes part in it.")
     assert all_of_them.value == sensor.value
-    (a_ninth,) = says("About 4.4 million, a ninth.")
+    (a_ninth,) = says("About 4 million, a tenth.")
     assert a_ninth == sensor.value / n.value
-    (under_one,) = says("They do take part, 81 at a time")
-    (directions,) = says("What was spent on 81 directions is not there for places.")
+    (right,) = says("About 0.4 million.")
+    assert right.value == millions.value
+    (under_one,) = says("They do take part, 100 at a time")
+    (directions,) = says("What was spent on 100 directions is not there for places.")
     assert directions.value == views.value
-    (rows, columns, share) = says("9 × 9 = 81 views share the sensor")
+    (rows, columns, share) = says("10 × 10 = 100 views share the sensor")
     assert share == rows.value * columns.value
     assert under_one.value == share.value
     wide, tall = says("one sensor of 720 × 540 pixels, three ways")
@@ -401,7 +403,7 @@ def test_one_slope_by_hand_and_your_slopes_along_a_row(says):
 
 
 def test_your_picture_of_a_pair_lies_half_a_slope_to_the_left(says):
-    says("(Your pictures lie d/2 to the left.")
+    says("(Your pictures lie half a disparity beside camviz's.")
     d, x0 = 8, 100
     left, right = np.zeros(200), np.zeros(200)
     left[x0], right[x0 - d] = 1, 1

@@ -171,8 +171,8 @@ def smear_by_shifting(light, exposure_s, shift_s):
 
 def test_how_bright_the_stripe_of_a_lamp_is(says):
     says(
-        "Beside its lamp the stripe is as bright as two ratios make it: the time of one shift over the exposure, "
-        "times the number of rows that the lamp covers. The shorter the exposure, the worse."
+        "How bright is the stripe, as a share of its lamp? It is the time of one shift divided by the exposure, times "
+        "the number of rows that the lamp covers. The shorter the exposure, the worse."
     )
     light = np.zeros(50)
     light[20:24] = 1e6  # electrons per second: a lamp of four rows
