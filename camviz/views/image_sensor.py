@@ -213,7 +213,7 @@ class ImageSensorView(View):
         if not self.green:
             return ""
         electrons, problem = self.your_e
-        words = svg.paragraph((16, 118), problem, 0.6 * panel.width, "note halo") if problem else ""
+        words = svg.paragraph((326, 60), problem, 148, "note halo") if problem else ""
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
             if np.isfinite(one):
                 below = panel.place((bar - 1 + i, np.log10(np.clip(min(one, self.full_well), 4, 1e6)))) + (0, 18)
