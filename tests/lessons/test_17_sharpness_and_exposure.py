@@ -488,3 +488,12 @@ def test_the_replies_of_the_exercises(says):
     assert np.arccos(0) == pytest.approx(np.pi / two.value)
     (place,) = says("for the places x = step · 0, 1, 2 …")
     assert place.value == 2
+
+
+def test_the_teacher_s_card_and_squared_paper(says):
+    aside, height = says("their edges leaning: 9 mm aside on 10 cm of height")
+    assert np.degrees(np.arctan(aside.value / (10 * height.value))) == pytest.approx(5, abs=0.2)
+    says("a straight edge that moves one square aside in ten rows")
+    assert len({round((row + 0.5) / 10 % 1, 6) for row in range(10)}) == 10
+    narrow, wide = says("Ask how much longer the shutter stays open at f/16 than at f/8.")
+    assert (narrow.value / wide.value) ** 2 == 4  # and not twice
