@@ -695,3 +695,17 @@ def test_before_the_lesson_whose_background_is_more_blurred(says):
 def test_before_the_lesson_light_near_the_rim_arrives_too(says):
     says("To the same point of the paper as the light through the middle.")
     assert blur(50.0, 1.0, 2000.0, 2000.0) == pytest.approx(0, abs=1e-12)  # both rims, and so all between them
+
+
+def test_the_limits_that_a_teacher_draws_on_the_board(says):
+    f, N, *drawn, no_limit = says(
+        "draw near and far limits of 50 mm at f/8 on the board, both over the focus distance: 2.3 m and 4.2 m for 3 m, "
+        "3.4 m and 9.5 m for 5 m. From 10.5 m on there is no far limit."
+    )
+    for near, far, s in (drawn[:3], drawn[3:]):
+        found = limits(f.value, N.value, 1000 * s.value, 0.03)
+        assert near == found[0] / 1000
+        assert far == found[1] / 1000
+    assert no_limit == hyperfocal(f.value, N.value, 0.03) / 1000
+    by_hand, away = says("Do one point by hand on the board, 50 mm and 1 m.")
+    assert image(by_hand.value, 1000 * away.value) == pytest.approx(52.63, abs=5e-3)  # as the lesson's cell prints it

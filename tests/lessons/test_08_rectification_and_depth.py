@@ -599,3 +599,23 @@ def test_before_the_lesson_which_side_is_hidden(says):
         hidden[name] = [camera + (edge - camera) * hedge / trunk[2] for edge in trunk[:2]]
     assert hidden["right"][0] < hidden["left"][0]  # more on the left of the trunk
     assert hidden["right"][1] < hidden["left"][1]
+
+
+def test_what_a_teacher_marks_on_the_board(says):
+    f, B, *marked = says(
+        "take f = 800 px and B = 0.1 m, and mark on a line on the board how far 10, 8, 6, 4 and 2 px of disparity are: "
+        "8, 10, 13.3, 20 and 40 m."
+    )
+    disparities, depths = np.array([one.value for one in marked[:5]]), marked[5:]
+    assert list(depths) == list(f.value * B.value / disparities)
+    assert np.ptp(np.diff(disparities)) == 0
+    assert (np.diff([one.value for one in depths], n=2) > 0).all()
+    whole, less = says("Only then let all compute f B/d for 8 px and for 7.5 px, and talk.")
+    assert whole.value - less.value == 0.5
+    nearer, farther = (800 * 0.1 / one.value for one in (whole, less))
+    assert nearer == pytest.approx(10)
+    assert farther - nearer == pytest.approx(0.667, abs=1e-3)  # one side of the interval that the lesson prints
+    cm, px, wrong, at = says("a telephone with B = 1 cm and f = 3000 px: half a pixel is worth 42 m at 50 m.")
+    assert wrong == at.value**2 / (cm.value / 100 * px.value) / 2
+    (near,) = says("They compute the telephone's error at 2 m")
+    assert near.value**2 / (cm.value / 100 * px.value) / 2 == pytest.approx(0.067, abs=1e-3)

@@ -430,6 +430,57 @@ def test_the_quiz_about_two_causes(says):
     assert (one.value, other.value) == (lens_leaves.value, pixel.value)
 
 
+def test_before_the_lesson_what_an_mtf_says(says):
+    left, frequency = says("A magazine says of a camera: its MTF is 0.6 at 0.1 cycles per pixel.")
+    (share,) = says("As stripes everywhere, with 60 % of their contrast.")
+    (sharp,) = says("Sharp in 60 % of the pixels, and blurred in the others.")
+    assert share.value == sharp.value == 100 * left.value
+    says("They repeat every ten pixels, and the difference between bright and dark")
+    (seen,), (again,) = says("Where 0.6 is left, you see"), says("is 0.6 of what it was in the scene")
+    assert seen.value == again.value == left.value
+    assert 1 / frequency.value == 10
+
+
+def test_before_the_lesson_two_stages(says):
+    (wall,) = says("A projector throws a grating on a wall, and 0.8 of its contrast arrives there.")
+    (camera,), (alone,) = says("By itself it would leave 0.4 of this"), says("It would be 0.4 if the wall had the full")
+    (product,), (weaker,), (mean,) = says("0.32: the camera takes"), says("0.4: the camera is"), says("0.6: the two")
+    one, other = says("Yes: 0.8 times 0.4.")
+    assert (one.value, other.value) == (wall.value, camera.value)
+    width = brentq(lambda w: np.sinc(w) - camera.value, 0, 1)  # of a pixel that leaves this much of one cycle
+    seen = quad(lambda x: wall.value * np.cos(2 * np.pi * x), -width / 2, width / 2)[0] / width
+    assert product == seen
+    assert product == one.value * other.value
+    assert weaker.value == alone.value == min(wall.value, camera.value)
+    assert mean == (wall.value + camera.value) / 2
+
+
+def test_before_the_lesson_stops(says):
+    N, time = says("At f/5.6, 1/50 s and ISO 200 a picture is right.")
+    (narrow, short), (wide, twice), (right, shortest) = (
+        says("f/8, 1/100 s, ISO 200"), says("f/2.8, 1/200 s, ISO 400"), says("f/2.8, 1/400 s, ISO 400"),
+    )  # fmt: skip
+    stops = [2 * np.log2(N.value / right.value), np.log2(time.value / shortest.value), np.log2(400 / 200)]
+    np.testing.assert_allclose(stops, [2, -3, 1], atol=1e-9)
+    assert (N.value / wide.value) ** 2 * time.value / twice.value * 400 / 200 == pytest.approx(2)
+    assert (N.value / narrow.value) ** 2 * time.value / short.value == pytest.approx(1 / 4, rel=0.03)
+    (smaller,) = says("f/8 is the smaller opening: half the light")
+    first, second = says("From f/5.6 to f/2.8 the diameter doubles, and the area is four times as large.")
+    assert (smaller.value, first.value, second.value) == (narrow.value, N.value, wide.value)
+
+
+def test_before_the_lesson_light_against_gain(says):
+    N, long, short = says("both times at f/4: once for 1/10 s at ISO 200, once for 1/160 s at ISO 3200")
+    (claimed,), (times,) = says("The one of 1/10 s: it got more light."), says("Yes: 16 times the light.")
+    assert times == short.value / long.value
+    assert times == 3200 / 200  # so the pictures are equally bright
+    assert claimed.value == long.value
+    says("Against the noise of photons the signal is then four times as strong.")
+    rng = np.random.default_rng(int(N.value))
+    few, many = (rng.poisson(n, 40_000) for n in (500, 500 * times.value))
+    assert (many.mean() / many.std()) / (few.mean() / few.std()) == pytest.approx(4, rel=0.03)
+
+
 def test_the_replies_of_the_exercises(says):
     (airy,) = says("The 1.22 belongs to the Airy disc's dark ring.")
     assert airy == brentq(j1, 3, 4.5) / np.pi
@@ -437,3 +488,12 @@ def test_the_replies_of_the_exercises(says):
     assert np.arccos(0) == pytest.approx(np.pi / two.value)
     (place,) = says("for the places x = step · 0, 1, 2 …")
     assert place.value == 2
+
+
+def test_the_teacher_s_card_and_squared_paper(says):
+    aside, height = says("their edges leaning: 9 mm aside on 10 cm of height")
+    assert np.degrees(np.arctan(aside.value / (10 * height.value))) == pytest.approx(5, abs=0.2)
+    says("a straight edge that moves one square aside in ten rows")
+    assert len({round((row + 0.5) / 10 % 1, 6) for row in range(10)}) == 10
+    narrow, wide = says("Ask how much longer the shutter stays open at f/16 than at f/8.")
+    assert (narrow.value / wide.value) ** 2 == 4  # and not twice
