@@ -174,7 +174,8 @@ def reply(patient: Patient, answer: Any, attempt: int) -> Verdict:
     if answer in {finding.id for finding in patient.inspected().findings}:
         said = f"The clinic names `{answer}` too, but as what follows from something else. What would cause it?"
         return Verdict(patient.name, "wrong", said, hint)
-    said = f"With `{answer}` one sees this: {kind.symptom}. The evidence is {kind.evidence}. Here it is not so, or another fault makes it so."
+    seen = f"With `{answer}` one sees this: {kind.symptom}. The evidence is {kind.evidence}."
+    said = f"{seen} Here it is not so, or another fault makes it so."
     return Verdict(patient.name, "wrong", said, hint)
 
 
