@@ -315,8 +315,12 @@ def fan(u: ArrayLike, v: ArrayLike, turns: ArrayLike) -> Array:
 def _seen(subject: str, speed: float, now_s: float, row_s: float, width: int, height: int) -> np.ndarray:
     """The picture whose rows are `row_s` apart, and the scene at `now_s`: sRGB bytes (2, height, width, 3)."""
     times = np.concatenate([row_times(height, row_s), np.full(height, now_s)])
-    draw = {"fan": _fan_rows, "view from a train": _train_rows}.get(subject, _wall_rows)
-    both = to_display(draw(times if draw is _wall_rows else speed * times, width, height)).reshape(2, height, width, 3)
+    draw: dict[str, Callable[..., np.ndarray]] = {"fan": _fan_rows, "view from a train": _train_rows}
+    if subject in draw:
+        rows = draw[subject](speed * times, width, height)
+    else:
+        rows = _wall_rows(times, width, height)
+    both = to_display(rows).reshape(2, height, width, 3)
     both.flags.writeable = False
     return both
 
