@@ -316,10 +316,7 @@ def _seen(subject: str, speed: float, now_s: float, row_s: float, width: int, he
     """The picture whose rows are `row_s` apart, and the scene at `now_s`: sRGB bytes (2, height, width, 3)."""
     times = np.concatenate([row_times(height, row_s), np.full(height, now_s)])
     draw: dict[str, Callable[..., np.ndarray]] = {"fan": _fan_rows, "view from a train": _train_rows}
-    if subject in draw:
-        rows = draw[subject](speed * times, width, height)
-    else:
-        rows = _wall_rows(times, width, height)
+    rows = draw[subject](speed * times, width, height) if subject in draw else _wall_rows(times, width, height)
     both = to_display(rows).reshape(2, height, width, 3)
     both.flags.writeable = False
     return both
