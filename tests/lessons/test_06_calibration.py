@@ -392,7 +392,7 @@ def test_parallel_boards_and_boards_that_lean_about_a_row(says):
 
 
 def test_cholesky_s_factor_of_B_is_K_inverted_and_transposed(says):
-    says("a triangular L with $B = L L^\\top$, is $K^{-\\top}$ up to a factor")
+    says("the triangular L with a positive diagonal and $B = L L^\\top$ is $K^{-\\top}$ up to a factor")
     K = np.array([[545.0, 0, 331], [0, 543, 233], [0, 0, 1]])
     inverse = np.linalg.inv(K)
     np.testing.assert_allclose(np.linalg.cholesky(7 * inverse.T @ inverse), np.sqrt(7) * inverse.T, atol=1e-12)

@@ -143,5 +143,5 @@ def test_three_wrong_functions_of_each_kind_make_another_picture(path, monkeypat
             seen[name] += bool(lesson.with_another(name, known.function))
             if seen[name] == WANTED:
                 break
-    assert len(seen) >= 2
+    assert len(seen) >= min(2, len(lesson.stubs))  # lesson 00 has one exercise
     assert all(count == WANTED for count in seen.values()), seen
