@@ -321,3 +321,4 @@ def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
     notebook = notebooks.read(path)
     assert lessons.is_fresh(notebook)
     assert "application/vnd.jupyter.widget-view+json" not in path.read_text(encoding="utf-8")
+    assert "pictures take their place" not in path.read_text(encoding="utf-8")  # saved with the real photographs
