@@ -3,6 +3,8 @@
 import nbformat
 import pytest
 
+from camviz.exercises import exercises
+from camviz.questions import questions
 from camviz.reading import main_line, paragraphs, sentences, too_long, unlinked, words
 
 
@@ -54,3 +56,19 @@ def test_the_first_use_of_a_term_is_a_link_to_its_entry():
     assert unlinked(notebook("The fold moves. " + linked), "05") == ["Fold"]
     assert unlinked(notebook("# The fold\n\n" + linked), "05") == []
     assert unlinked(notebook("The fold moves."), "01") == []  # not a term of that lesson
+
+
+@pytest.mark.parametrize("lesson", [f"{number:02}" for number in range(18)])
+def test_no_question_reply_or_hint_is_longer_either(lesson):
+    said = [(one.name, one.text) for one in questions(lesson).values()]
+    said += [
+        (one.name, text)
+        for one in questions(lesson).values()
+        for choice in one.choices
+        for text in (choice.text, choice.reply)
+    ]
+    for one in exercises(lesson).values():
+        said += [
+            (one.name, text) for text in (*one.hints, one.praise, *(known.explanation for known in one.misconceptions))
+        ]
+    assert [(name, long) for name, text in said for long in too_long(text)] == []

@@ -481,8 +481,9 @@ POSE = Exercise(
     hints=(
         "K⁻¹H is [r₁ r₂ t] times an unknown number, which may be negative. What length must r₁ have, and on which side "
         "of the camera is t?",
-        "Divide K⁻¹H by the length of its first column, and by the sign of the number that becomes t_z. r₃ is the "
-        "cross product of r₁ and r₂. `np.linalg.svd` of [r₁ r₂ r₃] gives U and Vᵀ, and their product is the nearest "
+        "Divide K⁻¹H by the length of its first column, and by the sign of the number that becomes t_z. The third "
+        "column r₃ is the cross product of r₁ and r₂. `np.linalg.svd` of [r₁ r₂ r₃] gives U and Vᵀ, and their product"
+        " is the nearest "
         "rotation.",
         "`M = M * np.sign(___) / np.linalg.norm(___)`",
     ),

@@ -619,7 +619,8 @@ IN_FRONT = Exercise(
     hints=(
         "Where two rays meet is told by two distances, λ along the left one and μ along the right one. What must be "
         "true of *both*?",
-        "Bring μ r_right to the left and t to the right: three equations A (λ, μ)ᵀ = −t for a pair, with the columns "
+        "Bring μ r_right to the left and t to the right. These are three equations A (λ, μ)ᵀ = −t for a pair, with "
+        "the columns "
         "R r_left and −r_right. `np.linalg.pinv` solves all of them at once, for A of shape (n, 3, 2).",
         "`A = np.stack([rays_left @ R.T, ___], axis=-1)` and, at the end, `return (distances > 0).___(axis=-1)`",
     ),

@@ -41,7 +41,7 @@ DEPTH = Exercise(
     hints=(
         "Part 5 ends with the formula for principal points that differ. Which disparity has a point at infinity there, "
         "and which disparities has no point in front of the cameras?",
-        "Two cases need care: where d + doffs is 0 the answer is infinity, and where it is below 0 the answer is NaN. "
+        "Two cases need care. Where d + doffs is 0 the answer is infinity, and where it is below 0 the answer is NaN. "
         "`np.where(condition, a, b)` chooses point by point, and `with np.errstate(divide='ignore'):` lets NumPy write "
         "inf for 1/0 without a warning.",
         "`return np.where(___ < 0, np.nan, Z)`",

@@ -490,9 +490,9 @@ WINDOW_MAP = Exercise(
     hints=(
         "For each pixel of the *window* ask which ray it shows, and then where the fisheye has that ray. Between the "
         "two the ray is turned, because the window looks to the side.",
-        "Three steps: pixel → ray, with the middle of the window at ((width − 1)/2, (height − 1)/2); the ray turned "
-        "about the y axis, so that straight ahead becomes (sin ψ, 0, cos ψ) for the yaw ψ; and the fisheye of "
-        "exercise 1.",
+        "There are three steps. First pixel → ray, with the middle of the window at ((width − 1)/2, (height − 1)/2). "
+        "Then turn the ray about the y axis: straight ahead becomes (sin ψ, 0, cos ψ) for the yaw ψ. Last comes the "
+        "fisheye of exercise 1.",
         "`X, Z = np.cos(yaw) * x + ___, np.cos(yaw) - ___`",
     ),
     praise="This is a virtual camera that pans without moving: one fisheye picture holds all its pictures.",

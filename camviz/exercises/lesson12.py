@@ -41,7 +41,7 @@ MOSAIC = Exercise(
     hints=(
         "Which filter stands over the first pixel? Which one over the first pixel beyond the tile's right edge, and "
         "which below its bottom edge?",
-        "The remainder `v % n` counts from 0 to n − 1 and begins again: so the tile repeats. `np.mgrid` gives the row "
+        "The remainder `v % n` counts from 0 to n − 1 and begins again. So the tile repeats. `np.mgrid` gives the row "
         "and the column of every pixel at once, and an array indexed by three arrays of one shape gives one number "
         "for each of their elements.",
         "`return picture[v, u, tile[v % ___, u % ___]]`",

@@ -263,7 +263,7 @@ SYSTEM = Exercise(
         "The lens passes its share of the contrast to the pixel, and the pixel passes its share of that. Beyond the "
         "cut-off 1/(λN) the lens passes nothing.",
         "With s = f λ N held at 1 by `np.minimum`, the formula itself is 0 beyond the cut-off. `np.sinc(x)` is "
-        "sin(πx)/(πx) and knows what to do at 0; an MTF is never negative, so take its size.",
+        "sin(πx)/(πx) and knows what to do at 0. An MTF is never negative, so take its size.",
         "`return lens * np.abs(np.sinc(___))`",
     ),
     praise="Two causes, one after the other: their MTFs multiply.",

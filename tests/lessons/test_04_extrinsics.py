@@ -80,8 +80,8 @@ def test_t_is_minus_c_on_the_axis_of_the_turn_and_c_after_a_half_turn_at_right_a
         "t = C holds only where R takes C to −C, as a half turn about an axis at right angles to C does, and for C = 0."
     )
     says(
-        "t equals −C only where R leaves C in place (no turn, or C on the axis of the turn), and C only where R "
-        "takes C to −C (such as a half turn about an axis at right angles to C) or C is the origin"
+        "The vector t equals −C only where R leaves C in place: no turn, or C on the axis of the turn. It equals C "
+        "only where R takes C to −C, as a half turn about an axis at right angles to C does, or where C is the origin."
     )  # fmt: skip
     for _ in range(100):
         axis, C, angle = rng.normal(size=3), rng.normal(size=3), rng.uniform(0.1, 3)

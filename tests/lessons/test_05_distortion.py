@@ -34,10 +34,7 @@ def bend(xy, *coefficients):
 def test_a_barrel_draws_corners_in_most(says):
     (k1,) = says("You set k1 = −0.3.")
     says("the corners are drawn in towards the centre")
-    says(
-        "points far out are drawn in most: the corners, being farthest, most of all, and the sides of the square bow "
-        "outwards"
-    )
+    says("So points far out are drawn in most, the corners most of all, and the sides of the square bow outwards.")
     corner, middle, half = g(np.sqrt(2), k1.value), g(1.0, k1.value), np.linspace(0, 1, 9)
     assert np.sqrt(2) - corner > 1 - middle > 0
     side = bend(np.stack([np.full(9, 0.5), half / 2], axis=-1), k1.value, 0.0, 0.0, 0.0)

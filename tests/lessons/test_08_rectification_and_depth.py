@@ -74,7 +74,7 @@ def test_no_row_by_row_search_can_find_the_partners_of_the_pair_as_taken(says, g
     seen = rows_as_taken(garden, uv, np.full(len(uv), garden["f"] * garden["B"] / 16))
     inside = np.all([(seen[side] > -0.5).all(axis=1) & (seen[side] < (479.5, 359.5)).all(axis=1) for side in SIDES], 0)
     apart = (seen["right"] - seen["left"])[inside, 1]
-    (average,) = says("partners lie 15 rows apart on average, here more, there less, and in places the other way round")
+    (average,) = says("Partners lie 15 rows apart on average, here more, there less, and in places the other way round")
     assert average == np.abs(apart).mean()
     assert apart.min() < 0 < average.value < apart.max()
     says("The yellow lines run at different slopes in the two pictures")

@@ -231,7 +231,7 @@ def test_the_question_about_the_fill_factor(says):
     assert infrared == elsewhere.value
     absorbed_mm = {550: 1 / 700, 900: 1 / 30.6}  # silicon at 300 K: 7.0e3 and 306 per cm (Green 2008)
     assert absorbed_mm[900] > 10 * absorbed_mm[550]
-    of_a_hundred, at = says("60 of a hundred at 550 nm are good for a sensor that is lit from the front")
+    at, of_a_hundred = says("At 550 nm 60 of a hundred are good for a sensor that is lit from the front")
     assert of_a_hundred == efficiency.value
     assert at == nm.value
 
@@ -586,7 +586,7 @@ def test_the_question_about_two_sheets(says):
     assert a[1].value < b[1].value
     assert a[2].value > b[2].value
     efficiency, noise, saturation = says(
-        "the KAF-3200ME, a CCD too, has 79 %, 12.6 e⁻ and 70,000 e⁻, and a greater dynamic range than A."
+        "The KAF-3200ME, a CCD too, has 79 %, 12.6 e⁻ and 70,000 e⁻, and a greater dynamic range than A."
     )
     assert KAF_3200ME.technology == "CCD"
     assert efficiency == KAF_3200ME_MEASURED["η"] == 100 * KAF_3200ME.sensor.efficiency()
