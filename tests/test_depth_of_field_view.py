@@ -232,3 +232,9 @@ def test_every_control_of_the_lens_cut_open_changes_it(name, value):
     assert "50.0 mm" in LensElementsView().description()
     with pytest.raises(ValueError, match="opening"):
         LensElementsView(opening=0)
+
+
+def test_a_sheet_of_four_pixels_is_a_picture_too():
+    """OpenCV takes four numbers in a column for a colour; at this focal length a lamp's sheet has just so many."""
+    view = DepthOfFieldView(f_number=1.4, focus_m=1.3, focal_mm=60.0, panels="photograph blur")
+    assert view.figure().photographs["lens"]

@@ -131,7 +131,7 @@ def _over(view: Floats, part: Layer, u: Floats, v: Floats, parallax: Array, shar
         behind[:] = seen
         return
     covered = cv2.extractChannel(seen, 3)
-    behind[:] = cv2.blendLinear(seen, behind, covered, cv2.subtract(1.0, covered))
+    behind[:] = cv2.blendLinear(seen, behind, covered, 1.0 - covered)
 
 
 def _grid(part: Layer) -> tuple[Floats, Floats]:
