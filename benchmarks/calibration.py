@@ -25,9 +25,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz.calibration import calibrate, detect
 from camviz.calibration.adjustment import Adjustment, moved
 from camviz.calibration.difference import pixel_grid
+from camviz.calibration.types import Board
 from camviz.calibration.uncertainty import projection_uncertainty
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Board
 from camviz.lenses import BrownConrady
 
 BOARD = Board(9, 6, 0.025)

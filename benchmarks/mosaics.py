@@ -19,7 +19,7 @@ from kernel import table
 
 from camviz import mosaics
 from camviz.mosaics import BAYER
-from camviz.photographs import photograph
+from camviz.scenes.photographs import photograph
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

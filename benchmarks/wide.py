@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.cubemap import cubemap_camera
 from camviz.lenses import Equidistant
-from camviz.reprojection import equirectangular_camera, reproject, turned
+from camviz.panoramas.cubemap import cubemap_camera
+from camviz.panoramas.reprojection import equirectangular_camera, reproject, turned
 
 RUNS = 21
 AROUND = equirectangular_camera(2048, 1024)

@@ -9,17 +9,20 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME = {
-    "Calibration": "camviz.files",
+    "Calibration": "camviz.calibration",
     "Camera": "camviz.cameras",
     "Intrinsics": "camviz.cameras",
     "Rig": "camviz.cameras",
     "explore": "camviz.widgets",
+    "inspect": "camviz.widgets.inspection",
     "load": "camviz.files",
     "look_at": "camviz.cameras",
 }
 
 _PARTS = (
+    "calibration",
     "cameras",
+    "clinic",
     "colour",
     "distortion",
     "lenses",
@@ -31,7 +34,10 @@ _PARTS = (
     "twoview",
 )
 
-__all__ = ["Calibration", "Camera", "Intrinsics", "Rig", "__version__", "explore", "load", "look_at", *_PARTS]
+__all__ = [
+    *("Calibration", "Camera", "Intrinsics", "Rig", "__version__", "explore", "inspect", "load", "look_at"),
+    *_PARTS,
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -2,7 +2,7 @@
 
 import sys
 
-from camviz.command import main
+from camviz.commands.command import main
 
 if __name__ == "__main__":
     sys.exit(main())

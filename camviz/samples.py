@@ -284,7 +284,7 @@ def earth_map(width: int = 1024) -> Panorama:
 
 
 def _garden_around(width: int, sentence: str) -> Panorama:
-    from camviz.reprojection import equirectangular_camera
+    from camviz.panoramas.reprojection import equirectangular_camera
     from camviz.scenes import snapshot, textured_scene
 
     return Panorama(snapshot(textured_scene(), equirectangular_camera(width, width // 2)), False, sentence)

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment, moved
+from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Board
 from camviz.lenses import BrownConrady
 
 BOARD = Board(9, 6, 0.025)

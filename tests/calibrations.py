@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Board, Calibration
 from camviz.lenses import BrownConrady
 
 BOARD = Board(9, 6, 0.025)

@@ -12,8 +12,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz.calibration.adjustment import Adjustment, sagittas, twisted
 from camviz.calibration.arrowhead import inverse
 from camviz.calibration.slopes import lens_parameters, pixel_slopes, with_parameters
+from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Calibration
 from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, UnifiedSphere
 
 SIGMA = 0.2

@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from camviz import prose
-from camviz.answers import AnswerBook, read_answers
-from camviz.questions import quiz_questions
+from camviz.course import prose
+from camviz.course.answers import AnswerBook, read_answers
+from camviz.course.questions import quiz_questions
 from camviz.widgets import quiz
 from camviz.widgets.question import QuestionWidget, Sheet
 

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.boards import fitted, pdf
 from camviz.calibration import find_corners
-from camviz.command import main
+from camviz.calibration.paper import fitted, pdf
+from camviz.commands.command import main
 from camviz.files import Board
 
 CHESSBOARD = Board(9, 6, 0.025)

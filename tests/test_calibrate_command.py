@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from test_calibration import BOARD, picture
 
 import camviz
-from camviz.command import main
+from camviz.commands.command import main
 
 ROOT = Path(__file__).parents[1]
 WORDS = ["--board", "9x6", "--square-mm", "25"]
@@ -153,7 +153,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):
         "solving": "import camviz.calibration.solving as s\ndef new(a):\n    STOP\ns._settled = new",
     }[stage].replace("STOP", stop)
     words = ["calibrate", "shots", *WORDS, "--workers", "2"]
-    start = f"import sys\nfrom camviz.command import main\nsys.exit(main({words!r}))"
+    start = f"import sys\nfrom camviz.commands.command import main\nsys.exit(main({words!r}))"
     process = subprocess.run(
         [sys.executable, "-c", f"{LISTEN}{code}\n{start}"],
         capture_output=True,

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.boards import black_parts
 from camviz.calibration import (
     MODELS,
     CannotCalibrate,
@@ -26,6 +25,7 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.detection import detect_pair
 from camviz.calibration.models import pose_from_rays
 from camviz.calibration.pairing import paired
+from camviz.calibration.paper import black_parts
 from camviz.cameras import Camera, Intrinsics
 from camviz.files import Board
 from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere

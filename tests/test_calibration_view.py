@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
+from camviz.calibration.types import Board
 from camviz.cameras import Camera, transform
-from camviz.files.calibration import Board
 from camviz.lenses import BrownConrady
 from camviz.views.board_pictures import FREE, TRUTH
 from camviz.views.calibration import CalibrationView

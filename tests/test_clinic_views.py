@@ -15,9 +15,9 @@ from camviz import twoview
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.uncertainty import projection_uncertainty
 from camviz.cameras import Camera, Intrinsics, transform
-from camviz.clinic.views import VIEWS, Case
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.views.clinic.board_residuals import BoardResidualsView
+from camviz.views.clinic.catalogue import VIEWS, Case
 from camviz.views.clinic.correlation import CorrelationView
 from camviz.views.clinic.coverage import CoverageView
 from camviz.views.clinic.cross_validation import CrossValidationView

@@ -12,9 +12,9 @@ from raw_charts import raw_chart
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour import balance, charts, spectra
 from camviz.colour.developing import Shot
-from camviz.photographs import photograph
 from camviz.scenes import Rectangle, Scene, Texture, render, textured_scene
 from camviz.scenes.light import to_display
+from camviz.scenes.photographs import photograph
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

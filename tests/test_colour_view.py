@@ -12,10 +12,12 @@ import pytest
 
 from camviz.colour import balance, spectra
 from camviz.colour.spaces import to_srgb
-from camviz.exercises import lesson13
-from camviz.photographs import photograph
+from camviz.course.material import module
 from camviz.scenes.light import to_display, to_encoded, to_linear
+from camviz.scenes.photographs import photograph
 from camviz.views.colour import LAMPS, LAYOUTS, PARTS, ColourView
+
+lesson13 = module("13")
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

@@ -7,8 +7,8 @@ import pytest
 from commandline import run
 from packaging.requirements import Requirement
 
-from camviz import doctor
-from camviz.command import main
+from camviz.commands import machine as doctor
+from camviz.commands.command import main
 
 
 def test_a_package_is_held_against_its_range():

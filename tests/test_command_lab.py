@@ -7,10 +7,10 @@ import types
 import pytest
 from commandline import ROOT, refused
 
-from camviz import working_copy
-from camviz.command import main
 from camviz.commands import lab
-from camviz.working_copy import MANIFEST, lay_out
+from camviz.commands.command import main
+from camviz.course import material
+from camviz.course.working_copy import MANIFEST, lay_out
 
 
 @pytest.fixture
@@ -152,7 +152,7 @@ def test_root_is_let_in_and_told(jupyter, room, monkeypatch, capsys, asked):
 
 def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatch, capsys):
     monkeypatch.setattr(lab, "checkout_lessons", lambda: None)
-    monkeypatch.setattr(lab, "lessons_source", lambda: lessons)
+    monkeypatch.setattr(lab, "lessons_folder", lambda: lessons)
     assert main(["lab"]) == 0
     copy = room / "camviz-lessons"
     assert jupyter == [[f"--ServerApp.root_dir={copy}", str(copy / "00_start.ipynb")]]
@@ -162,7 +162,7 @@ def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatc
 def test_the_editions_do_not_overwrite_each_other(jupyter, room, lessons, monkeypatch, capsys):
     """The teacher's edition is not laid out over students' lessons, and opening it does not make it theirs."""
     monkeypatch.setattr(lab, "checkout_lessons", lambda: None)
-    monkeypatch.setattr(lab, "lessons_source", lambda: lessons)
+    monkeypatch.setattr(lab, "lessons_folder", lambda: lessons)
     assert main(["lab"]) == 0
     capsys.readouterr()
     assert "the students' lessons are in this one" in refused(capsys, room, "teacher", "camviz-lessons")
@@ -177,9 +177,9 @@ def test_the_lessons_of_a_wheel_are_inside_the_package(tmp_path, monkeypatch):
     """Where there is no pyproject.toml beside the package, the lessons are in camviz/_lessons."""
     inside = tmp_path / "site-packages" / "camviz" / "_lessons"
     inside.mkdir(parents=True)
-    monkeypatch.setattr(working_copy.camviz, "__file__", str(inside.parent / "__init__.py"))
-    assert working_copy.checkout_lessons() is None
-    assert working_copy.lessons_source() == inside
+    monkeypatch.setattr(material.camviz, "__file__", str(inside.parent / "__init__.py"))
+    assert material.checkout_lessons() is None
+    assert material.lessons_folder() == inside
 
 
 def test_lab_refuses_a_file_for_a_folder(jupyter, room, capsys):

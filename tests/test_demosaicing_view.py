@@ -5,12 +5,12 @@ import re
 import cv2
 import numpy as np
 import pytest
+from camviz.course.exercises.lesson12 import edge_green, malvar_green
 
 from camviz import mosaics
-from camviz.exercises.lesson12 import edge_green, malvar_green
 from camviz.mosaics import BAYER, PATTERNS, XTRANS
-from camviz.photographs import photograph
 from camviz.scenes import to_display, to_linear
+from camviz.scenes.photographs import photograph
 from camviz.views.demosaicing import LAYOUTS, LOUPE, DemosaicingView, _everywhere, nearest_carrier
 
 

@@ -7,9 +7,11 @@ import pytest
 from camviz.calibration.difference import difference
 from camviz.cameras import Camera, Intrinsics
 from camviz.clinic.laboratory import ILLNESSES, VIEWS, experiment
-from camviz.exercises import lesson16
-from camviz.exercises.ward import COMPLAINTS, HEALTHY, Ward
+from camviz.course.material import module
 from camviz.views.fault_lab import FaultLabView, grouped
+
+lesson16 = module("16")
+Ward, HEALTHY, COMPLAINTS = (getattr(module("16", "ward"), name) for name in ("Ward", "HEALTHY", "COMPLAINTS"))
 
 
 def names(made):

@@ -20,7 +20,7 @@ from camviz.clinic.fields import smooth_field, warp_columns
 from camviz.clinic.findings import CHECKS
 from camviz.clinic.observed import explained, parameter_columns
 from camviz.clinic.virtual import single
-from camviz.command import main
+from camviz.commands.command import main
 from camviz.files import Board, CalibrationError
 from camviz.lenses import BrownConrady
 
@@ -224,7 +224,7 @@ def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(h
 
 def test_a_calibration_inspects_itself(healthy):
     _, calibration = healthy
-    assert calibration.inspect().checked == inspect(calibration).checked
+    assert camviz.inspect(calibration).checked == inspect(calibration).checked
 
 
 # Files that other commands refuse ------------------------------------------------------------------------------------

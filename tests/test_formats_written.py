@@ -12,9 +12,8 @@ import yaml
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import camviz
-from camviz import command
 from camviz.cameras import Camera, Intrinsics, transform
-from camviz.commands import convert
+from camviz.commands import command, convert
 from camviz.files import FORMATS, Board, Calibration, CalibrationError, alone, from_first_camera, write, writing
 from camviz.files.models import same_camera
 from camviz.lenses import (

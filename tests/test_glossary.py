@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from camviz.glossary import anchor, glossary, markdown, page, term
+from camviz.course.glossary import anchor, glossary, markdown, page, term
 
 ROOT = Path(__file__).parents[1]
 
@@ -90,7 +90,7 @@ def test_entries_show_as_safe_html_and_as_plain_text():
 
 
 def test_the_saved_glossary_is_fresh():
-    """Mend with: python -m camviz.glossary"""
+    """Mend with: python -m camviz.course.glossary"""
     assert (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8") == page()
 
 

@@ -5,9 +5,9 @@ import html
 import cv2
 import numpy as np
 import pytest
+from camviz.course.exercises.lesson14 import expected_electrons, row_time
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.exercises.lesson14 import expected_electrons, row_time
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors import decibel, gliding, rolling_picture
 from camviz.views.image_sensor import ImageSensorView

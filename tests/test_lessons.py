@@ -9,10 +9,14 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from camviz import lessons, notebooks
-from camviz.exercises import exercises, lesson05
-from camviz.pattern import SETUP, complaints
+from camviz.commands import lessons
+from camviz.course import notebooks, saved_outputs
+from camviz.course.exercises import exercises
+from camviz.course.lesson_rules import SETUP, complaints
+from camviz.course.material import module
 from camviz.teaching.edition import mark_solution, teacher_edition, write_teacher_edition
+
+lesson05 = module("05")
 
 ROOT = Path(__file__).parents[1]
 LESSONS = sorted((ROOT / "lessons").glob("*.ipynb"))
@@ -227,22 +231,22 @@ def test_tidying_makes_two_runs_of_one_lesson_equal(lesson):
         for number, cell in enumerate(notebook.cells):
             cell.id = f"{seed + number:08x}"
             cell.metadata["execution"] = {"iopub.execute_input": seed}
-        return nbformat.writes(lessons.tidied(notebook))
+        return nbformat.writes(saved_outputs.tidied(notebook))
 
     assert run(1) == run(1000)
-    tidy = lessons.tidied(lesson)
+    tidy = saved_outputs.tidied(lesson)
     assert [cell.execution_count for cell in tidy.cells if cell.cell_type == "code"][:3] == [1, 2, 3]
     assert len({cell.id for cell in tidy.cells}) == len(tidy.cells)
-    assert nbformat.writes(lessons.tidied(tidy)) == nbformat.writes(tidy)
+    assert nbformat.writes(saved_outputs.tidied(tidy)) == nbformat.writes(tidy)
 
 
 def test_saved_outputs_are_fresh_until_the_code_changes(lesson):
-    saved = lessons.tidied(lesson)
-    assert lessons.is_fresh(saved)
+    saved = saved_outputs.tidied(lesson)
+    assert saved_outputs.is_fresh(saved)
     saved.cells[0].source += "\nOne more word."
-    assert lessons.is_fresh(saved)
+    assert saved_outputs.is_fresh(saved)
     saved.cells[8].source += "\n"
-    assert not lessons.is_fresh(saved)
+    assert not saved_outputs.is_fresh(saved)
 
 
 def test_refreshing_runs_a_lesson_with_static_outputs_twice_alike(tmp_path):
@@ -254,15 +258,15 @@ def test_refreshing_runs_a_lesson_with_static_outputs_twice_alike(tmp_path):
         text("", "glossary"),
     ]
     notebooks.write(nbformat.v4.new_notebook(cells=cells), path)
-    assert not lessons.is_fresh(notebooks.read(path))
-    lessons.refresh(path)
+    assert not saved_outputs.is_fresh(notebooks.read(path))
+    saved_outputs.refresh(path)
     first = path.read_text(encoding="utf-8")
     notebook = notebooks.read(path)
-    assert lessons.is_fresh(notebook)
+    assert saved_outputs.is_fresh(notebook)
     assert notebook.cells[1].outputs[0].text == "1 wire\n"
     assert set(notebook.cells[2].outputs[0].data) == {"text/plain", "text/html"}
     assert '<a id="fold"></a>' in notebook.cells[3].source
-    lessons.refresh(path)
+    saved_outputs.refresh(path)
     assert path.read_text(encoding="utf-8") == first
 
 
@@ -286,7 +290,7 @@ def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp
 
 @EACH
 def test_every_lesson_follows_the_pattern(path):
-    """Told also by: python -m camviz.lessons check"""
+    """Told also by: python -m camviz.commands.lessons check"""
     assert complaints(notebooks.read(path), path.name) == []
 
 
@@ -317,8 +321,8 @@ def test_every_lesson_s_solutions_pass_and_its_stubs_do_not(path, monkeypatch):
 
 @EACH
 def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
-    """Mend with: python -m camviz.lessons refresh"""
+    """Mend with: python -m camviz.commands.lessons refresh"""
     notebook = notebooks.read(path)
-    assert lessons.is_fresh(notebook)
+    assert saved_outputs.is_fresh(notebook)
     assert "application/vnd.jupyter.widget-view+json" not in path.read_text(encoding="utf-8")
     assert "pictures take their place" not in path.read_text(encoding="utf-8")  # saved with the real photographs

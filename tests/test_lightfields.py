@@ -31,8 +31,8 @@ from camviz.lightfields import (
     to_mosaic,
     true_disparity,
 )
-from camviz.photographs import photograph
 from camviz.scenes import Rectangle, Scene, Texture, render, textured_scene, to_encoded, to_linear
+from camviz.scenes.photographs import photograph
 
 RNG = np.random.default_rng(5)
 EMPTY = np.zeros((1, 1, 1, 1, 3))

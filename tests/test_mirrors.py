@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Intrinsics
 from camviz.lenses import UnifiedSphere
-from camviz.mirrors import Catadioptric, Mirror, MirrorLens, direction_error, eccentricity, miss, photograph
+from camviz.panoramas.mirrors import Catadioptric, Mirror, MirrorLens, direction_error, eccentricity, miss, photograph
 from camviz.scenes import Scene, Texture
 from camviz.scenes.surfaces import Sphere
 

@@ -24,8 +24,8 @@ from camviz.mosaics import (
     zone_plate,
 )
 from camviz.mosaics.measures import lab
-from camviz.photographs import photograph
 from camviz.scenes import to_display
+from camviz.scenes.photographs import photograph
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

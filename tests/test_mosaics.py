@@ -30,7 +30,7 @@ from camviz.mosaics import (
     opencv,
     with_green,
 )
-from camviz.photographs import photograph
+from camviz.scenes.photographs import photograph
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # it imports from where SciPy will not keep things

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.command import main
+from camviz.commands.command import main
 from camviz.commands.noise import NOISE
 from camviz.sensors import Sensor
 

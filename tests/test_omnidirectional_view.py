@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.exercises import exercises
+from camviz.course.exercises import exercises
 from camviz.lenses import UnifiedSphere
-from camviz.reprojection import reproject
+from camviz.panoramas.reprojection import reproject
 from camviz.scenes import snapshot, textured_scene
 from camviz.views.omnidirectional import BLIND_DEG, OmnidirectionalView
 

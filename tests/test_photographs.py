@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from camviz.photographs import PHOTOGRAPHS, photograph, photograph_credit
+from camviz.scenes.photographs import PHOTOGRAPHS, photograph, photograph_credit
 
 # Shapes as scikit-image documents them in skimage.data; mean colour read with an independent decoder.
 SHAPES = {"astronaut": (512, 512), "camera": (512, 512), "chelsea": (300, 451), "coffee": (400, 600)}
@@ -48,7 +48,8 @@ def test_an_unknown_name_is_answered_with_the_known_ones(function):
 
 def test_reading_a_photograph_does_not_import_what_scikit_image_is_made_of():
     code = (
-        "import sys; from camviz.photographs import photograph; photograph('brick'); print('skimage.io' in sys.modules)"
+        "import sys; from camviz.scenes.photographs import photograph; photograph('brick'); "
+        "print('skimage.io' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from camviz import notebooks
+from camviz.course import notebooks
+from camviz.course.material import material
 from camviz.teaching import plans
 
 LESSONS = {path.name[:2]: path for path in sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))}
-PLANNED = sorted(path.stem for path in Path(plans.__file__).parent.glob("*.toml"))
+PLANNED = sorted(path.parent.name for path in material().glob("*/plan.toml"))
 EACH = pytest.mark.parametrize("number", PLANNED)
 
 PLAN = """

@@ -2,17 +2,15 @@
 
 import json
 import re
-from importlib.resources import files
 
 import pytest
 
-from camviz import prose
-from camviz.questions import Question, parse, question, questions, quiz_questions
+from camviz.course import prose
+from camviz.course.material import material
+from camviz.course.questions import Question, parse, question, questions, quiz_questions
 from camviz.widgets.question import QuestionWidget, Sheet, ask, quiz, score
 
-LESSONS = sorted(
-    path.name.removesuffix(".toml") for path in files("camviz.questions").iterdir() if path.name.endswith(".toml")
-)
+LESSONS = sorted(path.parent.name for path in material().glob("*/questions.toml"))
 ALL = [one for lesson in LESSONS for one in questions(lesson).values()]
 
 GOOD = """
@@ -131,7 +129,7 @@ PAIR = "".join(
 def test_a_pair_is_read_and_a_quiz_without_forms_is_form_b(monkeypatch):
     assert [one.form for one in parse("99", PAIR).values()] == ["A", "B"]
     for text, forms in ((PAIR, ["99.colour"]), (GOOD.replace("predict", "quiz"), [])):
-        monkeypatch.setattr("camviz.questions.questions", lambda lesson, text=text: parse(lesson, text))
+        monkeypatch.setattr("camviz.course.questions.questions", lambda lesson, text=text: parse(lesson, text))
         assert [one.name for one in quiz_questions("99", "A")] == forms
         assert len(quiz_questions("99")) == 1
 

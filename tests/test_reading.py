@@ -3,9 +3,9 @@
 import nbformat
 import pytest
 
-from camviz.exercises import exercises
-from camviz.questions import questions
-from camviz.reading import main_line, paragraphs, sentences, too_long, unlinked, words
+from camviz.course.exercises import exercises
+from camviz.course.questions import questions
+from camviz.course.reading import main_line, paragraphs, sentences, too_long, unlinked, words
 
 
 def notebook(*texts):

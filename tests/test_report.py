@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from calibrations import bare, pair, sick, single
 
+import camviz
 from camviz.clinic import inspect, inspect_file
 from camviz.clinic.findings import Inspection, kinds
-from camviz.clinic.live import LiveInspection
-from camviz.clinic.report import MOST_VIEWS, report, write_report
-from camviz.clinic.views import ALIASES, VIEWS
+from camviz.report.inspection import MOST_VIEWS, report, write_report
+from camviz.views.clinic.catalogue import ALIASES, VIEWS
+from camviz.widgets.inspection import LiveInspection
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -192,13 +193,13 @@ def test_the_notebook_chooses_between_cameras():
 @pytest.fixture
 def displayed(monkeypatch):
     shown = []
-    monkeypatch.setattr("camviz.clinic.live.display", lambda what, **_: shown.append(what))
+    monkeypatch.setattr("camviz.widgets.inspection.display", lambda what, **_: shown.append(what))
     return shown
 
 
 def test_a_saved_notebook_keeps_the_findings_and_a_still(displayed, monkeypatch):
     monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
-    inspection = inspect(sick())
+    inspection = camviz.inspect(sick())
     inspection._ipython_display_()
     words, still, widget = displayed
     assert inspection.findings[0].id in words["text/html"]

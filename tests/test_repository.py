@@ -13,8 +13,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 FLOOR_1 = (
-    *("cameras", "lenses", "distortion", "scenes", "twoview", "files", "calibration", "optics", "reprojection"),
-    *("mirrors", "ring", "lightfields", "mosaics", "colour", "sensors"),
+    *("cameras", "lenses", "distortion", "scenes", "twoview", "files", "calibration", "optics", "panoramas"),
+    *("lightfields", "mosaics", "colour", "sensors", "clinic", "samples"),
 )
 HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)|(?:src|href)=\"([^\"#]+)\"")

@@ -10,7 +10,6 @@ import py360convert
 import pytest
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.cubemap import FACES, Cubemap, Layout, cubemap_camera, face_camera, joined, split
 from camviz.lenses import (
     BrownConrady,
     Cylindrical,
@@ -24,7 +23,8 @@ from camviz.lenses import (
     Stereographic,
     UnifiedSphere,
 )
-from camviz.reprojection import (
+from camviz.panoramas.cubemap import FACES, Cubemap, Layout, cubemap_camera, face_camera, joined, split
+from camviz.panoramas.reprojection import (
     TOLERANCE,
     covered,
     equirectangular_camera,

@@ -5,7 +5,7 @@ import pytest
 
 from camviz.cameras import Camera, look_at
 from camviz.lenses import Equirectangular
-from camviz.ring import Ring, all_round
+from camviz.panoramas.ring import Ring, all_round
 from camviz.scenes import Scene, Texture, render, textured_scene
 from camviz.scenes.surfaces import Column
 

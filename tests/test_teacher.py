@@ -8,12 +8,15 @@ import nbformat
 import numpy as np
 import pytest
 
-from camviz import notebooks, questions
-from camviz.checks import Exercise
-from camviz.command import main
 from camviz.commands import teacher
-from camviz.exercises import exercises, lesson05
+from camviz.commands.command import main
+from camviz.course import notebooks, questions
+from camviz.course.checks import Exercise
+from camviz.course.exercises import exercises
+from camviz.course.material import module
 from camviz.teaching import edition, marking, markup, parts, plans, sheets
+
+lesson05 = module("05")
 
 ROOT = Path(__file__).parents[1]
 LESSONS = sorted((ROOT / "lessons").glob("*.ipynb"))

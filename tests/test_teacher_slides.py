@@ -7,7 +7,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from camviz import notebooks, prose
+from camviz.course import notebooks, prose
 from camviz.teaching import deck, parts, slides
 
 LESSONS = sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))

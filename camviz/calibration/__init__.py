@@ -7,6 +7,9 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
+    "Board": "types",
+    "Calibration": "types",
+    "CalibrationError": "types",
     "CannotCalibrate": "detection",
     "Detections": "detection",
     "detect": "detection",
@@ -19,6 +22,9 @@ _HOME = {
 
 __all__ = [
     "MODELS",
+    "Board",
+    "Calibration",
+    "CalibrationError",
     "CannotCalibrate",
     "Detections",
     "calibrate",

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.calibration.arrowhead import Arrowhead
 from camviz.calibration.slopes import lens_parameters, parameter, pixel_slopes, with_parameters
+from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, transform
-from camviz.files.calibration import Board, Calibration
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 

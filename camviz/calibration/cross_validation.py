@@ -11,8 +11,8 @@ from scipy.special import chdtrc
 
 from camviz.calibration.adjustment import Adjustment, Mask
 from camviz.calibration.difference import Difference, difference, pixel_grid
+from camviz.calibration.types import Board
 from camviz.calibration.uncertainty import mean_deviation, projection_covariance
-from camviz.files.calibration import Board
 from camviz.lenses.base import Array
 
 FEWEST_VIEWS = 3  # in each half

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from camviz.calibration.finding import charuco_detector, find_corners, look
-from camviz.files.calibration import Board, Mask
+from camviz.calibration.types import Board, Mask
 from camviz.lenses.base import Array
 
 __all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corners", "seen"]

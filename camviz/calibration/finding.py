@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from camviz.files.calibration import Board
+    from camviz.calibration.types import Board
 
 Array = NDArray[np.float64]
 

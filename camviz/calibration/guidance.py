@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from camviz.calibration.adjustment import Adjustment, moved
 from camviz.calibration.arrowhead import inverse
 from camviz.calibration.difference import pixel_grid
+from camviz.calibration.types import Board
 from camviz.calibration.uncertainty import projection_slopes, worst_deviation
 from camviz.cameras import Camera
-from camviz.files.calibration import Board
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation
 

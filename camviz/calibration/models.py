@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from camviz.calibration.detection import CannotCalibrate
+from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Board
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation

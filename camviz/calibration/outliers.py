@@ -19,7 +19,7 @@ import numpy as np
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.detection import seen
 from camviz.calibration.finding import FEWEST
-from camviz.files.calibration import Mask
+from camviz.calibration.types import Mask
 
 Masks = dict[str, Mask]
 

@@ -14,8 +14,8 @@ from camviz.calibration.detection import CannotCalibrate, Detections, seen
 from camviz.calibration.models import MODELS, Model, Views, poses_from_rays
 from camviz.calibration.outliers import Masks, outliers, sentences
 from camviz.calibration.slopes import with_parameters
+from camviz.calibration.types import Board, Calibration, Mask
 from camviz.cameras import Camera
-from camviz.files.calibration import Board, Calibration, Mask
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 

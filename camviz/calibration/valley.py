@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.calibration.types import Board
 from camviz.cameras import Camera
-from camviz.files.calibration import Board
 from camviz.lenses import UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.solving import ANOTHER_WAY_DEG
+from camviz.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import Evidence
@@ -20,7 +21,6 @@ from camviz.clinic.rig import (
     lone_poses,
     references,
 )
-from camviz.files.calibration import Board
 from camviz.poses import RigidTransform
 from camviz.twoview import RectifiedPair, rectify
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.models import poses_from_rays
+from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
 from camviz.clinic.catalogue import Lacking
 from camviz.clinic.observed import Observed
-from camviz.files.calibration import Board, Calibration
 from camviz.lenses import Cylindrical, Equirectangular
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform

@@ -7,19 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
 from camviz.clinic import checks_file, checks_lens, checks_model, checks_rig, checks_views
 from camviz.clinic.catalogue import SEVERITIES, Check, Finding, Kind, Lacking, found, kinds
 from camviz.clinic.evidence import Evidence
 from camviz.files import CalibrationError, load
-from camviz.files.calibration import Board, Calibration
-
-if TYPE_CHECKING:
-    from camviz.clinic.live import LiveInspection
 
 __all__ = ["CHECKS", "Finding", "Inspection", "Kind", "inspect", "inspect_file", "kinds"]
 
@@ -115,15 +112,6 @@ class Inspection:
 
     def __str__(self) -> str:
         return self.as_text()
-
-    def explore(self, images: str | PathLike[str] | None = None) -> LiveInspection:
-        """The findings with every view of the clinic, for a notebook; `images` is the folder of the pictures."""
-        from camviz.clinic.live import LiveInspection
-
-        return LiveInspection(self, images)
-
-    def _ipython_display_(self) -> None:
-        self.explore()._ipython_display_()
 
 
 def inspect(

@@ -16,13 +16,13 @@ import numpy as np
 import yaml
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.types import Calibration
 from camviz.cameras import Camera
 from camviz.clinic.findings import Inspection, inspect, inspect_file
 from camviz.clinic.rig import FLIPPED
 from camviz.clinic.virtual import SetUp, pair, single, spread_boards
 from camviz.distortion import ideal_image_radius, image_corner_radius
 from camviz.files import kalibr, ros
-from camviz.files.calibration import Calibration
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation

@@ -17,13 +17,13 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.difference import Difference, difference, pixel_grid
 from camviz.calibration.residual_statistics import view_rms
 from camviz.calibration.slopes import with_parameters
+from camviz.calibration.types import Board, Calibration
 from camviz.calibration.uncertainty import mean_deviation, projection_covariance
 from camviz.cameras import Camera, Intrinsics
 from camviz.clinic import injections
 from camviz.clinic.findings import Inspection, inspect
 from camviz.clinic.virtual import SetUp, spread_boards
 from camviz.distortion import image_corner_radius
-from camviz.files.calibration import Board, Calibration
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 

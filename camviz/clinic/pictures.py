@@ -10,8 +10,8 @@ from pathlib import Path
 from camviz.calibration import Detections
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.finding import read_gray
+from camviz.calibration.types import Board, Calibration
 from camviz.clinic.evidence import board_poses
-from camviz.files.calibration import Board, Calibration
 
 
 def sizes_of(paths: Sequence[str | PathLike[str]]) -> dict[str, tuple[int, int]]:

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence, board_poses
-from camviz.files.calibration import Board
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 

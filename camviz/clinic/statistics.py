@@ -141,7 +141,7 @@ HEAD = """\
 
 <!-- Made from camviz/clinic/findings.toml by: python -m camviz.clinic.statistics --page -->
 
-`camviz inspect FILE` and `camviz.load(path).inspect()` say what is wrong with a calibration. Every finding has a
+`camviz inspect FILE` and `camviz.inspect(camviz.load(path))` say what is wrong with a calibration. Every finding has a
 stable id, one sentence, the number that shows it, the view that shows it, its likely causes and a remedy. Nothing is
 guessed: a check whose evidence the file does not hold is listed as not made, with the reason. `camviz calibrate` writes
 files that hold all of it: corners, poses of the board, what was estimated and how well. With `--images` and `--board`

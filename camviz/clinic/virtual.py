@@ -9,8 +9,8 @@ from math import radians
 import numpy as np
 
 from camviz.calibration import Detections, calibrate, calibrate_pair
+from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Board, Calibration
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation

@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
 
 def board(options: argparse.Namespace) -> int:
     """Write the PDF, whole or not at all."""
-    from camviz.boards import fitted, pdf
+    from camviz.calibration.paper import fitted, pdf
 
     try:
         sheet = fitted(board_of(options), options.paper)

@@ -94,7 +94,7 @@ def calibrate(options: argparse.Namespace) -> int:
 def _inspect(calibration: Calibration, folder: Path, page: Path) -> None:
     """Say what an inspection finds, and write its page."""
     from camviz.clinic import inspect
-    from camviz.clinic.report import write_report
+    from camviz.report.inspection import write_report
 
     inspection = inspect(calibration)
     write_whole(page, lambda path: write_report(inspection, path, images=folder))

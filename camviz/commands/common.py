@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
-    from camviz.files.calibration import Board, Calibration
+    from camviz.calibration.types import Board, Calibration
 
 OK, LACKING, REFUSED, INTERRUPTED = 0, 1, 2, 130
 
@@ -96,7 +96,7 @@ def read_picture(path: Path) -> np.ndarray:
     import cv2
     import numpy as np
 
-    from camviz.reprojection import LONGEST
+    from camviz.panoramas.reprojection import LONGEST
 
     if not path.is_file():
         raise Refusal(f"{path}: there is no such picture." if not path.exists() else f"{path}: this is not a file.")
@@ -163,7 +163,7 @@ def add_board(command: argparse.ArgumentParser, required: bool = True, default: 
 def board_of(options: argparse.Namespace) -> Board:
     """The board of the options."""
     from camviz.calibration.finding import charuco_dictionary
-    from camviz.files.calibration import Board
+    from camviz.calibration.types import Board
 
     if options.marker_mm is not None and options.charuco is None:
         raise Refusal("--marker-mm is for a ChArUco board: name its dictionary with --charuco.")

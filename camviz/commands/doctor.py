@@ -20,7 +20,7 @@ def add(commands: Any) -> None:
 
 def doctor(options: argparse.Namespace) -> int:
     """Print what was found; the status tells whether something that is needed is missing."""
-    from camviz import doctor as examination
+    from camviz.commands import machine as examination
 
     findings = examination.examine()
     print(examination.as_json(findings) if options.json else examination.as_text(findings))

@@ -177,7 +177,7 @@ def _print(inspections: dict[str, Inspection], several: bool, as_json: bool) -> 
 
 
 def _report(inspection: Inspection, options: argparse.Namespace) -> None:
-    from camviz.clinic.report import write_report
+    from camviz.report.inspection import write_report
 
     first = Path((options.images or options.files)[0])
     folder = first if first.is_dir() else first.parent

@@ -10,7 +10,8 @@ from typing import Any
 
 import camviz
 from camviz.commands.common import LACKING, OK, Refusal, add_command
-from camviz.working_copy import checkout_lessons, edition, lay_out, lessons_source
+from camviz.course.material import checkout_lessons, lessons_folder
+from camviz.course.working_copy import edition, lay_out
 
 LAB = """\
 Opens the lessons in JupyterLab. In a checkout of the repository these are the lessons there. Otherwise they are
@@ -30,8 +31,8 @@ def lab(options: argparse.Namespace, beyond: list[str]) -> int:
     """Open JupyterLab on the checkout's lessons, or on a working copy."""
     if find_spec("jupyterlab") is None:
         raise Refusal("JupyterLab is not installed; `pip install 'camviz[lab]'` brings it.", LACKING)
-    source = lessons_source()
-    if source is None:
+    source = lessons_folder()
+    if not source.is_dir():
         raise Refusal("the lessons are not part of this installation; `pip install camviz` brings them.", LACKING)
     folder = options.directory or checkout_lessons() or Path("camviz-lessons")
     if folder.exists() and not folder.is_dir():

@@ -140,7 +140,7 @@ def as_text(edge: SlantedEdge, photo: Path, taken_as: str) -> str:
 
 def page(edge: SlantedEdge, name: str, taken_as: str) -> str:
     """The measurement as one page of HTML that needs no network: the figures, then the curves."""
-    from camviz.page import document, figure
+    from camviz.draw.page import document, figure
     from camviz.views.measured_edge import MeasuredEdgeView, written
 
     rows = "".join(

@@ -144,7 +144,7 @@ def remarks(found: Measurement) -> list[str]:
 
 def page(found: Measurement, recording: Recording) -> str:
     """The measurement as one page of HTML that needs no network: the figures, then the curves."""
-    from camviz.page import document, figure
+    from camviz.draw.page import document, figure
     from camviz.views.measured_noise import MeasuredNoiseView
 
     table = "".join(

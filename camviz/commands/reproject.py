@@ -80,8 +80,8 @@ def angle(text: str) -> float:
 
 def reproject(options: argparse.Namespace) -> int:
     """Write the picture another camera takes, whole or not at all."""
-    from camviz.reprojection import reproject as reprojected
-    from camviz.reprojection import turned
+    from camviz.panoramas.reprojection import reproject as reprojected
+    from camviz.panoramas.reprojection import turned
 
     refuse_output(options.output, "picture", options.file)
     _require_writer(options.output)
@@ -118,8 +118,8 @@ def _source(options: argparse.Namespace, width: int, height: int) -> Camera:
 
 def _target(options: argparse.Namespace, source: Camera) -> Camera:
     """The camera that is to take OUT, not yet turned."""
-    from camviz.projections import across_deg, projection
-    from camviz.reprojection import LONGEST
+    from camviz.panoramas.projections import across_deg, projection
+    from camviz.panoramas.reprojection import LONGEST
 
     if options.size is not None and not all(1 <= side <= LONGEST for side in options.size):
         width, height = options.size
@@ -155,7 +155,7 @@ def _whole(model: str, width: int, aspect: float) -> tuple[int, int]:
 
 
 def _named(what: str, model: str, width: int, height: int, hfov_deg: float | None) -> Camera:
-    from camviz.projections import projection
+    from camviz.panoramas.projections import projection
 
     try:
         kind = projection(model)
@@ -169,7 +169,7 @@ def _named(what: str, model: str, width: int, height: int, hfov_deg: float | Non
 
 def _calibrated(model: str, name: str | None, option: str, size: tuple[int, int] | None) -> Camera | None:
     """The camera of a calibration file, which may hold no size; None where the model is no file but a name."""
-    from camviz.projections import PROJECTIONS
+    from camviz.panoramas.projections import PROJECTIONS
 
     path = Path(model)
     if model in PROJECTIONS or not (path.exists() or path.suffix or len(path.parts) > 1):
@@ -197,7 +197,7 @@ def _finished(seen: np.ndarray, picture: np.ndarray, output: Path) -> np.ndarray
     """What was seen, whose last channel is alpha, as OUT can hold it."""
     import numpy as np
 
-    from camviz.reprojection import NOTHING
+    from camviz.panoramas.reprojection import NOTHING
 
     if picture.ndim == 3 and picture.shape[2] == 4:
         return seen

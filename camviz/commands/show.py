@@ -31,7 +31,7 @@ def show(options: argparse.Namespace) -> int:
     calibration = loaded(options.file, options.size)
     output = options.output or Path(options.file.stem + ".html")
     refuse_output(output, "page", options.file)
-    from camviz.page import write_page
+    from camviz.report.page import write_page
 
     write_whole(output, lambda path: write_page(calibration, path))
     for note in calibration.notes:
@@ -41,7 +41,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def refuse_renderer() -> None:
-    from camviz.doctor import renderer
+    from camviz.commands.machine import renderer
 
     finding = renderer()
     if finding.status != "ok":

@@ -10,7 +10,7 @@ from typing import Any
 
 import camviz
 from camviz.commands.common import LACKING, OK, Refusal, add_command, say
-from camviz.working_copy import edition, lay_out
+from camviz.course.working_copy import edition, lay_out
 
 TEACHER = """\
 Writes for each lesson, made from the very notebook that students get:
@@ -40,7 +40,7 @@ def add(commands: Any) -> None:
 
 def teacher(options: argparse.Namespace) -> int:
     """Write the teacher's edition, and never over what a teacher has changed in it."""
-    from camviz.lessons import lessons_folder
+    from camviz.course.material import lessons_folder
 
     if options.out.exists() and (not options.out.is_dir() or options.out.samefile(lessons_folder())):
         raise Refusal(f"{options.out}: expected a folder of its own for the teacher's edition.")

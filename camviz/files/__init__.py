@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from camviz.files.calibration import Board, Calibration, CalibrationError
+from camviz.calibration.types import Board, Calibration, CalibrationError
 from camviz.files.loading import load
 
 __all__ = ["FORMATS", "Board", "Calibration", "CalibrationError", "alone", "from_first_camera", "load", "write"]

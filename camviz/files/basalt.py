@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.output import as_json, refuse_own_world
 from camviz.files.section import LARGEST_SIDE, Section

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files import colmap_binary
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.section import COUNT, LARGEST, LARGEST_SIDE, ROTATION_TOLERANCE, Section
 from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_text

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from camviz.files.calibration import CalibrationError
+from camviz.calibration.types import CalibrationError
 from camviz.files.models import Model
 from camviz.files.section import Section
 from camviz.files.text import MAX_BYTES, open_bounded

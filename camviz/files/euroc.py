@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from camviz.files.calibration import Calibration
+from camviz.calibration.types import Calibration
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.output import as_yaml, only_camera, refuse_own_world
 from camviz.files.section import Section

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size
 from camviz.files.output import as_yaml, refuse_own_world, rows_of

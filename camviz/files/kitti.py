@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
 from camviz.files.sizes import agreed_size

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from camviz.files.calibration import CalibrationError
+from camviz.calibration.types import CalibrationError
 from camviz.files.trees import Tree, scalar, shown
 
 _QUOTED = r"""[bBuUrR]{0,2}(?:'[^'\\\n]*+(?:\\.[^'\\\n]*+)*+'|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+")"""

@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.files import (
     basalt,
     colmap,
@@ -23,7 +24,6 @@ from camviz.files import (
     ros,
     transforms,
 )
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.literal import parse_literal
 from camviz.files.section import LARGEST_SIDE, Section
 from camviz.files.text import read_bytes, text_of

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
 from camviz.files import matlab_binary
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.output import as_json, only_camera, refuse_own_world
 from camviz.files.section import BAD_K, Section, explained

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from camviz.files.calibration import CalibrationError
+from camviz.calibration.types import CalibrationError
 from camviz.files.text import MAX_BYTES
 from camviz.files.trees import MAX_DEPTH, MAX_NODES
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from camviz.calibration.types import CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import CalibrationError
 from camviz.files.section import explained
 from camviz.lenses import BrownConrady, Equidistant, ExtendedUnified, KannalaBrandt, Lens, Perspective, UnifiedSphere
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from camviz.files.calibration import Calibration
+from camviz.calibration.types import Calibration
 from camviz.files.models import Model, expressed, model_named
 from camviz.files.output import only_camera
 from camviz.files.section import COUNT, Section

@@ -9,8 +9,8 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from camviz.calibration.types import Board, Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Board, Calibration, CalibrationError
 from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
 from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere

@@ -9,8 +9,8 @@ from urllib.parse import quote
 
 import numpy as np
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.output import refuse_own_world
 from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere

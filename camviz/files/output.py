@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.poses import RigidTransform
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size, intrinsics
 from camviz.files.output import as_yaml, only_camera, refuse_own_world

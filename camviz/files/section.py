@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.files.calibration import CalibrationError
+from camviz.calibration.types import CalibrationError
 from camviz.files.trees import MAX_NODES, shown
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation

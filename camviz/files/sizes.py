@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from camviz.files.calibration import CalibrationError
+from camviz.calibration.types import CalibrationError
 from camviz.files.section import LARGEST_SIDE, Section
 
 

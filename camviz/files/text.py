@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from camviz.files.calibration import CalibrationError
+from camviz.calibration.types import CalibrationError
 
 MAX_BYTES = 16 * 2**20
 HEAD = 2**16  # characters that must tell which format this is

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.models import Model, expressed
 from camviz.files.output import as_json, rows_of
 from camviz.files.section import Section, explained

@@ -13,7 +13,7 @@ from xml.parsers import expat
 
 import yaml
 
-from camviz.files.calibration import CalibrationError
+from camviz.calibration.types import CalibrationError
 
 MAX_DEPTH = 32
 MAX_NODES = 1_000_000

@@ -11,8 +11,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.files import basalt, colmap, euroc, kalibr, kitti, matlab, metashape, mrcal, opencv_writing, ros, transforms
-from camviz.files.calibration import Calibration, CalibrationError
 from camviz.files.loading import load
 from camviz.files.models import same_camera
 

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.photographs import photograph
 from camviz.scenes import paint
 from camviz.scenes.light import SKYLIGHT, SUN, sunlight, to_display, to_linear
+from camviz.scenes.photographs import photograph
 from camviz.scenes.scene import Scene
 from camviz.scenes.standard import terrace_edges, things
 

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.photographs import photograph
 from camviz.scenes.light import sunlight, to_linear
+from camviz.scenes.photographs import photograph
 
 Plane = NDArray[np.floating]  # (height, width), or (height, width, 3) while it is being painted
 Picture = NDArray[np.uint8]

@@ -6,7 +6,7 @@ import re
 from html import escape
 from importlib.resources import files
 
-from camviz.notebooks import Notebook
+from camviz.course.notebooks import Notebook
 from camviz.teaching import parts, plans
 from camviz.teaching.slides import Slide, slides
 

@@ -9,10 +9,10 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from camviz import notebooks
-from camviz.lessons import tidied
-from camviz.notebooks import Cell, Notebook, exercise_cells, read, solution_code, write
-from camviz.questions import Question
+from camviz.course import notebooks
+from camviz.course.notebooks import Cell, Notebook, exercise_cells, read, solution_code, write
+from camviz.course.questions import Question
+from camviz.course.saved_outputs import tidied
 from camviz.teaching import parts, plans
 from camviz.teaching.plans import Plan, Step, Votes
 

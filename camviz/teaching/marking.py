@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from camviz.checks import Exercise, Misconception
-from camviz.trials import Arguments, Trial, run
+from camviz.course.checks import Exercise, Misconception
+from camviz.course.trials import Arguments, Trial, run
 
 POINTS = 4
 """Of each exercise."""

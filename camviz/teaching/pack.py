@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from camviz.notebooks import Notebook, read
+from camviz.course.notebooks import Notebook, read
 from camviz.teaching.deck import deck
 from camviz.teaching.edition import Say, lesson_paths, write_teacher_edition
 from camviz.teaching.sheets import sheets

@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from camviz import notebooks, questions
-from camviz.notebooks import Cell, Notebook
+from camviz.course import notebooks, questions
+from camviz.course.notebooks import Cell, Notebook
 
 _ASKED = re.compile(r"^(ask|quiz)\((.*)\)\s*$", re.MULTILINE)
 _PICTURE = re.compile(r'<img[^>]*?\salt="(?P<alt>[^"]*)"[^>]*?\ssrc="(?P<source>data:[^"]+)"')

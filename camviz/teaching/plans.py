@@ -29,11 +29,11 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from importlib.resources import files
 from typing import Any
 
-from camviz import notebooks, questions
-from camviz.exercises import exercises
+from camviz.course import notebooks, questions
+from camviz.course.exercises import exercises
+from camviz.course.material import material
 from camviz.teaching import markup, parts
 
 LONG, SHORT = 90, 45
@@ -150,7 +150,7 @@ def plan(lesson: str) -> Plan | None:
 
 @lru_cache
 def _plans(lesson: str) -> Plan | None:
-    path = files(__package__) / f"{lesson}.toml"
+    path = material(lesson, "plan.toml")
     if not lesson.isalnum() or not path.is_file():
         return None
     return parse(lesson, path.read_text(encoding="utf-8"))

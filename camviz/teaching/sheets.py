@@ -5,12 +5,12 @@ from __future__ import annotations
 from html import escape
 from importlib.resources import files
 
-from camviz import prose, questions
-from camviz.checks import Exercise
-from camviz.exercises import exercises
-from camviz.notebooks import Notebook, exercise_cells, solution_code
-from camviz.page import document
-from camviz.questions import Question
+from camviz.course import prose, questions
+from camviz.course.checks import Exercise
+from camviz.course.exercises import exercises
+from camviz.course.notebooks import Notebook, exercise_cells, solution_code
+from camviz.course.questions import Question
+from camviz.draw.page import document
 from camviz.teaching import markup, parts, plans
 from camviz.teaching.edition import place
 from camviz.teaching.marking import POINTS, RULE, WrongAnswer, example, wrong_answers

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 
-from camviz import prose
-from camviz.notebooks import Cell, Notebook, exercise_of
-from camviz.questions import Question
+from camviz.course import prose
+from camviz.course.notebooks import Cell, Notebook, exercise_of
+from camviz.course.questions import Question
 from camviz.teaching import markup, parts
 from camviz.teaching.parts import Shown
 

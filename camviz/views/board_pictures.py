@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.slopes import parameter
+from camviz.calibration.types import Board
 from camviz.calibration.zhang import board_pose, camera_matrix, focal_lengths, homography
 from camviz.cameras import Camera, Intrinsics, transform
-from camviz.files.calibration import Board
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation

@@ -10,12 +10,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, Item, Label, Line, axes_triad, camera_body, draw_space, space_panel
-from camviz.files.calibration import Board, Calibration
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import Control, View, choice, slider

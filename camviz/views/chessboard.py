@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.calibration.types import Board
 from camviz.draw.items import Line, Sheet
-from camviz.files.calibration import Board
 from camviz.lenses.base import Array
 
 

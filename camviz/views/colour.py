@@ -17,15 +17,15 @@ from camviz.colour import balance, spectra
 from camviz.colour.developing import Shot, developed, errors, in_daylight, xyz_from_raw
 from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.panel import photograph as photograph_panel
 from camviz.draw.picture import Picture, jpeg
-from camviz.photographs import photograph
 from camviz.scenes.light import to_display, to_linear
+from camviz.scenes.photographs import photograph
 from camviz.views import swatches
 from camviz.views.base import Control, View, choice, slider, switch
-from camviz.yours import tried
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
 LAYOUTS = {"chart photograph": 326, "spectra chart photograph steps": 640, "chart photograph yours": 626}

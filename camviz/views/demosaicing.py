@@ -17,6 +17,7 @@ from scipy.fft import fftshift, rfft2
 
 from camviz import mosaics
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.heat import heat_key, heat_map, heat_panel
 from camviz.draw.panel import Panel, image_panel
@@ -25,10 +26,9 @@ from camviz.draw.picture import Picture, jpeg, png
 from camviz.lenses.base import Array
 from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
 from camviz.mosaics.measures import Measures
-from camviz.photographs import photograph
 from camviz.scenes import render, textured_scene, to_display, to_linear
+from camviz.scenes.photographs import photograph
 from camviz.views.base import View, choice, slider
-from camviz.yours import tried
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz import optics
+from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
@@ -22,7 +23,6 @@ from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, t
 from camviz.scenes.aperture import Aperture, ThinLensCamera
 from camviz.views import lens_diagram
 from camviz.views.base import View, choice, slider, switch
-from camviz.yours import tried
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = 64, 256  # points of the lens

@@ -14,6 +14,7 @@ import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera, transform
+from camviz.course.yours import tried
 from camviz.distortion import bends
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
@@ -24,7 +25,6 @@ from camviz.scenes import textured_scene
 from camviz.views import garden
 from camviz.views.marks import border_arrow, camera_outline, clipped, crop, on_photograph, ring
 from camviz.views.two_cameras import TwoCameras
-from camviz.yours import tried
 
 _DISTANCES = np.concatenate([np.geomspace(0.02, 400, 120), [np.inf]])
 _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
@@ -22,7 +23,6 @@ from camviz.sensors import Sensor
 from camviz.sensors.frozen import Draw, exposed
 from camviz.views import garden
 from camviz.views.base import View, choice, slider
-from camviz.yours import tried
 
 FULL_WELL_E = 30_000.0
 READ_NOISE_E = 3.0

@@ -14,13 +14,13 @@ import numpy as np
 
 from camviz.clinic.catalogue import Finding
 from camviz.clinic.laboratory import BOARD, ILLNESSES, VIEWS, Experiment, experiment
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.marks import arrows
-from camviz.yours import tried
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
 _MOST = 4  # findings that have room

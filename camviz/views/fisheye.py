@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.items import Dots, Item, Line, axes_triad
 from camviz.draw.panel import Panel, image_panel, photograph
@@ -22,11 +23,10 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, draw_space, space_panel
 from camviz.lenses import Equidistant, Equisolid, Lens, Orthographic, Perspective, Stereographic
 from camviz.lenses.base import Array
-from camviz.reprojection import reproject, window
+from camviz.panoramas.reprojection import reproject, window
 from camviz.views import garden
 from camviz.views.base import View, choice, slider
 from camviz.views.marks import on_photograph
-from camviz.yours import tried
 
 SIDE = 480  # pixels of the picture, which is square
 

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics, transform
+from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture
@@ -37,7 +38,6 @@ from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.marks import border_arrow, clipped
-from camviz.yours import tried
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
 

@@ -15,6 +15,7 @@ from scipy import constants
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
+from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
@@ -25,7 +26,6 @@ from camviz.sensors import DigitalCamera, Sensor, decibel
 from camviz.sensors.digital_camera import Shot
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
 from camviz.views.base import View, choice, slider
-from camviz.yours import tried
 
 SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
 SCENE_LUX = 1000.0

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.heat import heat_key, heat_map, heat_panel
 from camviz.draw.panel import Panel, image_panel, photograph
@@ -24,7 +25,6 @@ from camviz.views import garden_field, microlens_diagram
 from camviz.views.base import Control, View, choice, slider, switch
 from camviz.views.depth_wedge import metres
 from camviz.views.marks import on_photograph, ring
-from camviz.yours import tried
 
 PITCH = 0.002  # metres between microlenses, of the camera that would record the garden's field
 _LOW, _HIGH = garden_field.SLOPES

@@ -13,7 +13,7 @@ from camviz.draw.items import Item, Label, Line, Sheet
 from camviz.draw.panel import Panel
 from camviz.draw.space import Dots
 from camviz.lenses.base import Array, unit
-from camviz.mirrors import Catadioptric, Mirror, MirrorLens, eccentricity
+from camviz.panoramas.mirrors import Catadioptric, Mirror, MirrorLens, eccentricity
 
 RIM_MM = 40.0  # from the axis to the edge of what is shown
 LEAST_XI = 1e-3  # below it a mirror is flat to within a micrometre

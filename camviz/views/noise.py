@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
@@ -23,7 +24,6 @@ from camviz.sensors.frozen import Draw, exposed
 from camviz.sensors.statistics import slope_through_origin
 from camviz.views import garden
 from camviz.views.base import View, slider, switch
-from camviz.yours import tried
 
 FULL_WELL_E = 15_000.0
 WHITE_E_PER_S = 10_000.0  # electrons that a white surface frees in a second

@@ -15,23 +15,23 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.cubemap import cubemap_camera
+from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import Eye, draw_space, space_panel
 from camviz.lenses import Lens, UnifiedSphere
 from camviz.lenses.base import Array
-from camviz.mirrors import Catadioptric, MirrorLens, direction_error, miss
-from camviz.mirrors import photograph as photographed
+from camviz.panoramas.cubemap import cubemap_camera
+from camviz.panoramas.mirrors import Catadioptric, MirrorLens, direction_error, miss
+from camviz.panoramas.mirrors import photograph as photographed
+from camviz.panoramas.reprojection import equirectangular_camera, reproject, window
 from camviz.poses import RigidTransform, Rotation
-from camviz.reprojection import equirectangular_camera, reproject, window
 from camviz.scenes import textured_scene, to_display
 from camviz.views import garden
 from camviz.views.base import View, choice, slider
 from camviz.views.marks import on_photograph
 from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
-from camviz.yours import tried
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
 UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from camviz.calibration.types import Board
 from camviz.calibration.zhang import focal_lengths, homography
 from camviz.cameras import Camera
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
-from camviz.files.calibration import Board
 from camviz.lenses.base import Array
-from camviz.yours import tried
 
 Function = Callable[..., Any]
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
@@ -23,7 +24,6 @@ from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, Sheet, draw_sp
 from camviz.poses import RigidTransform
 from camviz.scenes import render, snapshot, textured_scene, to_display
 from camviz.views.base import View, slider, switch
-from camviz.yours import tried
 
 WALL_MM = np.array([36.0, 27.0])
 PIXELS = 480  # across the wall: 75 µm each

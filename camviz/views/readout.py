@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
@@ -23,7 +24,6 @@ from camviz.lenses.base import Array
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors.readout import bucket_brigade, row_times
 from camviz.views.base import View, choice, slider
-from camviz.yours import tried
 
 ROWS = 480  # of the sensor: what the row time counts
 LARGE = (320, 240)  # pixels of a fine picture

@@ -15,6 +15,7 @@ import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.heat import heat_key, heat_map, heat_panel
 from camviz.draw.panel import Panel, image_panel, photograph
@@ -26,7 +27,6 @@ from camviz.views.base import View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
-from camviz.yours import tried
 
 _WIDTH, _TALLEST = 385, 289
 _MAP_WIDTH, _MAP_TALLEST = 236, 177

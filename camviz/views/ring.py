@@ -14,7 +14,7 @@ from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Equirectangular
 from camviz.lenses.base import Array
-from camviz.ring import Ring, all_round
+from camviz.panoramas.ring import Ring, all_round
 from camviz.scenes import textured_scene, to_display
 from camviz.views.base import View, slider, switch
 

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
+from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, png
@@ -26,7 +27,6 @@ from camviz.optics import (
 )
 from camviz.scenes import to_display
 from camviz.views.base import View, slider, switch
-from camviz.yours import tried
 
 FIELD_UM = (320, 240)  # of the sensor that the picture shows
 TOP_PER_MM = 260.0  # the curves' right end

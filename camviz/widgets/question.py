@@ -1,7 +1,7 @@
 """Questions to commit to before seeing: `ask("05.far_rays")`, and the quiz in two forms.
 
 `quiz("05", "A")` stands before a lesson, takes one choice a question and tells nothing. `quiz("05")`, form B, stands at
-its end and replies to each choice. What is chosen in either is kept beside the notebook (camviz.answers).
+its end and replies to each choice. What is chosen in either is kept beside the notebook (camviz.course.answers).
 
 Live, the answer stays in the kernel until the reader has committed to a choice. Without a kernel, or with
 CAMVIZ_STATIC=1, the same questions are a page of folded replies; of what is asked before a lesson, without any.
@@ -17,9 +17,9 @@ from typing import Any
 
 import traitlets
 
-from camviz import prose
-from camviz.answers import KEPT_IN, WHEN, AnswerBook
-from camviz.questions import Question, question, quiz_questions
+from camviz.course import prose
+from camviz.course.answers import KEPT_IN, WHEN, AnswerBook
+from camviz.course.questions import Question, question, quiz_questions
 from camviz.widgets.still import StillWidget
 
 Tries = tuple[int, ...]

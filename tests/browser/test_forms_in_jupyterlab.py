@@ -5,8 +5,8 @@ import json
 import pytest
 from laboratory import Notebook, jupyterlab
 
-from camviz.answers import KEPT_IN, read_answers
-from camviz.questions import quiz_questions
+from camviz.course.answers import KEPT_IN, read_answers
+from camviz.course.questions import quiz_questions
 
 pytestmark = pytest.mark.browser
 

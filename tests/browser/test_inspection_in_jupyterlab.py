@@ -14,7 +14,8 @@ pytestmark = pytest.mark.browser
 CELL = f"""import sys
 sys.path.insert(0, {str(Path(__file__).resolve().parents[1])!r})
 from calibrations import sick
-sick().inspect()
+from camviz import inspect
+inspect(sick())
 """
 
 

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from calibrations import pair, sick
 
 from camviz.clinic import inspect
-from camviz.clinic.report import write_report
+from camviz.report.inspection import write_report
 
 pytestmark = pytest.mark.browser
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from camviz import notebooks
+from camviz.course import notebooks
 from camviz.teaching.deck import deck
 
 pytestmark = pytest.mark.browser

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from camviz import glossary, notebooks, questions
-from camviz.exercises import exercises
+from camviz.course import glossary, notebooks, questions
+from camviz.course.exercises import exercises
 from camviz.teaching import plans
 
 HERE = Path(__file__).parent

@@ -6,10 +6,12 @@ from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
 from camviz import optics
-from camviz.exercises import lesson02
-from camviz.photographs import photograph
+from camviz.course.material import module
+from camviz.scenes.photographs import photograph
 from camviz.views.depth_of_field import DepthOfFieldView
 from camviz.views.lens_elements import LensElementsView
+
+lesson02 = module("02")
 
 EXCEPTIONS = {
     "United States patent 4,113,357": "the number of a patent",

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.photographs import photograph
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, towards_balloon
+from camviz.scenes.photographs import photograph
 from camviz.scenes.standard import textured_scene
 from camviz.views.intrinsics import GLOBE, GLOBE_RADIUS, IntrinsicsView
 

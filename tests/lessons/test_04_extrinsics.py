@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from camviz import notebooks
-from camviz.exercises import exercise
+from camviz.course import notebooks
+from camviz.course.exercises import exercise
 from camviz.scenes.standard import board_corners
 from camviz.views.frustum import FrustumView
 

@@ -6,10 +6,13 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
-from camviz.checks import judge
-from camviz.exercises import exercise, lesson08
+from camviz.course.checks import judge
+from camviz.course.exercises import exercise
+from camviz.course.material import module
 from camviz.scenes import snapshot, textured_scene
 from camviz.views.rectification import RectificationView
+
+lesson08 = module("08")
 
 EXCEPTIONS: dict[str, str] = {}
 

@@ -12,12 +12,15 @@ from quoting import LESSONS
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from camviz import notebooks
-from camviz.command import main
-from camviz.cubemap import FACES, face_camera
-from camviz.exercises import exercise, lesson10
+from camviz.commands.command import main
+from camviz.course import notebooks
+from camviz.course.exercises import exercise
+from camviz.course.material import module
 from camviz.lenses import DoubleSphere, UnifiedSphere
-from camviz.ring import Ring
+from camviz.panoramas.cubemap import FACES, face_camera
+from camviz.panoramas.ring import Ring
+
+lesson10 = module("10")
 
 EXCEPTIONS: dict[str, str] = {}
 

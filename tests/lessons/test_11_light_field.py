@@ -7,9 +7,12 @@ import pytest
 from quoting import LESSONS
 from scipy.ndimage import shift
 
-from camviz import notebooks
-from camviz.exercises import exercise, lesson11
+from camviz.course import notebooks
+from camviz.course.exercises import exercise
+from camviz.course.material import module
 from camviz.lightfields import LightField, from_microlens_image
+
+lesson11 = module("11")
 
 EXCEPTIONS: dict[str, str] = {}
 

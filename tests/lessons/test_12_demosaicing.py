@@ -11,12 +11,16 @@ import pytest
 from quoting import LESSONS
 from scipy.ndimage import convolve
 
-from camviz import mosaics, notebooks
-from camviz.checks import judge
-from camviz.exercises import exercise, lesson12
+from camviz import mosaics
+from camviz.course import notebooks
+from camviz.course.checks import judge
+from camviz.course.exercises import exercise
+from camviz.course.material import module
 from camviz.mosaics import BAYER, PATTERNS
-from camviz.photographs import photograph
+from camviz.scenes.photographs import photograph
 from camviz.views.demosaicing import DemosaicingView
+
+lesson12 = module("12")
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # it imports from where SciPy will not keep things

@@ -10,13 +10,16 @@ import pytest
 from quoting import LESSONS
 from scipy.optimize import minimize
 
-from camviz import notebooks
-from camviz.checks import judge
 from camviz.colour import balance, spectra
 from camviz.colour.spaces import difference, to_lab
-from camviz.exercises import exercise, lesson13
-from camviz.photographs import photograph
+from camviz.course import notebooks
+from camviz.course.checks import judge
+from camviz.course.exercises import exercise
+from camviz.course.material import module
+from camviz.scenes.photographs import photograph
 from camviz.views.colour import ColourView
+
+lesson13 = module("13")
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

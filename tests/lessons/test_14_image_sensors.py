@@ -9,13 +9,15 @@ from quoting import LESSONS
 from scipy import constants
 from scipy.stats import nbinom
 
-from camviz import notebooks
-from camviz.exercises import lesson14
-from camviz.photographs import photograph
+from camviz.course import notebooks
+from camviz.course.material import module
+from camviz.scenes.photographs import photograph
 from camviz.sensors import PUBLISHED, SHUTTERS, Sensor, decibel, smeared, transferred
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, KAF_3200ME
 from camviz.views.image_sensor import ImageSensorView
 from camviz.views.readout import LARGE, ReadoutView, fan
+
+lesson14 = module("14")
 
 EXCEPTIONS: dict[str, str] = {}
 

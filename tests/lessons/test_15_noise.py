@@ -6,14 +6,16 @@ import pytest
 from quoting import LESSONS
 from scipy.constants import physical_constants
 
-from camviz import notebooks
-from camviz.exercises import lesson15
+from camviz.course import notebooks
+from camviz.course.material import module
 from camviz.scenes import to_display
 from camviz.sensors import decibel
 from camviz.sensors.correction import NoiseModel, merged
 from camviz.sensors.measurement import Level, Measurement
 from camviz.sensors.statistics import pair
 from camviz.views.noise import PhotonTransferView
+
+lesson15 = module("15")
 
 EXCEPTIONS: dict[str, str] = {
     "That alone lowers K to 0.2801 DN/e⁻, by a quarter of a per cent.": "tests/test_emva.py measures it on the "

@@ -258,7 +258,9 @@ def test_shapes_and_answers_of_the_exercises(says):
     assert three.value == 3 == len(ANNA.experiment.truth.unproject(np.array([3.0, 4.0])))
     says("A corner is off beyond 6 σ, with σ from exercise 2")
     whole, line = says("Answer 3 if a whole view is off, else 2 if a row or a column is")
-    from camviz.exercises import lesson16
+    from camviz.course.material import module
+
+    lesson16 = module("16")
 
     bad = np.zeros((3, 4, 5, 2)) + np.random.default_rng(0).normal(0, 0.1, (3, 4, 5, 2))
     bad[0, 1] += 50
@@ -476,7 +478,7 @@ def test_hand_and_eye(says):
     from quoting import LESSONS
     from scipy.optimize import least_squares
 
-    from camviz import notebooks
+    from camviz.course import notebooks
 
     cell = next(
         one for one in notebooks.read(LESSONS / "16_clinic.ipynb").cells if one.source.startswith("from scipy.spatial")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from quoting import HERE, LESSONS
 
-from camviz import notebooks
-from camviz.checks import judge
-from camviz.exercises import exercises
-from camviz.trials import HINTS
+from camviz.course import notebooks
+from camviz.course.checks import judge
+from camviz.course.exercises import exercises
+from camviz.course.trials import HINTS
 
 SEEDS = range(50)
 ADVERSARIES = 8

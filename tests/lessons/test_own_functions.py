@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from quoting import LESSONS
 
-from camviz import notebooks
-from camviz.exercises import exercises
+from camviz.course import notebooks
+from camviz.course.exercises import exercises
 from camviz.widgets.explorer import Explorer
 
 PATHS = [path for path in sorted(LESSONS.glob("*.ipynb")) if "attempt(" in path.read_text(encoding="utf-8")]

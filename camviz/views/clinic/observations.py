@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.pairing import last_number
+from camviz.calibration.types import Board
 from camviz.cameras import Camera
-from camviz.files.calibration import Board
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 

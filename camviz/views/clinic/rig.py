@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from camviz.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.items import Item, Label, Line
 from camviz.draw.picture import Picture
 from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
-from camviz.files.calibration import Board
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import View, choice

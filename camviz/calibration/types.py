@@ -1,0 +1,112 @@
+"""What a calibration is: a board, cameras, and what was recorded with them, whatever program wrote it down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from camviz.cameras import Camera, Rig
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
+
+Mask = NDArray[np.bool_]
+
+
+class CalibrationError(ValueError):
+    """A file that cannot be read as a calibration; the message is one sentence: where, what was expected, what came.
+
+    `id` names the clinic's finding that this is, such as "bad-k", and `value` is the number that shows it; the id is
+    empty where the file is simply unreadable.
+    """
+
+    def __init__(self, sentence: str, id: str = "", value: float | None = None) -> None:
+        super().__init__(sentence)
+        self.id, self.value = id, value
+
+
+@dataclass(frozen=True)
+class Board:
+    """A chessboard: its inner corners by columns and rows, and the side of a square in metres, if the file is.
+
+    A ChArUco board has markers of `marker_size` metres, out of OpenCV's `dictionary` of that name ("DICT_5X5_100"), in
+    its white squares.
+    """
+
+    columns: int
+    rows: int
+    square_size: float
+    marker_size: float | None = None
+    dictionary: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("columns", "rows"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be a number of inner corners, at least 1, got {getattr(self, name)}")
+        if not self.square_size > 0:
+            raise ValueError(f"square_size must be a positive length, got {self.square_size}")
+        if (self.marker_size is None) != (self.dictionary is None):
+            raise ValueError(
+                f"marker_size and dictionary must be given together, got {self.marker_size} and {self.dictionary}"
+            )
+        if self.marker_size is not None and not 0 < self.marker_size < self.square_size:
+            raise ValueError(
+                f"marker_size must be a length below square_size = {self.square_size}, got {self.marker_size}"
+            )
+
+    @property
+    def corners(self) -> Array:
+        """The inner corners (columns * rows, 3) in the board's frame, row by row: x along a row, y down, z = 0."""
+        x, y = np.meshgrid(np.arange(self.columns, dtype=float), np.arange(self.rows, dtype=float))
+        return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=-1) * self.square_size
+
+    def warped(self, warp: ArrayLike) -> Array:
+        """The corners (columns * rows, 3) of a bent board: z = warp_x (1 - ξ²) + warp_y (1 - η²), ξ and η from -1 to 1.
+
+        `warp` (2,) has the sagittas in metres at the middle, along the rows and along the columns (mrcal's model).
+        """
+        corners = self.corners
+        half = np.maximum([self.columns - 1, self.rows - 1], 1) * self.square_size / 2
+        xi_eta = corners[:, :2] / half - 1
+        corners[:, 2] = (1 - xi_eta**2) @ np.asarray(warp, dtype=float)
+        return corners
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The cameras of one calibration file, by name and in place, and what else the file recorded.
+
+    The world is the frame of the first camera, the left one of a pair, unless the file has a world of its own, as
+    COLMAP's, mrcal's, nerfstudio's and Metashape's do. What was recorded of a camera is kept by its name and left out
+    where the file has none; the cameras of a rig have the same views. `notes` say in words what a reader should know
+    about the file.
+    """
+
+    cameras: Mapping[str, Camera]
+    source: Path
+    format: str
+    board: Board | None = None
+    detections: Mapping[str, Array] = field(default_factory=dict, repr=False)  # name → pixels (views, corners, 2)
+    cam_from_board: Mapping[str, RigidTransform] = field(default_factory=dict, repr=False)  # name → one pose per view
+    per_view_errors: Mapping[str, Array] = field(default_factory=dict, repr=False)  # name → RMS (views,) in pixels
+    world_from_imu: RigidTransform | None = None
+    notes: tuple[str, ...] = ()
+    pictures: Mapping[str, tuple[str, ...]] = field(default_factory=dict, repr=False)  # name → a file name per view
+    set_aside: Mapping[str, Mask] = field(default_factory=dict, repr=False)  # name → (views, corners): seen, not used
+    estimated: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # name → the intrinsics that were solved for
+    intrinsics_covariance: Mapping[str, Array] = field(default_factory=dict, repr=False)  # (n, n), as `estimated` has n
+    board_warp: Array | None = None  # (2,) sagittas in metres, see Board.warped
+    skipped: tuple[tuple[str, str], ...] = ()  # pictures that were not used, and why
+    faults: tuple[CalibrationError, ...] = ()  # what was mended in reading, where `load` was asked to mend
+
+    def __post_init__(self) -> None:
+        if not self.cameras:
+            raise ValueError("cameras must name at least one camera, got none")
+
+    @property
+    def rig(self) -> Rig:
+        """The cameras as one rig."""
+        return Rig(self.cameras)

@@ -1,0 +1,133 @@
+"""The glossary: one correct sentence for each term, with its formula and the lessons that use it.
+
+    from camviz.course.glossary import glossary, term
+
+`python -m camviz.course.glossary` writes docs/glossary.md anew.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import lru_cache
+from html import escape
+from types import MappingProxyType
+from typing import Any
+
+from camviz.course import prose
+from camviz.course.material import lessons_folder, material
+
+
+@dataclass(frozen=True)
+class Term:
+    """One entry. `also` are its other names, `lessons` the numbers of the lessons that use it ("05")."""
+
+    name: str
+    sentence: str
+    formula: str = ""
+    lessons: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
+    key: bool = False
+
+    @property
+    def anchor(self) -> str:
+        """The entry's address on a page: "principal-point"."""
+        return anchor(self.name)
+
+    def __repr__(self) -> str:
+        formula = f"\n    {self.formula}" if self.formula else ""
+        return f"{self.name}: {prose.to_plain(self.sentence)}{formula}{_in_words(self.lessons)}"
+
+    def _repr_html_(self) -> str:
+        formula = f"<br><code>{escape(self.formula)}</code>" if self.formula else ""
+        return (
+            f'<dl><dt id="{self.anchor}"><strong>{escape(self.name)}</strong></dt>'
+            f"<dd>{prose.inline(self.sentence)}{formula}{_in_words(self.lessons)}</dd></dl>"
+        )
+
+
+@dataclass(frozen=True)
+class Glossary:
+    """All entries in alphabetical order."""
+
+    terms: tuple[Term, ...]
+
+    def __repr__(self) -> str:
+        return "\n".join(repr(one) for one in self.terms)
+
+    def _repr_html_(self) -> str:
+        return "".join(one._repr_html_() for one in self.terms)
+
+
+@lru_cache
+def glossary() -> Glossary:
+    """The whole glossary."""
+    entries = [_term(one) for one in _table()["term"]]
+    return Glossary(tuple(sorted(entries, key=lambda one: one.name.casefold())))
+
+
+def term(name: str) -> Term:
+    """The entry of that name, or of which it is another name. Raises ValueError suggesting the nearest ones."""
+    known = _names()
+    if name.casefold() not in known:
+        near = get_close_matches(name.casefold(), known, n=3)
+        suggestion = f"; perhaps {', '.join(known[one].name for one in near)}" if near else ""
+        raise ValueError(f"the glossary has no entry {name!r}{suggestion}")
+    return known[name.casefold()]
+
+
+def anchor(name: str) -> str:
+    """A heading's address as GitHub makes it: lower case, hyphens for spaces, no other punctuation."""
+    return re.sub(r"[^\w\- ]", "", name.casefold()).replace(" ", "-")
+
+
+def markdown(lessons: str = "") -> str:
+    """The glossary as Markdown with an anchor at every entry; `lessons` is the way to the notebooks' folder."""
+    return "\n\n".join(_entry(one, lessons) for one in glossary().terms) + "\n"
+
+
+def page() -> str:
+    """docs/glossary.md."""
+    made = "<!-- Made from lessons/material/glossary.toml by: python -m camviz.course.glossary -->"
+    return f"# Glossary\n\n{made}\n\n{markdown('../lessons/')}"
+
+
+def _entry(one: Term, lessons: str) -> str:
+    formula = f" `{one.formula}`" if one.formula else ""
+    links = ", ".join(_link(number, lessons) for number in one.lessons)
+    used = f" *Lesson{'s' if len(one.lessons) > 1 else ''} {links}.*" if links else ""
+    return f'<a id="{one.anchor}"></a>**{one.name}.** {one.sentence}{formula}{used}'
+
+
+def _link(number: str, lessons: str) -> str:
+    notebook = _table()["notebooks"].get(number)
+    return f"[{number}]({lessons}{notebook})" if notebook else number
+
+
+def _in_words(lessons: tuple[str, ...]) -> str:
+    return f" (lesson{'s' if len(lessons) > 1 else ''} {', '.join(lessons)})" if lessons else ""
+
+
+def _term(entry: dict[str, Any]) -> Term:
+    lists: dict[str, Any] = {key: tuple(entry[key]) for key in ("lessons", "also") if key in entry}
+    return Term(**{**entry, **lists})
+
+
+@lru_cache
+def _names() -> Mapping[str, Term]:
+    entries = glossary().terms
+    other = {name.casefold(): one for one in entries for name in one.also}
+    own = {one.name.casefold(): one for one in entries}
+    return MappingProxyType(other | own)
+
+
+@lru_cache
+def _table() -> dict[str, Any]:
+    return tomllib.loads(material("glossary.toml").read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    lessons_folder().parent.joinpath("docs", "glossary.md").write_text(page(), encoding="utf-8")

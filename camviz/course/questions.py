@@ -1,0 +1,166 @@
+"""Predict questions and quizzes: one TOML file per lesson, read into frozen dataclasses that cannot be wrong.
+
+A `[[question]]` has an `id`, a `kind` ("predict" or "quiz"), a `text` and two or more `[[question.choice]]`, each with
+a `text` and a `reply`. Exactly one choice is `correct = true`; every other one names the `misconception` behind it.
+Texts are prose with `code` and *emphasis* (camviz.course.prose).
+
+A lesson's quiz has two parallel forms: A is asked before the lesson, B after it. Each quiz question names its `form`
+and its `concept`; each concept has one question in either form, and these twins offer the same misconceptions.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any
+
+from camviz.course.material import material
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One answer, and the reply to whoever chooses it."""
+
+    text: str
+    reply: str
+    correct: bool = False
+    misconception: str = ""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A multiple-choice question; `name` is "LESSON.ID". `form` and `concept` are "" outside a quiz with two forms."""
+
+    name: str
+    kind: str
+    text: str
+    choices: tuple[Choice, ...]
+    form: str = ""
+    concept: str = ""
+
+    def __post_init__(self) -> None:
+        for complaint in self._complaints():
+            raise ValueError(f"question {self.name}: {complaint}")
+
+    @property
+    def answer(self) -> int:
+        """The index of the correct choice."""
+        return next(i for i, choice in enumerate(self.choices) if choice.correct)
+
+    @property
+    def misconceptions(self) -> frozenset[str]:
+        """The misconceptions behind the wrong choices."""
+        return frozenset(choice.misconception for choice in self.choices if not choice.correct)
+
+    def _complaints(self) -> list[str]:
+        correct = sum(choice.correct for choice in self.choices)
+        replies = {choice.reply for choice in self.choices}
+        texts = {choice.text for choice in self.choices}
+        checks = [
+            (self.kind in ("predict", "quiz"), f'kind must be "predict" or "quiz", got {self.kind!r}'),
+            (self.form in ("", "A", "B"), f'form must be "A" or "B", got {self.form!r}'),
+            (bool(self.form) == bool(self.concept.strip()), "form and concept must be given together"),
+            (self.kind == "quiz" or not self.form, "a predict question has no form"),
+            (self.text.strip() != "", "text is empty"),
+            (len(self.choices) >= 2, f"needs at least two choices, has {len(self.choices)}"),
+            (correct == 1, f"needs exactly one choice with correct = true, has {correct}"),
+            (all(choice.text.strip() and choice.reply.strip() for choice in self.choices), "a text or reply is empty"),
+            (len(texts) == len(self.choices), "two choices have the same text"),
+            (len(replies) == len(self.choices), "two choices have the same reply"),
+            *(
+                (
+                    choice.correct != bool(choice.misconception),
+                    f"choice {choice.text!r} must be correct or name its misconception",
+                )
+                for choice in self.choices
+            ),
+        ]
+        return [complaint for holds, complaint in checks if not holds]
+
+
+@lru_cache
+def questions(lesson: str) -> Mapping[str, Question]:
+    """All questions of a lesson ("05"), by name and in their order. Raises ValueError when it has none."""
+    path = material(lesson, "questions.toml")
+    if not lesson.isalnum() or not path.is_file():
+        raise ValueError(f"there are no questions for lesson {lesson!r}")
+    return parse(lesson, path.read_text(encoding="utf-8"))
+
+
+def question(name: str) -> Question:
+    """The question called "LESSON.ID". Raises ValueError listing the lesson's questions when there is none."""
+    known = questions(name.partition(".")[0])
+    if name not in known:
+        raise ValueError(f"no question is called {name!r}; this lesson has {', '.join(known)}")
+    return known[name]
+
+
+def quiz_questions(lesson: str, form: str = "B") -> tuple[Question, ...]:
+    """One form of a lesson's quiz, in its order; () where it has none. A quiz without forms counts as form B."""
+    quiz = (one for one in questions(lesson).values() if one.kind == "quiz")
+    return tuple(one for one in quiz if (one.form or "B") == form)
+
+
+def parse(lesson: str, toml: str) -> dict[str, Question]:
+    """The questions in a TOML text, by name. Raises ValueError saying which question is wrong, and how."""
+    try:
+        tables = tomllib.loads(toml)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"questions.toml of lesson {lesson} is not TOML: {error}") from error
+    _only(tables, {"question"}, f"{lesson}.toml")
+    parsed = [_question(lesson, number, table) for number, table in enumerate(tables.get("question", []), start=1)]
+    names = [one.name for one in parsed]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"question {name}: its id occurs {names.count(name)} times")
+    _paired([one for one in parsed if one.kind == "quiz"])
+    return dict(zip(names, parsed, strict=True))
+
+
+def _question(lesson: str, number: int, table: dict[str, Any]) -> Question:
+    name = f"{lesson}.{table.get('id', f'(number {number}, without an id)')}"
+    _only(table, {"id", "kind", "form", "concept", "text", "choice"}, f"question {name}")
+    _needs(table, {"id": str, "kind": str, "text": str, "choice": list}, f"question {name}")
+    choices = tuple(
+        _choice(choice, f"question {name}, choice {i}") for i, choice in enumerate(table["choice"], start=1)
+    )
+    pair = {key: table.get(key, "") for key in ("form", "concept")}
+    _needs(pair, {"form": str, "concept": str}, f"question {name}")
+    return Question(name, table["kind"], table["text"], choices, **pair)
+
+
+def _paired(quiz: list[Question]) -> None:
+    """Raises ValueError naming the first question of a quiz with forms that lacks its one twin in the other form."""
+    for one in quiz if any(one.form for one in quiz) else ():
+        if not one.form:
+            raise ValueError(f"question {one.name}: needs a form and a concept, as the others of this quiz have them")
+        alike = [other for other in quiz if other.concept == one.concept]
+        in_form = [other.name for other in alike if other.form == one.form]
+        if len(in_form) > 1:
+            raise ValueError(f"question {one.name}: {' and '.join(in_form)} have one concept, {one.concept!r}")
+        twin = next((other for other in alike if other.form != one.form), None)
+        if twin is None:
+            missing = "B" if one.form == "A" else "A"
+            raise ValueError(f"question {one.name}: no question of form {missing} has its concept, {one.concept!r}")
+        if differ := sorted(one.misconceptions ^ twin.misconceptions):
+            raise ValueError(f"question {one.name}: its twin {twin.name} must share its misconceptions, not {differ}")
+
+
+def _choice(table: dict[str, Any], where: str) -> Choice:
+    _only(table, {field.name for field in fields(Choice)}, where)
+    _needs(table, {"text": str, "reply": str}, where)
+    return Choice(**table)
+
+
+def _only(table: dict[str, Any], known: set[str], where: str) -> None:
+    unknown = sorted(set(table) - known)
+    if unknown:
+        raise ValueError(f"{where}: knows {', '.join(sorted(known))}, got {', '.join(unknown)}")
+
+
+def _needs(table: dict[str, Any], kinds: dict[str, type], where: str) -> None:
+    for key, kind in kinds.items():
+        if not isinstance(table.get(key), kind):
+            raise ValueError(f"{where}: {key} must be given as {kind.__name__}, got {table.get(key)!r}")

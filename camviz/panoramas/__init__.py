@@ -1,0 +1,1 @@
+"""Wide pictures: cube maps, projections, reprojection, rings of cameras and mirrors."""

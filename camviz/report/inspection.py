@@ -1,0 +1,283 @@
+"""An inspection as one HTML file: the findings in words, then the views, linked with each other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from html import escape
+from importlib.resources import files
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from camviz.cameras import transform
+from camviz.draw import svg
+from camviz.draw.items import Face, Item, Label, Line
+from camviz.draw.page import document, figure
+from camviz.draw.panel import image_panel
+from camviz.draw.picture import Picture
+from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
+from camviz.poses import RigidTransform
+from camviz.report.page import numbers_table
+from camviz.views.board_poses import BoardPosesView
+from camviz.views.chessboard import outline
+from camviz.views.clinic.catalogue import ALIASES, LARGEST, VIEWS, Case, Entry
+from camviz.views.clinic.missing import MissingView
+from camviz.views.clinic.observations import Observations, short_names
+from camviz.views.clinic.residuals import ResidualsView, bars_panel
+
+if TYPE_CHECKING:
+    from camviz.clinic.findings import Finding, Inspection
+
+MOST_VIEWS = 24  # pictures of views that a page holds: the worst of them
+MOST_CAMERAS = 4
+MOST_BOARDS = 20  # of views whose pictures are not on the page
+
+_MARKS = {"fault": "✗ fault", "warning": "! warning", "note": "· note"}
+
+
+def write_report(
+    inspection: Inspection, path: str | PathLike[str], *, images: str | PathLike[str] | None = None
+) -> None:
+    """Write the report of an inspection to `path`; `images` is the folder of the calibration's pictures."""
+    Path(path).write_text(report(inspection, images=images), encoding="utf-8")
+
+
+def report(inspection: Inspection, *, images: str | PathLike[str] | None = None) -> str:
+    """The report as HTML text, readable without a network and without JavaScript."""
+    layout, script = (
+        (files("camviz.report") / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
+    )
+    if inspection.calibration is None:
+        body = _findings(inspection) + _missing(dict.fromkeys(_wanted(inspection), _UNREAD))
+        return document("A calibration that could not be read", body, layout=layout, script=script)
+    case = Case(inspection.calibration, inspection.compare, None if images is None else Path(images), LARGEST)
+    sections: list[tuple[Entry, str]] = []
+    missing: dict[str, str] = {}
+    for entry in VIEWS.values():
+        shown, why = _section(case, entry)
+        sections += [(entry, shown)] if shown else []
+        missing |= {entry.name: why} if why else {}
+    contents = "".join(f'<a href="#view-{entry.name}">{escape(entry.title)}</a> ' for entry, _ in sections)
+    parts = [
+        f"<p>{escape(inspection.calibration.format)}</p>",
+        _findings(inspection),
+        f'<nav aria-label="Views">{contents}</nav>',
+        numbers_table(inspection.calibration),
+        *(shown for _, shown in sections),
+        _missing(missing),
+    ]
+    return document(inspection.calibration.source.name, "".join(parts), layout=layout, script=script)
+
+
+_STILL = RigidTransform.identity()
+_UNREAD = "The file could not be read beyond the fault above."
+
+
+def _wanted(inspection: Inspection) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(finding.view for finding in inspection.findings))
+
+
+# The findings --------------------------------------------------------------------------------------------------------
+
+
+def _findings(inspection: Inspection) -> str:
+    counts = {severity: sum(f.severity == severity for f in inspection.findings) for severity in _MARKS}
+    told = ", ".join(f"{count} {severity}{'s' * (count != 1)}" for severity, count in counts.items() if count)
+    items = "".join(_finding(inspection, finding) for finding in inspection.findings)
+    found = f'<ol class="findings">{items}</ol>' if items else ""
+    return f'<section id="findings"><h2>{told or "Nothing found"}</h2>{found}{_checked(inspection)}</section>'
+
+
+def _finding(inspection: Inspection, finding: Finding) -> str:
+    number = (
+        ""
+        if finding.value is None
+        else f' <data value="{finding.value!r}">{finding.value:.4g} {escape(finding.unit)}</data>'
+    )
+    where = f" <span class=camera>{escape(finding.camera)}</span>" if finding.camera else ""
+    causes = f"<dt>likely</dt><dd>{escape('; '.join(finding.causes))}</dd>" if finding.causes else ""
+    remedy = f"<dt>remedy</dt><dd>{escape(finding.remedy)}</dd>" if finding.remedy else ""
+    return (
+        f'<li class="{finding.severity}"><p><strong>{_MARKS[finding.severity]}</strong> '
+        f"<code>{escape(finding.id)}</code>{where}: "
+        f"{escape(finding.sentence)}{number} {_see(inspection, finding)}</p><dl>{causes}{remedy}</dl></li>"
+    )
+
+
+def _see(inspection: Inspection, finding: Finding) -> str:
+    """Links to the view that shows a finding, and to the pictures that it is about."""
+    entry = VIEWS.get(ALIASES.get(finding.view, finding.view))
+    links = [f'<a href="#view-{finding.view}">{escape(entry.title if entry else finding.view)}</a>']
+    calibration = inspection.calibration
+    camera = finding.camera or (next(iter(calibration.cameras)) if calibration else "")
+    if calibration and camera in calibration.detections:
+        pictures = calibration.pictures.get(camera, ())
+        for view in finding.pictures[:6]:
+            name = pictures[view] if view < len(pictures) else f"view {view + 1}"
+            links.append(f'<a href="#{_id(camera)}-{view + 1}">{escape(Path(name).name)}</a>')
+    return f"<span class=see>→ {', '.join(links)}</span>"
+
+
+def _checked(inspection: Inspection) -> str:
+    skipped: dict[str, list[str]] = {}
+    for id, why in inspection.skipped:
+        skipped.setdefault(why, []).append(id)
+    rows = "".join(f"<li>Not checked, {escape(why)}: {escape(', '.join(ids))}.</li>" for why, ids in skipped.items())
+    return (
+        f"<details><summary>{len(inspection.checked)} checks made, {len(inspection.skipped)} not</summary><ul>"
+        f"<li>Checked: {escape(', '.join(inspection.checked) or 'nothing')}.</li>{rows}</ul></details>"
+    )
+
+
+# The views -----------------------------------------------------------------------------------------------------------
+
+
+def _section(case: Case, entry: Entry) -> tuple[str, str]:
+    """One view's section, of each camera where it is of one; or "" and why there is none."""
+    cameras = ("",) if entry.of_all else case.names[:MOST_CAMERAS]
+    shown, why = "", ""
+    for name in cameras:
+        view = entry.view(case, name)
+        if isinstance(view, ResidualsView):
+            shown += _linked(case, name, len(cameras) > 1)
+        elif isinstance(view, MissingView):
+            why = view.sentence
+        else:
+            shown += figure(name if len(cameras) > 1 else "", view.figure())
+    if not shown:
+        return "", why
+    left_out = case.names[MOST_CAMERAS:]
+    more = (
+        f'<p class="note">Shown for {MOST_CAMERAS} of {len(case.names)} cameras.</p>'
+        if left_out and not entry.of_all
+        else ""
+    )
+    anchors = "".join(f'<span id="view-{alias}"></span>' for alias, name in ALIASES.items() if name == entry.name)
+    return (
+        "<section "
+        f'id="view-{entry.name}">{anchors}<h2>{escape(entry.title)}</h2><p>{escape(entry.purpose)}</p>{shown}{more}</section>',
+        "",
+    )
+
+
+def _missing(missing: Mapping[str, str]) -> str:
+    """The views that could not be made, each with its anchor and the reason."""
+    if not missing:
+        return ""
+    items = []
+    for name, why in missing.items():
+        entry = VIEWS.get(ALIASES.get(name, name))
+        anchors = "".join(
+            f'<span id="view-{alias}"></span>' for alias, of in ALIASES.items() if of == name and alias not in missing
+        )
+        items.append(
+            f'<li id="view-{name}">{anchors}<strong>{escape(entry.title if entry else name)}</strong>: '
+            f"{escape(why)}</li>"
+        )
+    return f'<section id="missing"><h2>What could not be shown</h2><ul>{"".join(items)}</ul></section>'
+
+
+# A bar → its picture → its board -------------------------------------------------------------------------------------
+
+
+def _linked(case: Case, name: str, headed: bool) -> str:
+    """The bars of all views, and of the worst ones their pictures and boards, linked through `data-choose`."""
+    seen = case.observations(name)
+    shown = worst_views(seen)
+    view = ResidualsView.about(seen)
+    links = {i: f"#{_id(name)}-{i + 1}" for i in shown}
+    panel = bars_panel(seen)
+    bars = Picture(
+        svg.rectangle(0, 0, 960, 206, "paper") + view.bars_panel(panel, links=links), 960, 206,
+        f"Error of every view of {name}", view.description().split(" Shown:")[0],
+    )  # fmt: skip
+    few = f"<p>Of the {len(seen)} views the {len(shown)} worst are shown.</p>" if len(shown) < seen.shown.sum() else ""
+    words = f'{few}<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.</p>'
+    figures = "".join(_view_figure(view.but(view=i + 1), name, i) for i in shown)
+    heading = f"<h3>{escape(name)}</h3>" if headed else ""
+    return (
+        f'<div class="linked" data-worst="{seen.worst + 1}">{heading}{words}{_picture(bars)}'
+        '<div class="side-by-side"><div '
+        f'class="pictures">{figures}</div>{_picture(_boards(seen, name, links))}</div></div>'
+    )
+
+
+def worst_views(seen: Observations) -> list[int]:
+    """The views (from 0) whose pictures a page holds, in their order: all of them, or the worst."""
+    errors = np.nan_to_num(seen.rms_seen, nan=-1)
+    worst = [i for i in np.argsort(-errors, kind="stable").tolist() if seen.shown[i]]
+    return sorted(worst[:MOST_VIEWS])
+
+
+def _view_figure(view: ResidualsView, name: str, i: int) -> str:
+    """One view's picture with its residuals, those on the board, and its figures."""
+    k = view.observations.camera.intrinsics
+    panel = image_panel(f"picture {i + 1}", 10, 34, 450, k.width, k.height, tallest=400)
+    image, attached = view.picture_panel(panel)
+    below = panel.y + panel.height + 34
+    board = view.board_panel(space_panel(f"board {i + 1}", 10, below, 450, 170))
+    rows = "".join(
+        svg.text((10, below + 196 + 20 * j), a, "note") + svg.text((110, below + 196 + 20 * j), b, "label")
+        for j, (a, b) in enumerate(view.numbers().items())
+    )
+    height = below + 196 + 20 * len(view.numbers())
+    described = view.description().split("Shown: ")[1]
+    picture = Picture(
+        svg.rectangle(0, 0, 470, height, "paper") + image + board + rows,
+        470,
+        height,
+        view.observations.picture(i),
+        described,
+        attached,
+    )
+    return f'<figure id="{_id(name)}-{i + 1}" data-view="{i + 1}" tabindex="-1">{picture.embedded()}</figure>'
+
+
+def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
+    """The camera and the boards before it; each shown view's board is a group of its own, to be picked out."""
+    standing, size = seen.camera, seen.board.square_size
+    drawn = BoardPosesView(standing, seen.cam_from_board, seen.board, "camera")
+    panel = space_panel("boards", 10, 34, 470, 470)
+    away = float(np.nanmedian(seen.distances))
+    middle = np.nanmedian(seen.corners_cam.mean(axis=1), axis=0)
+    eye = Eye(tuple((0.62 * middle).tolist()), 1.5 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
+    items: list[Item] = [*camera_body(standing, 2 * size, colour="blue"), *axes_triad(_STILL, 2 * size)]
+    others = [i for i in range(len(seen)) if i not in links and seen.shown[i]][:MOST_BOARDS]
+    items += [item for i in others for item in drawn.board_items(seen.cam_from_board[i], False)]
+    content, _ = draw_space(panel, items, eye, renderer="wire")
+    names = short_names(seen.pictures, len(seen))
+    for i, link in links.items():
+        corners = transform(seen.cam_from_board[i], outline(seen.board))
+        group: list[Item] = [
+            Face(corners, "orange", 0.35),
+            Line(np.vstack([corners, corners[:1]]), "muted", 1.1),
+            Label(corners[0], names[i], "note"),
+        ]
+        lines, _ = draw_space(panel, group, eye, renderer="wire")
+        content += svg.element(
+            "a",
+            lines,
+            href=link,
+            data_choose=i + 1,
+            class_="board",
+            tabindex=-1,
+            aria_label=f"the board of {seen.picture(i)}",
+        )
+    body = svg.rectangle(0, 0, 490, 514, "paper") + panel.show(content, title="Where the boards were held")
+    told = (
+        f"The boards of {len(seen)} views of {name}, {np.nanmin(seen.distances):.2g} m to "
+        f"{np.nanmax(seen.distances):.2g} m before the camera."
+    )
+    return Picture(body, 490, 514, "Boards in space", told)
+
+
+def _picture(picture: Picture) -> str:
+    return f"<figure>{picture.embedded()}</figure>"
+
+
+def _id(name: str) -> str:
+    """A camera's name as the beginning of an anchor."""
+    return "of-" + re.sub(r"[^A-Za-z0-9]+", "-", name)

@@ -1,0 +1,149 @@
+"""An inspection in a notebook: its findings in words, and every view of the clinic to choose from, live."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from html import escape
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from IPython.display import display
+from ipywidgets import Dropdown, HBox, Layout, VBox
+
+from camviz import clinic
+from camviz.calibration.types import Calibration
+from camviz.clinic.findings import Inspection
+from camviz.views.base import View
+from camviz.views.clinic.catalogue import ALIASES, VIEWS, Case
+from camviz.views.distortion import DistortionView
+from camviz.widgets.explorer import Explorer, explore
+
+_LARGEST = 800  # pixels, of the longer side of a photograph
+_OF_DISTORTION = ("show", "hide_fold")  # the sliders would make it another lens
+_COLOURS = {"fault": "#c2185b", "warning": "#c05300", "note": "#5b6577"}
+
+
+class ShownInspection(Inspection):
+    """An inspection that a notebook shows with every view of the clinic."""
+
+    def explore(self, images: str | PathLike[str] | None = None) -> LiveInspection:
+        """The findings with every view of the clinic; `images` is the folder of the pictures."""
+        return LiveInspection(self, images)
+
+    def _ipython_display_(self) -> None:
+        self.explore()._ipython_display_()
+
+
+def inspect(calibration: Calibration, **options: Any) -> ShownInspection:
+    """What is wrong with a calibration, and what to do: `camviz.clinic.inspect` with its options, for a notebook."""
+    found = clinic.inspect(calibration, **options)
+    return ShownInspection(**{field.name: getattr(found, field.name) for field in fields(Inspection)})
+
+
+class LiveInspection:
+    """The findings and, below them, one view under the reader's hands; which one, and of which camera, is chosen above.
+
+    `explorer` is the view that is shown now; `show` chooses another one from code.
+    """
+
+    def __init__(self, inspection: Inspection, images: str | PathLike[str] | None = None) -> None:
+        self.inspection = inspection
+        self.explorer: Explorer | None = None
+        self.widget: VBox | None = None
+        if inspection.calibration is None:
+            return
+        self.case = Case(inspection.calibration, inspection.compare, None if images is None else Path(images), _LARGEST)
+        self._view = Dropdown(
+            options=self._options(), value=self._first(), description="view", layout=Layout(width="28em")
+        )
+        self._camera = Dropdown(options=self.case.names, value=self._camera_of(self._view.value), description="camera")
+        several = len(self.case.names) > 1
+        self._above = HBox([self._view, self._camera] if several else [self._view])
+        self._still_hidden = ""
+        self._changed()
+        self._view.observe(self._changed, "value")
+        self._camera.observe(self._changed, "value")
+
+    def show(self, name: str, camera: str = "") -> LiveInspection:
+        """Show the view of that name, of a camera; ValueError naming those there are for any other."""
+        name = ALIASES.get(name, name)
+        if name not in VIEWS:
+            raise ValueError(f"name must be one of {', '.join(VIEWS)}, got {name!r}")
+        if self.inspection.calibration is None:
+            raise ValueError("the file could not be read, so there is nothing to show of it")
+        if camera and camera not in self.case.names:
+            raise ValueError(f"camera must be one of {', '.join(self.case.names)}, got {camera!r}")
+        self._camera.value = camera or self._camera.value
+        self._view.value = name
+        return self
+
+    @property
+    def view(self) -> View | None:
+        """The view that is shown now."""
+        return self.explorer.view if self.explorer else None
+
+    def _options(self) -> list[tuple[str, str]]:
+        """The views by their titles, those that show a finding marked."""
+        told = {ALIASES.get(finding.view, finding.view) for finding in self.inspection.findings}
+        return [(f"{'⚠ ' if name in told else ''}{entry.title}", name) for name, entry in VIEWS.items()]
+
+    def _first(self) -> str:
+        """The view of the worst finding; the residuals where nothing was found."""
+        first = next((finding.view for finding in self.inspection.findings), "residual-vectors")
+        return ALIASES.get(first, first)
+
+    def _camera_of(self, name: str) -> str:
+        findings = (f.camera for f in self.inspection.findings if ALIASES.get(f.view, f.view) == name)
+        camera = next(findings, None)
+        return camera if camera in self.case.names else self.case.names[0]
+
+    def _changed(self, _change: Any = None) -> None:
+        view = VIEWS[self._view.value].view(self.case, self._camera.value)
+        explorer = explore(view, *(_OF_DISTORTION if isinstance(view, DistortionView) else ()))
+        # Whatever is shown later takes the place of the one saved picture.
+        self._still_hidden = self._still_hidden or explorer.still_hidden
+        explorer.still_hidden = self._still_hidden
+        before, self.explorer = self.explorer, explorer
+        if self.widget is None:
+            self.still_id = explorer.model_id
+            self.widget = VBox([self._above, explorer])
+            return
+        self.widget.children = (self._above, explorer)
+        if before is not None:
+            before.close()
+
+    def _ipython_display_(self) -> None:
+        words = {"text/html": findings_html(self.inspection), "text/plain": self.inspection.as_text()}
+        display(words, raw=True)
+        if self.explorer is None or self.widget is None:
+            return
+        still = self.explorer.still()
+        if os.environ.get("CAMVIZ_STATIC"):
+            display(still, raw=True)
+            return
+        kept = f'<div data-camviz-still="{self.still_id}">{still["text/html"]}</div>'
+        display({**still, "text/html": kept}, raw=True)
+        display(self.widget)
+
+
+def findings_html(inspection: Inspection) -> str:
+    """The findings as HTML that needs no style sheet."""
+    items = []
+    for finding in inspection.findings:
+        causes = f"<br>likely: {escape('; '.join(finding.causes))}" if finding.causes else ""
+        entry = VIEWS.get(ALIASES.get(finding.view, finding.view))
+        seen = f" (view: {escape(entry.title)})" if entry else ""
+        items.append(
+            f'<li style="border-left:4px solid {_COLOURS[finding.severity]};padding-left:.7em;margin:.4em '
+            '0;list-style:none">'
+            f"<b>{finding.severity}</b> <code>{escape(finding.id)}</code>: {escape(finding.sentence)}{seen}{causes}"
+            f"<br>remedy: {escape(finding.remedy)}</li>"
+        )
+    found = f'<ul style="padding:0;margin:0">{"".join(items)}</ul>' if items else "<p><b>Nothing found.</b></p>"
+    checked = escape(", ".join(inspection.checked)) or "nothing"
+    return (
+        f"{found}<p style='opacity:.75'>Checked: {checked}. Not checked: {len(inspection.skipped)} for want of "
+        "evidence.</p>"
+    )

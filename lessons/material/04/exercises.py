@@ -1,0 +1,748 @@
+"""Lesson 04, extrinsics: the camera's centre, a chain in the wrong order, what a rotation is, inverse, Rodrigues.
+
+A transform is named to_from_from and acts on column vectors: X_cam = R X_world + t. Answers are compared to a
+hundred-thousandth, for which float32 is good enough; what is wrong here is wrong by far more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from camviz.course.checks import Arguments, Array, Exercise
+from camviz.poses import RigidTransform, Rotation
+
+SINGLE_PRECISION = 1e-5
+ROUNDING = 1e-6  # how far each element of MᵀM, and the determinant, may be from a rotation's
+
+
+def _rotation(rng: np.random.Generator) -> Array:
+    return np.asarray(Rotation.random(rng=rng).as_matrix())
+
+
+def _rigid(rng: np.random.Generator, *shape: int) -> Array:
+    transforms = np.zeros((*shape, 4, 4))
+    for index in np.ndindex(shape):
+        transforms[index][:3, :3], transforms[index][:3, 3] = _rotation(rng), rng.uniform(1, 3, 3)
+    transforms[..., 3, 3] = 1
+    return transforms
+
+
+def _transposed(T: Array) -> Array:
+    return np.swapaxes(T, -1, -2)
+
+
+def _assembled(R: Array, t: Array) -> Array:
+    """[R t; 0 1] of rotations (..., 3, 3) and columns (..., 3, 1)."""
+    T = np.zeros((*R.shape[:-2], 4, 4))
+    T[..., :3, :3], T[..., :3, 3:], T[..., 3, 3] = R, t, 1
+    return T
+
+
+# 1: where the camera stands ------------------------------------------------------------------------------------------
+
+
+def centre(R: Array, t: Array) -> Array:
+    """C = -Rᵀ t, the point that R C + t = 0 takes to the camera's origin."""
+    return -R.T @ t
+
+
+def _centre_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for _ in range(4):
+        yield _rotation(rng), rng.uniform(1, 3, 3)
+
+
+CENTRE = Exercise(
+    name="04.centre",
+    reference=centre,
+    cases=_centre_cases,
+    tolerance=SINGLE_PRECISION,
+    shown=((np.eye(3), np.array([0.0, 0.0, 1.0])),),
+    hints=(
+        "The camera's centre is the one point of the world that has camera coordinates (0, 0, 0).",
+        "Put X_cam = 0 into X_cam = R X_world + t and solve for X_world. R is a rotation, so its inverse is its "
+        "transpose, `R.T`.",
+        "`return -___ @ t`",
+    ),
+    praise="That is where the camera stands. Put it back: R C + t is zero.",
+)
+
+
+@CENTRE.right
+def by_solving(R, t):
+    return np.linalg.solve(R, -t)
+
+
+@CENTRE.right
+def as_a_row_vector(R, t):
+    return -t @ R
+
+
+@CENTRE.right
+def from_the_inverse_matrix(R, t):
+    return np.linalg.inv(_assembled(R, t[:, None]))[:3, 3]
+
+
+@CENTRE.right
+def centre_by_scipy(R, t):
+    return -Rotation.from_matrix(R).apply(t, inverse=True)
+
+
+@CENTRE.right
+def centre_in_single_precision(R, t):
+    return -R.astype(np.float32).T @ t.astype(np.float32)
+
+
+@CENTRE.wrong("This is t itself: the world's origin as the camera has it, not the camera.")
+def the_vector_t(R, t):
+    return t
+
+
+@CENTRE.wrong(
+    "This is −t, the way from the world's origin to the camera, but still in the *camera's* axes: turn it into the "
+    "world's. Only where t lies on the axis of the turn is −t right by itself."
+)
+def minus_t(R, t):
+    return -t
+
+
+@CENTRE.wrong("This is −R t. R takes the world's axes to the camera's; you need the way back, and that is Rᵀ.")
+def turned_forwards(R, t):
+    return -R @ t
+
+
+@CENTRE.wrong("Only the sign is missing: R C + t = 0 has C = *minus* Rᵀ t.")
+def sign_forgotten(R, t):
+    return R.T @ t
+
+
+@CENTRE.wrong("This is R t. Solve R C + t = 0 for C: the sign changes, and R goes to the other side.")
+def turned_forwards_without_sign(R, t):
+    return R @ t
+
+
+@CENTRE.wrong("`*` multiplies element by element and leaves a whole matrix. Matrix times vector is `@`.")
+def element_by_element(R, t):
+    return -R.T * t
+
+
+@CENTRE.wrong(
+    "This is the third row of R: the direction in which the camera *looks*. Where it stands is another thing."
+)
+def optical_axis(R, t):
+    return R[2]
+
+
+@CENTRE.wrong(
+    "The direction is right, but you made its length 1. How far away the camera stands is part of the answer."
+)
+def direction_only(R, t):
+    return -R.T @ t / np.linalg.norm(t)
+
+
+@CENTRE.wrong("This is how far the camera is from the world's origin, |C| = |t|. A place has three coordinates.")
+def distance_only(R, t):
+    return np.linalg.norm(t)
+
+
+@CENTRE.wrong("These are homogeneous coordinates, (C, 1). Wanted are the three numbers: leave out the last.")
+def homogeneous(R, t):
+    return np.append(-R.T @ t, 1.0)
+
+
+# 2: find the bug in a chain ------------------------------------------------------------------------------------------
+
+
+def chain(world_from_cam: Array, world_from_board: Array) -> Array:
+    """cam_from_board = cam_from_world world_from_board, 4×4."""
+    return np.linalg.inv(world_from_cam) @ world_from_board
+
+
+def chain_as_given(world_from_cam, world_from_board):
+    return world_from_board @ np.linalg.inv(world_from_cam)
+
+
+def _chain_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in ((), (), (5,)):
+        yield _rigid(rng, *shape), _rigid(rng, *shape)
+
+
+CHAIN = Exercise(
+    name="04.chain",
+    reference=chain,
+    cases=_chain_cases,
+    tolerance=SINGLE_PRECISION,
+    as_given=chain_as_given,
+    hints=(
+        "Write down the name of each factor in the product, from left to right. Which two names stand side by side?",
+        "Neighbours must cancel, and what is left over must read *cam … board*. To turn a transform round, invert its "
+        "matrix and swap its names.",
+        "`cam_from_world = np.linalg.inv(___)`, then `return cam_from_world @ ___`",
+    ),
+    praise="cam_from_world · world_from_board: the worlds cancel. With names like these the order cannot go wrong.",
+)
+
+
+@CHAIN.right
+def solved_for_the_board(world_from_cam, world_from_board):
+    return np.linalg.solve(world_from_cam, world_from_board)
+
+
+@CHAIN.right
+def chained_by_scipy(world_from_cam, world_from_board):
+    chained = RigidTransform.from_matrix(world_from_cam).inv() * RigidTransform.from_matrix(world_from_board)
+    return chained.as_matrix()
+
+
+@CHAIN.right
+def rotation_and_translation_apart(world_from_cam, world_from_board):
+    back = _transposed(world_from_cam[..., :3, :3])
+    from_camera = world_from_board[..., :3, 3:] - world_from_cam[..., :3, 3:]
+    return _assembled(back @ world_from_board[..., :3, :3], back @ from_camera)
+
+
+@CHAIN.right
+def chained_in_single_precision(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_cam.astype(np.float32)) @ world_from_board.astype(np.float32)
+
+
+@CHAIN.wrong(
+    "This is world_from_cam · world_from_board. Between the factors stand *cam* and *world*: one of the two "
+    "has to be inverted first."
+)
+def nothing_inverted(world_from_cam, world_from_board):
+    return world_from_cam @ world_from_board
+
+
+@CHAIN.wrong(
+    "This is world_from_board · world_from_cam. *board* stands beside *world*: swapping the factors is not enough, "
+    "one of them has to be inverted."
+)
+def nothing_inverted_the_other_way_round(world_from_cam, world_from_board):
+    return world_from_board @ world_from_cam
+
+
+@CHAIN.wrong(
+    "This is board_from_world · world_from_cam = board_from_cam: it cancels, but it is the inverse of what is wanted."
+)
+def inverse_of_the_answer(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_board) @ world_from_cam
+
+
+@CHAIN.wrong("This is world_from_cam · board_from_world: you inverted the other of the two, and *cam* meets *board*.")
+def the_other_inverted(world_from_cam, world_from_board):
+    return world_from_cam @ np.linalg.inv(world_from_board)
+
+
+@CHAIN.wrong(
+    "This is cam_from_world · board_from_world. You inverted both: *world* meets *board*, and nothing cancels. The "
+    "board's transform was the right way round."
+)
+def both_inverted(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_cam) @ np.linalg.inv(world_from_board)
+
+
+@CHAIN.wrong(
+    "This is board_from_world · cam_from_world: both inverted, in the order of the story. On column vectors the "
+    "*first* step, from the board, stands on the right."
+)
+def both_inverted_in_the_order_of_the_story(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_board) @ np.linalg.inv(world_from_cam)
+
+
+@CHAIN.wrong(
+    "You transposed world_from_cam. The transpose inverts its 3×3 rotation, but not the 4×4 matrix with its "
+    "translation."
+)
+def transposed_for_inverse(world_from_cam, world_from_board):
+    return _transposed(world_from_cam) @ world_from_board
+
+
+@CHAIN.wrong(
+    "The rotation is right. The way from camera to board is still measured along the *world's* axes: turn it into the "
+    "camera's too."
+)
+def translations_subtracted(world_from_cam, world_from_board):
+    answer = chain(world_from_cam, world_from_board)
+    answer[..., :3, 3] = world_from_board[..., :3, 3] - world_from_cam[..., :3, 3]
+    return answer
+
+
+@CHAIN.wrong("`*` multiplies element by element. Transforms are chained by the matrix product, `@`.")
+def chained_element_by_element(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_cam) * world_from_board
+
+
+@CHAIN.wrong("This is cam_from_world alone: it starts at the world, and the board is still missing.")
+def without_the_board(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_cam)
+
+
+# 3: is it a rotation? ------------------------------------------------------------------------------------------------
+
+
+def is_rotation(M: Array) -> bool:
+    """Rᵀ R = I and det R = +1, but for rounding."""
+    return _orthogonal(M, ROUNDING) and bool(abs(np.linalg.det(M) - 1) < ROUNDING)
+
+
+def _orthogonal(M: Array, tolerance: float) -> bool:
+    return bool(np.allclose(M.T @ M, np.eye(3), rtol=0, atol=tolerance))
+
+
+def _leaning(rng: np.random.Generator, lean: float) -> Array:
+    """A rotation but for its second column, which leans towards the first by `lean`; both have length 1."""
+    return _rotation(rng) @ np.array([[1, lean, 0], [0, np.sqrt(1 - lean**2), 0], [0, 0, 1]])
+
+
+def _is_rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    matrices = _rotations_and_others(rng)
+    for index in rng.permutation(len(matrices)):
+        yield (matrices[index],)
+
+
+def _rotations_and_others(rng: np.random.Generator) -> list[Array]:
+    stretch = float(rng.uniform(1.2, 3.0))
+    return [
+        _rotation(rng),
+        np.eye(3)[rng.permutation([[2, 0, 1], [1, 2, 0]])[0]],  # axes renamed, without any rounding
+        _rotation(rng) @ np.diag([1.0, -1.0, 1.0]),  # a mirror
+        stretch * _rotation(rng),
+        _rotation(rng) @ np.diag([stretch, 1 / stretch, 1.0]),  # keeps volumes, not lengths
+        _leaning(rng, float(rng.uniform(2e-7, 4e-7))),  # as single precision leaves a rotation
+        _leaning(rng, float(rng.uniform(6e-6, 9e-6))),
+        _leaning(rng, float(rng.uniform(4e-4, 6e-4))),
+        _leaning(rng, float(rng.uniform(4e-4, 6e-4))).T,  # rows that lean
+        _leaning(rng, float(rng.uniform(0.3, 0.6))),
+        _leaning(rng, float(rng.uniform(0.3, 0.6))).T,
+    ]
+
+
+IS_ROTATION = Exercise(
+    name="04.is_rotation",
+    reference=is_rotation,
+    cases=_is_rotation_cases,
+    shown=((np.eye(3),), (2 * np.eye(3),)),
+    hints=(
+        "Two things must hold. The first is that lengths and angles are kept. What tells a rotation from a mirror?",
+        "The columns of M have length 1 and are perpendicular to each other when MᵀM is the identity. The "
+        "determinant of a rotation is +1. `np.allclose` compares whole matrices; give it `rtol=0, atol=1e-6`, for "
+        "its own tolerances are others.",
+        "`keeps_lengths = np.allclose(___, np.eye(3), rtol=0, atol=1e-6)`, then `keeps_hands = abs(___ - 1) < 1e-6`",
+    ),
+    praise="Lengths, angles and handedness: whatever keeps these three is a rotation.",
+)
+
+
+@IS_ROTATION.right
+def with_the_sign_of_the_determinant(M):
+    return np.abs(M @ M.T - np.eye(3)).max() < 1e-6 and np.linalg.det(M) > 0
+
+
+@IS_ROTATION.right
+def by_the_cross_product(M):
+    a, b, c = M.T
+    lengths = abs(a @ a - 1) < 1e-6 and abs(b @ b - 1) < 1e-6
+    return lengths and abs(a @ b) < 1e-6 and bool(np.abs(np.cross(a, b) - c).max() < 1e-6)
+
+
+@IS_ROTATION.right
+def nearest_rotation_by_scipy(M):
+    try:
+        return np.abs(Rotation.from_matrix(M).as_matrix() - M).max() < 1e-6
+    except ValueError:
+        return False
+
+
+@IS_ROTATION.right
+def element_by_element_in_a_loop(M):
+    for i in range(3):
+        for j in range(3):
+            if abs(sum(M[k, i] * M[k, j] for k in range(3)) - (i == j)) > 1e-6:
+                return False
+    return np.isclose(np.linalg.det(M), 1.0)
+
+
+@IS_ROTATION.wrong(
+    "A mirror passes your test: it keeps lengths and angles too, but turns a right hand into a left one. Look "
+    "at the determinant."
+)
+def mirrors_pass(M):
+    return _orthogonal(M, ROUNDING)
+
+
+@IS_ROTATION.wrong(
+    "A determinant of 1 says that *volumes* are kept. A stretch along x with a squeeze along y does that too."
+)
+def determinant_alone(M):
+    return abs(np.linalg.det(M) - 1) < ROUNDING
+
+
+@IS_ROTATION.wrong(
+    "A determinant of ±1 says that *volumes* are kept. A mirror passes, and so does a stretch along x with a "
+    "squeeze along y."
+)
+def determinant_of_either_sign(M):
+    return abs(abs(np.linalg.det(M)) - 1) < ROUNDING
+
+
+@IS_ROTATION.wrong(
+    "`==` allows no rounding: nearly every rotation fails. Ask whether the difference is less than `1e-6`."
+)
+def exactly(M):
+    return np.array_equal(M.T @ M, np.eye(3)) and np.linalg.det(M) == 1
+
+
+@IS_ROTATION.wrong("You say whether it is *not* a rotation: every answer is the opposite of the right one.")
+def is_not(M):
+    return not is_rotation(M)
+
+
+@IS_ROTATION.wrong(
+    "Columns of length 1 and a positive determinant are not enough: a matrix whose columns *lean* towards each other "
+    "passes. They must be perpendicular as well."
+)
+def unit_columns(M):
+    return bool(np.abs(np.linalg.norm(M, axis=0) - 1).max() < ROUNDING and np.linalg.det(M) > 0)
+
+
+@IS_ROTATION.wrong(
+    "Rows of length 1 and a positive determinant are not enough: a matrix whose rows *lean* towards each other passes. "
+    "They must be perpendicular as well."
+)
+def unit_rows(M):
+    return bool(np.abs(np.linalg.norm(M, axis=1) - 1).max() < ROUNDING and np.linalg.det(M) > 0)
+
+
+@IS_ROTATION.wrong(
+    "Columns of length 1 and a determinant of 1 catch a strong lean only. A lean of 0.0005 changes the determinant by "
+    "a ten-millionth: test the angles themselves, by MᵀM."
+)
+def unit_columns_and_unit_determinant(M):
+    return bool(np.abs(np.linalg.norm(M, axis=0) - 1).max() < ROUNDING and abs(np.linalg.det(M) - 1) < ROUNDING)
+
+
+@IS_ROTATION.wrong(
+    "Perpendicular columns and a positive determinant are not enough: twice a rotation passes. Lengths must be 1 as "
+    "well."
+)
+def perpendicular_columns(M):
+    products = M.T @ M
+    return bool(np.abs(products - np.diag(np.diag(products))).max() < ROUNDING and np.linalg.det(M) > 0)
+
+
+@IS_ROTATION.wrong(
+    "Your tolerance is far too wide: a matrix that is off by a thousandth is no rotation but for rounding."
+)
+def tolerance_of_a_hundredth(M):
+    return _orthogonal(M, 0.01) and abs(np.linalg.det(M) - 1) < 0.01
+
+
+@IS_ROTATION.wrong(
+    "Your tolerance is a little too wide: `1e-6` was asked for, and a lean of several millionths passes."
+)
+def tolerance_of_a_hundred_thousandth(M):
+    return _orthogonal(M, 1e-5) and abs(np.linalg.det(M) - 1) < 1e-5
+
+
+@IS_ROTATION.wrong(
+    "Your tolerance is too narrow. By itself `np.allclose` allows `1e-8` where a 0 is wanted, and most rotations "
+    "that were saved in single precision fail: give it `atol=1e-6`."
+)
+def tolerance_of_allclose(M):
+    return np.allclose(M.T @ M, np.eye(3)) and np.isclose(np.linalg.det(M), 1)
+
+
+@IS_ROTATION.wrong("`*` multiplies element by element. MᵀM is a matrix product, `M.T @ M`.")
+def squared_elements_of_m(M):
+    return np.allclose(M.T * M, np.eye(3), rtol=0, atol=ROUNDING) and abs(np.linalg.det(M) - 1) < ROUNDING
+
+
+# 4: the way back -----------------------------------------------------------------------------------------------------
+
+
+def invert(T: Array) -> Array:
+    """[R t; 0 1]⁻¹ = [Rᵀ -Rᵀt; 0 1] for rigid transforms (..., 4, 4)."""
+    back = _transposed(T[..., :3, :3])
+    return _assembled(back, -back @ T[..., :3, 3:])
+
+
+def _invert_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in ((), (), (1,), (4,), (2, 3)):
+        yield (_rigid(rng, *shape),)
+
+
+INVERT = Exercise(
+    name="04.invert",
+    reference=invert,
+    cases=_invert_cases,
+    tolerance=SINGLE_PRECISION,
+    hints=(
+        "Solve X' = R X + t for X. What stands in the place of R then, and what in the place of t?",
+        "The rotation is turned back by its transpose; for arrays, `np.swapaxes(…, -1, -2)` swaps the last two axes "
+        "only. `T[..., :3, 3:]`, with `3:` and not `3`, keeps t as a column, so that a matrix can multiply it. The "
+        "last row stays (0, 0, 0, 1).",
+        "`inverse[..., :3, 3:] = ___ @ T[..., :3, 3:]`",
+    ),
+    praise="No general inverse is needed: a transpose and one product. The new translation is the old centre.",
+)
+
+
+@INVERT.right
+def by_the_general_inverse(T):
+    return np.linalg.inv(T)
+
+
+@INVERT.right
+def inverted_by_scipy(T):
+    return RigidTransform.from_matrix(T).inv().as_matrix()
+
+
+@INVERT.right
+def one_after_the_other(T):
+    inverse = np.zeros(T.shape)
+    for index in np.ndindex(T.shape[:-2]):
+        R, t = T[index][:3, :3], T[index][:3, 3]
+        inverse[index] = np.block([[R.T, (-R.T @ t)[:, None]], [np.zeros(3), 1.0]])
+    return inverse
+
+
+@INVERT.right
+def by_einsum_in_single_precision(T):
+    inverse = np.array(T, dtype=np.float32)
+    inverse[..., :3, :3] = np.einsum("...ij->...ji", T[..., :3, :3])
+    inverse[..., :3, 3] = -np.einsum("...ji,...j->...i", T[..., :3, :3], T[..., :3, 3])
+    return inverse
+
+
+@INVERT.wrong("This is the transpose of the whole 4×4 matrix. Only the 3×3 rotation is inverted by transposing.")
+def only_transposed(T):
+    return _transposed(T)
+
+
+@INVERT.wrong("The rotation is right. The translation is not just −t: it has to be turned as well, −Rᵀ t.")
+def only_negated(T):
+    return _assembled(_transposed(T[..., :3, :3]), -T[..., :3, 3:])
+
+
+@INVERT.wrong("The translation must be turned by the *new* rotation: −Rᵀ t, where you have −R t.")
+def turned_by_the_old_rotation(T):
+    return _assembled(_transposed(T[..., :3, :3]), -T[..., :3, :3] @ T[..., :3, 3:])
+
+
+@INVERT.wrong("The sign is missing: solving X' = R X + t for X *subtracts* t first, so the new translation is −Rᵀ t.")
+def without_the_minus(T):
+    back = _transposed(T[..., :3, :3])
+    return _assembled(back, back @ T[..., :3, 3:])
+
+
+@INVERT.wrong("The rotation is turned back, and t was left as it was. It must be undone as well: −Rᵀ t.")
+def translation_kept(T):
+    return _assembled(_transposed(T[..., :3, :3]), T[..., :3, 3:])
+
+
+@INVERT.wrong("The translation is right, and R still turns forwards. Its inverse is its transpose.")
+def rotation_kept(T):
+    return _assembled(T[..., :3, :3], invert(T)[..., :3, 3:])
+
+
+@INVERT.wrong("This applies the transform twice; the inverse undoes it.")
+def twice(T):
+    return T @ T
+
+
+@INVERT.wrong("You changed the sign of every number. The inverse undoes the transform: T⁻¹ T is the identity.")
+def negated(T):
+    return -T
+
+
+@INVERT.wrong("The last row is missing: it is (0, 0, 0, 1), and your corner holds a 0.")
+def without_the_one(T):
+    answer = invert(T)
+    answer[..., 3, 3] = 0
+    return answer
+
+
+@INVERT.wrong(
+    "The translation stands in the last *row*. That is for points kept as rows; here they are columns, and t is the "
+    "last column."
+)
+def translation_in_the_last_row(T):
+    return _transposed(invert(T))
+
+
+@INVERT.wrong(
+    "Right for one matrix. For an array of them the rotations are `T[..., :3, :3]`, and a transpose has to swap the "
+    "*last two* axes."
+)
+def one_matrix_only(T):
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse
+
+
+# 5: Rodrigues --------------------------------------------------------------------------------------------------------
+
+
+def rodrigues(r: Array) -> Array:
+    """R = I + sin θ [k]ₓ + (1 - cos θ) [k]ₓ² of the rotation vector r = θ k."""
+    angle = np.linalg.norm(r)
+    if angle == 0:
+        return np.eye(3)
+    k = _cross(r / angle)
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def _cross(k: Array) -> Array:
+    """[k]ₓ, the matrix with [k]ₓ v = k × v."""
+    return np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+
+
+def _parts(r: Array) -> tuple[float, Array, Array]:
+    """Angle, axis and [k]ₓ of a rotation vector; the axis of (0, 0, 0) is (0, 0, 0)."""
+    angle = float(np.linalg.norm(r))
+    k = r / angle if angle else r
+    return angle, k, _cross(k)
+
+
+def _rodrigues_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for low, high in ((0.4, 1.4), (1.7, 3.0), (3.3, 6.0), (1e-4, 1e-3)):
+        axis = rng.uniform(0.2, 1, 3) * rng.choice([-1, 1], 3)
+        yield (float(rng.uniform(low, high)) * axis / np.linalg.norm(axis),)
+    yield (np.array([np.pi, 0, 0])[rng.permutation(3)],)
+    yield (np.zeros(3),)
+
+
+RODRIGUES = Exercise(
+    name="04.rodrigues",
+    reference=rodrigues,
+    cases=_rodrigues_cases,
+    tolerance=SINGLE_PRECISION,
+    shown=((np.array([0.0, 0.0, np.pi / 2]),),),
+    hints=(
+        "The angle θ is the length of r, and the axis k is r divided by it. What if the length is zero?",
+        "[k]ₓ is the matrix of the cross product that stands above the formula. Its square is a matrix product, by "
+        "`@`. Return `np.eye(3)` before you divide by zero.",
+        "`return np.eye(3) + ___ * K + ___ * K @ K`",
+    ),
+    praise="This is `cv2.Rodrigues`, and all that a calibration file means by its three numbers.",
+)
+
+
+@RODRIGUES.right
+def as_opencv_does_it(r):
+    import cv2
+
+    return cv2.Rodrigues(r)[0]
+
+
+@RODRIGUES.right
+def rodrigues_by_scipy(r):
+    return Rotation.from_rotvec(r).as_matrix()
+
+
+@RODRIGUES.right
+def with_the_outer_product(r):
+    angle, k, K = _parts(r)
+    return np.cos(angle) * np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * np.outer(k, k)
+
+
+@RODRIGUES.right
+def by_turning_the_axes_in_single_precision(r):
+    angle, k, _ = _parts(r.astype(np.float32))
+    turned = [
+        v * np.cos(angle) + np.cross(k, v) * np.sin(angle) + k * (k @ v) * (1 - np.cos(angle))
+        for v in np.eye(3, dtype=np.float32)
+    ]
+    return np.stack(turned, axis=-1)
+
+
+@RODRIGUES.wrong(
+    "You put r itself into [·]ₓ. The formula wants the unit vector k = r/θ there; the angle is in the sine and "
+    "cosine already."
+)
+def not_a_unit_vector(r):
+    angle, K = np.linalg.norm(r), _cross(r)
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+@RODRIGUES.wrong("`K**2` squares every element. [k]ₓ² is the matrix product, `K @ K`.")
+def squared_elements(r):
+    angle, _, K = _parts(r)
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K**2
+
+
+@RODRIGUES.wrong("You convert from degrees, but the length of r is in radians already.")
+def from_degrees(r):
+    return rodrigues(np.radians(r))
+
+
+@RODRIGUES.wrong("Right, but for (0, 0, 0): there you divide zero by zero. A turn by nothing is the identity.")
+def no_case_for_zero(r):
+    with np.errstate(invalid="ignore"):
+        K = _cross(r / np.linalg.norm(r))
+    angle = np.linalg.norm(r)
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+@RODRIGUES.wrong("Right, but for (0, 0, 0): a turn by nothing leaves every vector as it is, and zeros wipe it out.")
+def zeros_for_zero(r):
+    return rodrigues(r) if np.any(r) else np.zeros((3, 3))
+
+
+@RODRIGUES.wrong("This turns the other way: the signs in your [k]ₓ are flipped. [k]ₓ v has to be k × v, not v × k.")
+def the_other_way_round(r):
+    return rodrigues(-r)
+
+
+@RODRIGUES.wrong("Sine and 1 − cosine have changed places: the sine goes with [k]ₓ, 1 − cosine with its square.")
+def sine_and_cosine_swapped(r):
+    angle, _, K = _parts(r)
+    return np.eye(3) + (1 - np.cos(angle)) * K + np.sin(angle) * K @ K
+
+
+@RODRIGUES.wrong("The identity is missing: for a small angle hardly anything changes, so R must be near I.")
+def without_the_identity(r):
+    angle, _, K = _parts(r)
+    return np.sin(angle) * K + (1 - np.cos(angle)) * K @ K if angle else np.eye(3)
+
+
+@RODRIGUES.wrong("The last factor is 1 − cos θ. With cos θ alone even a tiny turn would move points far.")
+def cosine_alone(r):
+    angle, _, K = _parts(r)
+    return np.eye(3) + np.sin(angle) * K + np.cos(angle) * K @ K
+
+
+@RODRIGUES.wrong("I + [r]ₓ is right for tiny turns only. Sine and cosine are needed for the others.")
+def small_angles(r):
+    return np.eye(3) + _cross(r)
+
+
+@RODRIGUES.wrong("k kᵀ is not [k]ₓ²: the two differ by the identity, [k]ₓ² = k kᵀ − I.")
+def outer_product_for_the_square(r):
+    angle, k, K = _parts(r)
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * np.outer(k, k)
+
+
+@RODRIGUES.wrong(
+    "You took the three numbers for angles about x, y and z. They are *one* turn, about the axis r/θ by θ."
+)
+def three_angles(r):
+    return Rotation.from_euler("XYZ", r).as_matrix()
+
+
+@RODRIGUES.wrong(
+    "You took the three numbers for angles about axes that stay fixed. They are *one* turn, about r/θ by θ."
+)
+def three_angles_about_fixed_axes(r):
+    return Rotation.from_euler("xyz", r).as_matrix()
+
+
+@RODRIGUES.wrong("This turns by half the angle. θ/2 belongs to quaternions; here the whole angle stands.")
+def half_the_angle(r):
+    return rodrigues(r / 2)
+
+
+EXERCISES = (CENTRE, RODRIGUES, CHAIN, INVERT, IS_ROTATION)

@@ -1,0 +1,614 @@
+"""Lesson 09, fisheye: the angle of a ray, a projection of it, the Kannala–Brandt polynomial, and a straight window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+
+
+def _all_round(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    """Points in front, beside and behind, none on the axis."""
+    return rng.uniform(0.5, 2, (*shape, 1)) * rng.normal(size=(*shape, 3)) + np.array([1e-3, 2e-3, 0])
+
+
+def _off_axis(points):
+    return np.hypot(points[..., 0], points[..., 1])
+
+
+def _theta(points):
+    return np.arctan2(_off_axis(points), points[..., 2])
+
+
+def _mirrored(points):
+    """The angle as arctan has it: from −90° to 90°."""
+    return np.arctan(_off_axis(points) / points[..., 2])
+
+
+def _placed(points, r):
+    """Image points (..., 2) at the distance r from the middle, in the direction of (x, y)."""
+    return points[..., :2] * (r / _off_axis(points))[..., None]
+
+
+# 1: equidistant ------------------------------------------------------------------------------------------------------
+
+
+def equidistant(points: Array, f: float, cx: float, cy: float) -> Array:
+    """Pixels (..., 2) of camera-frame points (..., 3) through a lens r = f θ, also of points behind the camera."""
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    off_axis = np.hypot(x, y)
+    r = f * np.arctan2(off_axis, z)
+    return np.stack([cx + r * x / off_axis, cy + r * y / off_axis], axis=-1)
+
+
+def _equidistant_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield (_all_round(rng, shape), *rng.uniform([100, 200, 320], [400, 300, 500]).tolist())
+    yield (np.array([[0.3, -0.2, -1.0], [-0.5, 0.1, -0.4]]), *rng.uniform([100, 200, 320], [400, 300, 500]).tolist())
+
+
+EQUIDISTANT = Exercise(
+    name="09.equidistant",
+    reference=equidistant,
+    cases=_equidistant_cases,
+    shown=((np.array([1.0, 0.0, 0.0]), 200.0, 319.5, 239.5),),
+    hints=(
+        "Two questions, one after the other: how far from the middle does the ray land, and in which direction? Only "
+        "the angle from the z axis decides the first, only x and y decide the second.",
+        "`np.arctan2(a, b)` is the angle of a ray that goes a to the side and b ahead, right all the way round to "
+        "180°. To the side is √(x² + y²), `np.hypot(x, y)`. The direction is (x, y) divided by that.",
+        "`r = f * np.arctan2(___, ___)`",
+    ),
+    praise="A ray at 90°, which no pinhole can show, has a pixel now; so have the rays from behind.",
+)
+
+
+@EQUIDISTANT.right
+def by_the_arc_cosine(points, f, cx, cy):
+    theta = np.arccos(points[..., 2] / np.linalg.norm(points, axis=-1))
+    return f * _placed(points, theta) + (cx, cy)
+
+
+@EQUIDISTANT.right
+def with_the_azimuth(points, f, cx, cy):
+    x, y, z = np.moveaxis(points, -1, 0)
+    around, theta = np.arctan2(y, x), np.arctan2(np.sqrt(x**2 + y**2), z)
+    return np.stack([f * theta * np.cos(around) + cx, f * theta * np.sin(around) + cy], axis=-1)
+
+
+@EQUIDISTANT.right
+def as_opencv_does_it_in_front_and_turned_round_behind(points, f, cx, cy):
+    """cv2.fisheye knows θ below 90° only: a point behind is turned to the front, where its angle is π − θ."""
+    import cv2
+
+    K, front = np.array([[f, 0, 0], [0, f, 0], [0, 0, 1]]), points * [1, 1, -1]
+    ahead = np.where(points[..., 2:] > 0, points, front).reshape(1, -1, 3)
+    uv = cv2.fisheye.projectPoints(ahead, np.zeros(3), np.zeros(3), K, np.zeros(4))[0].reshape(*points.shape[:-1], 2)
+    r = np.linalg.norm(uv, axis=-1, keepdims=True)
+    return np.where(points[..., 2:] > 0, uv, uv / r * (f * np.pi - r)) + (cx, cy)
+
+
+@EQUIDISTANT.wrong(
+    "Points behind the camera are mirrored: arctan(r / z) ends at 90° and comes back negative. Use np.arctan2(r, z), "
+    "which knows the sign of z."
+)
+def mirrored(points, f, cx, cy):
+    return f * _placed(points, _mirrored(points)) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("This is r = f tan θ, the pinhole. The equidistant lens has r = f θ.")
+def pinhole(points, f, cx, cy):
+    return f * _placed(points, np.tan(_theta(points))) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("This is r = f sin θ, the orthographic lens, which folds at 90°. The equidistant lens has r = f θ.")
+def orthographic(points, f, cx, cy):
+    return f * _placed(points, np.sin(_theta(points))) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("This is r = 2f tan(θ/2), the stereographic lens. The equidistant one has r = f θ.")
+def stereographic(points, f, cx, cy):
+    return f * _placed(points, 2 * np.tan(_theta(points) / 2)) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("Your θ is in degrees. r = f θ wants radians.")
+def degrees(points, f, cx, cy):
+    return f * _placed(points, np.degrees(_theta(points))) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("The principal point is missing: pixels begin in the corner of the image, so add (cx, cy).")
+def without_the_principal_point(points, f, cx, cy):
+    return f * _placed(points, _theta(points))
+
+
+@EQUIDISTANT.wrong("f is missing: these are radians beside the principal point, not pixels.")
+def without_the_focal_length(points, f, cx, cy):
+    return _placed(points, _theta(points)) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("You multiply x and y themselves by f θ. Only their *direction* counts: divide by √(x² + y²).")
+def not_a_unit_direction(points, f, cx, cy):
+    return f * points[..., :2] * _theta(points)[..., None] + (cx, cy)
+
+
+@EQUIDISTANT.wrong(
+    "You divide x and y by the length of the whole ray. Their direction *in the image* is (x, y) / √(x² + y²): z has "
+    "no part in it."
+)
+def divided_by_the_whole_length(points, f, cx, cy):
+    return f * points[..., :2] * (_theta(points) / np.linalg.norm(points, axis=-1))[..., None] + (cx, cy)
+
+
+@EQUIDISTANT.wrong(
+    "arctan2's arguments have changed places: this is the angle above the image plane, not from the axis."
+)
+def angle_above_the_image_plane(points, f, cx, cy):
+    return f * _placed(points, np.pi / 2 - _theta(points)) + (cx, cy)
+
+
+@EQUIDISTANT.wrong(
+    "Each coordinate has an angle of its own here, arctan2(x, z) and arctan2(y, z). The lens knows one angle, that of "
+    "the ray from the axis, and shares f θ between u and v."
+)
+def an_angle_for_each_coordinate(points, f, cx, cy):
+    return f * np.arctan2(points[..., :2], points[..., 2:]) + (cx, cy)
+
+
+@EQUIDISTANT.wrong(
+    "NaN is the answer of a pinhole for what lies behind it. This lens has an image all around: θ simply exceeds 90°."
+)
+def nothing_behind(points, f, cx, cy):
+    return np.where(points[..., 2:] > 0, equidistant(points, f, cx, cy), np.nan)
+
+
+@EQUIDISTANT.wrong("cx and cy have changed places: cx goes with u, the column.")
+def principal_point_swapped(points, f, cx, cy):
+    return equidistant(points, f, cy, cx)
+
+
+# 2: find the bug -----------------------------------------------------------------------------------------------------
+
+
+def kannala_brandt(points: Array, k1: float, k2: float) -> Array:
+    """Image points (..., 2) in focal lengths, r = θ (1 + k1 θ² + k2 θ⁴), of camera-frame points (..., 3)."""
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    off_axis = np.hypot(x, y)
+    theta = np.arctan2(off_axis, z)
+    r = theta * (1 + k1 * theta**2 + k2 * theta**4)
+    return np.stack([r * x / off_axis, r * y / off_axis], axis=-1)
+
+
+def kannala_brandt_as_given(points, k1, k2):
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    off_axis = np.hypot(x, y)
+    theta = np.arctan(off_axis / z)
+    r = theta * (1 + k1 * theta**2 + k2 * theta**4)
+    return np.stack([r * x / off_axis, r * y / off_axis], axis=-1)
+
+
+def _polynomial(theta, k1, k2):
+    return theta * (1 + k1 * theta**2 + k2 * theta**4)
+
+
+def _coefficients(rng: np.random.Generator) -> list[float]:
+    return (rng.choice([-1, 1], 2) * rng.uniform([0.005, 0.0005], [0.02, 0.002])).tolist()
+
+
+def _polynomial_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield (_all_round(rng, shape), *_coefficients(rng))
+    yield (np.array([[0.3, -0.2, -1.0], [-0.5, 0.1, 0.4]]), *_coefficients(rng))
+
+
+KANNALA_BRANDT = Exercise(
+    name="09.kannala_brandt",
+    reference=kannala_brandt,
+    cases=_polynomial_cases,
+    as_given=kannala_brandt_as_given,
+    hints=(
+        "Try it point by point and compare with what you expect: a point ahead, one to the side, one behind such as "
+        "(1, 0, −1). At which of them, and in which line, does it go wrong?",
+        "The point (1, 0, −1) is 135° from the axis. np.arctan never gives more than 90°, and a negative z makes it "
+        "negative. Another function of NumPy takes numerator and denominator apart.",
+        "`theta = ___(off_axis, ___)`",
+    ),
+    praise="That bug is in OpenCV's own fisheye module: points behind the camera come out mirrored.",
+)
+
+
+@KANNALA_BRANDT.right
+def by_the_arc_cosine_of_the_ray(points, k1, k2):
+    theta = np.arccos(points[..., 2] / np.linalg.norm(points, axis=-1))
+    return _placed(points, _polynomial(theta, k1, k2))
+
+
+@KANNALA_BRANDT.right
+def half_a_turn_added_where_it_is_negative(points, k1, k2):
+    theta = _mirrored(points)
+    return _placed(points, _polynomial(np.where(theta < 0, theta + np.pi, theta), k1, k2))
+
+
+@KANNALA_BRANDT.right
+def from_the_image_plane(points, k1, k2):
+    theta = np.pi / 2 - np.arctan(points[..., 2] / _off_axis(points))
+    return _placed(points, theta + k1 * theta**3 + k2 * theta**5)
+
+
+@KANNALA_BRANDT.wrong("The sign alone is not enough: a point at 135° is not at 45°.")
+def absolute_value(points, k1, k2):
+    return _placed(points, _polynomial(np.abs(_mirrored(points)), k1, k2))
+
+
+@KANNALA_BRANDT.wrong(
+    "arctan2's arguments have changed places: this is the angle above the image plane, not from the axis."
+)
+def arguments_swapped(points, k1, k2):
+    return _placed(points, _polynomial(np.arctan2(points[..., 2], _off_axis(points)), k1, k2))
+
+
+@KANNALA_BRANDT.wrong(
+    "NaN behind the camera stops the wrong answers, but this lens does see there: θ goes on beyond 90°, and so does r."
+)
+def nan_behind(points, k1, k2):
+    return np.where(points[..., 2:] > 0, kannala_brandt(points, k1, k2), np.nan)
+
+
+@KANNALA_BRANDT.wrong(
+    "Everything behind the camera is put at 90°. Two points at 100° and at 150° would share a pixel: θ must go on."
+)
+def stopped_at_90_degrees(points, k1, k2):
+    return _placed(points, _polynomial(np.minimum(_theta(points), np.pi / 2), k1, k2))
+
+
+@KANNALA_BRANDT.wrong(
+    "arctan2(x, z) is the angle in the horizontal plane alone. From the axis it is √(x² + y²) to the side: off_axis."
+)
+def horizontal_angle(points, k1, k2):
+    return _placed(points, _polynomial(np.arctan2(points[..., 0], points[..., 2]), k1, k2))
+
+
+@KANNALA_BRANDT.wrong("arctan2(y, x) tells the direction *around* the axis. Wanted is the angle *from* the axis.")
+def angle_around_the_axis(points, k1, k2):
+    return _placed(points, _polynomial(np.arctan2(points[..., 1], points[..., 0]), k1, k2))
+
+
+@KANNALA_BRANDT.wrong("θ is in degrees now. The polynomial of Kannala and Brandt takes radians.")
+def angle_in_degrees(points, k1, k2):
+    return _placed(points, _polynomial(np.degrees(_theta(points)), k1, k2))
+
+
+@KANNALA_BRANDT.wrong(
+    "You add half a turn to every θ. Only where arctan comes out negative, behind the camera, is it missing."
+)
+def half_a_turn_added_everywhere(points, k1, k2):
+    return _placed(points, _polynomial(_mirrored(points) + np.pi, k1, k2))
+
+
+@KANNALA_BRANDT.wrong(
+    "The angle is right now, but the polynomial acts on tan θ in yours. Kannala–Brandt's acts on θ itself, which stays "
+    "finite at 90°."
+)
+def polynomial_of_the_tangent(points, k1, k2):
+    return _placed(points, _polynomial(np.tan(_theta(points)), k1, k2))
+
+
+@KANNALA_BRANDT.wrong("The angle is right now, but the polynomial has lost its leading θ: r is θ *times* the bracket.")
+def bracket_alone(points, k1, k2):
+    return _placed(points, _polynomial(_theta(points), k1, k2) / _theta(points))
+
+
+@KANNALA_BRANDT.wrong(
+    "arccos(z) is the angle only of a ray of length 1. Divide z by the length of the whole point (x, y, z) first."
+)
+def arc_cosine_of_z(points, k1, k2):
+    return _placed(points, _polynomial(np.arccos(points[..., 2]), k1, k2))
+
+
+# 3: back to the ray --------------------------------------------------------------------------------------------------
+
+
+def angle(radius: Array, k1: float, k2: float) -> Array:
+    """The θ in 0 … π with θ (1 + k1 θ² + k2 θ⁴) = radius ≥ 0, by Newton's method; NaN where there is none."""
+    theta = np.array(radius, dtype=float)
+    for _ in range(12):
+        error = theta * (1 + k1 * theta**2 + k2 * theta**4) - radius
+        theta = theta - error / (1 + 3 * k1 * theta**2 + 5 * k2 * theta**4)
+    found = np.abs(theta * (1 + k1 * theta**2 + k2 * theta**4) - radius) < 1e-9
+    return np.where(found & (theta >= 0) & (theta <= np.pi), theta, np.nan)
+
+
+def _angle_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Angles below 90°, behind the camera up to nearly 180°, on the axis, and radii that no ray has."""
+    for shape in SHAPES:
+        yield (rng.uniform(0.4, 1.8, shape), *rng.uniform([0.01, 0.001], [0.03, 0.003]).tolist())
+    k1, k2 = rng.uniform([0.01, 0.001], [0.03, 0.003]).tolist()
+    behind = _polynomial(rng.uniform([1.7, 2.4, 3.0], [2.2, 2.9, 3.1]), k1, k2)
+    beyond = _polynomial(rng.uniform(3.3, 4.0, 2), k1, k2)
+    yield (np.concatenate([[0.0], behind, beyond]), k1, k2)
+
+
+ANGLE = Exercise(
+    name="09.angle",
+    reference=angle,
+    cases=_angle_cases,
+    tolerance=1e-7,
+    shown=((np.array([0.5, 1.0]), 0.02, 0.001),),
+    hints=(
+        "The three steps above do this for one coefficient. Improve a first guess of θ step by step, then put θ back "
+        "into the polynomial and see whether the radius comes out. Which angles can a ray have at all?",
+        "Begin at θ = radius. Newton's step subtracts (what θ gives − radius) / (the slope at θ); twenty or thirty "
+        "steps are plenty. The slope is the derivative of θ + k1 θ³ + k2 θ⁵. In the end `np.where(condition, theta, "
+        "np.nan)` keeps what lies in 0 … π.",
+        "`theta = theta - error / (1 + ___ + ___)`",
+    ),
+    praise="It gives back the ray of every pixel that has one, and NaN where there is none.",
+)
+
+
+def _newton(radius, k1, k2, steps):
+    theta = np.array(radius, dtype=float)
+    for _ in range(steps):
+        slope = 1 + 3 * k1 * theta**2 + 5 * k2 * theta**4
+        theta = theta - (_polynomial(theta, k1, k2) - radius) / slope
+    return theta
+
+
+@ANGLE.right
+def by_newton_and_half_a_circle(radius, k1, k2):
+    theta = _newton(radius, k1, k2, 12)
+    return np.where(theta <= np.pi, theta, np.nan)
+
+
+@ANGLE.right
+def by_bisection(radius, k1, k2):
+    low, high = np.zeros_like(radius, dtype=float), np.full_like(radius, np.pi, dtype=float)
+    for _ in range(45):
+        middle = (low + high) / 2
+        short = _polynomial(middle, k1, k2) < radius
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return np.where(radius <= _polynomial(np.pi, k1, k2), low, np.nan)
+
+
+@ANGLE.right
+def by_the_roots_of_the_quintic(radius, k1, k2):
+    def one(r):
+        roots = np.roots([k2, 0, k1, 0, 1, -r])
+        real = [root.real for root in roots if abs(root.imag) < 1e-9 and -1e-12 <= root.real <= np.pi]
+        return real[0] if real else np.nan
+
+    return np.reshape([one(r) for r in np.ravel(radius)], np.shape(radius))
+
+
+@ANGLE.wrong("One division is only the first step. Put your θ back into the polynomial and look at what is left.")
+def one_division(radius, k1, k2):
+    return radius / (1 + k1 * radius**2 + k2 * radius**4)
+
+
+@ANGLE.wrong("This bends once more, the model forwards. The radius is given, the angle is wanted.")
+def forwards(radius, k1, k2):
+    return _polynomial(radius, k1, k2)
+
+
+@ANGLE.wrong("Flipping the signs is not the inverse, only its first term.")
+def signs_flipped(radius, k1, k2):
+    return _polynomial(radius, -k1, -k2)
+
+
+@ANGLE.wrong(
+    "The angles are right. But some of them are above π: no ray is farther from the axis than straight behind, so NaN."
+)
+def beyond_half_a_turn(radius, k1, k2):
+    return _newton(radius, k1, k2, 12)
+
+
+@ANGLE.wrong(
+    "Radii that no ray has are answered by π, straight behind. A clamped angle looks like a real one: the answer is "
+    "NaN."
+)
+def clamped_at_half_a_turn(radius, k1, k2):
+    return np.minimum(_newton(radius, k1, k2, 12), np.pi)
+
+
+@ANGLE.wrong("Radii that no ray has are answered by 0, which is the axis itself. The answer is NaN.")
+def zero_for_no_ray(radius, k1, k2):
+    return np.nan_to_num(angle(radius, k1, k2))
+
+
+@ANGLE.wrong("Two of Newton's steps are not enough behind the camera: iterate until nothing changes.")
+def two_steps(radius, k1, k2):
+    theta = _newton(radius, k1, k2, 2)
+    return np.where(theta <= np.pi, theta, np.nan)
+
+
+@ANGLE.wrong("You stop at 90°. A fisheye sees beyond it: only above π, straight behind, there is no ray any more.")
+def nothing_beyond_90_degrees(radius, k1, k2):
+    theta = angle(radius, k1, k2)
+    return np.where(theta <= np.pi / 2, theta, np.nan)
+
+
+@ANGLE.wrong("You ask whether the *radius* is above π. The bent radius of a ray from behind may well be: ask it of θ.")
+def radius_asked_instead_of_angle(radius, k1, k2):
+    return np.where(radius <= np.pi, _newton(radius, k1, k2, 12), np.nan)
+
+
+@ANGLE.wrong("This is the pinhole's inverse, θ = atan r. Here it is θ itself that the polynomial bends.")
+def arc_tangent(radius, k1, k2):
+    return np.arctan(radius)
+
+
+@ANGLE.wrong("These are degrees. The polynomial, and the answer, are in radians.")
+def in_degrees(radius, k1, k2):
+    return np.degrees(angle(radius, k1, k2))
+
+
+@ANGLE.wrong(
+    "The slope of θ + k1 θ³ + k2 θ⁵ is 1 + *3* k1 θ² + *5* k2 θ⁴. Without the 3 and the 5 the steps are too long. "
+    "Where they miss, you answer NaN, though there is a ray."
+)
+def wrong_slope(radius, k1, k2):
+    theta = np.array(radius, dtype=float)
+    for _ in range(6):
+        theta = theta - (_polynomial(theta, k1, k2) - radius) / (1 + k1 * theta**2 + k2 * theta**4)
+    return np.where((np.abs(_polynomial(theta, k1, k2) - radius) < 1e-9) & (theta <= np.pi), theta, np.nan)
+
+
+# 4: the window -------------------------------------------------------------------------------------------------------
+
+
+def window_map(width: int, height: int, f_window: float, yaw: float, f: float, cx: float, cy: float) -> Array:
+    """For each pixel (height, width, 2) of a perspective window turned right by `yaw`, its pixel in an r = f θ lens."""
+    return equidistant(_turned(_rays(width, height, f_window), yaw), f, cx, cy)
+
+
+def _rays(width, height, f_window, middle=0.5):
+    """The rays (height, width, 3) of a window whose middle is at (width/2 − middle, height/2 − middle)."""
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    x, y = (u - width / 2 + middle) / f_window, (v - height / 2 + middle) / f_window
+    return np.stack([x, y, np.ones_like(x)], axis=-1)
+
+
+def _turned(rays, yaw):
+    x, y, z = np.moveaxis(rays, -1, 0)
+    return np.stack([np.cos(yaw) * x + np.sin(yaw) * z, y, np.cos(yaw) * z - np.sin(yaw) * x], axis=-1)
+
+
+def _window_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """A window to one side, and one that looks backwards over the other shoulder."""
+    side = rng.choice([-1, 1])
+    for width, height, yaw in ((8, 6, side * rng.uniform(0.4, 1.2)), (4, 10, -side * rng.uniform(1.9, 2.5))):
+        f_window, f, cx, cy = rng.uniform([3, 90, 150, 210], [9, 200, 200, 260]).tolist()
+        yield (width, height, f_window, float(yaw), f, cx, cy)
+
+
+WINDOW_MAP = Exercise(
+    name="09.window_map",
+    reference=window_map,
+    cases=_window_cases,
+    tolerance=1e-5,  # of a pixel: float32, which `cv2.remap` wants, is good enough
+    hints=(
+        "For each pixel of the *window* ask which ray it shows, and then where the fisheye has that ray. Between the "
+        "two the ray is turned, because the window looks to the side.",
+        "There are three steps. First pixel → ray, with the middle of the window at ((width − 1)/2, (height − 1)/2). "
+        "Then turn the ray about the y axis: straight ahead becomes (sin ψ, 0, cos ψ) for the yaw ψ. Last comes the "
+        "fisheye of exercise 1.",
+        "`X, Z = np.cos(yaw) * x + ___, np.cos(yaw) - ___`",
+    ),
+    praise="This is a virtual camera that pans without moving: one fisheye picture holds all its pictures.",
+)
+
+
+@WINDOW_MAP.right
+def with_a_rotation_matrix(width, height, f_window, yaw, f, cx, cy):
+    from camviz.poses import Rotation
+
+    rays = _rays(width, height, f_window).reshape(-1, 3)
+    turned = Rotation.from_euler("y", yaw).apply(rays)
+    return equidistant(turned, f, cx, cy).reshape(height, width, 2)
+
+
+@WINDOW_MAP.right
+def with_k_inverse_and_rodrigues(width, height, f_window, yaw, f, cx, cy):
+    import cv2
+
+    K = np.array([[f_window, 0, (width - 1) / 2], [0, f_window, (height - 1) / 2], [0, 0, 1]])
+    v, u = np.mgrid[:height, :width]
+    R, _ = cv2.Rodrigues(np.array([0.0, yaw, 0.0]))
+    return equidistant(np.stack([u, v, 1 + 0 * u], axis=-1) @ np.linalg.inv(K).T @ R.T, f, cx, cy)
+
+
+@WINDOW_MAP.right
+def pixel_by_pixel(width, height, f_window, yaw, f, cx, cy):
+    uv = np.zeros((height, width, 2), np.float32)
+    for v in range(height):
+        for u in range(width):
+            x, y = (u - (width - 1) / 2) / f_window, (v - (height - 1) / 2) / f_window
+            ray = np.array([np.cos(yaw) * x + np.sin(yaw), y, np.cos(yaw) - np.sin(yaw) * x])
+            uv[v, u] = equidistant(ray, f, cx, cy)
+    return uv
+
+
+@WINDOW_MAP.wrong(
+    "Your window turns to the left for a positive yaw: the ray straight ahead must go to (sin ψ, 0, cos ψ)."
+)
+def turned_to_the_left(width, height, f_window, yaw, f, cx, cy):
+    return window_map(width, height, f_window, -yaw, f, cx, cy)
+
+
+@WINDOW_MAP.wrong("Your window always looks straight ahead: the rays are not turned.")
+def not_turned(width, height, f_window, yaw, f, cx, cy):
+    return window_map(width, height, f_window, 0.0, f, cx, cy)
+
+
+@WINDOW_MAP.wrong("Half a pixel off: the middle of pixels 0 … width − 1 is (width − 1)/2, not width/2.")
+def half_a_pixel_off(width, height, f_window, yaw, f, cx, cy):
+    return equidistant(_turned(_rays(width, height, f_window, middle=0), yaw), f, cx, cy)
+
+
+@WINDOW_MAP.wrong(
+    "Rows and columns have changed places: an image array is indexed [v, u], its shape is (height, width)."
+)
+def transposed(width, height, f_window, yaw, f, cx, cy):
+    return window_map(width, height, f_window, yaw, f, cx, cy).transpose(1, 0, 2)
+
+
+@WINDOW_MAP.wrong("The last axis holds (u, v), column first: `cv2.remap` reads it so. Yours has the row first.")
+def row_first(width, height, f_window, yaw, f, cx, cy):
+    return window_map(width, height, f_window, yaw, f, cx, cy)[..., ::-1]
+
+
+@WINDOW_MAP.wrong(
+    "The window looks backwards in one case, and there your rays are mirrored: arctan2, not arctan, as in exercise 2."
+)
+def mirrored_behind(width, height, f_window, yaw, f, cx, cy):
+    rays = _turned(_rays(width, height, f_window), yaw)
+    return f * _placed(rays, _mirrored(rays)) + (cx, cy)
+
+
+@WINDOW_MAP.wrong(
+    "You drew the fisheye's side in perspective too, r = f tan θ. The window is perspective; the picture it is cut out "
+    "of is equidistant, r = f θ."
+)
+def perspective_on_both_sides(width, height, f_window, yaw, f, cx, cy):
+    rays = _turned(_rays(width, height, f_window), yaw)
+    return f * _placed(rays, np.tan(_theta(rays))) + (cx, cy)
+
+
+@WINDOW_MAP.wrong(
+    "The window turns up or down in yours: you turned the rays about the x axis. A yaw is a turn about the y axis."
+)
+def pitched(width, height, f_window, yaw, f, cx, cy):
+    x, y, z = np.moveaxis(_rays(width, height, f_window), -1, 0)
+    return equidistant(
+        np.stack([x, np.cos(yaw) * y + np.sin(yaw) * z, np.cos(yaw) * z - np.sin(yaw) * y], axis=-1), f, cx, cy
+    )
+
+
+@WINDOW_MAP.wrong(
+    "The two focal lengths have changed places: f_window makes rays of the window's pixels, f makes the fisheye's "
+    "pixels of rays."
+)
+def focal_lengths_swapped(width, height, f_window, yaw, f, cx, cy):
+    return window_map(width, height, f, yaw, f_window, cx, cy)
+
+
+@WINDOW_MAP.wrong(
+    "The middle of the window is never subtracted, so that its upper left corner looks straight ahead before the turn."
+)
+def corner_for_the_middle(width, height, f_window, yaw, f, cx, cy):
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    return equidistant(_turned(np.stack([u / f_window, v / f_window, np.ones(u.shape)], axis=-1), yaw), f, cx, cy)
+
+
+@WINDOW_MAP.wrong("The fisheye's principal point is missing: add (cx, cy) to what its lens says.")
+def without_the_fisheye_s_middle(width, height, f_window, yaw, f, cx, cy):
+    return window_map(width, height, f_window, yaw, f, 0.0, 0.0)
+
+
+@WINDOW_MAP.wrong("`yaw` is in radians already; you convert it from degrees once more, and the window hardly turns.")
+def yaw_taken_for_degrees(width, height, f_window, yaw, f, cx, cy):
+    return window_map(width, height, f_window, np.radians(yaw), f, cx, cy)
+
+
+EXERCISES = (EQUIDISTANT, KANNALA_BRANDT, ANGLE, WINDOW_MAP)

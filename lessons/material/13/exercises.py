@@ -1,0 +1,611 @@
+"""Lesson 13, white balance and colour: the response, grey world, developing with a bug in it, the matrix, and metamers.
+
+Raw colours (..., 3) are linear; a matrix acts on columns, so an array of colours is `rgb @ M.T`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+
+
+def spectra(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """A light (n,) and three sensitivities (n, 3) that overlap."""
+    place = np.linspace(0, 1, n)[:, None]
+    centres = np.array([0.75, 0.5, 0.25]) + rng.uniform(-0.08, 0.08, 3)
+    widths = rng.uniform(0.2, 0.3, 3)
+    return rng.uniform(0.2, 1.5, n), np.exp(-(((place - centres) / widths) ** 2)) * rng.uniform(0.5, 1.5, 3)
+
+
+# 1: the response -----------------------------------------------------------------------------------------------------
+
+
+def response(light: Array, reflectance: Array, sensitivity: Array) -> Array:
+    """Each channel's count as a share of its count for a perfect white: Σ L R S / Σ L S, wavelength by wavelength."""
+    return (light * reflectance) @ sensitivity / (light @ sensitivity)
+
+
+def _response_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        n = int(rng.integers(7, 15))
+        light, sensitivity = spectra(rng, n)
+        yield light, rng.uniform(0, 1, (*shape, n)), sensitivity
+
+
+RESPONSE = Exercise(
+    name="13.response",
+    reference=response,
+    cases=_response_cases,
+    hints=(
+        "What reaches the sensor at one wavelength, and how much of it does one channel count? Add that up over all "
+        "wavelengths. Then do the same for a surface that reflects everything.",
+        "`@` multiplies and adds up: along the last axis of what stands before it, the first axis of what stands "
+        "behind it. So wavelengths come last on its left. A perfect white has reflectance 1 at every wavelength.",
+        "`return (light * ___) @ sensitivity / (___ @ sensitivity)`",
+    ),
+    praise="Everything that a sensor knows of a surface went through this sum.",
+)
+
+
+@RESPONSE.right
+def by_einsum(light, reflectance, sensitivity):
+    counted = np.einsum("n,...n,nc->...c", light, reflectance, sensitivity)
+    return counted / np.einsum("n,nc->c", light, sensitivity)
+
+
+@RESPONSE.right
+def with_the_step_in_nanometres(light, reflectance, sensitivity):
+    reaching = (light * reflectance)[..., None] * sensitivity
+    return np.sum(5.0 * reaching, axis=-2) / np.sum(5.0 * light[:, None] * sensitivity, axis=0)
+
+
+@RESPONSE.right
+def as_a_weighted_mean(light, reflectance, sensitivity):
+    weights = light[:, None] * sensitivity
+    return reflectance @ (weights / weights.sum(axis=0))
+
+
+@RESPONSE.wrong(
+    "This is the sum itself. Divide it, channel by channel, by what a perfect white gives in the same light."
+)
+def sum_alone(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity
+
+
+@RESPONSE.wrong("The light is missing. What reaches the sensor is light *times* reflectance.")
+def without_light(light, reflectance, sensitivity):
+    return reflectance @ sensitivity / sensitivity.sum(axis=0)
+
+
+@RESPONSE.wrong("You divide by the sum of the sensitivity. A perfect white gives the sum of light *times* sensitivity.")
+def beside_the_sensitivity(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity / sensitivity.sum(axis=0)
+
+
+@RESPONSE.wrong("You divide by the sum of the light. A perfect white gives the sum of light times *sensitivity*.")
+def beside_the_light(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity / light.sum()
+
+
+@RESPONSE.wrong("All channels are divided by the white's *green*. Here each channel is to be a share of its own.")
+def beside_green(light, reflectance, sensitivity):
+    return (light * reflectance) @ sensitivity / (light @ sensitivity)[1]
+
+
+@RESPONSE.wrong("The surface is missing: this is what a perfect white gives beside itself.")
+def without_surface(light, reflectance, sensitivity):
+    return np.ones((*np.shape(reflectance)[:-1], 3))
+
+
+@RESPONSE.wrong(
+    "This is the mean reflectance, the same for each channel. A channel weighs wavelengths by its own curve."
+)
+def mean_reflectance(light, reflectance, sensitivity):
+    return np.repeat(np.mean(reflectance, axis=-1, keepdims=True), 3, axis=-1)
+
+
+@RESPONSE.wrong("Upside down: this is how many times brighter the white is than the surface.")
+def upside_down(light, reflectance, sensitivity):
+    return 1 / response(light, reflectance, sensitivity)
+
+
+@RESPONSE.wrong("The light stands in it twice: once in the product, and once more in the sum.")
+def light_twice(light, reflectance, sensitivity):
+    return (light**2 * reflectance) @ sensitivity / (light**2 @ sensitivity)
+
+
+@RESPONSE.wrong(
+    "You multiply two finished sums, one of light and one of reflectance. The product belongs *inside* the sum, "
+    "wavelength by wavelength."
+)
+def product_of_sums(light, reflectance, sensitivity):
+    return (light @ sensitivity) * (reflectance @ sensitivity) / (light @ sensitivity)
+
+
+@RESPONSE.wrong(
+    "`np.trapezoid` counts the first and the last wavelength by half. That is a way to integrate too, but this lesson "
+    "takes the plain sum over the table."
+)
+def by_trapezoids(light, reflectance, sensitivity):
+    halved = light * np.where(np.isin(np.arange(len(light)), (0, len(light) - 1)), 0.5, 1.0)
+    return response(halved, reflectance, sensitivity)
+
+
+@RESPONSE.wrong("One surface is right. For many, their wavelengths are the last axis: put `@ sensitivity` behind them.")
+def one_surface_only(light, reflectance, sensitivity):
+    return sensitivity.T @ (light * reflectance) / (light @ sensitivity)
+
+
+# 2: grey world -------------------------------------------------------------------------------------------------------
+
+
+def grey_world(raw: Array) -> Array:
+    """The gains that make the mean of all colours grey, green's gain being 1."""
+    mean = raw.reshape(-1, 3).mean(axis=0)
+    return mean[1] / mean
+
+
+def _grey_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    casts = ((0.5, 0.9, 1.5), (0.9, 1.5, 0.5), (1.5, 0.5, 0.9), (1.5, 0.9, 0.5))
+    for shape, cast in zip(((6, 5), (4,), (3, 2, 4), (9, 1)), casts, strict=True):
+        yield (rng.gamma(2.0, 0.15, (*shape, 3)) * cast,)
+
+
+GREY_WORLD = Exercise(
+    name="13.grey_world",
+    reference=grey_world,
+    cases=_grey_cases,
+    hints=(
+        "Take the mean of each channel over the whole picture. By which number must red be multiplied so that its mean "
+        "becomes as large as green's? And green itself?",
+        "`raw.reshape(-1, 3)` makes one long list of colours, of a list and of a picture alike. The mean over its "
+        "`axis=0` has three numbers, and green is the one in the middle.",
+        "`return mean[___] / ___`",
+    ),
+    praise="Two lines, and they believe that the world is grey. Now you know when not to believe them.",
+)
+
+
+@GREY_WORLD.right
+def over_all_axes_but_the_last(raw):
+    mean = raw.mean(axis=tuple(range(raw.ndim - 1)))
+    return np.array([mean[1] / mean[0], 1.0, mean[1] / mean[2]])
+
+
+@GREY_WORLD.right
+def from_opencv_s_mean(raw):
+    import cv2
+
+    red, green, blue, _ = cv2.mean(raw.reshape(-1, 1, 3))
+    return green / np.array([red, green, blue])
+
+
+@GREY_WORLD.right
+def from_sums(raw):
+    sums = sum(raw.reshape(-1, 3))
+    return sums[1] / sums
+
+
+@GREY_WORLD.wrong("These are the gains upside down: a weak channel needs *more*.")
+def gains_upside_down(raw):
+    return 1 / grey_world(raw)
+
+
+@GREY_WORLD.wrong(
+    "These are the means. The gains are what the channels must be *multiplied* by to make the means equal."
+)
+def means_alone(raw):
+    return raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("The means come out equal, at the mean of all three. Here green is to stay as it is: its gain is 1.")
+def at_the_mean_of_all(raw):
+    return raw.mean() / raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("The means come out equal, at 1: that changes the exposure too. Let green keep its level.")
+def at_one(raw):
+    return 1 / raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong(
+    "These gains make the *brightest* of each channel equal: that is the white patch, not the grey world."
+)
+def white_patch(raw):
+    return raw.reshape(-1, 3).max(axis=0)[1] / raw.reshape(-1, 3).max(axis=0)
+
+
+@GREY_WORLD.wrong("You scale down to the smallest channel, as `cv2.xphoto` does. Here green's gain is to be 1.")
+def down_to_the_smallest(raw):
+    return raw.reshape(-1, 3).mean(axis=0).min() / raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("You scale up to the largest channel. Here green's gain is to be 1, whichever channel is largest.")
+def up_to_the_largest(raw):
+    return raw.reshape(-1, 3).mean(axis=0).max() / raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("This takes the *median* for grey. Grey world takes the mean.")
+def by_the_median(raw):
+    return np.median(raw.reshape(-1, 3), axis=0)[1] / np.median(raw.reshape(-1, 3), axis=0)
+
+
+@GREY_WORLD.wrong("Red keeps its level in yours. Green is channel 1, and its gain is to be 1.")
+def red_kept(raw):
+    return raw.reshape(-1, 3).mean(axis=0)[0] / raw.reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("This is the mean of each colour's own gains. Grey is the *mean colour*: average first, then divide.")
+def mean_of_ratios(raw):
+    return (raw[..., 1:2] / raw).reshape(-1, 3).mean(axis=0)
+
+
+@GREY_WORLD.wrong("These are the balanced colours. Asked for are the three gains that do it.")
+def balanced_colours(raw):
+    return raw * grey_world(raw)
+
+
+@GREY_WORLD.wrong("A list of colours is right. A picture has two axes to average over, rows and columns.")
+def first_axis_only(raw):
+    mean = raw.mean(axis=0)
+    return mean[..., 1:2] / mean
+
+
+# 4: find the bug in developing ---------------------------------------------------------------------------------------
+
+
+def develop(raw: Array, gains: Array, matrix: Array) -> Array:
+    """Gains, then the matrix, both on linear data; then what the screen cannot show is cut off; then gamma, 1/2.2."""
+    return np.clip((raw * gains) @ matrix.T, 0, 1) ** (1 / 2.2)
+
+
+def develop_as_given(raw, gains, matrix):
+    encoded = np.clip(raw, 0, 1) ** (1 / 2.2)
+    return np.clip((encoded * gains) @ matrix.T, 0, 1)
+
+
+def _develop_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        matrix = np.eye(3) + rng.uniform(-0.4, 0.4, (3, 3))
+        yield rng.uniform(0.05, 0.7, (*shape, 3)), rng.uniform(1.2, 2.0, 3), matrix
+    strong = np.array([[0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9], [0.95, 0.95, 0.9], [0.3, 0.4, 0.2]])
+    matrix = np.array([[1.8, -0.7, -0.1], [-0.3, 1.6, -0.3], [0.1, -0.8, 1.7]])  # leaves 0 … 1 at either end
+    yield strong + rng.uniform(-0.02, 0.02, strong.shape), np.array([2.1, 1, 1.6]), matrix
+
+
+DEVELOP = Exercise(
+    name="13.develop",
+    reference=develop,
+    cases=_develop_cases,
+    as_given=develop_as_given,
+    tolerance=1e-7,
+    hints=(
+        "Each step is right by itself; look at their *order*. On what kind of values do the gains and the matrix act "
+        "here: on light, or on what is meant for a screen?",
+        "Light adds up, encoded values do not. So everything that multiplies or mixes colours comes first, and the "
+        "curve of the screen last. A power of a negative number is not a number: cut off before it.",
+        "`return np.clip((___ * gains) @ matrix.T, 0, 1) ** ___`",
+    ),
+    praise="Light adds up linearly, so gains and matrices belong before gamma. This is a very common bug.",
+)
+
+
+@DEVELOP.right
+def by_opencv_s_transform(raw, gains, matrix):
+    import cv2
+
+    linear = cv2.transform(np.reshape(raw * gains, (-1, 1, 3)), matrix).reshape(raw.shape)
+    return np.power(np.minimum(np.maximum(linear, 0), 1), 1 / 2.2)
+
+
+@DEVELOP.right
+def gains_inside_the_matrix(raw, gains, matrix):
+    return np.clip(raw @ (matrix * gains).T, 0, 1) ** (1 / 2.2)
+
+
+@DEVELOP.right
+def step_by_step(raw, gains, matrix):
+    balanced = raw * gains
+    mixed = np.stack([np.sum(row * balanced, axis=-1) for row in matrix], axis=-1)
+    return np.exp(np.log(np.clip(mixed, 1e-300, 1)) / 2.2)
+
+
+@DEVELOP.wrong("Now the gains act on linear data, and the matrix still on encoded ones. It needs light as well.")
+def matrix_on_encoded_values(raw, gains, matrix):
+    return np.clip(np.clip(raw * gains, 0, 1) ** (1 / 2.2) @ matrix.T, 0, 1)
+
+
+@DEVELOP.wrong("The order is right now, and the matrix is transposed: colours are rows here, so it is `@ matrix.T`.")
+def matrix_transposed(raw, gains, matrix):
+    return np.clip((raw * gains) @ matrix, 0, 1) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("The matrix was fitted to *balanced* colours: gains first, then the matrix.")
+def matrix_before_gains(raw, gains, matrix):
+    return np.clip((raw @ matrix.T) * gains, 0, 1) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("Gains and matrix act on light now. The result is still linear: the screen wants its power at the end.")
+def without_gamma(raw, gains, matrix):
+    return np.clip((raw * gains) @ matrix.T, 0, 1)
+
+
+@DEVELOP.wrong("The power at the end is upside down: encoding makes the darks *lighter*.")
+def gamma_upside_down(raw, gains, matrix):
+    return np.clip((raw * gains) @ matrix.T, 0, 1) ** 2.2
+
+
+@DEVELOP.wrong("The values are encoded twice, at the beginning and at the end. Once is right, at the end.")
+def encoded_twice(raw, gains, matrix):
+    return develop_as_given(raw, gains, matrix) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("The order is right. Cut off *before* the power: of a negative number it is not a number.")
+def cut_off_too_late(raw, gains, matrix):
+    return np.clip(((raw * gains) @ matrix.T) ** (1 / 2.2), 0, 1)
+
+
+@DEVELOP.wrong("The order is right. Nothing is cut off: a screen shows 0 … 1, and a negative number has no such power.")
+def nothing_cut_off(raw, gains, matrix):
+    return ((raw * gains) @ matrix.T) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("You cut off between gains and matrix too. What is above 1 there may come back below it: cut off once.")
+def cut_off_in_between(raw, gains, matrix):
+    return np.clip(np.clip(raw * gains, 0, 1) @ matrix.T, 0, 1) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("The order is right. This is the curve of sRGB, straight near black; the plain power is asked for here.")
+def with_the_curve_of_srgb(raw, gains, matrix):
+    light = np.clip((raw * gains) @ matrix.T, 0, 1)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+@DEVELOP.wrong("You divide by the gains. A gain multiplies: a weak channel has a gain above 1.")
+def divided_by_gains(raw, gains, matrix):
+    return np.clip((raw / gains) @ matrix.T, 0, 1) ** (1 / 2.2)
+
+
+@DEVELOP.wrong("The gains are gone. The matrix was fitted to balanced colours: multiply by them first.")
+def without_gains(raw, gains, matrix):
+    return np.clip(raw @ matrix.T, 0, 1) ** (1 / 2.2)
+
+
+# 3: the matrix -------------------------------------------------------------------------------------------------------
+
+
+def fit_matrix(raw: Array, target: Array) -> Array:
+    """The M (3, 3) with the least Σ |M raw − target|²."""
+    return np.asarray(np.linalg.lstsq(raw, target, rcond=None)[0].T, dtype=np.float64)
+
+
+def _matrix_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for n in (3, 6, 24):
+        raw = rng.uniform(0.05, 0.6, (n, 3)) + np.eye(3)[np.arange(n) % 3]
+        matrix = np.eye(3) + rng.uniform(-0.4, 0.4, (3, 3))
+        yield raw, raw @ matrix.T + rng.normal(0, 0.02, (n, 3))
+
+
+FIT_MATRIX = Exercise(
+    name="13.fit_matrix",
+    reference=fit_matrix,
+    cases=_matrix_cases,
+    tolerance=1e-7,
+    hints=(
+        "Here colours are rows. Write the equation for one of them, with the unknown to the right of the raw colour: "
+        "is the unknown M, or M turned over?",
+        "`np.linalg.lstsq(a, b, rcond=None)` finds the X for which a @ X comes nearest to b, for all columns of b at "
+        "once. It returns four things, and X is the first. How is X related to M?",
+        "`return np.linalg.lstsq(___, ___, rcond=None)[0]___`",
+    ),
+    praise="Many equations, nine unknowns. `cv2.ccm` would hand you this matrix transposed.",
+)
+
+
+@FIT_MATRIX.right
+def by_the_normal_equations(raw, target):
+    return np.linalg.solve(raw.T @ raw, raw.T @ target).T
+
+
+@FIT_MATRIX.right
+def by_opencv_s_solver(raw, target):
+    import cv2
+
+    return cv2.solve(raw, target, flags=cv2.DECOMP_SVD)[1].T
+
+
+@FIT_MATRIX.right
+def by_the_pseudo_inverse(raw, target):
+    return target.T @ np.linalg.pinv(raw.T)
+
+
+@FIT_MATRIX.right
+def row_by_row(raw, target):
+    q, r = np.linalg.qr(raw)
+    return np.array([np.linalg.solve(r, q.T @ target[:, channel]) for channel in range(3)])
+
+
+@FIT_MATRIX.wrong("This is M transposed: `raw @ X ≈ target` gives X = Mᵀ. It is the convention of `cv2.ccm`.")
+def transposed(raw, target):
+    return fit_matrix(raw, target).T
+
+
+@FIT_MATRIX.wrong("This matrix goes the other way, from target to raw: change places in `lstsq`.")
+def backwards(raw, target):
+    return fit_matrix(target, raw)
+
+
+@FIT_MATRIX.wrong(
+    "You fitted target → raw and inverted. That makes the error of the *raw* colours least, not of the result."
+)
+def backwards_and_inverted(raw, target):
+    return np.linalg.inv(fit_matrix(target, raw))
+
+
+@FIT_MATRIX.wrong("This is diagonal: three gains. A matrix also takes from each channel what belongs to another.")
+def three_gains(raw, target):
+    return np.diag((raw * target).sum(axis=0) / (raw**2).sum(axis=0))
+
+
+@FIT_MATRIX.wrong("You solve for the first three colours exactly. The others have a say too: least squares over all.")
+def first_three_colours(raw, target):
+    return np.linalg.solve(raw[:3], target[:3]).T
+
+
+@FIT_MATRIX.wrong("This is rawᵀ target. The normal equations divide by rawᵀ raw, with `np.linalg.solve`.")
+def without_the_inverse(raw, target):
+    return (raw.T @ target).T
+
+
+@FIT_MATRIX.wrong("You fitted an offset as well and left it out in the end. Black stays black: three columns, no ones.")
+def with_an_offset(raw, target):
+    return np.linalg.lstsq(np.column_stack([raw, np.ones(len(raw))]), target, rcond=None)[0][:3].T
+
+
+@FIT_MATRIX.wrong("You scale the rows until each adds up to 1. That keeps white, but it is not asked for here.")
+def white_kept(raw, target):
+    matrix = fit_matrix(raw, target)
+    return matrix / matrix.sum(axis=1, keepdims=True)
+
+
+@FIT_MATRIX.wrong("`lstsq` returns four things: the solution, residuals, rank and singular values. Take the first.")
+def all_that_lstsq_returns(raw, target):
+    return np.linalg.lstsq(raw, target, rcond=None)
+
+
+@FIT_MATRIX.wrong("These are the errors that remain. Asked for is the matrix that makes them least.")
+def errors_that_remain(raw, target):
+    return raw @ fit_matrix(raw, target).T - target
+
+
+@FIT_MATRIX.wrong("You average over the colours first. One mean colour cannot tell how channels are to be mixed.")
+def from_the_mean_colour(raw, target):
+    return np.diag(target.mean(axis=0) / raw.mean(axis=0))
+
+
+# 5: what the sensor is blind to --------------------------------------------------------------------------------------
+
+
+def unseen(change: Array, sensor: Array) -> Array:
+    """What is left of a change (n,) of a spectrum when all that the sensor (n, 3) notices of it is taken away."""
+    return change - sensor @ np.linalg.solve(sensor.T @ sensor, sensor.T @ change)
+
+
+def _unseen_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for n in (7, 12, 20):
+        yield rng.normal(size=n), spectra(rng, n)[1]
+    sensor = spectra(rng, 15)[1]
+    yield rng.normal(size=15) / 4 - sensor @ [1.0, 1.2, 0.8], sensor  # its weights are negative
+
+
+UNSEEN = Exercise(
+    name="13.unseen",
+    reference=unseen,
+    cases=_unseen_cases,
+    tolerance=1e-7,
+    hints=(
+        "A sensor notices mixtures of its own three curves, and nothing else. Which mixture comes nearest to the "
+        "change? What is left when you take it away?",
+        "The nearest mixture is a fit by least squares with three unknowns, the weights of the curves. Either "
+        "`np.linalg.lstsq` finds them, or three equations: what is left, summed with each curve, must give 0.",
+        "`weights = np.linalg.solve(sensor.T @ sensor, ___)`, and then `return change - ___`",
+    ),
+    praise="Add your result to any spectrum, and the sensor will never know: a metameric black.",
+)
+
+
+@UNSEEN.right
+def by_least_squares(change, sensor):
+    return change - sensor @ np.linalg.lstsq(sensor, change, rcond=None)[0]
+
+
+@UNSEEN.right
+def onto_the_null_space(change, sensor):
+    from scipy.linalg import null_space
+
+    blind = null_space(sensor.T)
+    return blind @ (blind.T @ change)
+
+
+@UNSEEN.right
+def off_an_orthonormal_basis(change, sensor):
+    basis = np.linalg.qr(sensor)[0]
+    return change - basis @ (basis.T @ change)
+
+
+@UNSEEN.wrong("This is the part that the sensor *does* notice. Subtract it from the change.")
+def seen_part(change, sensor):
+    return change - unseen(change, sensor)
+
+
+@UNSEEN.wrong(
+    "You took away each channel's share by itself. The curves overlap, so their shares count twice: solve for the "
+    "three weights together."
+)
+def each_curve_by_itself(change, sensor):
+    return change - sensor @ (sensor.T @ change / (sensor**2).sum(axis=0))
+
+
+@UNSEEN.wrong("The weights are not Sᵀ change, but the solution of (SᵀS) w = Sᵀ change: the curves are no unit vectors.")
+def without_solving(change, sensor):
+    return change - sensor @ (sensor.T @ change)
+
+
+@UNSEEN.wrong("Of nothing the sensor notices nothing, indeed. Asked for is what is left of *this* change.")
+def nothing(change, sensor):
+    return np.zeros_like(change)
+
+
+@UNSEEN.wrong("You took away the mean. The sensor notices more than a level: it has three curves.")
+def mean_taken_away(change, sensor):
+    return change - change.mean()
+
+
+@UNSEEN.wrong("Green notices nothing any more. Red and blue still do: all three curves must be taken away.")
+def green_only(change, sensor):
+    green = sensor[:, 1]
+    return change - green * (green @ change) / (green @ green)
+
+
+@UNSEEN.wrong(
+    "You take the curves away one after another. Each one brings back some of those before it, because they overlap: "
+    "solve for the three weights together."
+)
+def one_after_another(change, sensor):
+    left = change
+    for curve in sensor.T:
+        left = left - curve * (curve @ left) / (curve @ curve)
+    return left
+
+
+@UNSEEN.wrong("The sign is flipped: it is the change minus the mixture, not the mixture minus the change.")
+def mixture_minus_change(change, sensor):
+    return -unseen(change, sensor)
+
+
+@UNSEEN.wrong(
+    "The sensor is blind to this spectrum too, but it is not the part of *this* change: it never looks at it."
+)
+def another_blind_spectrum(change, sensor):
+    return np.linalg.svd(sensor.T)[2][-1]
+
+
+@UNSEEN.wrong("You allow no negative weights. A mixture may subtract a curve: this is arithmetic, not light.")
+def no_negative_weights(change, sensor):
+    return change - sensor @ np.maximum(np.linalg.solve(sensor.T @ sensor, sensor.T @ change), 0)
+
+
+@UNSEEN.wrong("You divide by the *sum* of each curve. A fit divides by the sum of its squares, and by what overlaps.")
+def divided_by_sums(change, sensor):
+    return change - sensor @ (sensor.T @ change / sensor.sum(axis=0))
+
+
+@UNSEEN.wrong("These are the weights of the mixture. Put the mixture together, and take it away from the change.")
+def weights_alone(change, sensor):
+    return np.linalg.solve(sensor.T @ sensor, sensor.T @ change)
+
+
+EXERCISES = (RESPONSE, GREY_WORLD, FIT_MATRIX, DEVELOP, UNSEEN)

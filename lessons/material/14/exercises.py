@@ -1,0 +1,471 @@
+"""Lesson 14, image sensors: row times from a lamp's stripes, a leaky bucket brigade, electrons from lux, decibels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+
+PHOTONS_PER_LUX = 4091.0  # of 555 nm, per second and µm²: 1/683 W/m² over h c / λ
+
+
+# 3: electrons from lux -----------------------------------------------------------------------------------------------
+
+
+def expected_electrons(lux: Array, f_number: float, pitch_um: float, exposure_s: float, efficiency: float) -> Array:
+    """Electrons (...) in a pixel that sees a white wall under `lux` (...): η · 4091 E t p², E = lux / 4N²."""
+    return efficiency * PHOTONS_PER_LUX * lux / (4 * f_number**2) * exposure_s * pitch_um**2
+
+
+def _electron_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        others = (rng.uniform(1.4, 8), rng.uniform(2, 9), rng.uniform(1e-3, 0.1), rng.uniform(0.1, 0.9))
+        yield (rng.uniform(100, 1000, shape), *(float(one) for one in others))
+
+
+EXPECTED_ELECTRONS = Exercise(
+    name="14.expected_electrons",
+    reference=expected_electrons,
+    cases=_electron_cases,
+    shown=((np.array(500.0), 4.0, 3.45, 0.01, 0.77),),
+    hints=(
+        "Go step by step: lux on the wall → lux on the sensor → photons per µm² → photons on the pixel → electrons. "
+        "Which of these steps is missing, or there twice?",
+        "The equation above with π L = lux, T = 1 and θ = 0 tells the lux on the sensor. Photons grow with those lux, "
+        "with the time, and with the pixel's area. A share η of the photons frees electrons.",
+        "`photons = 4091 * ___ * exposure_s * ___`",
+    ),
+    praise="From lux to electrons, without a constant that a datasheet would not give you.",
+    tolerance=2e-4,  # 4091 is rounded: the lesson's own photons_per_lux is as good
+)
+
+
+@EXPECTED_ELECTRONS.right
+def with_the_constants_of_nature(lux, f_number, pitch_um, exposure_s, efficiency):
+    from scipy.constants import c, h
+
+    watts_per_m2 = lux / (4 * f_number**2) / 683
+    photons_per_s = watts_per_m2 * (1e-6 * pitch_um) ** 2 / (h * c / 555e-9)
+    return efficiency * photons_per_s * exposure_s
+
+
+@EXPECTED_ELECTRONS.right
+def with_the_aperture_s_angle(lux, f_number, pitch_um, exposure_s, efficiency):
+    luminance = lux / np.pi
+    solid_angle = np.pi / (4 * f_number**2)
+    return 4091 * efficiency * exposure_s * pitch_um**2 * luminance * solid_angle
+
+
+@EXPECTED_ELECTRONS.right
+def in_single_precision(lux, f_number, pitch_um, exposure_s, efficiency):
+    dose = np.asarray(lux, dtype=np.float32) * np.float32(exposure_s) / np.float32(2 * f_number) ** 2
+    return np.float32(4091 * efficiency) * dose * np.float32(pitch_um) ** 2
+
+
+@EXPECTED_ELECTRONS.wrong("You multiply by the pixel's pitch. Light falls on its *area*, pitch².")
+def pitch_for_area(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, 1.0, exposure_s, efficiency) * pitch_um
+
+
+@EXPECTED_ELECTRONS.wrong("The pixel is a square in this exercise. Yours is a circle as wide as the pitch.")
+def a_round_pixel(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, 1.0, exposure_s, efficiency) * np.pi * (pitch_um / 2) ** 2
+
+
+@EXPECTED_ELECTRONS.wrong("The photons are counted per µm². You turned the pitch into metres, which they do not want.")
+def pitch_in_metres(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, 1e-6 * pitch_um, exposure_s, efficiency)
+
+
+@EXPECTED_ELECTRONS.wrong("The f-number enters squared: it sets the aperture's *diameter*, and light uses the area.")
+def f_number_not_squared(lux, f_number, pitch_um, exposure_s, efficiency):
+    return 4091 * efficiency * lux / (4 * f_number) * exposure_s * pitch_um**2
+
+
+@EXPECTED_ELECTRONS.wrong("The 4 below is missing: E = π L / (4 N²), and a matt white wall has π L = lux.")
+def without_the_four(lux, f_number, pitch_um, exposure_s, efficiency):
+    return 4 * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency)
+
+
+@EXPECTED_ELECTRONS.wrong("There is a π too much: it is π L that equals the wall's lux, so that no π is left.")
+def luminance_taken_for_lux(lux, f_number, pitch_um, exposure_s, efficiency):
+    return np.pi * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency)
+
+
+@EXPECTED_ELECTRONS.wrong(
+    "`lux / 4 * f_number**2` divides by 4 and then *multiplies* by N². Brackets around the whole divisor mend it."
+)
+def brackets_forgotten(lux, f_number, pitch_um, exposure_s, efficiency):
+    return 4091 * efficiency * (lux / 4 * f_number**2) * exposure_s * pitch_um**2
+
+
+@EXPECTED_ELECTRONS.wrong("Those are the lux on the wall. The lens lets a small part of them through to the sensor.")
+def without_a_lens(lux, f_number, pitch_um, exposure_s, efficiency):
+    return 4091 * efficiency * lux * exposure_s * pitch_um**2
+
+
+@EXPECTED_ELECTRONS.wrong("These are the *photons*. Only a share η of them frees an electron.")
+def photons(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, pitch_um, exposure_s, 1.0)
+
+
+@EXPECTED_ELECTRONS.wrong("You divide by η: that is how many photons it takes. Here photons are given: multiply.")
+def divided_by_the_efficiency(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, pitch_um, exposure_s, 1 / efficiency)
+
+
+@EXPECTED_ELECTRONS.wrong("These are electrons per *second*: the exposure is missing.")
+def a_rate(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, pitch_um, 1.0, efficiency)
+
+
+@EXPECTED_ELECTRONS.wrong("The exposure is in seconds already, as its name says; you treat it as milliseconds.")
+def exposure_in_milliseconds(lux, f_number, pitch_um, exposure_s, efficiency):
+    return expected_electrons(lux, f_number, pitch_um, exposure_s / 1000, efficiency)
+
+
+# 1: a lamp's stripes -------------------------------------------------------------------------------------------------
+
+
+def row_time(stripes: Array, rows: int, mains_hz: float) -> Array:
+    """Seconds from row to row when a frame of `rows` rows shows that many bright stripes (...) of a lamp on the mains.
+
+    The lamp is bright twice in each period, so `stripes` stripes last stripes / 2 mains_hz seconds.
+    """
+    return np.asarray(stripes) / (2 * mains_hz * rows)
+
+
+def _row_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape, mains_hz in zip(SHAPES, (50.0, 60.0, 60.0, 50.0), strict=True):
+        yield rng.uniform(1.5, 9, shape), int(rng.integers(480, 2160)), mains_hz
+
+
+ROW_TIME = Exercise(
+    name="14.row_time",
+    reference=row_time,
+    cases=_row_cases,
+    shown=((np.array(3.0), 1080, 50.0),),
+    hints=(
+        "How long does one stripe last? How long do all the stripes of a frame last? And how many rows is that?",
+        "The current has two strong moments in each of its periods, one each way, and the lamp is bright in both. So a "
+        "stripe lasts half a period, and the frame as many half periods as it has stripes.",
+        "`frame_s = stripes / ___`",
+    ),
+    praise="A lamp and a telephone are all it takes. Measure yours.",
+    tolerance=1e-11,  # of microseconds
+)
+
+
+@ROW_TIME.right
+def by_rows_in_a_stripe(stripes, rows, mains_hz):
+    rows_in_a_stripe = rows / np.asarray(stripes)
+    return 1 / (2 * mains_hz) / rows_in_a_stripe
+
+
+@ROW_TIME.right
+def by_the_period(stripes, rows, mains_hz):
+    period_s = 1 / mains_hz
+    return period_s / 2 * np.asarray(stripes) / rows
+
+
+@ROW_TIME.wrong("A factor of 2 too long: the current flows both ways, so the lamp is bright *twice* in each period.")
+def bright_once_in_a_period(stripes, rows, mains_hz):
+    return np.asarray(stripes) / mains_hz / rows
+
+
+@ROW_TIME.wrong("Twice as often bright means *shorter* stripes: double the mains frequency, do not halve it.")
+def half_the_frequency(stripes, rows, mains_hz):
+    return np.asarray(stripes) / (mains_hz / 2) / rows
+
+
+@ROW_TIME.wrong("This is the time of the whole frame. From one row to the next is one `rows`-th of it.")
+def the_whole_frame(stripes, rows, mains_hz):
+    return np.asarray(stripes) / (2 * mains_hz)
+
+
+@ROW_TIME.wrong("This is how long one stripe lasts, half a period. The frame has `stripes` of them and `rows` rows.")
+def one_stripe(stripes, rows, mains_hz):
+    return np.full(np.shape(stripes), 1 / (2 * mains_hz))
+
+
+@ROW_TIME.wrong(
+    "More stripes mean a *slower* sensor: the more often the lamp is bright meanwhile, the longer the frame."
+)
+def fewer_with_more_stripes(stripes, rows, mains_hz):
+    return 1 / (2 * mains_hz * rows * np.asarray(stripes))
+
+
+@ROW_TIME.wrong("This is how many rows a stripe is wide. Ask next how long they take.")
+def rows_in_a_stripe(stripes, rows, mains_hz):
+    return rows / np.asarray(stripes)
+
+
+@ROW_TIME.wrong("This is how many rows are read in a second. The question is how many seconds a row takes.")
+def rows_per_second(stripes, rows, mains_hz):
+    return 2 * mains_hz * rows / np.asarray(stripes)
+
+
+@ROW_TIME.wrong("You multiply by the frequency. Hertz are *per second*: divide by them to come to seconds.")
+def multiplied_by_hertz(stripes, rows, mains_hz):
+    return np.asarray(stripes) * 2 * mains_hz / rows
+
+
+@ROW_TIME.wrong("In microseconds this is right. Seconds are asked for.")
+def in_microseconds(stripes, rows, mains_hz):
+    return 1e6 * row_time(stripes, rows, mains_hz)
+
+
+@ROW_TIME.wrong("Your function fits mains of 50 Hz only. Elsewhere they have 60: use `mains_hz`.")
+def fifty_hertz_written_in(stripes, rows, mains_hz):
+    return np.asarray(stripes) / 100 / rows
+
+
+@ROW_TIME.wrong("You count the gaps between stripes. `stripes` says how often the lamp was bright: take all of them.")
+def gaps_between_stripes(stripes, rows, mains_hz):
+    return (np.asarray(stripes) - 1) / (2 * mains_hz) / rows
+
+
+@ROW_TIME.wrong("The stripes fill all rows of the frame, its last one too: divide by `rows`, not by one less.")
+def gaps_between_rows(stripes, rows, mains_hz):
+    return np.asarray(stripes) / (2 * mains_hz) / (rows - 1)
+
+
+# 4: find the bug in the decibels --------------------------------------------------------------------------------------
+
+
+def dynamic_range_db(saturation_e: Array, dark_noise_e: Array) -> Array:
+    """20 log10 of saturation over the threshold that EMVA 1288 prints, σ_d + ½, both in electrons."""
+    return 20 * np.log10(np.asarray(saturation_e) / (np.asarray(dark_noise_e) + 0.5))
+
+
+def dynamic_range_as_given(saturation_e, dark_noise_e):
+    ratio = saturation_e / (dark_noise_e + 0.5)
+    return 20 * np.log(ratio)
+
+
+def _range_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield rng.uniform(3000, 90_000, shape), rng.uniform(2, 15, shape)
+
+
+DYNAMIC_RANGE_DB = Exercise(
+    name="14.dynamic_range_db",
+    reference=dynamic_range_db,
+    cases=_range_cases,
+    as_given=dynamic_range_as_given,
+    hints=(
+        "Put in a ratio that you know. 10 to 1 is 20 dB: a saturation of 10 and a dark noise of ½ give that ratio.",
+        "The ratio itself is right. Look up what NumPy's logarithms have as their bases, and which base decibels need.",
+        "`return 20 * np.___(ratio)`",
+    ),
+    praise="A published result file has this very error: 142 dB, from a camera that has 62.",
+    tolerance=1e-6,
+)
+
+
+@DYNAMIC_RANGE_DB.right
+def as_a_difference_of_levels(saturation_e, dark_noise_e):
+    return 20 * np.log10(saturation_e) - 20 * np.log10(np.asarray(dark_noise_e) + 0.5)
+
+
+@DYNAMIC_RANGE_DB.right
+def with_the_base_changed(saturation_e, dark_noise_e):
+    return 20 / np.log(10) * np.log(np.asarray(saturation_e) / (np.asarray(dark_noise_e) + 0.5))
+
+
+@DYNAMIC_RANGE_DB.right
+def in_a_loop(saturation_e, dark_noise_e):
+    import math
+
+    pairs = np.broadcast(saturation_e, dark_noise_e)
+    values = [20 * math.log10(most / (noise + 0.5)) for most, noise in pairs]
+    return np.reshape(values, pairs.shape)
+
+
+def _ratio(saturation_e, dark_noise_e):
+    return np.asarray(saturation_e) / (np.asarray(dark_noise_e) + 0.5)
+
+
+@DYNAMIC_RANGE_DB.wrong("The logarithm is right now, and the result is half: ratios of signals take 20, of powers 10.")
+def ten_for_twenty(saturation_e, dark_noise_e):
+    return 10 * np.log10(_ratio(saturation_e, dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("It was the logarithm that was at fault, and not the 20: with 10 the fault is only halved.")
+def ten_with_the_natural_logarithm(saturation_e, dark_noise_e):
+    return 10 * np.log(_ratio(saturation_e, dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("The 20 is lost. This is the exponent of ten; decibels are twenty times as many.")
+def without_the_twenty(saturation_e, dark_noise_e):
+    return np.log10(_ratio(saturation_e, dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("These are stops, factors of 2. Decibels are 20 times the logarithm to another base.")
+def stops(saturation_e, dark_noise_e):
+    return np.log2(_ratio(saturation_e, dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("The logarithm to base 2 counts stops. Twenty times as many of those are no decibels either.")
+def twenty_times_stops(saturation_e, dark_noise_e):
+    return 20 * np.log2(_ratio(saturation_e, dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("The logarithm is right now, but you divide by the dark noise alone. The threshold is σ_d + ½.")
+def over_the_noise(saturation_e, dark_noise_e):
+    return 20 * np.log10(np.asarray(saturation_e) / np.asarray(dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("`a / b + 0.5` adds the ½ to the *ratio*. It belongs to the noise: keep both in brackets.")
+def half_added_to_the_ratio(saturation_e, dark_noise_e):
+    return 20 * np.log10(np.asarray(saturation_e) / np.asarray(dark_noise_e) + 0.5)
+
+
+@DYNAMIC_RANGE_DB.wrong("The threshold lies half an electron *above* the dark noise. You took the half away.")
+def half_taken_away(saturation_e, dark_noise_e):
+    return 20 * np.log10(np.asarray(saturation_e) / (np.asarray(dark_noise_e) - 0.5))
+
+
+@DYNAMIC_RANGE_DB.wrong(
+    "That is the exact threshold, ½ + √(σ² + ¼), and good physics. The published file was made with σ_d + ½, and its "
+    "figure can only be mended with the same: leave the ratio as it was."
+)
+def over_the_exact_threshold(saturation_e, dark_noise_e):
+    return 20 * np.log10(np.asarray(saturation_e) / (0.5 + np.sqrt(np.asarray(dark_noise_e) ** 2 + 0.25)))
+
+
+@DYNAMIC_RANGE_DB.wrong("The ratio stands on its head: saturation over threshold is above 1, and its decibels above 0.")
+def upside_down(saturation_e, dark_noise_e):
+    return -20 * np.log10(_ratio(saturation_e, dark_noise_e))
+
+
+@DYNAMIC_RANGE_DB.wrong("You divide one logarithm by the other. The logarithm of a ratio is their *difference*.")
+def quotient_of_logarithms(saturation_e, dark_noise_e):
+    return 20 * np.log10(saturation_e) / np.log10(np.asarray(dark_noise_e) + 0.5)
+
+
+@DYNAMIC_RANGE_DB.wrong("You subtract the threshold from the saturation. A range in decibels is of their *ratio*.")
+def difference_for_ratio(saturation_e, dark_noise_e):
+    return 20 * np.log10(np.asarray(saturation_e) - (np.asarray(dark_noise_e) + 0.5))
+
+
+# 2: what arrives in its own packet -----------------------------------------------------------------------------------
+
+
+def arriving(electrons: Array, efficiency: float) -> Array:
+    """What reaches the amplifier in its own packet, of a column (height,) whose row i takes i + 1 shifts."""
+    return electrons * efficiency ** (1 + np.arange(len(electrons)))
+
+
+def _brigade_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for height in (1, 2, 7, 40):
+        yield rng.uniform(100, 9000, height), float(rng.uniform(0.9, 0.999))
+
+
+ARRIVING = Exercise(
+    name="14.arriving",
+    reference=arriving,
+    cases=_brigade_cases,
+    shown=((np.array([1000.0, 1000.0, 1000.0]), 0.99),),
+    hints=(
+        "Follow one bucket. What share of it is left after one shift, and after two? How many shifts does row 0 take?",
+        "After n shifts a power of the efficiency is left. Make an array of each row's n: `np.arange` counts from "
+        "0, but even row 0 has to be shifted into the register.",
+        "`return electrons * efficiency**___`",
+    ),
+    praise="This is why a CCD of 6000 rows needs a transfer efficiency of 0.999999.",
+    tolerance=1e-9,
+)
+
+
+@ARRIVING.right
+def shift_by_shift(electrons, efficiency):
+    left = np.array(electrons, dtype=float)
+    for row in range(len(left)):
+        left[row:] *= efficiency  # the rows that are still on their way
+    return left
+
+
+@ARRIVING.right
+def by_a_running_product(electrons, efficiency):
+    return electrons * np.cumprod(np.full(len(electrons), efficiency))
+
+
+@ARRIVING.right
+def by_the_binomial_law(electrons, efficiency):
+    from scipy.stats import nbinom
+
+    return electrons * nbinom.pmf(0, 1 + np.arange(len(electrons)), efficiency)
+
+
+@ARRIVING.wrong("One shift too few: even row 0 must be shifted once, into the register.")
+def row_0_not_shifted(electrons, efficiency):
+    return electrons * efficiency ** np.arange(len(electrons))
+
+
+@ARRIVING.wrong("One shift too many: row 0 is *one* shift away from the register, and row i is i + 1.")
+def row_0_shifted_twice(electrons, efficiency):
+    return electrons * efficiency ** (2 + np.arange(len(electrons)))
+
+
+@ARRIVING.wrong("Every row loses as much in yours, once. A farther one has a longer way: multiply once for each shift.")
+def one_shift_for_all(electrons, efficiency):
+    return electrons * efficiency
+
+
+@ARRIVING.wrong("Every row takes as many shifts as the column is high in yours. The near ones arrive sooner.")
+def the_whole_way_for_all(electrons, efficiency):
+    return electrons * efficiency ** len(electrons)
+
+
+@ARRIVING.wrong("Losses do not add, they multiply: each shift leaves behind a share of what is *still there*.")
+def losses_added(electrons, efficiency):
+    return electrons * (1 - (1 - efficiency) * (1 + np.arange(len(electrons))))
+
+
+@ARRIVING.wrong("The exponential is a good approximation where hardly anything is lost. A power is exact, and simpler.")
+def exponential(electrons, efficiency):
+    return electrons * np.exp(-(1 - efficiency) * (1 + np.arange(len(electrons))))
+
+
+@ARRIVING.wrong("You *multiply* by the number of shifts. Shift after shift multiplies by the efficiency: a power.")
+def times_the_shifts(electrons, efficiency):
+    return electrons * efficiency * (1 + np.arange(len(electrons)))
+
+
+@ARRIVING.wrong("1 − efficiency is the share left behind. What moves on at each shift is the efficiency itself.")
+def the_share_left_behind(electrons, efficiency):
+    return electrons * (1 - efficiency) ** (1 + np.arange(len(electrons)))
+
+
+@ARRIVING.wrong("This is what each row has *lost* on its way. The question is what is left.")
+def what_is_lost(electrons, efficiency):
+    return electrons - arriving(electrons, efficiency)
+
+
+@ARRIVING.wrong("The order is turned round: row 0 is the nearest to the register and has the shortest way.")
+def far_rows_first(electrons, efficiency):
+    return electrons * (efficiency ** (1 + np.arange(len(electrons))))[::-1]
+
+
+@ARRIVING.wrong(
+    "`efficiency**1 + np.arange(…)` is a power *and then* a sum: `**` binds first. Brackets round the exponent mend it."
+)
+def brackets_around_the_exponent_forgotten(electrons, efficiency):
+    return electrons * (efficiency**1 + np.arange(len(electrons)))
+
+
+@ARRIVING.wrong("The trails of the rows before have been let in. Only what arrives in its *own* packet counts here.")
+def with_the_trails(electrons, efficiency):
+    buckets, arrived = np.array(electrons, dtype=float), []
+    for _ in range(len(buckets)):
+        moved = efficiency * buckets
+        buckets -= moved
+        buckets[:-1] += moved[1:]
+        arrived.append(moved[0])
+    return np.array(arrived)
+
+
+EXERCISES = (ROW_TIME, ARRIVING, EXPECTED_ELECTRONS, DYNAMIC_RANGE_DB)

@@ -1,0 +1,594 @@
+"""Lesson 16, the clinic: statistics of residuals, lines of a board, what a rotation explains, and a first diagnosis.
+
+Residuals are observed less projected, in pixels, (views, corners, 2) or (rows, columns, 2), NaN where nothing was seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from camviz.course.checks import Arguments, Array, Exercise
+from camviz.poses import Rotation
+
+RAYLEIGH = np.sqrt(2 * np.log(2))  # the median length of a residual over the σ of its coordinates
+
+
+def _residuals(rng: np.random.Generator, *shape: int) -> Array:
+    return rng.normal(0, rng.uniform(0.1, 0.4), (*shape, 2))
+
+
+def _unseen(rng: np.random.Generator, residuals: Array) -> Array:
+    """The same with about every seventh corner unseen, in every view at least one."""
+    hidden = rng.uniform(size=residuals.shape[:-1]) < 0.15
+    hidden[..., 0] = True
+    residuals[hidden] = np.nan
+    return residuals
+
+
+# 1: the bars ---------------------------------------------------------------------------------------------------------
+
+
+def view_rms(residuals: Array) -> Array:
+    """The RMS length (views,) of each view's residuals (views, corners, 2), over the corners that were seen."""
+    squares = np.sum(residuals**2, axis=-1)
+    return np.sqrt(np.nanmean(squares, axis=-1))
+
+
+def _view_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    yield (_residuals(rng, 5, 24),)
+    yield (_residuals(rng, 1, 54),)
+    yield (_unseen(rng, _residuals(rng, 7, 30)),)
+
+
+VIEW_RMS = Exercise(
+    name="16.view_rms",
+    reference=view_rms,
+    cases=_view_cases,
+    hints=(
+        "The length of a residual comes first: both coordinates of one corner are *one* residual.",
+        "Add the squares of the two coordinates, take the mean over the corners of a view that were seen "
+        "(`np.nanmean` passes over NaN), then the root.",
+        "`return np.sqrt(np.nanmean(___, axis=-1))`",
+    ),
+    praise="These are the bars of the clinic, and what OpenCV calls perViewErrors.",
+)
+
+
+@VIEW_RMS.right
+def view_by_view(residuals):
+    errors = []
+    for view in residuals:
+        seen = view[~np.isnan(view).any(axis=1)]
+        errors.append(np.linalg.norm(seen) / np.sqrt(len(seen)))
+    return np.array(errors)
+
+
+@VIEW_RMS.right
+def from_lengths(residuals):
+    lengths = np.linalg.norm(residuals, axis=-1)
+    return np.sqrt(np.nansum(lengths**2, axis=-1) / np.sum(np.isfinite(lengths), axis=-1))
+
+
+@VIEW_RMS.wrong("This is the RMS of one *coordinate*: too small by √2. OpenCV, like its users, counts a corner once.")
+def of_single_coordinates(residuals):
+    return np.sqrt(np.nanmean(residuals**2, axis=(-1, -2)))
+
+
+@VIEW_RMS.wrong(
+    "This is the mean length. RMS squares first, then takes the mean, then the root: large errors weigh more."
+)
+def mean_length(residuals):
+    return np.nanmean(np.linalg.norm(residuals, axis=-1), axis=-1)
+
+
+@VIEW_RMS.wrong(
+    "It is right where every corner was seen. A corner that was not is NaN, and takes the whole mean with it."
+)
+def with_nan(residuals):
+    return np.sqrt(np.mean(np.sum(residuals**2, axis=-1), axis=-1))
+
+
+@VIEW_RMS.wrong(
+    "It is right where every corner was seen. Divide by the number of corners that *were*, not by all of them."
+)
+def divided_by_all(residuals):
+    return np.sqrt(np.nansum(residuals**2, axis=(-1, -2)) / residuals.shape[-2])
+
+
+@VIEW_RMS.wrong("The mean of the squares still wants its root.")
+def without_the_root(residuals):
+    return np.nanmean(np.sum(residuals**2, axis=-1), axis=-1)
+
+
+@VIEW_RMS.wrong("This is the median length. A median passes over a few corners that are far off; the RMS shows them.")
+def median_length(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1), axis=-1)
+
+
+@VIEW_RMS.wrong("This is one number for all views together. Take the mean over the corners only, and keep the views.")
+def all_views_together(residuals):
+    return np.sqrt(np.nanmean(np.sum(residuals**2, axis=-1)))
+
+
+@VIEW_RMS.wrong("This is one number for each *corner*, over all views. The bars are one for each view.")
+def corner_by_corner(residuals):
+    return np.sqrt(np.nanmean(np.sum(residuals**2, axis=-1), axis=0))
+
+
+@VIEW_RMS.wrong(
+    "You add the squares and never divide by how many there are: a view with more corners would look worse."
+)
+def sum_for_mean(residuals):
+    return np.sqrt(np.nansum(residuals**2, axis=(-1, -2)))
+
+
+@VIEW_RMS.wrong(
+    "You average the arrows before you measure their length. Arrows that point in opposite directions cancel."
+)
+def length_of_the_mean(residuals):
+    return np.linalg.norm(np.nanmean(residuals, axis=-2), axis=-1)
+
+
+# 2: what is normal? --------------------------------------------------------------------------------------------------
+
+
+def robust_sigma(residuals: Array) -> float:
+    """σ of one coordinate of residuals (..., 2): the median of their lengths over √(2 ln 2) (Rayleigh)."""
+    return float(np.nanmedian(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH)
+
+
+def _sigma_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    yield (_residuals(rng, 60),)
+    for shape in ((8, 54), (3, 6, 9)):
+        wild = _unseen(rng, _residuals(rng, *shape))
+        wild[0] += rng.uniform(5, 30, 2)
+        yield (wild,)
+
+
+ROBUST_SIGMA = Exercise(
+    name="16.robust_sigma",
+    reference=robust_sigma,
+    cases=_sigma_cases,
+    tolerance=1e-3,  # where the number of corners is even, a median of squares is not quite the square of a median
+    hints=(
+        "A median stands in the middle: as long as fewer than half are wild, it does not matter how wild they are.",
+        "For Gaussian noise of σ in each coordinate the median *length* is σ √(2 ln 2) = 1.177 σ. Solve for σ; "
+        "`np.nanmedian` passes over corners that were not seen.",
+        "`return np.nanmedian(___) / np.sqrt(2 * np.log(2))`",
+    ),
+    praise="A view that is thirty pixels off moves your idea of what is normal only a little, and one that is three "
+    "hundred pixels off moves it no more.",
+)
+
+
+@ROBUST_SIGMA.right
+def from_the_seen_ones(residuals):
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    return np.median(lengths[np.isfinite(lengths)]) / np.sqrt(np.log(4))
+
+
+@ROBUST_SIGMA.right
+def from_squares(residuals):
+    return np.sqrt(np.nanquantile(np.sum(residuals**2, axis=-1), 0.5) / (2 * np.log(2)))
+
+
+@ROBUST_SIGMA.wrong("This is the ordinary standard deviation: the wild view, which you want to find, has moved it.")
+def standard_deviation(residuals):
+    return np.nanstd(residuals)
+
+
+@ROBUST_SIGMA.wrong("This is the median length. It is 1.177 σ, not σ: divide by √(2 ln 2).")
+def median_of_lengths(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1))
+
+
+@ROBUST_SIGMA.wrong("A good robust σ, of single *coordinates*. Here it is asked from the median of the lengths.")
+def of_coordinates(residuals):
+    return 1.4826 * np.nanmedian(np.abs(residuals))
+
+
+@ROBUST_SIGMA.wrong(
+    "The factor 1.4826 belongs to the absolute value of one number. A length in the plane has √(2 ln 2)."
+)
+def factor_of_one_number(residuals):
+    return 1.4826 * np.nanmedian(np.linalg.norm(residuals, axis=-1))
+
+
+@ROBUST_SIGMA.wrong(
+    "It is right where every corner was seen; elsewhere NaN gets into the median. There is `np.nanmedian`."
+)
+def nan_in_the_median(residuals):
+    return np.median(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH
+
+
+@ROBUST_SIGMA.wrong("You multiply by √(2 ln 2). The median length is *longer* than σ by that factor: divide.")
+def multiplied(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) * RAYLEIGH
+
+
+@ROBUST_SIGMA.wrong("The factor is the *root* of 2 ln 2. You divide by 2 ln 2 itself.")
+def root_forgotten(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / (2 * np.log(2))
+
+
+@ROBUST_SIGMA.wrong("Two coordinates make √2 for an RMS. A median length is longer than σ by √(2 ln 2).")
+def divided_by_root_two(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / np.sqrt(2)
+
+
+@ROBUST_SIGMA.wrong("This begins with the *mean* length, and one wild view moves a mean as far as it likes.")
+def from_the_mean_length(residuals):
+    return np.nanmean(np.linalg.norm(residuals, axis=-1)) / np.sqrt(np.pi / 2)
+
+
+@ROBUST_SIGMA.wrong("You use the logarithm to base ten. The formula has the natural one, ln, which is `np.log`.")
+def common_logarithm(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / np.sqrt(2 * np.log10(2))
+
+
+# 3: find the bug -----------------------------------------------------------------------------------------------------
+
+
+def line_lengths(residuals: Array, rows: int, columns: int) -> tuple[Array, Array]:
+    """The median length of the residuals (rows * columns, 2) in every row (rows,) and every column (columns,)."""
+    lengths = np.linalg.norm(residuals, axis=-1).reshape(rows, columns)
+    return np.median(lengths, axis=1), np.median(lengths, axis=0)
+
+
+def line_lengths_as_given(residuals, rows, columns):
+    lengths = np.linalg.norm(residuals, axis=-1).reshape(columns, rows)
+    return np.median(lengths, axis=0), np.median(lengths, axis=1)
+
+
+def _line_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for rows, columns in ((6, 9), (5, 8), (4, 4)):
+        grid = _residuals(rng, rows, columns)
+        grid[:, rng.integers(columns)] += rng.uniform(3, 8, 2)
+        yield (grid.reshape(-1, 2), rows, columns)
+
+
+LINES = Exercise(
+    name="16.line_lengths",
+    reference=line_lengths,
+    cases=_line_cases,
+    as_given=line_lengths_as_given,
+    hints=(
+        "Write the numbers 0 to 5 into a board of 2 rows and 3 columns, row by row, and follow one of them through.",
+        "Corners come row by row: the columns count fastest. Which of the two is then the first axis of the grid, and "
+        "along which axis does the median of one row run?",
+        "`lengths = np.linalg.norm(residuals, axis=-1).reshape(___)`",
+    ),
+    praise="Now a bad column is a bad column. The wrong reshape never raises an error.",
+)
+
+
+@LINES.right
+def line_by_line(residuals, rows, columns):
+    grid = residuals.reshape(rows, columns, 2)
+    across = [np.median(np.linalg.norm(grid[row], axis=-1)) for row in range(rows)]
+    down = [np.median(np.linalg.norm(grid[:, column], axis=-1)) for column in range(columns)]
+    return np.array(across), np.array(down)
+
+
+@LINES.right
+def by_strides(residuals, rows, columns):
+    lengths = np.hypot(*residuals.T)
+    return (
+        np.array([np.median(lengths[row * columns : (row + 1) * columns]) for row in range(rows)]),
+        np.array([np.median(lengths[column::columns]) for column in range(columns)]),
+    )
+
+
+@LINES.wrong("The grid is right now. But the median of a *row* runs along axis 1, over its columns.")
+def axes_left_as_they_were(residuals, rows, columns):
+    return line_lengths(residuals, rows, columns)[::-1]
+
+
+@LINES.wrong("The axes of the medians were right for that grid. It is the grid that is taken apart in the wrong order.")
+def only_the_axes_changed(residuals, rows, columns):
+    return line_lengths_as_given(residuals, rows, columns)[::-1]
+
+
+@LINES.wrong("These are means. One corner that is far off moves the mean of its whole row; a median stays.")
+def means(residuals, rows, columns):
+    lengths = np.linalg.norm(residuals, axis=-1).reshape(rows, columns)
+    return lengths.mean(axis=1), lengths.mean(axis=0)
+
+
+@LINES.wrong("These are the largest residuals. A bad column is one in which *most* corners are off: the median.")
+def largest(residuals, rows, columns):
+    lengths = np.linalg.norm(residuals, axis=-1).reshape(rows, columns)
+    return lengths.max(axis=1), lengths.max(axis=0)
+
+
+@LINES.wrong("These are medians of squared lengths. The task asks for lengths, in pixels.")
+def squared_lengths(residuals, rows, columns):
+    lengths = np.sum(residuals**2, axis=-1).reshape(rows, columns)
+    return np.median(lengths, axis=1), np.median(lengths, axis=0)
+
+
+@LINES.wrong("Row medians come back twice. The second answer is for the columns: the median along axis 0.")
+def rows_twice(residuals, rows, columns):
+    across = line_lengths(residuals, rows, columns)[0]
+    return across, across
+
+
+@LINES.wrong("A residual has two coordinates, and you look at the first alone: an error along the other goes unseen.")
+def one_coordinate(residuals, rows, columns):
+    lengths = np.abs(residuals[:, 0]).reshape(rows, columns)
+    return np.median(lengths, axis=1), np.median(lengths, axis=0)
+
+
+@LINES.wrong("The sum of the two coordinates is no length: its parts can cancel. Square, add, take the root.")
+def coordinates_added(residuals, rows, columns):
+    lengths = np.abs(residuals.sum(axis=1)).reshape(rows, columns)
+    return np.median(lengths, axis=1), np.median(lengths, axis=0)
+
+
+# 4: triage -----------------------------------------------------------------------------------------------------------
+
+
+def triage(residuals: Array) -> int:
+    """What is wrong with views (views, rows, columns, 2): 0 nothing, 1 a corner, 2 a line of corners, 3 a whole view.
+
+    A corner is off beyond 6 σ, σ being robust; a line or a view when at least half of its corners are.
+    """
+    return _triage(residuals)
+
+
+def _triage(residuals, sigma=robust_sigma, times=6.0, share=0.5, rows=True, columns=True):
+    off = np.linalg.norm(residuals, axis=-1) > times * sigma(residuals)
+    if (off.mean(axis=(1, 2)) >= share).any():
+        return 3
+    if (columns and (off.mean(axis=1) >= share).any()) or (rows and (off.mean(axis=2) >= share).any()):
+        return 2
+    return int(off.any())
+
+
+def _triage_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Nothing, a corner, whole lines and views, lines and views of which most is off, and lines of which little is."""
+    marks = (
+        (slice(0), slice(0), slice(0)),
+        (3, 2, 4),
+        (1, 2, slice(None)),
+        (2, slice(None), 7),
+        (5, slice(None), slice(None)),
+        (4, 3, slice(1, 8)),
+        (6, slice(2, 6), 3),
+        (0, slice(None), slice(2, 8)),
+        (7, 1, slice(0, 3)),
+        (3, slice(1, 3), 5),
+        (slice(None), 2, slice(None)),
+    )
+    for mark in rng.permutation(np.array(marks, dtype=object)):
+        residuals = np.clip(rng.normal(0, 1, (8, 6, 9, 2)), -3, 3)
+        residuals[7, 5, 8] = 3.2, -3.2  # 4.5 σ: far, and not off
+        residuals *= rng.uniform(0.1, 0.4)
+        residuals[tuple(mark)] += rng.uniform(15, 40) * np.array([np.cos(a := rng.uniform(0, 6.3)), np.sin(a)])
+        yield (residuals,)
+
+
+TRIAGE = Exercise(
+    name="16.triage",
+    reference=triage,
+    cases=_triage_cases,
+    hints=(
+        "First decide which corners are off: a mask (views, rows, columns). Then ask for the largest thing first: a "
+        "view, a line, a corner.",
+        "The mean of a mask is a share. Over both axes of the board it is the share of bad corners in a view; over the "
+        "rows (axis 1) that in each column, over the columns (axis 2) that in each row.",
+        "`off = lengths > ___ * np.median(lengths) / np.sqrt(2 * np.log(2))`",
+    ),
+    praise="That is the first thing the clinic does with every set of corners.",
+)
+
+
+@TRIAGE.right
+def by_counting(residuals):
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    off = lengths > 6 * np.median(lengths) / np.sqrt(np.log(4))
+    _, rows, columns = off.shape
+    if np.any(np.sum(off, axis=(1, 2)) * 2 >= rows * columns):
+        return 3
+    lines = np.any(off.sum(axis=1) * 2 >= rows) or np.any(off.sum(axis=2) * 2 >= columns)
+    return 2 if lines else 1 if off.any() else 0
+
+
+@TRIAGE.right
+def view_by_view_by_hand(residuals):
+    lengths = np.linalg.norm(residuals, axis=-1)
+    limit, worst = 6 * np.median(lengths) / np.sqrt(2 * np.log(2)), 0
+    for view in lengths > limit:
+        lines = [*view, *view.T]
+        found = 3 if view.mean() >= 0.5 else 2 if max(line.mean() for line in lines) >= 0.5 else int(view.any())
+        worst = max(worst, found)
+    return worst
+
+
+@TRIAGE.wrong("Columns, corners and views are found; a bad *row* goes as single corners.")
+def without_rows(residuals):
+    return _triage(residuals, rows=False)
+
+
+@TRIAGE.wrong("Rows, corners and views are found; a bad *column* goes as single corners.")
+def without_columns(residuals):
+    return _triage(residuals, columns=False)
+
+
+@TRIAGE.wrong("Your σ is the ordinary standard deviation. A bad view makes it so large that nothing is beyond 6 σ.")
+def by_standard_deviation(residuals):
+    return _triage(residuals, sigma=np.std)
+
+
+@TRIAGE.wrong("A bad view is called a bad line. It has bad lines, all of them: ask for the view first.")
+def lines_before_views(residuals):
+    return min(triage(residuals), 2)
+
+
+@TRIAGE.wrong("Healthy or not is told right. The number should say *what* is off.")
+def healthy_or_not(residuals):
+    return int(triage(residuals) > 0)
+
+
+@TRIAGE.wrong("You ask for *all* corners of a line or a view. Half of them is enough: a line may be partly right.")
+def all_corners_of_a_line(residuals):
+    return _triage(residuals, share=1.0)
+
+
+@TRIAGE.wrong("You ask for *any* corner of a line or a view. One wrong corner does not make its row wrong: half does.")
+def any_corner_of_a_line(residuals):
+    return _triage(residuals, share=1e-9)
+
+
+@TRIAGE.wrong(
+    "Beyond 3 σ lies one corner in ninety of a perfectly healthy camera: a length in the plane is longer than one "
+    "number. The limit here is 6 σ."
+)
+def three_sigma(residuals):
+    return _triage(residuals, times=3.0)
+
+
+@TRIAGE.wrong(
+    "Each view is compared with its own σ. A view that is off as a whole is normal by its own standard: take σ from "
+    "all views together."
+)
+def each_view_by_itself(residuals):
+    return max(_triage(view[None]) for view in residuals)
+
+
+# 5: what a turn explains ---------------------------------------------------------------------------------------------
+
+
+def implied_rotation(rays_first: Array, rays_second: Array) -> Array:
+    """The R (3, 3) for which R rays_first is closest to rays_second, both (n, 3): Kabsch (1976)."""
+    U, _, Vt = np.linalg.svd(rays_second.T @ rays_first)
+    return U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+
+
+def _rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for n in (4, 12, 60):
+        rays = np.concatenate([rng.uniform(-0.7, 0.7, (n, 2)), np.ones((n, 1))], axis=1)
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        turn = Rotation.from_rotvec(rng.uniform(0.1, 0.3, 3) * rng.choice([-1, 1], 3))
+        other = turn.apply(rays) + rng.normal(0, 0.002, (n, 3))
+        yield rays, other / np.linalg.norm(other, axis=1, keepdims=True)
+    angle, tilt = np.linspace(-1, 1, 7), 0.01 * np.array([1, -1, 1, -1, 1, -1, 1])
+    flat = np.stack([np.sin(angle), tilt, np.cos(angle)], axis=-1)  # almost one plane, where noise may ask for a mirror
+    yield flat, Rotation.from_rotvec([0.1, -0.2, rng.uniform(0.2, 0.5)]).apply(flat * [1, -1, 1])
+
+
+ROTATION = Exercise(
+    name="16.implied_rotation",
+    reference=implied_rotation,
+    cases=_rotation_cases,
+    tolerance=1e-7,
+    hints=(
+        "The sum of the products, `rays_second.T @ rays_first`, is a 3 × 3 matrix. The rotation closest to it is the "
+        "answer.",
+        "A singular value decomposition, `np.linalg.svd`, takes that matrix apart into a rotation, a stretch and a "
+        "rotation; leave the stretch out. Where what is left has determinant −1 it is a mirror: turn the last axis "
+        "round.",
+        "`return U @ np.diag([1, 1, ___]) @ Vt`",
+    ),
+    praise="What is left after this rotation is what two calibrations really disagree about.",
+)
+
+
+@ROTATION.right
+def by_scipy(rays_first, rays_second):
+    return Rotation.align_vectors(rays_second, rays_first)[0].as_matrix()
+
+
+@ROTATION.right
+def by_davenport_s_quaternion(rays_first, rays_second):
+    B = rays_second.T @ rays_first
+    z = np.array([B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]])
+    K = np.block([[B + B.T - np.trace(B) * np.eye(3), z[:, None]], [z[None], np.array([[np.trace(B)]])]])
+    return Rotation.from_quat(np.linalg.eigh(K)[1][:, -1]).as_matrix()
+
+
+@ROTATION.right
+def with_the_sign_in_u(rays_first, rays_second):
+    U, _, Vt = np.linalg.svd(np.einsum("ni,nj->ij", rays_second, rays_first))
+    if np.linalg.det(U) * np.linalg.det(Vt) < 0:
+        U[:, -1] *= -1
+    return U @ Vt
+
+
+def _skew(w):
+    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+
+
+@ROTATION.wrong("This is the rotation from the second to the first: the other way round.")
+def the_other_way_round(rays_first, rays_second):
+    return implied_rotation(rays_first, rays_second).T
+
+
+@ROTATION.wrong("For rays in all directions this is right. Rays in one plane may give you a *mirror*, det R = −1.")
+def perhaps_a_mirror(rays_first, rays_second):
+    U, _, Vt = np.linalg.svd(rays_second.T @ rays_first)
+    return U @ Vt
+
+
+@ROTATION.wrong(
+    "You saw that det R may be −1, and change the sign of all of R. That turns every ray round; only the axis of the "
+    "smallest singular value is to change its sign."
+)
+def all_signs_changed(rays_first, rays_second):
+    R = perhaps_a_mirror(rays_first, rays_second)
+    return R if np.linalg.det(R) > 0 else -R
+
+
+@ROTATION.wrong("This is the best 3 × 3 matrix, and no rotation: it may stretch, which a camera cannot when it turns.")
+def least_squares(rays_first, rays_second):
+    return np.linalg.lstsq(rays_first, rays_second, rcond=None)[0].T
+
+
+@ROTATION.wrong(
+    "You subtract the mean ray first, as one does for clouds of points that may also be moved. Rays all begin in the "
+    "camera: nothing is to be subtracted."
+)
+def centred(rays_first, rays_second):
+    return implied_rotation(rays_first - rays_first.mean(axis=0), rays_second - rays_second.mean(axis=0))
+
+
+@ROTATION.wrong("This is the shortest turn from one mean ray to the other. It knows nothing of a roll about that ray.")
+def from_mean_to_mean(rays_first, rays_second):
+    a, b = rays_first.mean(axis=0), rays_second.mean(axis=0)
+    axis = np.cross(a, b)
+    angle = np.arctan2(np.linalg.norm(axis), a @ b)
+    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+
+
+@ROTATION.wrong("You use the first two rays alone. All of them have noise, so all of them should have a say.")
+def from_two_rays(rays_first, rays_second):
+    def frame(rays):
+        x = rays[0] / np.linalg.norm(rays[0])
+        z = np.cross(x, rays[1]) / np.linalg.norm(np.cross(x, rays[1]))
+        return np.stack([x, np.cross(z, x), z], axis=1)
+
+    return frame(rays_second) @ frame(rays_first).T
+
+
+@ROTATION.wrong(
+    "This is the first-order turn, I + [w]ₓ. It is no rotation: it stretches, more the larger the angle is."
+)
+def first_order(rays_first, rays_second):
+    A = np.concatenate([-_skew(ray) for ray in rays_first])
+    w = np.linalg.lstsq(A, (rays_second - rays_first).ravel(), rcond=None)[0]
+    return np.eye(3) + _skew(w)
+
+
+@ROTATION.wrong("This is the identity. It would be the answer if the two cameras looked the same way.")
+def no_turn(rays_first, rays_second):
+    return np.eye(3)
+
+
+@ROTATION.wrong("The stretch is still in it: leave the singular values out, U and Vᵀ alone are the rotation.")
+def stretch_kept(rays_first, rays_second):
+    return rays_second.T @ rays_first / len(rays_first)
+
+
+EXERCISES = (VIEW_RMS, ROBUST_SIGMA, LINES, TRIAGE, ROTATION)

@@ -1,0 +1,555 @@
+"""Lesson 17, sharpness and exposure: from an edge to its MTF, lens and pixel together, the dark corners, the shutter.
+
+Frequencies are in cycles per pixel where an edge was measured, and in cycles per mm where optics makes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+
+# 1: from the profile to the line spread ------------------------------------------------------------------------------
+
+
+def line_spread(profile: Array, step: float) -> Array:
+    """The derivative (n - 1,) of an edge's profile (n,), per pixel, divided by the edge's height: its area is 1."""
+    change = np.diff(profile) / step
+    return change / (change.sum() * step)
+
+
+def _edges(rng: np.random.Generator) -> Iterator[Arguments]:
+    for n, step, falling in ((12, 0.25, False), (20, 0.125, True), (9, 0.5, False)):
+        x = np.linspace(-3, 3, n)
+        rise = 1 / (1 + np.exp(-rng.uniform(1.5, 2.5) * x)) + rng.uniform(0.15, 0.3) * x * np.exp(-(x**2))
+        rise = rise + 0.1 * np.cos(3 * x)  # it overshoots, as a sharpened picture does
+        yield rng.uniform(0.5, 1.5) + rng.uniform(1.5, 4.0) * (-1 if falling else 1) * rise, step
+
+
+LINE_SPREAD = Exercise(
+    name="17.line_spread",
+    reference=line_spread,
+    cases=_edges,
+    shown=((np.array([0.0, 0.1, 0.5, 0.9, 1.0]), 0.125),),
+    hints=(
+        "A profile of n values has n − 1 steps between neighbours. Which area must the curve of these steps have?",
+        "`np.diff` gives the steps. Divide by the distance between samples, and then by the whole rise of the edge, so "
+        "that the area (the sum times the step) becomes 1.",
+        "`return change / (___ * step)`",
+    ),
+    praise="Its area is 1 for every edge, bright or dark side first.",
+)
+
+
+@LINE_SPREAD.right
+def by_the_whole_rise(profile, step):
+    return (profile[1:] - profile[:-1]) / (profile[-1] - profile[0]) / step
+
+
+@LINE_SPREAD.right
+def by_convolution(profile, step):
+    return np.convolve(profile, [1, -1], "valid") / step / (profile[-1] - profile[0])
+
+
+@LINE_SPREAD.right
+def scaled_to_0_and_1_first(profile, step):
+    scaled = (profile - profile[0]) / (profile[-1] - profile[0])
+    return np.array([(scaled[i + 1] - scaled[i]) / step for i in range(len(scaled) - 1)])
+
+
+@LINE_SPREAD.wrong("These are the bare differences. Divide them by the step and by the edge's whole rise.")
+def bare_differences(profile, step):
+    return np.diff(profile)
+
+
+@LINE_SPREAD.wrong("The slope is right. A stronger edge is not a sharper one: divide by the edge's whole rise too.")
+def slope(profile, step):
+    return np.diff(profile) / step
+
+
+@LINE_SPREAD.wrong("Your values add up to 1, but their *area* is to be 1: each stands for a strip as wide as the step.")
+def sum_of_one(profile, step):
+    return np.diff(profile) / np.diff(profile).sum()
+
+
+@LINE_SPREAD.wrong("You divide by the greatest value, so the peak is 1. The area is to be 1.")
+def peak_of_one(profile, step):
+    change = np.diff(profile)
+    return change / change[np.argmax(np.abs(change))]
+
+
+@LINE_SPREAD.wrong("`np.gradient` averages two neighbouring steps: that blurs the edge, and there are n values of it.")
+def by_gradient(profile, step):
+    return np.gradient(profile, step) / (profile[-1] - profile[0])
+
+
+@LINE_SPREAD.wrong(
+    "You take the size of every step. Where a sharpened edge overshoots, its profile falls: keep the sign."
+)
+def sizes_of_the_steps(profile, step):
+    change = np.abs(np.diff(profile))
+    return change / (change.sum() * step)
+
+
+@LINE_SPREAD.wrong("What falls has been cut off at 0. An overshoot is part of the edge, and its sign belongs to it.")
+def without_the_overshoot(profile, step):
+    change = np.maximum(np.diff(profile) * np.sign(profile[-1] - profile[0]), 0)
+    return change / (change.sum() * step)
+
+
+@LINE_SPREAD.wrong("An edge from bright to dark comes out negative. Divide by the rise with its sign, not by its size.")
+def negative_for_falling_edges(profile, step):
+    return np.diff(profile) / (np.abs(profile[-1] - profile[0]) * step)
+
+
+@LINE_SPREAD.wrong("You multiply by the step. A slope is a change *divided* by the distance over which it happens.")
+def multiplied_by_the_step(profile, step):
+    return np.diff(profile) * step / (profile[-1] - profile[0])
+
+
+@LINE_SPREAD.wrong("This is the profile scaled to 0 … 1. The line spread is its derivative.")
+def profile_scaled(profile, step):
+    return ((profile - profile[0]) / (profile[-1] - profile[0]))[1:]
+
+
+# 2: from the line spread to the MTF ----------------------------------------------------------------------------------
+
+
+def mtf(light: Array, step: float, frequency: Array) -> Array:
+    """|Σ light e^(-2πi f x)| / Σ light at frequencies (...), for light (n,) at places `step` apart."""
+    x = step * np.arange(len(light))
+    waves = np.exp(-2j * np.pi * np.multiply.outer(frequency, x))
+    return np.abs(waves @ light) / np.abs(np.sum(light))
+
+
+def _spreads(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        n, step = int(rng.integers(16, 24)), float(rng.choice([0.125, 0.2, 0.25]))
+        x = np.linspace(-2.2, 1.8, n)
+        light = rng.uniform(2, 5) * (np.exp(-(x**2) * rng.uniform(1, 3)) + 0.3 * np.exp(-((x - 1) ** 2) * 6))
+        yield light, step, rng.uniform(0.1, 0.5, shape)
+
+
+MTF = Exercise(
+    name="17.mtf",
+    reference=mtf,
+    cases=_spreads,
+    hints=(
+        "The contrast that is left must not depend on where the edge stands. So look at the cosine *and* the sine wave "
+        "of that frequency, and divide by what a wave of frequency 0 gives.",
+        "`np.multiply.outer(frequency, x)` has an axis more than `frequency`, for the places x = step · 0, 1, 2 …; "
+        "`waves @ light` sums over it. `np.abs` of a complex number is its size.",
+        "`waves = np.exp(___ * np.multiply.outer(frequency, x))`",
+    ),
+    praise="It is 1 at frequency 0, and it does not matter where the edge stands.",
+)
+
+
+@MTF.right
+def by_cosine_and_sine(light, step, frequency):
+    x = step * np.arange(len(light))
+    angle = 2 * np.pi * np.asarray(frequency)[..., None] * x
+    return np.hypot(np.sum(light * np.cos(angle), axis=-1), np.sum(light * np.sin(angle), axis=-1)) / np.sum(light)
+
+
+@MTF.right
+def from_the_middle_of_the_edge(light, step, frequency):
+    x = step * (np.arange(len(light)) - len(light) / 2)
+    waves = np.exp(2j * np.pi * np.multiply.outer(frequency, x))
+    return np.abs(np.sum(light * waves, axis=-1)) / light.sum()
+
+
+@MTF.right
+def frequency_by_frequency(light, step, frequency):
+    x = step * np.arange(len(light))
+    one_by_one = [abs(np.sum(light * np.exp(-2j * np.pi * f * x))) for f in np.ravel(frequency)]
+    return np.reshape(one_by_one, np.shape(frequency)) / sum(light)
+
+
+def _transform(light, step, frequency, turn=2 * np.pi):
+    return np.exp(-1j * turn * np.multiply.outer(frequency, step * np.arange(len(light)))) @ light
+
+
+@MTF.wrong("The 2π is missing. One cycle is a full turn, so the angle of the wave is 2π · f · x.")
+def without_two_pi(light, step, frequency):
+    return np.abs(_transform(light, step, frequency, 1.0)) / np.sum(light)
+
+
+@MTF.wrong("You have π where 2π belongs. One cycle is a full turn, 2π.")
+def with_pi(light, step, frequency):
+    return np.abs(_transform(light, step, frequency, np.pi)) / np.sum(light)
+
+
+@MTF.wrong("Your places count samples. The frequency is in cycles per *pixel*, and samples are `step` pixels apart.")
+def places_in_samples(light, step, frequency):
+    return np.abs(_transform(light, 1.0, frequency)) / np.sum(light)
+
+
+@MTF.wrong("You kept the cosine part alone. It changes sign when the edge stands elsewhere; take the complex size.")
+def cosine_alone(light, step, frequency):
+    return np.real(_transform(light, step, frequency)) / np.sum(light)
+
+
+@MTF.wrong("This is the size of the cosine part. The sine part belongs to it: the size of both is √(cos² + sin²).")
+def size_of_the_cosine(light, step, frequency):
+    return np.abs(np.real(_transform(light, step, frequency))) / np.sum(light)
+
+
+@MTF.wrong("This is the *square* of the MTF. Contrast is a size, not a power: take the root.")
+def power(light, step, frequency):
+    return (np.abs(_transform(light, step, frequency)) / np.sum(light)) ** 2
+
+
+@MTF.wrong("At frequency 0 yours is the sum of the light. The MTF is 1 there: divide by that sum.")
+def not_divided(light, step, frequency):
+    return np.abs(_transform(light, step, frequency))
+
+
+@MTF.wrong("You divide by the number of samples. The MTF is 1 at frequency 0: divide by what the sum gives there.")
+def divided_by_the_count(light, step, frequency):
+    return np.abs(_transform(light, step, frequency)) / len(light)
+
+
+@MTF.wrong(
+    "You divide by the greatest of the values asked for. Frequency 0 need not be among them: use the sum of light."
+)
+def divided_by_the_greatest(light, step, frequency):
+    size = np.abs(_transform(light, step, frequency))
+    return size / np.max(size)
+
+
+@MTF.wrong("This is the phase, which says where the edge stands. The MTF is the size.")
+def phase(light, step, frequency):
+    return np.angle(_transform(light, step, frequency))
+
+
+@MTF.wrong("`np.fft` answers at frequencies of its own, not at those that were asked for. Write the sum out.")
+def by_fft(light, step, frequency):
+    return np.abs(np.fft.rfft(light)) / np.sum(light)
+
+
+@MTF.wrong("You add up the sizes of all terms. The waves must cancel first: take the size of the sum.")
+def sum_of_the_sizes(light, step, frequency):
+    x = step * np.arange(len(light))
+    return np.sum(np.abs(light * np.exp(-2j * np.pi * np.multiply.outer(frequency, x))), axis=-1) / np.sum(light)
+
+
+# 3: lens and pixel ---------------------------------------------------------------------------------------------------
+
+
+def system_mtf(per_mm: Array, f_number: float, wavelength_mm: float, pitch_mm: float) -> Array:
+    """The MTF (...) of a perfect lens in focus times that of a square pixel; 0 from the cut-off 1/(λ N) on."""
+    s = np.minimum(per_mm * wavelength_mm * f_number, 1)
+    lens = 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
+    return lens * np.abs(np.sinc(per_mm * pitch_mm))
+
+
+def _gratings(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        N, wavelength, pitch = rng.uniform(4, 11), rng.uniform(4.5e-4, 6.5e-4), rng.uniform(0.003, 0.006)
+        yield rng.uniform(0.1, 0.6, shape) / (wavelength * N), N, wavelength, pitch
+    N, wavelength, pitch = rng.uniform(8, 11), 5.5e-4, 0.012
+    cut = 1 / (wavelength * N)
+    yield np.array([0.0, 0.6 / pitch, 1.5 / pitch, 0.9 * cut, cut, 1.7 * cut]), N, wavelength, pitch
+
+
+SYSTEM = Exercise(
+    name="17.system_mtf",
+    reference=system_mtf,
+    cases=_gratings,
+    hints=(
+        "The lens passes its share of the contrast to the pixel, and the pixel passes its share of that. Beyond the "
+        "cut-off 1/(λN) the lens passes nothing.",
+        "With s = f λ N held at 1 by `np.minimum`, the formula itself is 0 beyond the cut-off. `np.sinc(x)` is "
+        "sin(πx)/(πx) and knows what to do at 0. An MTF is never negative, so take its size.",
+        "`return lens * np.abs(np.sinc(___))`",
+    ),
+    praise="Two causes, one after the other: their MTFs multiply.",
+)
+
+
+@SYSTEM.right
+def with_where_for_the_cut_off(per_mm, f_number, wavelength_mm, pitch_mm):
+    s = np.asarray(per_mm) * wavelength_mm * f_number
+    inside = np.clip(s, 0, 1)
+    lens = np.where(s < 1, 2 / np.pi * (np.arccos(inside) - inside * np.sqrt(1 - inside**2)), 0)
+    return lens * abs(np.sinc(np.asarray(per_mm) * pitch_mm))
+
+
+@SYSTEM.right
+def by_the_angle(per_mm, f_number, wavelength_mm, pitch_mm):
+    angle = np.arccos(np.clip(np.asarray(per_mm) * wavelength_mm * f_number, 0, 1))
+    return np.abs((2 * angle - np.sin(2 * angle)) / np.pi * np.sinc(np.asarray(per_mm) * pitch_mm))
+
+
+def _lens(per_mm, f_number, wavelength_mm):
+    s = np.minimum(np.asarray(per_mm) * wavelength_mm * f_number, 1)
+    return 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
+
+
+def _pixel(per_mm, pitch_mm):
+    return np.abs(np.sinc(np.asarray(per_mm) * pitch_mm))
+
+
+@SYSTEM.wrong("You take the weaker of the two. Each passes its share of what the other left: multiply.")
+def the_weaker_one(per_mm, f_number, wavelength_mm, pitch_mm):
+    return np.minimum(_lens(per_mm, f_number, wavelength_mm), _pixel(per_mm, pitch_mm))
+
+
+@SYSTEM.wrong("This is the mean of the two. Each passes its share of what the other left: multiply.")
+def the_mean(per_mm, f_number, wavelength_mm, pitch_mm):
+    return (_lens(per_mm, f_number, wavelength_mm) + _pixel(per_mm, pitch_mm)) / 2
+
+
+@SYSTEM.wrong("`np.sinc(x)` is sin(πx)/(πx) already: the π is in it twice now.")
+def sinc_with_pi(per_mm, f_number, wavelength_mm, pitch_mm):
+    return _lens(per_mm, f_number, wavelength_mm) * np.abs(np.sinc(np.pi * np.asarray(per_mm) * pitch_mm))
+
+
+@SYSTEM.wrong(
+    "At frequency 0 your pixel is 0/0, and so NaN. A uniform surface keeps all of its contrast: the limit is 1."
+)
+def nothing_at_zero(per_mm, f_number, wavelength_mm, pitch_mm):
+    x = np.pi * np.asarray(per_mm) * pitch_mm
+    return _lens(per_mm, f_number, wavelength_mm) * np.abs(np.sin(x) / x)
+
+
+@SYSTEM.wrong(
+    "Beyond the cut-off the arccos of a number above 1 is NaN. The lens passes *nothing* there: the answer is 0."
+)
+def nan_beyond_the_cut_off(per_mm, f_number, wavelength_mm, pitch_mm):
+    s = np.asarray(per_mm) * wavelength_mm * f_number
+    return 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2)) * _pixel(per_mm, pitch_mm)
+
+
+@SYSTEM.wrong("The 1.22 belongs to the Airy disc's dark ring. The cut-off is 1/(λN), without it.")
+def with_the_airy_factor(per_mm, f_number, wavelength_mm, pitch_mm):
+    return _lens(per_mm, 1.22 * f_number, wavelength_mm) * _pixel(per_mm, pitch_mm)
+
+
+@SYSTEM.wrong("This falls in a straight line, as behind a *square* opening. A round one has arccos s − s √(1 − s²).")
+def straight_line(per_mm, f_number, wavelength_mm, pitch_mm):
+    return np.maximum(1 - np.asarray(per_mm) * wavelength_mm * f_number, 0) * _pixel(per_mm, pitch_mm)
+
+
+@SYSTEM.wrong("Without the 2/π your lens is π/2 at frequency 0. It cannot give more contrast than the scene has.")
+def without_two_over_pi(per_mm, f_number, wavelength_mm, pitch_mm):
+    return np.pi / 2 * _lens(per_mm, f_number, wavelength_mm) * _pixel(per_mm, pitch_mm)
+
+
+@SYSTEM.wrong("This is the lens alone. A pixel averages over its width, and that takes contrast too.")
+def lens_alone(per_mm, f_number, wavelength_mm, pitch_mm):
+    return _lens(per_mm, f_number, wavelength_mm)
+
+
+@SYSTEM.wrong("This is the pixel alone. Diffraction takes contrast too, more of it the larger N is.")
+def pixel_alone(per_mm, f_number, wavelength_mm, pitch_mm):
+    return _pixel(per_mm, pitch_mm)
+
+
+@SYSTEM.wrong(
+    "Beyond 1/p yours is negative. There bright and dark change places; the MTF is the *size* of the contrast."
+)
+def with_its_sign(per_mm, f_number, wavelength_mm, pitch_mm):
+    return _lens(per_mm, f_number, wavelength_mm) * np.sinc(np.asarray(per_mm) * pitch_mm)
+
+
+@SYSTEM.wrong("Your s is f λ / N, so a smaller opening passes finer gratings. It is the other way: s = f λ N.")
+def divided_by_the_f_number(per_mm, f_number, wavelength_mm, pitch_mm):
+    return _lens(per_mm, 1 / f_number, wavelength_mm) * _pixel(per_mm, pitch_mm)
+
+
+# 4: the corners ------------------------------------------------------------------------------------------------------
+
+
+def falloff(r: Array, v: float) -> Array:
+    """cos⁴ θ of the light (...) at heights r (...) on a sensor at distance v, where tan θ = r / v."""
+    return np.cos(np.arctan(r / v)) ** 4
+
+
+def _heights(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield rng.uniform(6, 22, shape), float(rng.uniform(20, 60))
+
+
+FALLOFF = Exercise(
+    name="17.falloff",
+    reference=falloff,
+    cases=_heights,
+    shown=((np.array([0.0, 21.6]), 35.0),),
+    hints=(
+        "Draw the triangle of the lens, the middle of the sensor and the point: which of its sides are v and r?",
+        "The angle has the tangent r / v. `np.arctan` and `np.cos` both count in radians.",
+        "`return np.cos(___) ** 4`",
+    ),
+    praise="A wide lens pays for its angle: at 45° a quarter of the light is left.",
+)
+
+
+@FALLOFF.right
+def without_an_angle(r, v):
+    return 1 / (1 + (r / v) ** 2) ** 2
+
+
+@FALLOFF.right
+def by_the_slant_distance(r, v):
+    return (v / np.hypot(r, v)) ** 4
+
+
+@FALLOFF.wrong(
+    "This is cos θ, one of the four. The opening looks narrower, it is farther away, and the light falls aslant."
+)
+def first_power(r, v):
+    return np.cos(np.arctan(r / v))
+
+
+@FALLOFF.wrong("This is cos² θ, the longer way alone. The narrower opening and the slanting light give two more.")
+def second_power(r, v):
+    return np.cos(np.arctan(r / v)) ** 2
+
+
+@FALLOFF.wrong("This is cos³ θ: one of the four is missing. The opening is seen aslant, and the sensor is lit aslant.")
+def third_power(r, v):
+    return np.cos(np.arctan(r / v)) ** 3
+
+
+@FALLOFF.wrong("You use r / v as the angle. It is the *tangent* of the angle.")
+def tangent_as_angle(r, v):
+    return np.cos(r / v) ** 4
+
+
+@FALLOFF.wrong("You use the arcsine. r and v are the two short sides of the triangle: their ratio is a tangent.")
+def by_arcsine(r, v):
+    return np.cos(np.arcsin(np.minimum(r / v, 1))) ** 4
+
+
+@FALLOFF.wrong("`np.cos` counts in radians, and yours is given degrees.")
+def in_degrees(r, v):
+    return np.cos(np.degrees(np.arctan(r / v))) ** 4
+
+
+@FALLOFF.wrong("This grows towards the corner: it is what a correction multiplies by, 1 / cos⁴ θ.")
+def the_correction(r, v):
+    return 1 / np.cos(np.arctan(r / v)) ** 4
+
+
+@FALLOFF.wrong("r and v have changed places: in the middle, r is 0, and so is the angle.")
+def upside_down(r, v):
+    return np.cos(np.arctan(v / r)) ** 4
+
+
+@FALLOFF.wrong("This is how much is *lost*. Wanted is what is left.")
+def what_is_lost(r, v):
+    return 1 - np.cos(np.arctan(r / v)) ** 4
+
+
+@FALLOFF.wrong("This is the loss in stops. Wanted is the share of light that is left.")
+def in_stops(r, v):
+    return np.log2(np.cos(np.arctan(r / v)) ** 4)
+
+
+@FALLOFF.wrong(
+    "You halve the angle's tangent. r is counted from the *middle* of the sensor, so it is r / v as it stands."
+)
+def half_the_height(r, v):
+    return np.cos(np.arctan(r / (2 * v))) ** 4
+
+
+# 5: find the bug in the shutter --------------------------------------------------------------------------------------
+
+
+def shutter(t: Array, N: float, S: float, new_N: float, new_S: float) -> Array:
+    """t (N'/N)² S/S': the time (...) at f/N' and ISO S' that is as bright as t (...) at f/N and ISO S."""
+    return t * (new_N / N) ** 2 * S / new_S
+
+
+def shutter_as_given(t, N, S, new_N, new_S):
+    return t * (new_N / N) * S / new_S
+
+
+def _settings(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        N, ratio = rng.uniform(2.0, 5.0), rng.uniform(1.3, 2.5)
+        S, gain = float(rng.choice([100.0, 200.0, 400.0])), float(rng.uniform(1.7, 5.0))
+        yield rng.uniform(0.01, 2.0, shape), float(N), S, float(N * ratio), S * gain
+    yield 0.5, 8.0, 800.0, 2.8, 100.0
+
+
+SHUTTER = Exercise(
+    name="17.shutter",
+    reference=shutter,
+    cases=_settings,
+    as_given=shutter_as_given,
+    hints=(
+        "Keep ISO as it is and double N. How much narrower is the opening, and how much less light comes through it?",
+        "Light comes through the *area* of the opening. It goes with the square of the diameter f / N.",
+        "`return t * ___ * S / new_S`",
+    ),
+    praise="Twice the f-number takes four times as long; twice the ISO takes half.",
+)
+
+
+@SHUTTER.right
+def by_exposure_values(t, N, S, new_N, new_S):
+    stops = 2 * np.log2(new_N / N) - np.log2(new_S / S)
+    return t * 2**stops
+
+
+@SHUTTER.right
+def by_the_product_that_stays(t, N, S, new_N, new_S):
+    return (t * S / N**2) * new_N**2 / new_S
+
+
+@SHUTTER.wrong("The square is there now, but the ratio is upside down: a larger f-number is a smaller opening.")
+def opening_upside_down(t, N, S, new_N, new_S):
+    return t * (N / new_N) ** 2 * S / new_S
+
+
+@SHUTTER.wrong("The aperture is right now, but ISO is upside down: more gain needs *less* time.")
+def gain_upside_down(t, N, S, new_N, new_S):
+    return t * (new_N / N) ** 2 * new_S / S
+
+
+@SHUTTER.wrong("Both ratios are upside down now.")
+def both_upside_down(t, N, S, new_N, new_S):
+    return t * (N / new_N) ** 2 * new_S / S
+
+
+@SHUTTER.wrong("You squared the ISO as well. Gain is a plain factor; only the opening is an area.")
+def everything_squared(t, N, S, new_N, new_S):
+    return t * (new_N / N * S / new_S) ** 2
+
+
+@SHUTTER.wrong("Now the ISO is squared in place of the aperture. It is the opening that is an area.")
+def gain_squared(t, N, S, new_N, new_S):
+    return t * (new_N / N) * (S / new_S) ** 2
+
+
+@SHUTTER.wrong("The aperture is right now, and ISO has got lost.")
+def without_gain(t, N, S, new_N, new_S):
+    return t * (new_N / N) ** 2
+
+
+@SHUTTER.wrong("You count one f-number as one stop. A stop is a *factor* of √2 in N: 2, 2.8, 4, 5.6.")
+def f_numbers_as_stops(t, N, S, new_N, new_S):
+    return t * 2.0 ** (new_N - N) * S / new_S
+
+
+@SHUTTER.wrong("You took the root of the ratio. The area goes with its square.")
+def root(t, N, S, new_N, new_S):
+    return t * np.sqrt(new_N / N) * S / new_S
+
+
+@SHUTTER.wrong("Only the new f-number is squared. The old one belongs in the square too: (new_N / N)².")
+def one_square(t, N, S, new_N, new_S):
+    return t * new_N**2 / N * S / new_S
+
+
+@SHUTTER.wrong("This is the factor by which the time changes. Multiply the old time by it.")
+def the_factor(t, N, S, new_N, new_S):
+    return np.ones_like(t) * (new_N / N) ** 2 * S / new_S
+
+
+EXERCISES = (LINE_SPREAD, MTF, SYSTEM, FALLOFF, SHUTTER)
