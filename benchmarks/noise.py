@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 
 from camviz.sensors import Sensor
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 from camviz.sensors.recording import measure, read_recording
 from camviz.views.noise import PhotonTransferView
 

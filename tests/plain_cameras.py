@@ -10,7 +10,8 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import poisson
 
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 from camviz.sensors.statistics import stack
 
 NORMAL = 1 / np.sqrt(2 * np.pi)

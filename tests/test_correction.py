@@ -19,7 +19,8 @@ from camviz.sensors.correction import (
     stabilised,
     unstabilised,
 )
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 
 SENSOR = Sensor(
     quantum_efficiency=0.5,

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from camviz.sensors import Sensor, decibel
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 from camviz.sensors.recording import measure, read_recording
 from camviz.sensors.statistics import frame_variance, pair, stack
 

@@ -13,7 +13,8 @@ from plain_cameras import PlainCamera, Shooting, error, measured, pattern, rando
 from camviz.sensors.estimate import Estimate, combined, of
 from camviz.sensors.estimates import threshold
 from camviz.sensors.hidden import before_rounding, clipped_bias, clipped_variance, missed_beyond, rounding_bias
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 from camviz.sensors.statistics import pair, stack
 
 SIZE = (120, 160)

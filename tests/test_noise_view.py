@@ -10,7 +10,8 @@ import pytest
 
 from camviz.sensors import Sensor
 from camviz.sensors.frozen import Draw, exposed
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 from camviz.views.measured_noise import MeasuredNoiseView
 from camviz.views.noise import LEVELS, PhotonTransferView
 

@@ -15,18 +15,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from math import hypot, inf, isfinite, nan, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camviz.sensors.estimate import CERTAIN, PROMISE, UNKNOWN, Estimate, combined, of
 from camviz.sensors.hidden import QUANTISED, ROUNDING
+from camviz.sensors.readings import Readings
 from camviz.sensors.scale import CLIPPED, Scale
 from camviz.sensors.statistics import Pair, Part, Stack, parts_of_difference
-
-if TYPE_CHECKING:
-    from camviz.sensors.measurement import Measurement
 
 Array = NDArray[np.float64]
 
@@ -37,7 +34,7 @@ PATTERNS_ALIKE = 0.01  # of PRNU
 class Estimates:
     """The estimate of every figure of a measurement."""
 
-    def __init__(self, found: Measurement) -> None:
+    def __init__(self, found: Readings) -> None:
         self.found = found
 
     @cached_property
@@ -45,6 +42,11 @@ class Estimates:
         found = self.found
         seen: list[Pair | Stack] = [one for level in found.levels for one in (level.bright, level.dark)]
         return Scale.of([*seen, *(one for one in (found.bright, found.dark) if one)], found.step, found.saturated)
+
+    @property
+    def clipped(self) -> bool:
+        """True where the black level cuts the noise of the dark frames off, of pairs or of the stack."""
+        return self.dark_share > CLIPPED
 
     @cached_property
     def bright(self) -> list[Estimate]:

@@ -6,25 +6,21 @@ and one of dark frames, where they were taken, give the fixed patterns.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, nan, sqrt
+from math import nan, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.sensors.estimates import Estimates, threshold
 from camviz.sensors.hidden import QUANTISED, ROUNDING
-from camviz.sensors.scale import CLIPPED
-from camviz.sensors.statistics import Pair, Stack, pair, straight_line
+from camviz.sensors.readings import Readings
+from camviz.sensors.statistics import straight_line
 from camviz.sensors.trust import Figure, judged
 
 Array = NDArray[np.float64]
 
-LINEAR = 0.7  # of saturation: the range in which gain and responsivity are fitted
-LINEARITY = (0.05, 0.95)  # of saturation: the range in which the linearity error is judged
-SURELY = 5.0  # standard deviations
 FIGURES = (
     "gain_dn_per_e",
     "read_noise_e",
@@ -41,122 +37,12 @@ FIGURES = (
 
 
 @dataclass(frozen=True)
-class Level:
-    """One exposure: a pair of bright and a pair of dark frames, and the photons per pixel (NaN where unknown)."""
-
-    exposure_s: float
-    bright: Pair
-    dark: Pair
-    photons: float = nan
-
-    @classmethod
-    def of(
-        cls, exposure_s: float, bright: Sequence[ArrayLike], dark: Sequence[ArrayLike], photons: float = nan
-    ) -> Level:
-        """The level of two bright and two dark frames (height, width)."""
-        return cls(exposure_s, pair(*bright), pair(*dark), photons)
-
-
-@dataclass(frozen=True)
-class Measurement:
+class Measurement(Readings):
     """The EMVA figures of levels of rising brightness.
 
     The attributes are the standard's estimates, whatever the frames are worth; NaN where there is none. `judged` holds
     those that can be trusted, bounds for the others, and `why` they are withheld; `figures` the trusted values alone.
-
-    `step` is the difference of neighbouring digital numbers: 1, but 16 where 12 bits were stored in the upper bits of
-    16. Release 3 of the standard counted it as noise when the light changed between the two frames of a pair, release
-    4.0 does not: `flicker_counts` is for data of the older kind. ValueError with fewer than two levels, where none is
-    brighter than the dark, or where all are saturated.
     """
-
-    levels: tuple[Level, ...]
-    bright: Stack | None = None
-    dark: Stack | None = None
-    step: float = 1.0
-    flicker_counts: bool = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "levels", tuple(sorted(self.levels, key=lambda one: one.bright.mean - one.dark.mean)))
-        if len(self.levels) < 2:
-            raise ValueError(f"a photon transfer needs at least two levels of exposure, got {len(self.levels)}")
-        if not self.signal[-1] > 0:
-            raise ValueError("the bright frames are not brighter than the dark ones: have they changed places?")
-        if not (self.variance > 0).any():
-            raise ValueError("the bright frames are saturated throughout: no pixel of them changes, expose less")
-        if not np.any(self.variance > self.dark_variance):
-            raise ValueError("the bright frames are saturated throughout: they have less noise than the dark ones")
-
-    # What was seen, level by level (n,) -------------------------------------------------------------------------------
-
-    @cached_property
-    def signal(self) -> Array:
-        """μ_y − μ_y.dark, DN."""
-        return np.array([one.bright.mean - one.dark.mean for one in self.levels])
-
-    @cached_property
-    def variance(self) -> Array:
-        """σ²_y, temporal, DN²."""
-        return np.array([self.temporal(one.bright) for one in self.levels])
-
-    @cached_property
-    def dark_variance(self) -> Array:
-        """σ²_y.dark, temporal, DN²."""
-        return np.array([self.temporal(one.dark) for one in self.levels])
-
-    def temporal(self, seen: Pair) -> float:
-        """The total temporal variance (DN²) of a pair's frames, with the noise that a row shares."""
-        return seen.variance + (seen.drift**2 / 2 if self.flicker_counts else 0)
-
-    @cached_property
-    def noisy_rows(self) -> bool:
-        """True where the pixels of a row share noise that is another one in each frame.
-
-        Without it the mean of a row's N pixels varies by 1/N of their own variance. Dark and bright pairs are asked
-        apart: lamps flicker in rows under a rolling shutter.
-        """
-        dark = {id(one.dark): one.dark for one in self.levels}.values()
-        return _noisy_rows(list(dark)) or _noisy_rows([one.bright for one in self.levels])
-
-    @cached_property
-    def pixel_variance(self) -> Array:
-        """σ²_y, DN², as far as photons make it: of pixels about their row's mean where rows have noise of their own."""
-        return np.array([one.bright.within_rows for one in self.levels]) if self.noisy_rows else self.variance
-
-    @cached_property
-    def photons(self) -> Array:
-        """μ_p, photons per pixel; NaN where unknown."""
-        return np.array([one.photons for one in self.levels])
-
-    @cached_property
-    def exposures_s(self) -> Array:
-        return np.array([one.exposure_s for one in self.levels])
-
-    # Saturation -------------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def peak(self) -> int:
-        """The level with the largest temporal variance: saturation, where there is a level beyond it."""
-        return int(np.argmax(self.pixel_variance))
-
-    @cached_property
-    def saturated(self) -> bool:
-        """True where the variance falls again beyond its peak, by more than chance: its own, of pixels and of rows."""
-        highest, last = self.levels[self.peak].bright, self.levels[-1].bright
-        errors = [one.within_error if self.noisy_rows else one.total_error for one in (highest, last)]
-        return bool(self.pixel_variance[self.peak] - self.pixel_variance[-1] > SURELY * hypot(*errors))
-
-    @cached_property
-    def linear(self) -> NDArray[np.bool_]:
-        """The levels (n,) that gain and responsivity are fitted to: up to 70 % of saturation."""
-        top = self.peak if self.saturated else len(self.levels) - 1
-        chosen = (self.signal <= LINEAR * self.signal[top]) & (np.arange(len(self.levels)) <= top)
-        return chosen if chosen.any() else np.arange(len(self.levels)) == top
-
-    @cached_property
-    def full_well_e(self) -> float:
-        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks."""
-        return self.estimates.full_well.value
 
     # Gain and quantum efficiency --------------------------------------------------------------------------------------
 
@@ -215,13 +101,14 @@ class Measurement:
         return straight_line(self.exposures_s, self.dark_variance)[0] / self.gain_dn_per_e**2
 
     @cached_property
-    def several_exposures(self) -> bool:
-        return len(np.unique(self.exposures_s)) > 2
+    def full_well_e(self) -> float:
+        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks."""
+        return self.estimates.full_well.value
 
     @cached_property
     def clipped(self) -> bool:
         """True where the black level cuts the noise of the dark frames off, of pairs or of the stack."""
-        return self.estimates.dark_share > CLIPPED
+        return self.estimates.clipped
 
     # What follows -----------------------------------------------------------------------------------------------------
 
@@ -253,28 +140,6 @@ class Measurement:
         """μ_p.sat / μ_p.min, which is μ_e.sat / μ_e.min."""
         return self.full_well_e / self.threshold_e
 
-    @cached_property
-    def judged_levels(self) -> NDArray[np.bool_]:
-        """The levels (n,) whose deviations from a straight line are judged: 5–95 % of saturation."""
-        top = self.signal[self.peak if self.saturated else -1]
-        return (self.signal >= LINEARITY[0] * top) & (self.signal <= LINEARITY[1] * top)
-
-    @cached_property
-    def linearity(self) -> tuple[float, float, float]:
-        """The smallest, the largest and the mean absolute deviation from a straight line, relative to it.
-
-        The line is fitted to light (photons, else exposure) over 5–95 % of saturation, each level with weight
-        1/signal²: relative deviations count. NaN where fewer than three levels lie there or the light is not known.
-        """
-        light = self.photons if np.isfinite(self.photons).all() else self.exposures_s
-        inside = self.judged_levels
-        if inside.sum() < 3 or len(np.unique(light[inside])) < 3:
-            return nan, nan, nan
-        x, y = light[inside], self.signal[inside]
-        slope, intercept = np.polyfit(x, y, 1, w=1 / y)
-        deviations = y / (slope * x + intercept) - 1
-        return float(deviations.min()), float(deviations.max()), float(np.abs(deviations).mean())
-
     # Patterns that stay -----------------------------------------------------------------------------------------------
 
     @cached_property
@@ -296,25 +161,6 @@ class Measurement:
         found = self.estimates.prnu.value
         return found if found > 0 else nan
 
-    @cached_property
-    def pattern_weights(self) -> Array:
-        """What each level's s²_y.dark (n,) weighs in DSNU² of pairs: a line over exposure², taken half way."""
-        equal = np.full(len(self.levels), 1 / len(self.levels))
-        if not self.several_exposures:
-            return equal
-        square = self.exposures_s**2
-        half = np.argmin(abs(self.signal - 0.5 * self.signal[self.peak]))
-        apart = square - square.mean()
-        return np.asarray(equal + (square[half] - square.mean()) * apart / np.sum(apart**2))
-
-    @cached_property
-    def gain_pattern_weights(self) -> list[float]:
-        """What the s²_y − s²_y.dark of each linear level weighs in PRNU² of pairs alone."""
-        seen = [one for one, used in zip(self.levels, self.linear, strict=True) if used]
-        errors = np.array([one.bright.pattern_error**2 + one.dark.pattern_error**2 for one in seen])
-        sure, square = 1 / np.maximum(errors, 1e-12), self.signal[self.linear] ** 2
-        return list(sure * square / np.sum(sure * square**2))
-
     def pattern_split(self) -> dict[str, dict[str, float]]:
         """DSNU (electrons) and PRNU (fractions) as row, column and pixel parts; empty without stacks.
 
@@ -334,7 +180,7 @@ class Measurement:
     @cached_property
     def judged(self) -> dict[str, Figure]:
         """Every figure by its name: its value where that can be trusted, its bounds, and why it is withheld."""
-        return judged(self)
+        return judged(self.estimates)
 
     def figures(self) -> dict[str, float]:
         """The EMVA figures by name, fractions and decibels (20 log10); NaN where these frames cannot tell one.
@@ -347,12 +193,3 @@ class Measurement:
     def why(self, name: str) -> str:
         """Why the figure of this name is withheld, one clause; "" for one that is told."""
         return self.judged[name].why
-
-
-def _noisy_rows(seen: Sequence[Pair]) -> bool:
-    """Whether the means of rows vary by more than their pixels' own noise explains, beyond chance."""
-    asked = [one for one in seen if one.rows > 2 and one.columns > 1 and one.within_rows > 0]
-    if not asked:
-        return False
-    ratios = [one.row_means * one.columns / one.within_rows for one in asked]
-    return bool(np.mean(ratios) > 1 + SURELY * sqrt(2 / ((asked[0].rows - 1) * len(asked))))

@@ -9,13 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, isfinite, log10, nan
-from typing import TYPE_CHECKING
 
 from camviz.sensors.estimate import CERTAIN, PROMISE, UNKNOWN, Estimate, of
+from camviz.sensors.estimates import Estimates
 from camviz.sensors.hidden import QUANTISED
-
-if TYPE_CHECKING:
-    from camviz.sensors.measurement import Measurement
 
 DECIBELS = 0.26  # 20 log10 of 1.03
 PATTERN = 0.05
@@ -39,9 +36,9 @@ class Figure:
         return isfinite(self.low) and isfinite(self.high)
 
 
-def judged(found: Measurement) -> dict[str, Figure]:
+def judged(e: Estimates) -> dict[str, Figure]:
     """Every figure by its name."""
-    return {name: _judged(found, name, one) for name, one in _all(found).items()}
+    return {name: _judged(e, name, one) for name, one in _all(e).items()}
 
 
 def kept(name: str, one: Estimate) -> bool:
@@ -55,8 +52,7 @@ def kept(name: str, one: Estimate) -> bool:
     return one.within(PATTERN if name.startswith(("dsnu", "prnu")) else PROMISE)
 
 
-def _all(found: Measurement) -> dict[str, Estimate]:
-    e = found.estimates
+def _all(e: Estimates) -> dict[str, Estimate]:
     return {
         "gain_dn_per_e": e.gain,
         "read_noise_e": e.read_noise,
@@ -69,14 +65,14 @@ def _all(found: Measurement) -> dict[str, Estimate]:
         "dark_current_e_per_s": e.dark_current,
         "threshold_e": e.threshold,
         "threshold_photons": e.threshold_photons,
-        **_linearity(found),
+        **_linearity(e),
         **(e.parts() or dict.fromkeys(SPLIT, UNKNOWN)),
     }
 
 
-def _linearity(found: Measurement) -> dict[str, Estimate]:
-    smallest, largest, mean = found.linearity
-    off = found.estimates.linearity_error if isfinite(mean) else nan
+def _linearity(e: Estimates) -> dict[str, Estimate]:
+    smallest, largest, mean = e.found.linearity
+    off = e.linearity_error if isfinite(mean) else nan
     if not off < 0.5:  # no signal to speak of
         return dict.fromkeys(LINEARITY_NAMES, Estimate(mean, 0.0, -inf, inf))
     return {
@@ -89,29 +85,29 @@ def _log(value: float) -> float:
     return log10(value) if value > 0 else nan
 
 
-def _judged(found: Measurement, name: str, one: Estimate) -> Figure:
+def _judged(e: Estimates, name: str, one: Estimate) -> Figure:
     low, high = one.bounds
     if not name.startswith("linearity") and not name.endswith("_db"):
         low = max(low, 0.0)
     told = kept(name, one)
     if name in SPLIT and not told:  # parts of one picture share its chance, so that only a ceiling is sure
         low = min(low, 0.0)
-    return Figure(one.value if told else nan, low, high, "" if told else _why(found, name, one))
+    return Figure(one.value if told else nan, low, high, "" if told else _why(e, name, one))
 
 
 # Reasons --------------------------------------------------------------------------------------------------------------
 
 
-def _why(found: Measurement, name: str, one: Estimate) -> str:
-    if not name.startswith(("prnu", "linearity", "gain")) and not kept("gain_dn_per_e", found.estimates.gain):
-        return f"K is not known, since {_why(found, 'gain_dn_per_e', found.estimates.gain)}"
+def _why(e: Estimates, name: str, one: Estimate) -> str:
+    if not name.startswith(("prnu", "linearity", "gain")) and not kept("gain_dn_per_e", e.gain):
+        return f"K is not known, since {_why(e, 'gain_dn_per_e', e.gain)}"
     if not isfinite(one.value):
-        return _missing(found, name)
+        return _missing(e, name)
     by_chance = one.high - one.low <= CERTAIN * one.error
-    if one.bounds[0] <= 0 and name in _ABSENT and by_chance and not found.clipped:
+    if one.bounds[0] <= 0 and name in _ABSENT and by_chance and not e.clipped:
         return _ABSENT[name]
     if _hides(one, name):
-        return _hidden(found, name)
+        return _hidden(e, name)
     if name in LINEARITY_NAMES:
         return f"these frames are too few to tell: ± {100 * (one.bounds[1] - one.value):.2g} % of the signal"
     off = max(one.bounds[1] - one.value, one.value - one.bounds[0])
@@ -127,18 +123,17 @@ def _hides(one: Estimate, name: str) -> bool:
     return not kept(name, Estimate(one.value, 0.0, one.low, one.high))
 
 
-def _hidden(found: Measurement, name: str) -> str:
+def _hidden(e: Estimates, name: str) -> str:
     """What hides a figure, chance apart."""
-    e = found.estimates
     apart = "the levels are too far apart, or the frames too few, to tell where between them saturation lies"
     if name in ("full_well_e", "snr_max_db"):
         return apart
     if name == "dynamic_range_db" and not _hides(e.threshold, "threshold_e"):
         return apart
-    if e.dark_share > 0 and (found.clipped or not e.dark_rounded):
+    if e.dark_share > 0 and (e.clipped or not e.dark_rounded):
         return f"{e.dark_share:.2%} of the dark pixels are at an end of the scale: the black level cuts their noise off"
     if e.dark_rounded:
-        square, noise = found.step**2, min(one.value for one in e.dark)
+        square, noise = e.found.step**2, min(one.value for one in e.dark)
         return (
             f"rounding hides noise as small as that of a pixel in the dark, {noise:.2g} DN² "
             f"(the standard's limit is {QUANTISED * square:g} DN²)"
@@ -146,9 +141,8 @@ def _hidden(found: Measurement, name: str) -> str:
     return "the frames reach an end of the scale, which cuts their noise off"
 
 
-def _missing(found: Measurement, name: str) -> str:
+def _missing(e: Estimates, name: str) -> str:
     """Why there is no estimate at all."""
-    e = found.estimates
     no_gain = "the noise does not rise with the signal, so there is no gain to be read from it"
     not_full = "no level is saturated: the noise still rises at the brightest"
     if name == "gain_dn_per_e":
@@ -161,7 +155,7 @@ def _missing(found: Measurement, name: str) -> str:
         return "the dark frames have fewer than three different exposures"
     if name.startswith("linearity"):
         return "fewer than three levels lie between 5 and 95 % of saturation, or the light is not known"
-    if name in SPLIT and not (found.bright and found.dark):
+    if name in SPLIT and not (e.found.bright and e.found.dark):
         return "only a stack of frames of both kinds tells rows, columns and pixels apart"
     if name.startswith("prnu") and e.beyond:
         return "pixels of the bright stack are saturated"

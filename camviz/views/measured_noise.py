@@ -11,7 +11,8 @@ import numpy as np
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
-from camviz.sensors.measurement import LINEAR, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import LINEAR
 from camviz.sensors.trust import Figure
 from camviz.views.base import View
 

@@ -11,7 +11,8 @@ from camviz.course.material import module
 from camviz.scenes import to_display
 from camviz.sensors import decibel
 from camviz.sensors.correction import NoiseModel, merged
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 from camviz.sensors.statistics import pair
 from camviz.views.noise import PhotonTransferView
 
