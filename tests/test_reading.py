@@ -40,7 +40,7 @@ def test_limits_hold_at_their_last_word():
     assert too_long("word " * 36 + ".") == ["a sentence of 36 words: " + ("word " * 12)[:60] + " …"]
     sentence = "Word " * 29 + "word. "
     assert too_long(sentence * 3) == []
-    assert "a paragraph of 120 words" in too_long(sentence * 4)[0]
+    assert "a paragraph of 91 words" in too_long(sentence * 3 + "Word.")[0]
 
 
 def test_folded_boxes_and_further_reading_are_beside_the_main_line():
