@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.colour.spaces import difference, from_srgb, to_lab, to_srgb, tristimulus
+from camviz.colour.spaces import delta_e_2000, from_srgb, to_lab, to_srgb, tristimulus
 from camviz.colour.spectra import illuminant, reflectances
 from camviz.lenses.base import Array
 from camviz.scenes.light import to_linear
@@ -78,7 +78,7 @@ def differences(rgb: Array) -> Array:
     """ΔE2000 (24,) between linear sRGB colours (24, 3) and the published ones, scaled to the same white patch in Y."""
     white = tristimulus(illuminant("D65"))
     xyz, truth = from_srgb(rgb), published_xyz()
-    return difference(to_lab(xyz * truth[18, 1] / xyz[18, 1], white), to_lab(truth, white))
+    return delta_e_2000(to_lab(xyz * truth[18, 1] / xyz[18, 1], white), to_lab(truth, white))
 
 
 def _parts(picture: NDArray[np.uint8]) -> Iterator[tuple[Array, NDArray[np.uint8]]]:

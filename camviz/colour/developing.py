@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.colour.balance import WHITE, fit_matrix, neutral, response, seen
-from camviz.colour.spaces import SRGB_FROM_XYZ, difference, from_srgb, to_lab, to_srgb
+from camviz.colour.spaces import SRGB_FROM_XYZ, delta_e_2000, from_srgb, to_lab, to_srgb
 from camviz.colour.spectra import illuminant, reflectances, sensitivities, srgb_primaries
 from camviz.lenses.base import Array
 from camviz.scenes.light import to_encoded, to_linear
@@ -88,4 +88,4 @@ def developed(raw: ArrayLike, gains: ArrayLike, matrix: ArrayLike, *, encoded: b
 
 def errors(rgb: ArrayLike, true_xyz: ArrayLike) -> Array:
     """ΔE2000 (...) between linear sRGB colours and true XYZ under D65, each (..., 3)."""
-    return difference(to_lab(from_srgb(rgb), WHITE), to_lab(true_xyz, WHITE))
+    return delta_e_2000(to_lab(from_srgb(rgb), WHITE), to_lab(true_xyz, WHITE))

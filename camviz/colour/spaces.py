@@ -95,7 +95,7 @@ def from_lab(lab: ArrayLike, white: ArrayLike) -> Array:
     return np.where(f**3 > _KNEE, f**3, (116 * f - 16) / _SLOPE) * np.asarray(white, dtype=float)
 
 
-def difference(lab1: ArrayLike, lab2: ArrayLike) -> Array:
+def delta_e_2000(lab1: ArrayLike, lab2: ArrayLike) -> Array:
     """ΔE2000 (...) between two CIELAB colours (..., 3): about 1 is the least that an eye sees side by side.
 
     After G. Sharma, W. Wu and E. N. Dalal, The CIEDE2000 color-difference formula, Color Res. Appl. 30 (2005).

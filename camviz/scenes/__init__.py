@@ -1,4 +1,7 @@
-"""Scenes: surfaces with textures, a tracer that photographs them through any lens, and the same world as lines."""
+"""Scenes: surfaces with textures, a tracer that photographs them through any lens, and the same world as lines.
+
+How the tracer works is read most easily in `camviz.scenes.plain_tracer`.
+"""
 
 from camviz.scenes.light import to_display, to_encoded, to_linear
 from camviz.scenes.scene import Scene, render, snapshot

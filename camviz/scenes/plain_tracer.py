@@ -34,13 +34,12 @@ def _light(scene: Scene, origin: Array, directions: Array) -> Array:
     light, distance = _sky(scene, directions), np.full(directions.shape[1], np.inf)
     for surface in scene.surfaces:
         with np.errstate(divide="ignore", invalid="ignore"):  # a ray that passes the surface by has no distance to it
-            at = surface.meet(origin, directions.copy())
+            at = surface.meet(origin, directions.astype(np.float32))
         nearer = at.depth < distance
         if not nearer.any():
             continue
         distance[nearer] = at.depth[nearer]
-        where = Meeting(at.depth[nearer].astype(np.float32), at.place[:, nearer].astype(np.float32))
-        light[nearer] = surface.radiance(where, 0.0)[:, :3]
+        light[nearer] = surface.radiance(Meeting(at.depth[nearer], at.place[:, nearer]), 0.0)[:, :3]
     return light
 
 

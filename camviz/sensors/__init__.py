@@ -1,11 +1,14 @@
 """Image sensors: what turns light into numbers, after EMVA Standard 1288, release 4.0 (linear)."""
 
+from camviz.sensors.correction import NoiseModel, average, flattened, less_dark, merged, smoothed
 from camviz.sensors.counting import poisson
 from camviz.sensors.dark import band_gap_ev, dark_current_ratio, doubling_temperature_k
 from camviz.sensors.digital_camera import DigitalCamera, Shot
 from camviz.sensors.efficiency import EfficiencyCurve
 from camviz.sensors.fixed_pattern import FixedPattern
+from camviz.sensors.measurement import Measurement
 from camviz.sensors.published import PUBLISHED, SHUTTERS, MeasuredShutter, PublishedSensor
+from camviz.sensors.readings import Level
 from camviz.sensors.readout import (
     Brigade,
     bloomed,
@@ -17,6 +20,7 @@ from camviz.sensors.readout import (
     smeared,
     transferred,
 )
+from camviz.sensors.recording import Recording, RecordingError, measure, read_recording
 from camviz.sensors.sensor import (
     Exposure,
     Sensor,
@@ -37,11 +41,17 @@ __all__ = [
     "EfficiencyCurve",
     "Exposure",
     "FixedPattern",
+    "Level",
     "MeasuredShutter",
+    "Measurement",
+    "NoiseModel",
     "PublishedSensor",
+    "Recording",
+    "RecordingError",
     "Sensor",
     "Shot",
     "amplify",
+    "average",
     "band_gap_ev",
     "bloomed",
     "bucket_brigade",
@@ -50,14 +60,20 @@ __all__ = [
     "decibel",
     "doubling_temperature_k",
     "fill",
+    "flattened",
     "gliding",
     "leak",
+    "less_dark",
+    "measure",
+    "merged",
     "poisson",
     "quantise",
     "read",
+    "read_recording",
     "rolling_picture",
     "rolling_rays",
     "row_times",
     "smeared",
+    "smoothed",
     "transferred",
 ]

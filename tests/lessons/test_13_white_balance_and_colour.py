@@ -11,7 +11,7 @@ from quoting import LESSONS
 from scipy.optimize import minimize
 
 from camviz.colour import balance, spectra
-from camviz.colour.spaces import difference, to_lab
+from camviz.colour.spaces import delta_e_2000, to_lab
 from camviz.course import notebooks
 from camviz.course.checks import judge
 from camviz.course.exercises import exercise
@@ -451,7 +451,7 @@ def test_no_matrix_leaves_less(says):
     def mean(values):
         """By camviz's formula, which is faster; tests/test_colour.py holds it to colour-science's."""
         shown = (balanced @ values.reshape(3, 3).T) @ SRGB.matrix_RGB_to_XYZ.T
-        return difference(to_lab(shown, D65), to_lab(truth, D65)).mean()
+        return delta_e_2000(to_lab(shown, D65), to_lab(truth, D65)).mean()
 
     assert by_fit == delta(balanced @ matrix.T, truth).mean()
     best = matrix.ravel()
