@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camviz.sensors import Sensor
-from camviz.sensors.frozen import Draw, exposed
+from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import Level
 from camviz.views.measured_noise import MeasuredNoiseView

@@ -10,7 +10,7 @@ from camviz.sensors.measurement import Measurement
 from camviz.sensors.published import PUBLISHED, SHUTTERS, MeasuredShutter, PublishedSensor
 from camviz.sensors.readings import Level
 from camviz.sensors.readout import (
-    Brigade,
+    CcdRegister,
     bloomed,
     bucket_brigade,
     gliding,
@@ -36,7 +36,7 @@ from camviz.sensors.sensor import (
 __all__ = [
     "PUBLISHED",
     "SHUTTERS",
-    "Brigade",
+    "CcdRegister",
     "DigitalCamera",
     "EfficiencyCurve",
     "Exposure",

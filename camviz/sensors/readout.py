@@ -24,7 +24,7 @@ FORGOTTEN = 1e-7  # the share of a charge below which the trail that it leaves i
 
 
 @dataclass(frozen=True, eq=False)
-class Brigade:
+class CcdRegister:
     """A bucket brigade at work: charge still on the area (height, width), in the register (width,), and read so far."""
 
     area: Array
@@ -32,7 +32,7 @@ class Brigade:
     read: Array
 
 
-def bucket_brigade(electrons: ArrayLike, ticks: int) -> Brigade:
+def bucket_brigade(electrons: ArrayLike, ticks: int) -> CcdRegister:
     """The brigade after the amplifier has read `ticks` pixels: rows shift into the register, which shifts along.
 
     A row enters the register when the one before has been read out, all with perfect transfer. Raises ValueError for
@@ -48,7 +48,7 @@ def bucket_brigade(electrons: ArrayLike, ticks: int) -> Brigade:
     area[: height - loaded] = charge[loaded:]
     if along:
         register[: width - along] = charge[rows, along:]
-    return Brigade(area, register, charge.ravel()[:ticks])
+    return CcdRegister(area, register, charge.ravel()[:ticks])
 
 
 def transferred(electrons: ArrayLike, efficiency: float, overscan: int = 0) -> Array:

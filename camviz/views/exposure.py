@@ -20,7 +20,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.optics import exposure_value, relative_illumination, unvignetted_share
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
-from camviz.sensors.frozen import Draw, exposed
+from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.views import garden
 from camviz.views.base import View, choice, slider
 
