@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import re
 from typing import Any
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
+from camviz.files.format import File, Format
 from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size
-from camviz.files.output import as_yaml, refuse_own_world, rows_of
-from camviz.files.section import Section, explained
+from camviz.files.output import as_rows, as_yaml
+from camviz.files.section import Section, Size, explained
 from camviz.files.trees import shown
 from camviz.lenses import (
     BrownConrady,
@@ -42,6 +43,7 @@ LENSES = {
     ("eucm", "none"): ExtendedUnified,
     ("ds", "none"): DoubleSphere,
 }
+TITLE = "Kalibr camchain"
 GRID = "fx fy cx cy"
 WRITTEN = [
     Model("pinhole none", Perspective, GRID),
@@ -55,9 +57,9 @@ WRITTEN = [
 ]
 
 
-def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+def read(file: File) -> Calibration:
     """The cameras of the chain in place: the world is cam0's frame, T_cn_cnm1 is cam_n from cam_(n-1)."""
-    chain = _chain(section)
+    chain = _chain(file.section)
     cameras: dict[str, Camera] = {}
     cam_from_world, notes = RigidTransform.identity(), []
     for index, (name, part) in enumerate(chain.items()):
@@ -67,9 +69,9 @@ def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibrat
                 step = RigidTransform.identity()
                 notes.append(f"The file does not say where {name} stands: it is drawn at the place of cam{index - 1}.")
             cam_from_world = step * cam_from_world
-        cameras[name] = _camera(part, size).at(cam_from_world.inv())
+        cameras[name] = _camera(part, file.size).at(cam_from_world.inv())
     imu = _cam_from_imu(chain["cam0"])
-    return Calibration(cameras, path, "Kalibr camchain", world_from_imu=imu, notes=tuple(notes))
+    return Calibration(cameras, file.path, TITLE, world_from_imu=imu, notes=tuple(notes))
 
 
 def _chain(section: Section) -> dict[str, Section]:
@@ -80,12 +82,12 @@ def _chain(section: Section) -> dict[str, Section]:
     return {name: section.section(name) for name in expected}
 
 
-def _camera(part: Section, size: tuple[int, int] | None) -> Camera:
+def _camera(part: Section, given: Size | None) -> Camera:
     projection = _choice(part, "camera_model", PROJECTIONS)
     values = part.vector("intrinsics", [len(PROJECTIONS[projection].split())], PROJECTIONS[projection])
-    width, height = image_size(part, size)
+    size = image_size(part, given)
     with explained(part.where("intrinsics")):
-        grid = Intrinsics(width, height, *values[-4:])
+        grid = Intrinsics(*size, *values[-4:])
     return Camera(grid, _lens(part, projection, values[:-4]))
 
 
@@ -130,21 +132,20 @@ def _cam_from_imu(part: Section) -> RigidTransform | None:
 
 def write(calibration: Calibration) -> bytes:
     """cam0, cam1 …, each beside the one before and, where there is one, beside the IMU."""
-    refuse_own_world(calibration, "Kalibr")
     chain: dict[str, Any] = {}
     before = None
     for index, (name, camera) in enumerate(calibration.cameras.items()):
         part = _written(name, camera)
         if calibration.world_from_imu is not None:
-            part["T_cam_imu"] = rows_of(camera.cam_from_world * calibration.world_from_imu)
+            part["T_cam_imu"] = as_rows(camera.cam_from_world * calibration.world_from_imu)
         if before is not None:
-            part["T_cn_cnm1"] = rows_of(camera.cam_from_world * before.world_from_cam)
+            part["T_cn_cnm1"] = as_rows(camera.cam_from_world * before.world_from_cam)
         chain[f"cam{index}"], before = part, camera
     return as_yaml(chain)
 
 
 def _written(name: str, camera: Camera) -> dict[str, Any]:
-    model, same = expressed(name, camera, WRITTEN, "Kalibr")
+    model, same = expressed(name, camera, WRITTEN, TITLE)
     projection, distortion = model.name.split()
     values = model.values(same, 0.0)
     count = len(PROJECTIONS[projection].split())
@@ -155,3 +156,17 @@ def _written(name: str, camera: Camera) -> dict[str, Any]:
         "distortion_coeffs": values[count:],
         "resolution": [camera.intrinsics.width, camera.intrinsics.height],
     }
+
+
+FORMAT = Format(
+    name="kalibr",
+    title=TITLE,
+    file="camchain.yaml",
+    recognise=lambda file: any(re.fullmatch(r"cam\d+", key) for key in file.section.values),
+    read=read,
+    write=write,
+    models="pinhole with radtan, equidistant, fov, none; omni with radtan, none; eucm; ds",
+    says="T_cn_cnm1 from the camera before; T_cam_imu from the IMU (OpenVINS's T_imu_cam is read too)",
+    lacks="skew, k3",
+    rank=41,
+)

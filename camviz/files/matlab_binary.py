@@ -4,10 +4,16 @@ The layout is that of "MAT-File Format", MathWorks, chapter 1. The file comes fr
 the bytes that are there, what is compressed unfolds into a bounded buffer, and nothing is allocated on a file's word.
 """
 
+# scipy.io.loadmat is not used. Measured with SciPy 1.17: cells nested 30,000 deep (1.4 MB) end the process with a
+# segmentation fault, 56 bytes that announce 2**28 cells take 5 s and 2.1 GB, and a nested variable is read past the
+# length that it announces. A check before it would have to follow every variable, its dimensions and its length:
+# all of this reader but its last 40 lines.
+
 from __future__ import annotations
 
 import struct
 import zlib
+from base64 import b64decode
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import prod
@@ -15,9 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from camviz.calibration.types import CalibrationError
+from camviz.calibration.types import Calibration, CalibrationError
+from camviz.files import matlab
+from camviz.files.format import File, Format
+from camviz.files.section import Section
 from camviz.files.text import MAX_BYTES
-from camviz.files.trees import MAX_DEPTH, MAX_NODES
+from camviz.files.trees import MAX_DEPTH, MAX_NODES, shown
 
 SIGNATURE = b"MATLAB 5.0 MAT-file"
 HOW = "in MATLAB, s = toStruct(params); save('camera.mat', 's', '-v7') makes one that can be read"
@@ -27,11 +36,21 @@ _ENCODINGS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
 _MATRIX, _COMPRESSED = 14, 15
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16, 17
 _LOGICAL = 0x200
+_MOST_DIMENSIONS = 32  # NumPy's bound; a file may announce millions
 
 
-def is_mat(content: bytes) -> bool:
-    """True for the bytes of such a file."""
-    return content.startswith(SIGNATURE)
+def read(file: File) -> Calibration:
+    """From the one variable that holds parameters, or the variables that are them."""
+    variables = parse(file.content)
+    held = [Section(each, name, file.mended) for name, each in variables.items() if isinstance(each, dict)]
+    found = [each for each in [Section(variables, mended=file.mended), *held] if matlab.is_parameters(each)]
+    if len(found) != 1:
+        names = ", ".join(shown(name) for name in list(variables)[:6]) or "nothing"
+        raise CalibrationError(
+            f"expected one struct with {matlab.RADIAL}, IntrinsicMatrix or FocalLength, got {len(found)} among "
+            f"{names}; {HOW}"
+        )
+    return matlab.read_parameters(found[0], file)
 
 
 def parse(content: bytes) -> dict[str, Any]:
@@ -43,23 +62,11 @@ def parse(content: bytes) -> dict[str, Any]:
     variables: dict[str, Any] = {}
     for kind, data in reader.elements(content[_HEADER:]):
         if kind == _COMPRESSED:
-            kind, data = next(reader.elements(_inflated(data)), (0, b""))
+            kind, data = next(reader.elements(reader.inflated(data)), (0, b""))
         if kind == _MATRIX:
             name, value = reader.variable(data)
             variables[name] = value
     return variables
-
-
-def _inflated(data: bytes) -> bytes:
-    """What is compressed, up to the bound that holds for every file."""
-    try:
-        unfolding = zlib.decompressobj()
-        unfolded = unfolding.decompress(data, MAX_BYTES + 1)
-    except zlib.error as error:
-        raise CalibrationError(f"a compressed variable is broken ({error})") from None
-    if len(unfolded) > MAX_BYTES:
-        raise CalibrationError(f"expected variables of at most {MAX_BYTES >> 20} MB, one unfolds to more")
-    return unfolded
 
 
 @dataclass
@@ -68,6 +75,18 @@ class _Reader:
 
     order: str
     nodes: int = 0
+    room: int = MAX_BYTES  # for what is compressed, all variables together
+
+    def inflated(self, data: bytes) -> bytes:
+        """What is compressed, within the bound that holds for a file."""
+        try:
+            unfolded = zlib.decompressobj().decompress(data, self.room + 1)
+        except zlib.error as error:
+            raise CalibrationError(f"a compressed variable is broken ({error})") from None
+        self.room -= len(unfolded)
+        if self.room < 0:
+            raise CalibrationError(f"expected variables of at most {MAX_BYTES >> 20} MB, they unfold to more")
+        return unfolded
 
     def elements(self, data: bytes) -> Iterator[tuple[int, bytes]]:
         """The data elements one after another: their type and bytes."""
@@ -105,8 +124,8 @@ class _Reader:
         return name, self._value(kind, logical, sides, parts, depth)
 
     def _value(self, kind: int, logical: bool, sides: list[int], parts: Iterator[tuple[int, bytes]], depth: int) -> Any:
-        if len(sides) < 2 or min(sides) < 0:
-            raise CalibrationError(f"expected two or more dimensions, got {sides[:4]}")
+        if not 2 <= len(sides) <= _MOST_DIMENSIONS or min(sides) < 0:
+            raise CalibrationError(f"expected 2 to {_MOST_DIMENSIONS} dimensions, got {len(sides)}: {sides[:4]}")
         if kind == _STRUCT:
             return self._struct(prod(sides), parts, depth)
         if kind == _CELL:
@@ -181,3 +200,20 @@ def _listed(values: np.ndarray, logical: bool) -> Any:
     if values.size == 1:
         return listed.ravel()[0].item()
     return listed.ravel().tolist() if 1 in values.shape else listed.tolist()
+
+
+_EXAMPLE = """\
+DwAAAHkAAAB4nONjYGBwYGRgYAPSHEDMxAABrFA+IxwzMhSDxVkY+KFiukDslp+cmOOTmpdekgHSFlCUmZecWZCYE5CfmVfC4JmbmJ4anFmVygADfCD7GBD2sWGx
+jwlKgwAnEAvANDvUO8BoisxhKIGYw5BHoTl1UHNaHACc1xUh"""  # s.FocalLength = [500 500]; s.PrincipalPoint = [320 240]; …
+
+FORMAT = Format(
+    name="mat",
+    title="MATLAB .mat",
+    file="camera.mat",
+    recognise=lambda file: not file.path.is_dir() and file.content.startswith(SIGNATURE),
+    read=read,
+    models="as `matlab`",
+    says=f"as `matlab`; of level 5: {HOW}",
+    example=SIGNATURE.ljust(_HEADER - 4) + b"\0\1IM" + b64decode(_EXAMPLE),
+    rank=20,
+)
