@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -12,12 +13,13 @@ import camviz
 import camviz.files
 from camviz.cameras import Camera, Intrinsics
 from camviz.commands import command
-from camviz.files import Calibration, CalibrationError, File, Format, format_of, formats, page, write
+from camviz.files import Calibration, CalibrationError, File, Format, format_of, formats, write
 from camviz.files.models import same_camera
 from camviz.files.registry import written
 from camviz.lenses import Perspective
 
 PAGE = Path(__file__).parents[1] / "docs" / "formats.md"
+renewed = run_path(str(PAGE.with_suffix(".py")))["renewed"]
 SIZE = (640, 480)
 IMU = RigidTransform.from_components([0.05, 0.02, -0.01], Rotation.from_rotvec([-0.2, 0.1, 1.4]))
 CAMERA = Camera(Intrinsics(*SIZE, 500.0, 500.0, 321.25, 239.5), Perspective())
@@ -113,8 +115,8 @@ def test_each_recogniser_tells_its_own_files_from_those_of_the_others(tmp_path):
 
 def test_the_documentations_table_is_made_from_the_formats():
     text = PAGE.read_text(encoding="utf-8")
-    assert page.renewed(text) == text
-    assert page.renewed(text.replace("| `basalt` |", "| `old` |")) == text
+    assert renewed(text) == text
+    assert renewed(text.replace("| `basalt` |", "| `old` |")) == text
 
 
 def test_the_help_lists_every_format(capsys):
@@ -149,7 +151,7 @@ def test_a_format_is_one_file(tmp_path, toy, capsys):
         command.main(["convert", "--help"])
     assert "  toy         Toy (camera.toy), one camera\n" in capsys.readouterr().out
     row = "| `toy` | Toy: camera.toy | pinhole | one line | skew, several cameras, a world of its own |\n"
-    assert row in page.renewed(PAGE.read_text(encoding="utf-8"))
+    assert row in renewed(PAGE.read_text(encoding="utf-8"))
     (tmp_path / "c.toy").write_text("toy 1\n")
     assert complaint(tmp_path / "c.toy").endswith("c.toy: expected toy WIDTH HEIGHT F CX CY, got 1 numbers")
 

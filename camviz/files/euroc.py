@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from camviz.calibration.types import Calibration
-from camviz.files.format import File, Format, chosen, listed
+from camviz.files.format import File, Format, chosen, coefficients_of, listed
 from camviz.files.models import Model, expressed
 from camviz.files.output import as_matrix, as_yaml
 from camviz.files.section import agreed_size
@@ -15,7 +14,6 @@ from camviz.lenses import BrownConrady, KannalaBrandt
 
 TITLE = "EuRoC sensor.yaml"
 GRID = "fx fy cx cy"
-RADIAL_TANGENTIAL = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
 MODELS = [
     Model("radial-tangential", BrownConrady, f"{GRID} k1 k2 p1 p2"),
     Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
@@ -34,12 +32,8 @@ def read(file: File) -> Calibration:
     model = chosen(section, "distortion_model", MODELS)
     size = agreed_size(section.size("resolution"), file.size, "resolution")
     values = section.vector("intrinsics", [4], "fu fv cu cv")
-    others = (5, 8) if model.lens is BrownConrady else ()
-    coefficients = section.coefficients("distortion_coefficients", [4], " ".join(model.names[4:]), others)
-    if len(coefficients) != 4:  # mended
-        model = replace(model, parameters=" ".join([GRID, *RADIAL_TANGENTIAL[: len(coefficients)]]))
-    values += coefficients
-    camera = model.camera(values, *size, 0.0, section.where("intrinsics"))
+    model, coefficients = coefficients_of(section, "distortion_coefficients", model, len(values))
+    camera = model.camera([*values, *coefficients], *size, 0.0, section.where("intrinsics"))
     imu = section.transform("T_BS").inv() if "T_BS" in section else None
     return Calibration({"camera": camera}, file.path, TITLE, world_from_imu=imu)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,11 @@ from camviz.files.models import Model
 from camviz.files.section import Section
 from camviz.files.text import read_bytes, text_of
 from camviz.files.trees import parse, shown
+from camviz.lenses import BrownConrady
 
 Content = bytes | dict[str, bytes]  # of a file, or of the files of a folder by name
 
+OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}
 
 
@@ -93,6 +95,19 @@ def chosen(section: Section, key: str, models: Iterable[Model]) -> Model:
     """The one of a format's camera models that a word of the file names."""
     by_name = {model.name: model for model in models}
     return by_name[section.choice(key, list(by_name))]
+
+
+def coefficients_of(section: Section, key: str, model: Model, first: int) -> tuple[Model, list[float]]:
+    """The distortion coefficients under a key, which are the model's parameters from the `first` on, and the model.
+
+    Where a file is mended, a Brown–Conrady model has as many as there are: 4, 5 or 8 in OpenCV's order.
+    """
+    names = model.names[first:]
+    others = (5, 8) if model.lens is BrownConrady else ()
+    values = section.coefficients(key, [len(names)], " ".join(names), others)
+    if len(values) != len(names):
+        model = replace(model, parameters=" ".join([*model.names[:first], *OPENCV_ORDER[: len(values)]]))
+    return model, values
 
 
 def listed(models: Iterable[Model]) -> str:

@@ -6,12 +6,12 @@ import re
 from typing import Any
 
 from camviz.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera, Intrinsics
-from camviz.files.format import File, Format
+from camviz.cameras import Camera
+from camviz.files.format import File, Format, coefficients_of
 from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size
 from camviz.files.output import as_rows, as_yaml
-from camviz.files.section import Section, Size, explained
+from camviz.files.section import Section, Size
 from camviz.files.trees import shown
 from camviz.lenses import (
     BrownConrady,
@@ -19,33 +19,16 @@ from camviz.lenses import (
     ExtendedUnified,
     FieldOfView,
     KannalaBrandt,
-    Lens,
     Perspective,
     UnifiedSphere,
 )
 from camviz.poses import RigidTransform
 
-PROJECTIONS = {
-    "pinhole": "fu fv pu pv",
-    "omni": "xi fu fv pu pv",
-    "eucm": "alpha beta fu fv pu pv",
-    "ds": "xi alpha fu fv pu pv",
-}
-DISTORTIONS = {"radtan": "k1 k2 p1 p2", "equidistant": "k1 k2 k3 k4", "fov": "w", "none": ""}
+WORDS = ("camera_model", "distortion_model")
 SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
-LENSES = {
-    ("pinhole", "radtan"): BrownConrady,
-    ("pinhole", "equidistant"): KannalaBrandt,
-    ("pinhole", "fov"): FieldOfView,
-    ("pinhole", "none"): Perspective,
-    ("omni", "radtan"): UnifiedSphere,
-    ("omni", "none"): UnifiedSphere,
-    ("eucm", "none"): ExtendedUnified,
-    ("ds", "none"): DoubleSphere,
-}
 TITLE = "Kalibr camchain"
 GRID = "fx fy cx cy"
-WRITTEN = [
+MODELS = [  # camera_model and distortion_model; Kalibr's fu fv pu pv are the grid, and its w is omega
     Model("pinhole none", Perspective, GRID),
     Model("pinhole radtan", BrownConrady, f"{GRID} k1 k2 p1 p2"),
     Model("pinhole equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
@@ -83,33 +66,27 @@ def _chain(section: Section) -> dict[str, Section]:
 
 
 def _camera(part: Section, given: Size | None) -> Camera:
-    projection = _choice(part, "camera_model", PROJECTIONS)
-    values = part.vector("intrinsics", [len(PROJECTIONS[projection].split())], PROJECTIONS[projection])
+    model = _model(part)
+    count = model.names.index("cy") + 1
+    values = part.vector("intrinsics", [count], " ".join(model.names[:count]))
     size = image_size(part, given)
-    with explained(part.where("intrinsics")):
-        grid = Intrinsics(*size, *values[-4:])
-    return Camera(grid, _lens(part, projection, values[:-4]))
+    if model.names[count:] or part.values.get("distortion_coeffs"):
+        model, coefficients = coefficients_of(part, "distortion_coeffs", model, count)
+        values += coefficients
+    return model.camera(values, *size, 0.0, part.where("intrinsics"))
 
 
-def _lens(part: Section, projection: str, shape: list[float]) -> Lens:
-    distortion = _choice(part, "distortion_model", DISTORTIONS)
-    lens = LENSES.get((projection, distortion))
-    if lens is None:
-        known = ", ".join(other for model, other in LENSES if model == projection)
-        raise part.error("distortion_model", f"{known} with {projection}", shown(distortion))
-    names = DISTORTIONS[distortion].split()
-    held = part.values.get("distortion_coeffs") or names
-    others = (5, 8) if lens is BrownConrady else ()
-    coefficients = part.coefficients("distortion_coeffs", [len(names)], " ".join(names), others) if held else []
-    with explained(part.path):
-        return lens(*shape, *coefficients)
-
-
-def _choice(part: Section, key: str, known: dict[str, str]) -> str:
-    value = SYNONYMS.get(part.text(key), part.text(key))
-    if value not in known:
-        raise part.error(key, " or ".join(known), shown(value))
-    return value
+def _model(part: Section) -> Model:
+    projection, distortion = (SYNONYMS.get(part.text(key), part.text(key)) for key in WORDS)
+    by_name = {model.name: model for model in MODELS}
+    for index, word in enumerate((projection, distortion)):
+        known = list(dict.fromkeys(name.split()[index] for name in by_name))
+        if word not in known:
+            raise part.error(WORDS[index], " or ".join(known), shown(word))
+    if f"{projection} {distortion}" not in by_name:
+        known = [name.split()[1] for name in by_name if name.startswith(f"{projection} ")]
+        raise part.error(WORDS[1], f"{', '.join(known)} with {projection}", shown(distortion))
+    return by_name[f"{projection} {distortion}"]
 
 
 def _from_previous(part: Section, previous: Section) -> RigidTransform | None:
@@ -145,10 +122,10 @@ def write(calibration: Calibration) -> bytes:
 
 
 def _written(name: str, camera: Camera) -> dict[str, Any]:
-    model, same = expressed(name, camera, WRITTEN, TITLE)
+    model, same = expressed(name, camera, MODELS, TITLE)
     projection, distortion = model.name.split()
     values = model.values(same, 0.0)
-    count = len(PROJECTIONS[projection].split())
+    count = model.names.index("cy") + 1
     return {
         "camera_model": projection,
         "intrinsics": values[:count],

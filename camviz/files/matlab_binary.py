@@ -38,6 +38,8 @@ _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16,
 _LOGICAL = 0x200
 _MOST_DIMENSIONS = 32  # NumPy's bound; a file may announce millions
 
+Part = tuple[int, bytes]  # an element's type and its data
+
 
 def read(file: File) -> Calibration:
     """From the one variable that holds parameters, or the variables that are them."""
@@ -88,7 +90,7 @@ class _Reader:
             raise CalibrationError(f"expected variables of at most {MAX_BYTES >> 20} MB, they unfold to more")
         return unfolded
 
-    def elements(self, data: bytes) -> Iterator[tuple[int, bytes]]:
+    def elements(self, data: bytes) -> Iterator[Part]:
         """The data elements one after another: their type and bytes."""
         at = 0
         while at + 8 <= len(data):
@@ -113,80 +115,75 @@ class _Reader:
         if not data:
             return "", []
         parts = self.elements(data)
-        flags = self._integers(self._part(parts, "flags"), "u4")
+        flags = self._integers(parts, "class", 6)
         if not flags:
             raise CalibrationError("a variable lacks its class")
         kind, logical = flags[0] & 0xFF, bool(flags[0] & _LOGICAL)
         if kind in (_OBJECT, _FUNCTION, _OPAQUE):
             raise CalibrationError(f"expected numbers and structs, a variable is a MATLAB object; {HOW}")
-        sides = self._integers(self._part(parts, "dimensions"), "i4")
+        sides = self._integers(parts, "dimensions", 5)
         name = self._part(parts, "name")[1].decode("latin-1")
         return name, self._value(kind, logical, sides, parts, depth)
 
-    def _value(self, kind: int, logical: bool, sides: list[int], parts: Iterator[tuple[int, bytes]], depth: int) -> Any:
+    def _value(self, kind: int, logical: bool, sides: list[int], parts: Iterator[Part], depth: int) -> Any:
         if not 2 <= len(sides) <= _MOST_DIMENSIONS or min(sides) < 0:
             raise CalibrationError(f"expected 2 to {_MOST_DIMENSIONS} dimensions, got {len(sides)}: {sides[:4]}")
+        count = prod(sides)
         if kind == _STRUCT:
-            return self._struct(prod(sides), parts, depth)
+            return self._struct(count, parts, depth)
         if kind == _CELL:
-            return [self._inner(parts, depth) for _ in self._counted(prod(sides))]
+            self._count(count)
+            return [self._inner(parts, depth) for _ in range(count)]
         if kind == _CHAR:
-            return self._words(self._part(parts, "text"))
+            return self._words(*self._part(parts, "text"))
         if kind == _SPARSE or len(sides) > 2:
             return None  # no part of a calibration that is read
-        return _listed(self._numbers(self._part(parts, "numbers"), sides), logical)
+        values = self._array(*self._part(parts, "numbers"))
+        if values.size != count:
+            raise CalibrationError(f"expected {sides[0]} × {sides[1]} numbers, got {values.size}")
+        self._count(count)
+        return _listed(values.reshape(sides, order="F"), logical)
 
-    def _struct(self, count: int, parts: Iterator[tuple[int, bytes]], depth: int) -> Any:
-        (length,) = self._integers(self._part(parts, "length of names"), "i4")[:1] or [0]
+    def _struct(self, count: int, parts: Iterator[Part], depth: int) -> Any:
+        (length,) = self._integers(parts, "length of names", 5)[:1] or [0]
         names = self._part(parts, "names")[1]
         if length <= 0:
             raise CalibrationError("a struct's names have no length")
         fields = [names[i : i + length].split(b"\0")[0].decode("latin-1") for i in range(0, len(names), length)]
-        made = [{field: self._inner(parts, depth) for field in fields} for _ in self._counted(count if fields else 0)]
-        return made[0] if count == 1 and made else made
+        count = count if fields else 0
+        self._count(count)
+        made = [{field: self._inner(parts, depth) for field in fields} for _ in range(count)]
+        return made[0] if len(made) == 1 else made
 
-    def _inner(self, parts: Iterator[tuple[int, bytes]], depth: int) -> Any:
+    def _inner(self, parts: Iterator[Part], depth: int) -> Any:
         kind, data = self._part(parts, "value")
         if kind != _MATRIX:
             raise CalibrationError(f"expected a value, got an element of type {kind}")
         return self.variable(data, depth + 1)[1]
 
-    def _numbers(self, part: tuple[int, bytes], sides: list[int]) -> np.ndarray:
-        values = self._array(part)
-        if values.size != prod(sides):
-            raise CalibrationError(f"expected {sides[0]} × {sides[1]} numbers, got {values.size}")
-        self._count(values.size)
-        return values.reshape(sides, order="F")
-
-    def _words(self, part: tuple[int, bytes]) -> str:
-        kind, data = part
+    def _words(self, kind: int, data: bytes) -> str:
         if kind in _ENCODINGS:
             encoding = _ENCODINGS[kind] + ("" if kind == 16 else "-le" if self.order == "<" else "-be")
             return data.decode(encoding, errors="replace")
-        return "".join(chr(code) for code in self._array(part).tolist() if 0 <= code < 0x110000)
+        return "".join(chr(code) for code in self._array(kind, data).tolist() if 0 <= code < 0x110000)
 
-    def _integers(self, part: tuple[int, bytes], expected: str) -> list[int]:
-        if _NUMBERS.get(part[0]) != expected:
-            raise CalibrationError(f"expected integers, got an element of type {part[0]}")
-        values: list[int] = self._array(part).tolist()
+    def _integers(self, parts: Iterator[Part], what: str, expected: int) -> list[int]:
+        kind, data = self._part(parts, what)
+        if kind != expected:
+            raise CalibrationError(f"expected integers for the {what}, got an element of type {kind}")
+        values: list[int] = self._array(kind, data).tolist()
         return values
 
-    def _array(self, part: tuple[int, bytes]) -> np.ndarray:
-        kind, data = part
+    def _array(self, kind: int, data: bytes) -> np.ndarray:
         if kind not in _NUMBERS:
             raise CalibrationError(f"expected numbers, got an element of type {kind}")
         dtype = np.dtype(self.order + _NUMBERS[kind])
         return np.frombuffer(data[: len(data) // dtype.itemsize * dtype.itemsize], dtype)
 
-    def _part(self, parts: Iterator[tuple[int, bytes]], what: str) -> tuple[int, bytes]:
-        part = next(parts, None)
-        if part is None:
-            raise CalibrationError(f"a variable ends before its {what}")
-        return part
-
-    def _counted(self, count: int) -> range:
-        self._count(count)
-        return range(count)
+    def _part(self, parts: Iterator[Part], what: str) -> Part:
+        for part in parts:
+            return part
+        raise CalibrationError(f"a variable ends before its {what}")
 
     def _count(self, more: int) -> None:
         self.nodes += more

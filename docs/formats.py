@@ -1,14 +1,14 @@
-"""The table of formats in docs/formats.md: `python -m camviz.files.page docs/formats.md` writes it afresh."""
+"""The table of formats in docs/formats.md: `python docs/formats.py` makes it from what the formats declare."""
 
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 from camviz.files.format import Format
 from camviz.files.registry import formats
 
+PAGE = Path(__file__).with_suffix(".md")
 HEAD = "| `--to` | file | camera models | conventions of its own | not written |\n|---|---|---|---|---|\n"
 _TABLE = re.compile(r"^\| `--to` .*\n(?:\|.*\n)*", re.MULTILINE)
 
@@ -39,5 +39,4 @@ def _not_written(format: Format) -> str:
 
 
 if __name__ == "__main__":
-    page = Path(sys.argv[1])
-    page.write_text(renewed(page.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
