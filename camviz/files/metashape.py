@@ -38,7 +38,7 @@ def read(file: File) -> Calibration:
 
 
 def _read_document(chunk: Section, file: File) -> Calibration:
-    sensors = {str(sensor.get("id", "a number")): sensor for sensor in _each(chunk, "sensors", "sensor")}
+    sensors = {str(sensor.get("id", "a number")): sensor for sensor in _each(chunk.section("sensors"), "sensor")}
     shared: dict[str, Camera] = {}
     cameras: dict[str, Camera] = {}
     lost = 0
@@ -59,25 +59,24 @@ def _read_document(chunk: Section, file: File) -> Calibration:
     return Calibration(cameras, file.path, "Metashape cameras", notes=tuple(notes))
 
 
-def _each(section: Section, outer: str, inner: str) -> list[Section]:
-    part = section.section(outer)
-    held = part.values.get(inner)
+def _each(section: Section, name: str) -> list[Section]:
+    """The elements of a name inside another, however many there are."""
+    held = section.values.get(name)
     parts = held if isinstance(held, Repeated) else [] if held is None else [held]
     if not all(isinstance(value, dict) for value in parts):
-        raise part.error(inner, "elements with attributes", shown(held))
-    return [part.part(value, part.where(f"{inner}[{index}]")) for index, value in enumerate(parts)]
+        raise section.error(name, "elements with attributes", shown(held))
+    return [section.part(value, section.where(f"{name}[{index}]")) for index, value in enumerate(parts)]
 
 
 def _cameras(section: Section) -> Iterator[Section]:
     """Those of a list, and those in its groups."""
-    holder = section.part({"cameras": dict(section.values)}, section.path)
-    yield from _each(holder, "cameras", "camera")
-    for group in _each(holder, "cameras", "group"):
+    yield from _each(section, "camera")
+    for group in _each(section, "group"):
         yield from _cameras(group)
 
 
 def _sensor(sensor: Section, size: Size | None) -> Camera:
-    found = _each(sensor.part({"sensor": dict(sensor.values)}, sensor.path), "sensor", "calibration")
+    found = _each(sensor, "calibration")
     adjusted = [part for part in found if part.values.get("class") == "adjusted"] or found
     if not adjusted:
         raise sensor.error("calibration", "a calibration", "none")
