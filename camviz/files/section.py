@@ -40,9 +40,11 @@ class Section:
         return self.values.get(key) is not None
 
     def where(self, key: str) -> str:
+        """The path of keys that leads to this one."""
         return f"{self.path}.{key}" if self.path else key
 
     def error(self, key: str, expected: str, got: Any, id: str = "", value: float | None = None) -> CalibrationError:
+        """What is wrong under a key: what was expected there and what came."""
         return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}", id, value)
 
     def mend(self, error: CalibrationError) -> None:
@@ -56,11 +58,13 @@ class Section:
         return Section(values, where, self.mended)
 
     def get(self, key: str, expected: str) -> Any:
+        """The value of a key that must be there."""
         if key not in self:
             raise CalibrationError(f"{self.where(key)}: expected {expected}, the key is missing")
         return self.values[key]
 
     def section(self, key: str) -> Section:
+        """A mapping."""
         value = self.get(key, "a mapping")
         if not isinstance(value, dict):
             raise self.error(key, "a mapping", shown(value))
@@ -74,6 +78,7 @@ class Section:
         return [self.part(part, self.where(f"{key}[{index}]")) for index, part in enumerate(held)]
 
     def text(self, key: str) -> str:
+        """A word."""
         value = self.get(key, "a word")
         if not isinstance(value, str):
             raise self.error(key, "a word", shown(value))
@@ -87,6 +92,7 @@ class Section:
         return value
 
     def number(self, key: str) -> float:
+        """One finite number, bare or as a matrix of one element."""
         value = self.get(key, "a number")
         values = self.array(key) if isinstance(value, (list, dict)) else _as_array(value, self.where(key))
         if values.size != 1:
@@ -95,6 +101,7 @@ class Section:
         return float(values.flat[0])
 
     def whole(self, key: str, largest: int) -> int:
+        """A whole number from 1 to the largest."""
         value = self.number(key)
         if value != int(value) or not 1 <= value <= largest:
             raise self.error(key, f"a whole number from 1 to {largest}", f"{value:g}")
@@ -148,6 +155,7 @@ class Section:
         return values.reshape(rows, columns)
 
     def rotation(self, key: str) -> Rotation:
+        """The rotation of 3×3 numbers."""
         return self._rotation(self.matrix(key, 3, 3), key)
 
     def transform(self, key: str) -> RigidTransform:

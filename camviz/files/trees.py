@@ -60,9 +60,11 @@ class Tree:
 
     @property
     def wants_key(self) -> bool:
+        """Whether a mapping is open and its next key has not come."""
         return bool(self._open) and isinstance(self._open[-1][0], dict) and self._keys[-1] is None
 
     def key(self, key: str) -> None:
+        """The key of the value that comes next."""
         mapping = self._open[-1][0]
         if key in mapping:
             raise CalibrationError(f"the key {shown(key)} appears twice")
@@ -70,12 +72,14 @@ class Tree:
         self._keys[-1] = key
 
     def leaf(self, value: Any, anchor: str | None = None) -> None:
+        """A value that holds no others."""
         self._count(1)
         self._place(value)
         if anchor:
             self._anchors[anchor] = value, 1
 
     def begin(self, container: Any, anchor: str | None = None) -> None:
+        """The start of a list or mapping, which is empty."""
         if len(self._open) == MAX_DEPTH:
             raise CalibrationError(f"nested more than {MAX_DEPTH} levels deep, which no calibration is")
         self._count(1)
@@ -83,6 +87,7 @@ class Tree:
         self._keys.append(None)
 
     def end(self) -> None:
+        """The end of the list or mapping that began last."""
         container, anchor, start = self._open.pop()
         self._keys.pop()
         if anchor:
@@ -90,6 +95,7 @@ class Tree:
         self._place(container)
 
     def alias(self, anchor: str) -> None:
+        """The value of an anchor once more, counted in full."""
         if anchor not in self._anchors:
             raise CalibrationError(f"the alias {shown(anchor)} points to nothing that came before it")
         value, size = self._anchors[anchor]
