@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import camviz
 from camviz.files import CalibrationError
-from camviz.files.loading import parse
+from camviz.files.trees import parse
 
 DATA = Path(__file__).parent / "data"
 FILES = sorted(path for path in DATA.rglob("*") if path.is_file())

@@ -2,8 +2,11 @@
 
 import os
 import re
+import struct
 import subprocess
 import sys
+import time
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +77,15 @@ def test_a_directory(tmp_path):
 
 def test_a_name_that_is_none(tmp_path):
     assert "is not a file name" in complaint(f"{tmp_path}/a\0b")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows says that there is no such file")
+@pytest.mark.parametrize("name", ["a" * 256, "a" * 5000, "a/" * 3000, "file/camera.yml"])
+def test_a_name_that_the_system_refuses(tmp_path, name):
+    """Longer than the 255 bytes or 4096 of a path that Linux takes, or below a file."""
+    (tmp_path / "file").write_text(MONO)
+    with pytest.raises(CalibrationError, match=r"cannot be read \((File name too long|Not a directory)\)$"):
+        camviz.load(tmp_path / name)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
@@ -235,12 +247,12 @@ def test_a_damaged_ros_file_names_the_key_and_the_number(tmp_path, old, new, wha
     [
         ("cam1:", "cam7:", "expected the cameras cam0, cam1, cam2"),
         ("camera_model: pinhole", "camera_model: pinole", r"cam0.camera_model: .*'pinole'"),
-        ("camera_model: pinhole", "camera_model: eucm", "cam0.intrinsics: expected 6 numbers"),
+        ("camera_model: pinhole", "camera_model: eucm", "cam0.distortion_model: expected none with eucm, got .radtan."),
         ("distortion_model: radtan", "distortion_model: [1]", "cam0.distortion_model: expected a word"),
         (
             "distortion_model: radtan",
             "distortion_model: fov",
-            r"cam0.distortion_coeffs: expected 1 numbers \(w\), got 4",
+            r"cam0.distortion_coeffs: expected 1 numbers \(omega\), got 4",
         ),
         ("[458.654,", "[", "cam0.intrinsics: expected 4 numbers"),
         ("[458.654,", "[-1,", "fx must be a positive focal length"),
@@ -354,6 +366,95 @@ def test_the_largest_allowed_files_need_neither_hours_nor_gigabytes(tmp_path):
     run = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
     assert (run.returncode, run.stderr) == (0, "")
     assert run.stdout.splitlines() == sorted(LARGEST)
+
+
+def element(kind, data):
+    """A data element of a .mat file: type, size, data, and bytes up to a multiple of eight."""
+    return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+
+def matrix(kind, sides, rest, name=b""):
+    """A variable of a class (1 cell, 4 text, 6 double) with these dimensions, whatever follows them."""
+    dimensions = element(5, np.array(sides, "<i4").tobytes())
+    return element(14, element(6, struct.pack("<II", kind, 0)) + dimensions + element(1, name) + rest)
+
+
+def compressed(variable):
+    """An element of type 15, which nothing follows up to a multiple of eight."""
+    data = zlib.compress(variable)
+    return struct.pack("<II", 15, len(data)) + data
+
+
+def nested(depth):
+    inner = matrix(6, (1, 1), element(9, struct.pack("<d", 1)))
+    for _ in range(depth):
+        inner = matrix(1, (1, 1), inner)
+    return inner
+
+
+WORDS_OF_A_MEGABYTE = matrix(4, (1, 2**20), element(16, bytes(2**20)), b"a")
+HOSTILE_MAT = {
+    "a million dimensions": (compressed(matrix(6, [2**31 - 1] * 10**6, b"")), "2 to 32 dimensions"),
+    "cells without end": (matrix(1, (2**28, 1), b""), "at most 1,000,000 values"),
+    "dimensions below zero": (matrix(1, (-1, -5), b""), "dimensions"),
+    "deep cells": (nested(20_000), "32 levels"),
+    "900 variables that unfold": (compressed(WORDS_OF_A_MEGABYTE) * 900, "at most 16 MB, they unfold to more"),
+    "a variable longer than it says": (struct.pack("<II", 14, 8) + nested(0)[8:], "announces 8 bytes, 0 are left"),
+}
+
+
+@pytest.mark.parametrize(("body", "what"), HOSTILE_MAT.values(), ids=HOSTILE_MAT)
+def test_a_mat_file_that_announces_much_is_refused_at_once(tmp_path, body, what):
+    (tmp_path / "p.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + body)
+    start = time.process_time()
+    assert re.search(what, complaint(tmp_path / "p.mat"))
+    assert time.process_time() - start < 5
+
+
+MANY_KEYS = {
+    "json": "{" + ",".join(f'"{n:x}":1' for n in range(990_000)) + "}",
+    "xml": "<opencv_storage>" + "".join(f"<k{n:x}>1</k{n:x}>" for n in range(400_000)) + "</opencv_storage>",
+}
+
+
+@pytest.mark.parametrize("text", MANY_KEYS.values(), ids=MANY_KEYS)
+def test_a_mapping_of_a_million_keys_is_refused_at_once(tmp_path, text):
+    """Readers look through all keys for the several spellings of a name."""
+    start = time.process_time()
+    assert "at most 10,000 keys" in refusal(tmp_path, text)
+    assert time.process_time() - start < 10
+
+
+LITERALS = {
+    "signs": "-" * 250_000 + "1",
+    "sums": "1" + "+1" * 120_000,
+    "attributes": "a" + ".b" * 120_000,
+    "calls": "a" + "()" * 120_000,
+    "format strings": "f'" + "{1}" * 80_000 + "'",
+    "keys": "{" + ",".join(f"'{n}': 1" for n in range(20_000)) + "}",
+    "digits": "9" * 250_000,
+    "large": "1" + "0" * 400,
+    "quotes": "'\\" * 4_000_000,
+    "escapes": "'\\d', 1j",
+    "set": "{1, 2}",
+    "no key": "{**{}}",
+}
+
+
+@pytest.mark.parametrize("value", LITERALS.values(), ids=LITERALS)
+def test_a_literal_is_refused_at_once(tmp_path, value, recwarn):
+    """What makes Python's own parser recurse, and format strings, which take it a time that grows with the square."""
+    start = time.process_time()
+    refusal(tmp_path, f"{{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': {value}}}")
+    assert time.process_time() - start < 5
+    assert list(recwarn) == []
+
+
+def test_a_literals_long_strings_are_passed_over(tmp_path):
+    """As mrcal's optimization inputs, megabytes of text that nothing here reads."""
+    text = (DATA / "mrcal_stereographic.cameramodel").read_text().rstrip().removesuffix("}")
+    (tmp_path / "c.cameramodel").write_text(text + f",'optimization_inputs': b'{'A#[{' * 2**20}',  # it's long\n}}")
+    assert camviz.load(tmp_path / "c.cameramodel").cameras["camera"].intrinsics.width == 640
 
 
 def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):

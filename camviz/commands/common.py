@@ -36,16 +36,22 @@ def say(sentence: str) -> None:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one sentence."""
+    """A parser whose errors are one sentence; `listing` makes what its help says beside, when it is asked for."""
+
+    listing: Callable[[], str] | None = None
+
+    def format_help(self) -> str:
+        """The help, with the listing before the examples."""
+        if self.listing:
+            self.epilog, self.listing = "\n\n".join(filter(None, [self.listing(), self.epilog])), None
+        return super().format_help()
 
     def error(self, message: str) -> Any:
         raise Refusal(f"{message}; see `{self.prog} --help`.")
 
 
-def add_command(
-    commands: Any, name: str, run: Callable[..., int], what: str, description: str
-) -> argparse.ArgumentParser:
-    command = commands.add_parser(
+def add_command(commands: Any, name: str, run: Callable[..., int], what: str, description: str) -> Parser:
+    command: Parser = commands.add_parser(
         name, help=what, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     command.set_defaults(run=run)

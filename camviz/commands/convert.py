@@ -16,22 +16,7 @@ cameras is refused with the reason; what it cannot hold beside them (corners, bo
 out. The format of IN is told by its content. A COLMAP model is a folder.
 """
 
-FORMATS = """\
-formats:
-  opencv      OpenCV FileStorage, by the ending of OUT: .yml, .xml or .json; one camera or a pair
-  ros         ROS CameraInfo (camera.yaml), one camera
-  kalibr      Kalibr camchain (camchain.yaml)
-  colmap      COLMAP model as text, a folder
-  colmap-bin  the same, binary
-  mrcal       mrcal (camera.cameramodel), one camera
-  nerfstudio  nerfstudio and instant-ngp (transforms.json)
-  euroc       EuRoC (sensor.yaml), one camera
-  basalt      Basalt (calibration.json), cameras around an IMU
-  kitti       KITTI (calib.txt), rectified cameras
-  kitti-raw   KITTI (calib_cam_to_cam.txt), the cameras before rectification
-  matlab      MATLAB's cameraParameters as JSON, one camera
-  metashape   Metashape XML
-
+EXAMPLES = """\
 examples:
   camviz convert camera.yml camera.cameramodel --to mrcal
   camviz convert stereo.yml chain.yaml --to kalibr --size 640x480
@@ -41,7 +26,7 @@ examples:
 
 def add(commands: Any) -> None:
     command = add_command(commands, "convert", convert, "write a calibration for another program", CONVERT)
-    command.epilog = FORMATS
+    command.epilog, command.listing = EXAMPLES, _listing
     command.add_argument("file", metavar="IN", type=Path, help="the calibration, or the folder of a COLMAP model")
     command.add_argument("output", metavar="OUT", type=Path, help="the file to write; for COLMAP a new folder")
     command.add_argument("--to", metavar="FORMAT", required=True, help="one of the formats below")
@@ -50,6 +35,12 @@ def add(commands: Any) -> None:
     command.add_argument(
         "--first-as-world", action="store_true", help="make the first camera's frame the world, as some formats must"
     )
+
+
+def _listing() -> str:
+    from camviz.files.registry import listing
+
+    return listing()
 
 
 def convert(options: argparse.Namespace) -> int:

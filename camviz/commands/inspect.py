@@ -105,9 +105,13 @@ def _named(words: list[str]) -> Iterator[tuple[str, list[Path]]]:
 
 
 def _is_model(folder: Path) -> bool:
-    from camviz.files import colmap
+    from camviz.files import CalibrationError, File, format_of
 
-    return colmap.model_of(folder) is not None
+    try:
+        format_of(File(folder))
+    except CalibrationError:
+        return False
+    return True
 
 
 def _board(options: argparse.Namespace) -> Board | None:

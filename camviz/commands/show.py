@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from camviz.commands.common import OK, Refusal, add_command, loaded, refuse_output, size, write_whole
@@ -12,17 +13,23 @@ SHOW = """\
 Writes one HTML page that shows the cameras of a calibration: where they stand and what they see, how their lenses
 bend straight lines, and how their pictures are tied together. The page holds everything it needs and opens offline.
 
-Reads OpenCV FileStorage (one camera or a pair), ROS CameraInfo, Kalibr camchains, COLMAP models (their folder too),
-mrcal, nerfstudio, EuRoC, Basalt, KITTI, MATLAB (as JSON) and Metashape files; the content tells which it is. The file
-is only read: nothing in it is run, and it is not changed.
+Reads the formats below; the content of the file tells which it is. The file is only read: nothing in it is run, and it
+is not changed.
 """
 
 
 def add(commands: Any) -> None:
     command = add_command(commands, "show", show, "write a page that shows a calibration", SHOW)
+    command.listing = _listing
     command.add_argument("file", metavar="FILE", type=Path, help="the calibration")
     command.add_argument("-o", "--output", metavar="OUT.html", type=Path, help="the page (default: FILE's name, .html)")
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
+
+
+def _listing() -> str:
+    from camviz.files.registry import titles
+
+    return fill(f"formats: {titles()}", 110, subsequent_indent="  ")
 
 
 def show(options: argparse.Namespace) -> int:

@@ -1,16 +1,24 @@
-"""Calibration files: `load(path)` reads what a dozen programs write into a `Calibration`, and `write` the way back."""
+"""Calibration files: `load(path)` reads what a dozen programs write into a `Calibration`, and `write` the way back.
 
-from typing import Any
+Each format is a module here that exports FORMAT, a `Format`; nothing else lists the formats.
+"""
 
 from camviz.calibration.types import Board, Calibration, CalibrationError
-from camviz.files.loading import load
+from camviz.files.format import File, Format
+from camviz.files.loading import format_of, load
+from camviz.files.registry import formats
+from camviz.files.writing import alone, from_first_camera, write
 
-__all__ = ["FORMATS", "Board", "Calibration", "CalibrationError", "alone", "from_first_camera", "load", "write"]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module 'camviz.files' has no attribute {name!r}")
-    from camviz.files import writing
-
-    return getattr(writing, name)
+__all__ = [
+    "Board",
+    "Calibration",
+    "CalibrationError",
+    "File",
+    "Format",
+    "alone",
+    "format_of",
+    "formats",
+    "from_first_camera",
+    "load",
+    "write",
+]

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.models import Model, expressed, model_named
-from camviz.files.output import as_json, refuse_own_world
-from camviz.files.section import LARGEST_SIDE, Section
-from camviz.files.trees import shown
+from camviz.files.format import File, Format, chosen, listed
+from camviz.files.models import Model, expressed
+from camviz.files.output import as_json
+from camviz.files.section import Section, Size, as_size
 from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
 from camviz.poses import RigidTransform
 
@@ -29,28 +26,20 @@ MODELS = [
 KEYS = {"omega": "w"}
 
 
-def read(section: Section, path: Path) -> Calibration:
+def read(file: File) -> Calibration:
     """cam0, cam1 … by T_imu_cam, the camera's place in the IMU's frame; the world is cam0's frame."""
-    whole = section.section("value0")
-    lenses, places = (_list(whole, key) for key in ("intrinsics", "T_imu_cam"))
-    sizes = whole.matrix("resolution", len(lenses), 2) if lenses else np.empty((0, 2))
+    whole = file.section.section("value0")
+    lenses, places = whole.sections("intrinsics"), whole.sections("T_imu_cam")
     if not lenses or len(lenses) != len(places):
         raise whole.error("intrinsics", "as many cameras as in T_imu_cam, at least one", f"{len(lenses)}")
+    sizes = whole.matrix("resolution", len(lenses), 2)
     imu_from_cam = [_pose(place) for place in places]
     world_from_imu = imu_from_cam[0].inv()
     cameras = {}
     for index, (part, size, pose) in enumerate(zip(lenses, sizes, imu_from_cam, strict=True)):
-        sides = Section({"width": float(size[0]), "height": float(size[1])}, whole.where(f"resolution[{index}]"))
-        camera = _camera(part, sides.whole("width", LARGEST_SIDE), sides.whole("height", LARGEST_SIDE))
+        camera = _camera(part, as_size(size[0], size[1], whole.where(f"resolution[{index}]")))
         cameras[f"cam{index}"] = camera.at(world_from_imu * pose) if index else camera
-    return Calibration(cameras, path, "Basalt", world_from_imu=world_from_imu)
-
-
-def _list(section: Section, key: str) -> list[Section]:
-    held = section.get(key, "a list")
-    if not isinstance(held, list) or not all(isinstance(part, dict) for part in held):
-        raise section.error(key, "a list of mappings", shown(held))
-    return [section.part(part, section.where(f"{key}[{index}]")) for index, part in enumerate(held)]
+    return Calibration(cameras, file.path, "Basalt", world_from_imu=world_from_imu)
 
 
 def _pose(section: Section) -> RigidTransform:
@@ -59,16 +48,14 @@ def _pose(section: Section) -> RigidTransform:
     return RigidTransform.from_components(place, section.quaternion(quaternion, section.path))
 
 
-def _camera(section: Section, width: int, height: int) -> Camera:
-    name = section.choice("camera_type", [model.name for model in MODELS])
-    model, held = model_named(name, MODELS) or MODELS[0], section.section("intrinsics")
+def _camera(section: Section, size: Size) -> Camera:
+    model, held = chosen(section, "camera_type", MODELS), section.section("intrinsics")
     values = [held.number(KEYS.get(key, key)) for key in model.names]
-    return model.camera(values, width, height, 0.0, held.path)
+    return model.camera(values, *size, 0.0, held.path)
 
 
 def write(calibration: Calibration) -> bytes:
     """All cameras beside the IMU; CalibrationError where the calibration does not know of one."""
-    refuse_own_world(calibration, "Basalt")
     if calibration.world_from_imu is None:
         raise CalibrationError("Basalt places its cameras by the IMU, and this calibration holds none")
     imu_from_world = calibration.world_from_imu.inv()
@@ -90,3 +77,16 @@ def _written_pose(pose: RigidTransform) -> dict[str, float]:
 def _written_camera(model: Model, camera: Camera) -> dict[str, Any]:
     values = zip(model.names, model.values(camera, 0.0), strict=True)
     return {"camera_type": model.name, "intrinsics": {KEYS.get(name, name): value for name, value in values}}
+
+
+FORMAT = Format(
+    name="basalt",
+    title="Basalt",
+    file="calibration.json",
+    recognise=lambda file: "value0" in file.section,
+    read=read,
+    write=write,
+    models=listed(MODELS),
+    says="T_imu_cam: camera → IMU, quaternion x y z w",
+    lacks="skew, cameras without an IMU",
+)

@@ -1,20 +1,20 @@
-"""COLMAP models: a folder with cameras and images, as text or binary; the file's own world and unit."""
+"""COLMAP models as text: a folder with cameras.txt and images.txt, in a world and a unit of their own."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files import colmap_binary
+from camviz.files.format import File, Format, listed
 from camviz.files.models import Model, expressed, model_named
-from camviz.files.section import COUNT, LARGEST, LARGEST_SIDE, ROTATION_TOLERANCE, Section
-from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_text
+from camviz.files.section import COUNT, LARGEST, ROTATION_TOLERANCE, Section, agreed_size, named
+from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_bytes, text_of
 from camviz.files.trees import scalar, shown
 from camviz.lenses import (
     BrownConrady,
@@ -51,63 +51,64 @@ WRITTEN = [model for number, model in MODELS.items() if number < 14] + [MODELS[1
 UNNAMED = {11: "RAD_TAN_THIN_PRISM_FISHEYE", 12: "SIMPLE_DIVISION", 13: "DIVISION"}
 UNNAMED |= {17: "EQUIRECTANGULAR"}
 _CAMERA_LINE = re.compile(r"(?:[ \t]*(?:#[^\r\n]*)?\r?\n)*[ \t]*\d+[ \t]+[A-Z][A-Z0-9_]{2,40}[ \t]+\d+[ \t]+\d+[ \t]")
-_FILES = ("cameras.txt", "images.txt", "cameras.bin", "images.bin")
 
+Cameras = dict[int, Camera]  # by number
 Image = tuple[str, int, list[float]]  # name, number of its camera, quaternion w x y z and translation
 
 
-def model_of(path: Path) -> Path | None:
-    """The cameras file of the model that a path belongs to, be it the folder, that file, or the images beside it."""
+def cameras_file(path: Path, ending: str) -> Path | None:
+    """The cameras file of the model that a path belongs to: its folder, that file, or the images beside it."""
     if path.is_dir():
-        found = [path / name for name in ("cameras.bin", "cameras.txt") if (path / name).is_file()]
-        return found[0] if found else None
-    if path.name in _FILES or path.suffix == ".bin":
-        return path.with_name(path.name.replace("images", "cameras"))
-    return None
+        path = path / f"cameras{ending}"
+        return path if path.is_file() else None
+    belongs = path.suffix == ending and path.stem in ("cameras", "images")
+    return path.with_name(f"cameras{ending}") if belongs else None
 
 
-def is_cameras(text: str) -> bool:
-    """True for the text of a cameras.txt: a number, a camera model, a width, a height."""
-    return bool(_CAMERA_LINE.match(text[:HEAD]))
+def is_model(file: File) -> object:
+    """True for a model's folder and files, and for lines of a number, a camera model, a width and a height."""
+    return cameras_file(file.path, ".txt") or _CAMERA_LINE.match(file.text[:HEAD])
 
 
-def read(cameras_path: Path, path: Path, mended: list[CalibrationError] | None = None) -> Calibration:
+def read(file: File) -> Calibration:
     """The images of a model as cameras in its world, by name; without an images file the cameras alone."""
-    binary = cameras_path.suffix == ".bin"
-    with _named(cameras_path):
-        cameras = colmap_binary.cameras(cameras_path, MODELS, _unknown) if binary else _cameras(read_text(cameras_path))
+    return read_model(cameras_file(file.path, ".txt") or file.path, file, _cameras, _images)
+
+
+def read_model(
+    cameras_path: Path, file: File, cameras_of: Callable[[Path], Cameras], images_of: Callable[[Path], Iterator[Image]]
+) -> Calibration:
+    """The same by the functions that read its two files."""
+    with _within(file, cameras_path):
+        cameras = cameras_of(cameras_path)
         if not cameras:
             raise CalibrationError("expected at least one camera, got none")
     images_path = cameras_path.with_name("images" + cameras_path.suffix)
     if cameras_path.stem != "cameras" or not images_path.exists():
         note = "There is no images file beside the cameras: they stand at the origin."
-        return Calibration({f"camera{n}": camera for n, camera in cameras.items()}, path, "COLMAP", notes=(note,))
-    with _named(images_path):
-        placed = _placed(cameras, colmap_binary.images(images_path) if binary else _images(images_path), mended)
+        return Calibration({f"camera{n}": camera for n, camera in cameras.items()}, file.path, "COLMAP", notes=(note,))
+    with _within(file, images_path):
+        placed = _placed(cameras, images_of(images_path), file.mended)
     notes = ["COLMAP's world has no unit of its own: lengths are in the file's."]
     if idle := len(cameras) - len({id(camera.lens) for camera in placed.values()}):
         notes.append(f"{idle} of the {len(cameras)} cameras took none of the images and are left out.")
-    return Calibration(placed, path, "COLMAP", notes=tuple(notes))
+    return Calibration(placed, file.path, "COLMAP", notes=tuple(notes))
 
 
-@contextmanager
-def _named(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except CalibrationError as error:
-        said = str(error)
-        said = said if said.startswith(str(path)) else f"{path}: {said}"
-        raise CalibrationError(said, error.id, error.value) from error.__cause__
+def _within(file: File, path: Path) -> AbstractContextManager[None]:
+    """Names the file of the model in which something is wrong, unless it is the one that was asked for."""
+    return nullcontext() if path == file.path else named(path.name)
 
 
-def _unknown(name: str) -> CalibrationError:
+def unknown_model(name: str) -> CalibrationError:
+    """The error for a camera model of COLMAP's that has no lens here."""
     known = ", ".join(model.name for model in MODELS.values())
     return CalibrationError(f"there is no lens here for the camera model {name}; there is for {known}")
 
 
-def _cameras(text: str) -> dict[int, Camera]:
+def _cameras(path: Path) -> Cameras:
     """Lines of CAMERA_ID MODEL WIDTH HEIGHT PARAMS…"""
-    cameras: dict[int, Camera] = {}
+    text, cameras = text_of(read_bytes(path)), {}
     if text.count("\n") > MAX_IMAGES:
         raise CalibrationError(f"expected at most {MAX_IMAGES:,} lines, got {text.count(chr(10)):,}")
     for number, line in enumerate(text.splitlines(), 1):
@@ -119,7 +120,7 @@ def _cameras(text: str) -> dict[int, Camera]:
             raise CalibrationError(f"{where}: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS…, got {shown(line)}")
         model = model_named(words[1], MODELS.values())
         if model is None:
-            raise _unknown(words[1][:40])
+            raise unknown_model(words[1][:40])
         key = _whole(words[0], where)
         if key in cameras:
             raise CalibrationError(f"{where}: the camera {key} appears twice")
@@ -130,11 +131,9 @@ def _cameras(text: str) -> dict[int, Camera]:
 
 def camera_of(model: Model, section: Section) -> Camera:
     """A camera of `size` and `params`, at the origin."""
-    width, height = (side for side in section.vector("size", [2], "width height"))
-    sides = Section({"width": width, "height": height}, section.path)
+    size = agreed_size(section.size("size"), None, "size")
     values = section.vector("params", [len(model.names)], model.parameters, COUNT)
-    width, height = sides.whole("width", LARGEST_SIDE), sides.whole("height", LARGEST_SIDE)
-    return model.camera(values, width, height, FIRST_PIXEL, section.path)
+    return model.camera(values, *size, FIRST_PIXEL, section.path)
 
 
 def _images(path: Path) -> Iterator[Image]:
@@ -172,9 +171,7 @@ def _numbers(words: list[str]) -> list[object]:
     return [scalar(word) for word in words]
 
 
-def _placed(
-    cameras: dict[int, Camera], images: Iterable[Image], mended: list[CalibrationError] | None
-) -> dict[str, Camera]:
+def _placed(cameras: Cameras, images: Iterable[Image], mended: list[CalibrationError] | None) -> dict[str, Camera]:
     """cam_from_world = [R(q) | t] for every image."""
     names, used, poses = [], [], []
     for name, key, pose in images:
@@ -229,7 +226,7 @@ def rows(calibration: Calibration) -> tuple[list[Row], list[Image]]:
     return cameras, images
 
 
-def write_text(calibration: Calibration) -> dict[str, bytes]:
+def write(calibration: Calibration) -> dict[str, bytes]:
     """cameras.txt, images.txt and an empty points3D.txt."""
     cameras, images = rows(calibration)
     lines = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
@@ -244,7 +241,16 @@ def write_text(calibration: Calibration) -> dict[str, bytes]:
     return {name: text.encode() for name, text in (texts | {"points3D.txt": points}).items()}
 
 
-def write_binary(calibration: Calibration) -> dict[str, bytes]:
-    """The same in COLMAP's binary form."""
-    cameras, images = rows(calibration)
-    return colmap_binary.packed(cameras, images)
+FORMAT = Format(
+    name="colmap",
+    title="COLMAP model as text",
+    file="a folder",
+    recognise=is_model,
+    read=read,
+    write=write,
+    own_world=True,
+    models=f"{listed(WRITTEN)}; SIMPLE_FISHEYE and FISHEYE are read too",
+    says="first pixel's centre at (0.5, 0.5); quaternion w x y z, world → camera; no unit",
+    lacks="skew, thin prisms of a lens that is no fisheye, names with spaces",
+    rank=25,
+)

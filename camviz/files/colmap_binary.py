@@ -1,45 +1,47 @@
-"""COLMAP's binary files: little-endian, counted, and not to be believed before they are weighed."""
+"""COLMAP models in binary: little-endian files, whose counts are checked before anything is made of them."""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
-from camviz.calibration.types import CalibrationError
-from camviz.files.models import Model
+from camviz.calibration.types import Calibration, CalibrationError
+from camviz.files import colmap
+from camviz.files.colmap import MODELS, UNNAMED, Cameras, Image, camera_of, unknown_model
+from camviz.files.format import File
 from camviz.files.section import Section
 from camviz.files.text import MAX_BYTES, open_bounded
-
-if TYPE_CHECKING:
-    from camviz.cameras import Camera
-    from camviz.files.colmap import Image, Row
 
 MAX_CAMERAS, MAX_IMAGES, MAX_NAME = 10_000, 100_000, 1024
 POINT = 24  # bytes: x, y, number of the 3D point
 
 
-def cameras(path: Path, models: Mapping[int, Model], unknown: Callable[[str], Exception]) -> dict[int, Camera]:
-    """By number: uint32 id, int32 model, uint64 width, uint64 height, double parameters."""
-    from camviz.files.colmap import UNNAMED, camera_of
+def read(file: File) -> Calibration:
+    """The images of a model as cameras in its world, by name; without an images file the cameras alone."""
+    return colmap.read_model(colmap.cameras_file(file.path, ".bin") or file.path, file, _cameras, _images)
 
-    found: dict[int, Camera] = {}
+
+def _cameras(path: Path) -> Cameras:
+    """By number: uint32 id, int32 model, uint64 width, uint64 height, double parameters."""
+    found: Cameras = {}
     with open_bounded(path, MAX_BYTES) as file:
         for index in range(_count(file, MAX_CAMERAS, "cameras")):
             key, number, width, height = _unpack(file, "<IiQQ")
-            if number not in models:
-                raise unknown(UNNAMED.get(int(number), f"number {number}"))
-            params = _unpack(file, f"<{len(models[int(number)].names)}d")
+            if number not in MODELS:
+                raise unknown_model(UNNAMED.get(int(number), f"number {number}"))
+            params = _unpack(file, f"<{len(MODELS[int(number)].names)}d")
             if key in found:
                 raise CalibrationError(f"the camera {key} appears twice")
             section = Section({"size": [width, height], "params": list(params)}, f"camera[{index}]")
-            found[int(key)] = camera_of(models[int(number)], section)
+            found[int(key)] = camera_of(MODELS[int(number)], section)
         _at_end(file)
     return found
 
 
-def images(path: Path) -> Iterator[Image]:
+def _images(path: Path) -> Iterator[Image]:
     """uint32 id, double q w x y z and t x y z, uint32 camera, the name up to a NUL, and the points, passed over."""
     with open_bounded(path, 64 * MAX_BYTES) as file:
         for _ in range(_count(file, MAX_IMAGES, "images")):
@@ -90,8 +92,9 @@ def _at_end(file: BinaryIO) -> None:
         raise CalibrationError("goes on after all that it announces was said")
 
 
-def packed(rows: list[Row], placed: list[Image]) -> dict[str, bytes]:
+def write(calibration: Calibration) -> dict[str, bytes]:
     """cameras.bin, images.bin and a points3D.bin without points."""
+    rows, placed = colmap.rows(calibration)
     all_cameras = [struct.pack("<Q", len(rows))]
     for key, number, _, values, camera in rows:
         size = camera.intrinsics.width, camera.intrinsics.height
@@ -101,3 +104,16 @@ def packed(rows: list[Row], placed: list[Image]) -> dict[str, bytes]:
         all_images.append(struct.pack("<I7dI", index, *pose, key) + name.encode() + b"\0" + struct.pack("<Q", 0))
     nothing = struct.pack("<Q", 0)
     return {"cameras.bin": b"".join(all_cameras), "images.bin": b"".join(all_images), "points3D.bin": nothing}
+
+
+FORMAT = replace(
+    colmap.FORMAT,
+    name="colmap-bin",
+    title="binary COLMAP model",
+    recognise=lambda file: file.path.suffix == ".bin" or colmap.cameras_file(file.path, ".bin"),
+    read=read,
+    write=write,
+    models="as `colmap`",
+    says="as `colmap`",
+    rank=10,
+)

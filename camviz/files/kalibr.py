@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import re
 from typing import Any
 
 from camviz.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera, Intrinsics
+from camviz.cameras import Camera
+from camviz.files.format import File, Format, coefficients_of
 from camviz.files.models import Model, expressed
 from camviz.files.opencv import image_size
-from camviz.files.output import as_yaml, refuse_own_world, rows_of
-from camviz.files.section import Section, explained
+from camviz.files.output import as_rows, as_yaml
+from camviz.files.section import Section, Size
 from camviz.files.trees import shown
 from camviz.lenses import (
     BrownConrady,
@@ -18,32 +19,16 @@ from camviz.lenses import (
     ExtendedUnified,
     FieldOfView,
     KannalaBrandt,
-    Lens,
     Perspective,
     UnifiedSphere,
 )
 from camviz.poses import RigidTransform
 
-PROJECTIONS = {
-    "pinhole": "fu fv pu pv",
-    "omni": "xi fu fv pu pv",
-    "eucm": "alpha beta fu fv pu pv",
-    "ds": "xi alpha fu fv pu pv",
-}
-DISTORTIONS = {"radtan": "k1 k2 p1 p2", "equidistant": "k1 k2 k3 k4", "fov": "w", "none": ""}
+WORDS = ("camera_model", "distortion_model")
 SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
-LENSES = {
-    ("pinhole", "radtan"): BrownConrady,
-    ("pinhole", "equidistant"): KannalaBrandt,
-    ("pinhole", "fov"): FieldOfView,
-    ("pinhole", "none"): Perspective,
-    ("omni", "radtan"): UnifiedSphere,
-    ("omni", "none"): UnifiedSphere,
-    ("eucm", "none"): ExtendedUnified,
-    ("ds", "none"): DoubleSphere,
-}
+TITLE = "Kalibr camchain"
 GRID = "fx fy cx cy"
-WRITTEN = [
+MODELS = [  # camera_model and distortion_model; Kalibr's fu fv pu pv are the grid, and its w is omega
     Model("pinhole none", Perspective, GRID),
     Model("pinhole radtan", BrownConrady, f"{GRID} k1 k2 p1 p2"),
     Model("pinhole equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
@@ -55,9 +40,9 @@ WRITTEN = [
 ]
 
 
-def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+def read(file: File) -> Calibration:
     """The cameras of the chain in place: the world is cam0's frame, T_cn_cnm1 is cam_n from cam_(n-1)."""
-    chain = _chain(section)
+    chain = _chain(file.section)
     cameras: dict[str, Camera] = {}
     cam_from_world, notes = RigidTransform.identity(), []
     for index, (name, part) in enumerate(chain.items()):
@@ -67,9 +52,9 @@ def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibrat
                 step = RigidTransform.identity()
                 notes.append(f"The file does not say where {name} stands: it is drawn at the place of cam{index - 1}.")
             cam_from_world = step * cam_from_world
-        cameras[name] = _camera(part, size).at(cam_from_world.inv())
+        cameras[name] = _camera(part, file.size).at(cam_from_world.inv())
     imu = _cam_from_imu(chain["cam0"])
-    return Calibration(cameras, path, "Kalibr camchain", world_from_imu=imu, notes=tuple(notes))
+    return Calibration(cameras, file.path, TITLE, world_from_imu=imu, notes=tuple(notes))
 
 
 def _chain(section: Section) -> dict[str, Section]:
@@ -80,34 +65,28 @@ def _chain(section: Section) -> dict[str, Section]:
     return {name: section.section(name) for name in expected}
 
 
-def _camera(part: Section, size: tuple[int, int] | None) -> Camera:
-    projection = _choice(part, "camera_model", PROJECTIONS)
-    values = part.vector("intrinsics", [len(PROJECTIONS[projection].split())], PROJECTIONS[projection])
-    width, height = image_size(part, size)
-    with explained(part.where("intrinsics")):
-        grid = Intrinsics(width, height, *values[-4:])
-    return Camera(grid, _lens(part, projection, values[:-4]))
+def _camera(part: Section, given: Size | None) -> Camera:
+    model = _model(part)
+    count = model.names.index("cy") + 1
+    values = part.vector("intrinsics", [count], " ".join(model.names[:count]))
+    size = image_size(part, given)
+    if model.names[count:] or part.values.get("distortion_coeffs"):
+        model, coefficients = coefficients_of(part, "distortion_coeffs", model, count)
+        values += coefficients
+    return model.camera(values, *size, 0.0, part.where("intrinsics"))
 
 
-def _lens(part: Section, projection: str, shape: list[float]) -> Lens:
-    distortion = _choice(part, "distortion_model", DISTORTIONS)
-    lens = LENSES.get((projection, distortion))
-    if lens is None:
-        known = ", ".join(other for model, other in LENSES if model == projection)
-        raise part.error("distortion_model", f"{known} with {projection}", shown(distortion))
-    names = DISTORTIONS[distortion].split()
-    held = part.values.get("distortion_coeffs") or names
-    others = (5, 8) if lens is BrownConrady else ()
-    coefficients = part.coefficients("distortion_coeffs", [len(names)], " ".join(names), others) if held else []
-    with explained(part.path):
-        return lens(*shape, *coefficients)
-
-
-def _choice(part: Section, key: str, known: dict[str, str]) -> str:
-    value = SYNONYMS.get(part.text(key), part.text(key))
-    if value not in known:
-        raise part.error(key, " or ".join(known), shown(value))
-    return value
+def _model(part: Section) -> Model:
+    projection, distortion = (SYNONYMS.get(part.text(key), part.text(key)) for key in WORDS)
+    by_name = {model.name: model for model in MODELS}
+    for index, word in enumerate((projection, distortion)):
+        known = list(dict.fromkeys(name.split()[index] for name in by_name))
+        if word not in known:
+            raise part.error(WORDS[index], " or ".join(known), shown(word))
+    if f"{projection} {distortion}" not in by_name:
+        known = [name.split()[1] for name in by_name if name.startswith(f"{projection} ")]
+        raise part.error(WORDS[1], f"{', '.join(known)} with {projection}", shown(distortion))
+    return by_name[f"{projection} {distortion}"]
 
 
 def _from_previous(part: Section, previous: Section) -> RigidTransform | None:
@@ -130,24 +109,23 @@ def _cam_from_imu(part: Section) -> RigidTransform | None:
 
 def write(calibration: Calibration) -> bytes:
     """cam0, cam1 …, each beside the one before and, where there is one, beside the IMU."""
-    refuse_own_world(calibration, "Kalibr")
     chain: dict[str, Any] = {}
     before = None
     for index, (name, camera) in enumerate(calibration.cameras.items()):
         part = _written(name, camera)
         if calibration.world_from_imu is not None:
-            part["T_cam_imu"] = rows_of(camera.cam_from_world * calibration.world_from_imu)
+            part["T_cam_imu"] = as_rows(camera.cam_from_world * calibration.world_from_imu)
         if before is not None:
-            part["T_cn_cnm1"] = rows_of(camera.cam_from_world * before.world_from_cam)
+            part["T_cn_cnm1"] = as_rows(camera.cam_from_world * before.world_from_cam)
         chain[f"cam{index}"], before = part, camera
     return as_yaml(chain)
 
 
 def _written(name: str, camera: Camera) -> dict[str, Any]:
-    model, same = expressed(name, camera, WRITTEN, "Kalibr")
+    model, same = expressed(name, camera, MODELS, TITLE)
     projection, distortion = model.name.split()
     values = model.values(same, 0.0)
-    count = len(PROJECTIONS[projection].split())
+    count = model.names.index("cy") + 1
     return {
         "camera_model": projection,
         "intrinsics": values[:count],
@@ -155,3 +133,17 @@ def _written(name: str, camera: Camera) -> dict[str, Any]:
         "distortion_coeffs": values[count:],
         "resolution": [camera.intrinsics.width, camera.intrinsics.height],
     }
+
+
+FORMAT = Format(
+    name="kalibr",
+    title=TITLE,
+    file="camchain.yaml",
+    recognise=lambda file: any(re.fullmatch(r"cam\d+", key) for key in file.section.values),
+    read=read,
+    write=write,
+    models="pinhole with radtan, equidistant, fov, none; omni with radtan, none; eucm; ds",
+    says="T_cn_cnm1 from the camera before; T_cam_imu from the IMU (OpenVINS's T_imu_cam is read too)",
+    lacks="skew, k3",
+    rank=41,
+)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -11,9 +10,9 @@ import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
+from camviz.files.format import File, Format
 from camviz.files.models import Model, expressed
-from camviz.files.section import Section
-from camviz.files.sizes import agreed_size, two_sides
+from camviz.files.section import Section, Size, agreed_size
 from camviz.files.trees import Repeated, shown
 from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt
 
@@ -28,15 +27,18 @@ TYPES = {"frame": 0, "fisheye": 1, "equidistant_fisheye": 1, "spherical": 2, "cy
 COEFFICIENTS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 
 
-def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+def read(file: File) -> Calibration:
     """`<calibration>`: one camera at the origin; `<document>`: every aligned camera in the chunk's frame."""
-    if "<calibration>" in section:
-        calibration = section.section("<calibration>")
+    if "<calibration>" in file.section:
+        calibration = file.section.section("<calibration>")
         kind = calibration.text("projection") if "projection" in calibration else "frame"
-        held = two_sides(calibration, "width", "height")
-        return Calibration({"camera": _camera(calibration, kind, held, size)}, path, "Metashape calibration")
-    chunk = section.section("<document>").section("chunk")
-    sensors = {str(sensor.get("id", "a number")): sensor for sensor in _each(chunk, "sensors", "sensor")}
+        held = calibration.sides("width", "height")
+        return Calibration({"camera": _camera(calibration, kind, held, file.size)}, file.path, "Metashape calibration")
+    return _read_document(file.section.section("<document>").section("chunk"), file)
+
+
+def _read_document(chunk: Section, file: File) -> Calibration:
+    sensors = {str(sensor.get("id", "a number")): sensor for sensor in _each(chunk.section("sensors"), "sensor")}
     shared: dict[str, Camera] = {}
     cameras: dict[str, Camera] = {}
     lost = 0
@@ -48,45 +50,44 @@ def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibrat
         if key not in sensors or name in cameras:
             raise part.error("label" if key in sensors else "sensor_id", "one that the file has once", shown(name))
         if key not in shared:
-            shared[key] = _sensor(sensors[key], size)
+            shared[key] = _sensor(sensors[key], file.size)
         cameras[name] = shared[key].at(part.transform("transform"))
     if not cameras:
         raise CalibrationError("<document>.chunk.cameras: expected a camera with a transform, found none")
     notes = ["The world is the chunk's own frame; its transform to the earth is not applied."]
     notes += [f"{lost} cameras that were not aligned are left out."] * (lost > 0)
-    return Calibration(cameras, path, "Metashape cameras", notes=tuple(notes))
+    return Calibration(cameras, file.path, "Metashape cameras", notes=tuple(notes))
 
 
-def _each(section: Section, outer: str, inner: str) -> list[Section]:
-    part = section.section(outer)
-    held = part.values.get(inner)
+def _each(section: Section, name: str) -> list[Section]:
+    """The elements of a name inside another, however many there are."""
+    held = section.values.get(name)
     parts = held if isinstance(held, Repeated) else [] if held is None else [held]
     if not all(isinstance(value, dict) for value in parts):
-        raise part.error(inner, "elements with attributes", shown(held))
-    return [part.part(value, part.where(f"{inner}[{index}]")) for index, value in enumerate(parts)]
+        raise section.error(name, "elements with attributes", shown(held))
+    return [section.part(value, section.where(f"{name}[{index}]")) for index, value in enumerate(parts)]
 
 
 def _cameras(section: Section) -> Iterator[Section]:
     """Those of a list, and those in its groups."""
-    holder = section.part({"cameras": dict(section.values)}, section.path)
-    yield from _each(holder, "cameras", "camera")
-    for group in _each(holder, "cameras", "group"):
+    yield from _each(section, "camera")
+    for group in _each(section, "group"):
         yield from _cameras(group)
 
 
-def _sensor(sensor: Section, size: tuple[int, int] | None) -> Camera:
-    found = _each(sensor.part({"sensor": dict(sensor.values)}, sensor.path), "sensor", "calibration")
+def _sensor(sensor: Section, size: Size | None) -> Camera:
+    found = _each(sensor, "calibration")
     adjusted = [part for part in found if part.values.get("class") == "adjusted"] or found
     if not adjusted:
         raise sensor.error("calibration", "a calibration", "none")
     calibration = adjusted[0]
     holder = calibration if "resolution" in calibration else sensor
-    held = two_sides(holder.section("resolution"), "width", "height") if "resolution" in holder else None
+    held = holder.section("resolution").sides("width", "height") if "resolution" in holder else None
     kind = calibration.text("type") if "type" in calibration else "frame"
     return _camera(calibration, kind, held, size)
 
 
-def _camera(section: Section, kind: str, held: tuple[int, int] | None, size: tuple[int, int] | None) -> Camera:
+def _camera(section: Section, kind: str, held: Size | None, size: Size | None) -> Camera:
     """u = w/2 + cx + x' (f + b1) + y' b2, v = h/2 + cy + y' f, with the first pixel's centre at 0.5."""
     width, height = agreed_size(held, size, "width, height")
     if kind not in TYPES:
@@ -161,3 +162,18 @@ def _sensor_lines(number: int, name: str, camera: Camera) -> list[str]:
         f'<sensor id="{number}" label="sensor {number}" type="{kind}">{size}',
         f'<calibration type="{kind}" class="adjusted">{size}{numbers}</calibration></sensor>',
     ]
+
+
+FORMAT = Format(
+    name="metashape",
+    title="Metashape",
+    file="camera.xml",
+    recognise=lambda file: "<calibration>" in file.section or "<document>" in file.section,
+    read=read,
+    write=write,
+    own_world=True,
+    models="frame, fisheye, spherical, cylindrical",
+    says="one camera or cameras in place; cx, cy from the middle of the image, first pixel's centre at 0.5; "
+    "f = fy, b1 = fx − fy, b2 = skew; p1 and p2 the other way round",
+    lacks="rational, prism and tilt coefficients",
+)

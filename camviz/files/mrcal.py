@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from camviz.calibration.types import Calibration
+from camviz.files.format import File, Format, listed
+from camviz.files.literal import parse_literal
 from camviz.files.models import Model, expressed, model_named
-from camviz.files.output import only_camera
-from camviz.files.section import COUNT, Section
-from camviz.files.sizes import pair_of_sides
+from camviz.files.section import COUNT, Section, agreed_size
 from camviz.files.text import HEAD
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, Equirectangular, Perspective, Stereographic
 from camviz.poses import RigidTransform, Rotation
 
+TITLE = "mrcal cameramodel"
 GRID = "fx fy cx cy"
 MODELS = [
     Model("LENSMODEL_PINHOLE", Perspective, GRID),
@@ -29,26 +29,28 @@ POSES = ("rt_cam_ref", "extrinsics")  # the second until mrcal 2.4
 _KEY = re.compile(r"""(?:\s|#[^\n]*\n)*\{(?:\s|#[^\n]*\n)*['"](?:lensmodel|[a-z_]+)['"]\s*:""")
 
 
-def is_model(text: str, path: Path) -> bool:
+def is_model(file: File) -> bool:
     """True for a .cameramodel, and for a literal that names a lens model."""
-    named = path.suffix == ".cameramodel" or re.search(r"""['"]lensmodel['"]\s*:""", text[:HEAD])
-    return bool(named and _KEY.match(text[:HEAD]))
+    head = file.text[:HEAD]
+    named = file.path.suffix == ".cameramodel" or re.search(r"""['"]lensmodel['"]\s*:""", head)
+    return bool(named and _KEY.match(head))
 
 
-def read(section: Section, path: Path) -> Calibration:
+def read(file: File) -> Calibration:
     """One camera in mrcal's reference frame: [r t] takes points from it to the camera."""
+    section = file.mapping(parse_literal(file.text))
     name = section.text("lensmodel")
     model = model_named(name, MODELS)
     if model is None:
-        known = ", ".join(each.name for each in MODELS)
-        raise section.error("lensmodel", f"one of {known}, the ones there is a lens for here", shown(name))
-    width, height = pair_of_sides(section, "imagersize")
+        raise section.error("lensmodel", f"one of {listed(MODELS)}, the ones there is a lens for here", shown(name))
+    size = agreed_size(section.size("imagersize"), file.size, "imagersize")
     values = section.vector("intrinsics", [len(model.names)], model.parameters, COUNT)
-    camera = model.camera(values, width, height, 0.0, section.where("intrinsics"))
+    camera = model.camera(values, *size, 0.0, section.where("intrinsics"))
     key = next((key for key in POSES if key in section), POSES[0])
     rt = section.vector(key, [6], "rotation vector and translation") if key in section else [0.0] * 6
     cam_from_world = RigidTransform.from_components(rt[3:], Rotation.from_rotvec(rt[:3]))
-    return Calibration({"camera": camera.at(cam_from_world.inv())}, path, "mrcal cameramodel", notes=_notes(section))
+    placed = {"camera": camera.at(cam_from_world.inv())}
+    return Calibration(placed, file.path, TITLE, notes=_notes(section))
 
 
 def _notes(section: Section) -> tuple[str, ...]:
@@ -58,8 +60,8 @@ def _notes(section: Section) -> tuple[str, ...]:
 
 def write(calibration: Calibration) -> bytes:
     """The literal, with `extrinsics`, which every mrcal reads."""
-    name, camera = only_camera(calibration, "mrcal's cameramodel")
-    model, same = expressed(name, camera, MODELS, "mrcal's cameramodel")
+    ((name, camera),) = calibration.cameras.items()
+    model, same = expressed(name, camera, MODELS, TITLE)
     grid, pose = camera.intrinsics, camera.cam_from_world
     rt = [float(x) for x in (*pose.rotation.as_rotvec(), *pose.translation)]
     lines = [
@@ -71,3 +73,19 @@ def write(calibration: Calibration) -> bytes:
         f"'imagersize': [{grid.width}, {grid.height}],",
     ]
     return ("{\n" + "".join(f"    {line}\n" for line in lines) + "}\n").encode()
+
+
+FORMAT = Format(
+    name="mrcal",
+    title=TITLE,
+    file="camera.cameramodel",
+    recognise=is_model,
+    read=read,
+    write=write,
+    most_cameras=1,
+    own_world=True,
+    models=listed(MODELS).replace("LENSMODEL_", ""),
+    says="[r t] from the reference to the camera (`extrinsics`, `rt_cam_ref`)",
+    lacks="skew, tilt",
+    rank=30,
+)

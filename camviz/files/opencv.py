@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
 from camviz.calibration.types import Board, Calibration, CalibrationError
-from camviz.cameras import Camera, Intrinsics
-from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
-from camviz.files.sizes import agreed_size, pair_of_sides
+from camviz.cameras import Camera
+from camviz.files.format import File, Format
+from camviz.files.opencv_writing import TITLE, write
+from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
 from camviz.poses import RigidTransform, Rotation
 
@@ -38,30 +38,30 @@ def camera_tags(section: Section) -> set[str]:
     return {tag for key in matrices if (tag := _tag(key, MATRIX)) is not None}
 
 
-def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+def read(file: File) -> Calibration:
     """One camera, or a pair with X_right = R X_left + T; the world is the left camera's frame."""
-    tags = camera_tags(section)
+    tags = camera_tags(file.section)
     if len(tags) == 1:
-        return _read_one(section, path, size, tags.pop())
+        return _read_one(file, tags.pop())
     if tags in PAIRS:
-        return _read_pair(section, path, size, *sorted(tags))
-    keys = ", ".join(sorted(key for key in section.values if _tag(key, MATRIX) is not None))
+        return _read_pair(file, *sorted(tags))
+    keys = ", ".join(sorted(key for key in file.section.values if _tag(key, MATRIX) is not None))
     raise CalibrationError(f"expected one camera matrix or a pair such as M1 and M2, got {keys}")
 
 
-def _read_one(section: Section, path: Path, size: tuple[int, int] | None, tag: str) -> Calibration:
+def _read_one(file: File, tag: str) -> Calibration:
+    section = file.section
     name = section.text("camera_name") if "camera_name" in section else "camera"
-    width, height = image_size(section, size)
-    camera, notes = _camera(section, tag, width, height), _notes(section, [tag])
+    camera, notes = _camera(section, tag, image_size(section, file.size)), _notes(section, [tag])
     if key := _find(section, ROTATION):
         section.rotation(key)
         notes.append("R and T are not used: the file holds one camera, and it stands at the origin.")
-    return Calibration({name: camera}, path, "OpenCV FileStorage", **_recorded(section, {name: tag}, notes))
+    return Calibration({name: camera}, file.path, TITLE, **_recorded(section, {name: tag}, notes))
 
 
-def _read_pair(section: Section, path: Path, size: tuple[int, int] | None, left: str, right: str) -> Calibration:
-    width, height = image_size(section, size)
-    notes = _notes(section, [left, right])
+def _read_pair(file: File, left: str, right: str) -> Calibration:
+    section = file.section
+    size, notes = image_size(section, file.size), _notes(section, [left, right])
     right_from_left = _right_from_left(section)
     if right_from_left is None:
         right_from_left = RigidTransform.identity()
@@ -70,38 +70,25 @@ def _read_pair(section: Section, path: Path, size: tuple[int, int] | None, left:
         if key := _find(section, ROTATION, tag):
             section.rotation(key)
     cameras = {
-        "left": _camera(section, left, width, height),
-        "right": _camera(section, right, width, height).at(right_from_left.inv()),
+        "left": _camera(section, left, size),
+        "right": _camera(section, right, size).at(right_from_left.inv()),
     }
     recorded = _recorded(section, {"left": left, "right": right}, notes)
-    return Calibration(cameras, path, "OpenCV FileStorage, stereo", **recorded)
+    return Calibration(cameras, file.path, f"{TITLE}, stereo", **recorded)
 
 
-def image_size(section: Section, given: tuple[int, int] | None) -> tuple[int, int]:
+def image_size(section: Section, given: Size | None) -> Size:
     """Width and height from the file, or as given where the file is silent; never one against the other."""
-    return agreed_size(_held_size(section), given, "image_width, image_height")
-
-
-def _held_size(section: Section) -> tuple[int, int] | None:
     if key := _find(section, SIZE):
-        return pair_of_sides(section, key)
-    keys = _find(section, WIDTH), _find(section, HEIGHT)
-    if keys == (None, None):
-        return None
-    wide, high = keys[0] or "image_width", keys[1] or "image_height"
-    return section.whole(wide, LARGEST_SIDE), section.whole(high, LARGEST_SIDE)
+        held = section.size(key)
+    else:
+        held = section.sides(_find(section, WIDTH) or "image_width", _find(section, HEIGHT) or "image_height")
+    return agreed_size(held, given, "image_width, image_height")
 
 
-def intrinsics(section: Section, key: str, width: int, height: int) -> Intrinsics:
-    """The camera matrix under `key`, 3×3."""
-    with explained(section.where(key), BAD_K):
-        K = section.camera_matrix(section.matrix(key, 3, 3), section.where(key))
-        return Intrinsics.from_matrix(K, width, height)
-
-
-def _camera(section: Section, tag: str, width: int, height: int) -> Camera:
+def _camera(section: Section, tag: str, size: Size) -> Camera:
     key = _find(section, MATRIX, tag) or "camera_matrix"
-    return Camera(intrinsics(section, key, width, height), _lens(section, tag))
+    return Camera(section.intrinsics(section.matrix(key, 3, 3), section.where(key), size), _lens(section, tag))
 
 
 def _lens(section: Section, tag: str) -> Lens:
@@ -249,3 +236,19 @@ def _tag(key: str, spellings: str) -> str | None:
     plain = key.replace("_", "").lower()
     match = re.fullmatch(rf"(?P<before>left|right)?(?:{spellings})(?P<after>[0-9]|left|right|l|r)?", plain)
     return match and (match["before"] or "") + (match["after"] or "")
+
+
+FORMAT = Format(
+    name="opencv",
+    title=TITLE,
+    file="camera.yml, .xml or .json",
+    recognise=lambda file: camera_tags(file.section),
+    read=read,
+    write=write,
+    endings=(".yml", ".xml", ".json"),
+    most_cameras=2,
+    models="5, 8, 12, 14 coefficients; `fisheye_model: 1`; `xi` of omnidir",
+    says="X_right = R X_left + T",
+    lacks="skew (but for omnidir)",
+    rank=80,
+)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -12,7 +11,6 @@ import numpy as np
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.models import Model, expressed
-from camviz.files.output import refuse_own_world
 from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
 
 GRID = "fx fy cx cy"
@@ -30,16 +28,9 @@ MODELS = [
 TITLE = "OpenCV FileStorage"
 
 
-def write(calibration: Calibration, path: Path) -> bytes:
-    """In the form that the path's ending asks for, YAML where it asks for none."""
-    refuse_own_world(calibration, TITLE)
-    count = len(calibration.cameras)
-    if count > 2:
-        raise CalibrationError(
-            f"{TITLE} holds one camera or a pair, this calibration has {count}: choose one (--camera NAME)"
-        )
-    values = _pair(calibration) if count == 2 else _one(calibration)
-    return _stored(values, path.suffix.lower())
+def write(calibration: Calibration, ending: str) -> bytes:
+    """In the form that the ending asks for, YAML where it asks for none."""
+    return _stored(_pair(calibration) if len(calibration.cameras) == 2 else _one(calibration), ending)
 
 
 def _one(calibration: Calibration) -> dict[str, Any]:
@@ -114,10 +105,10 @@ def _views(calibration: Calibration, name: str, tag: str) -> dict[str, Any]:
     return {f"{key}{tag}": value for key, value in values.items()}
 
 
-def _stored(values: dict[str, Any], suffix: str) -> bytes:
+def _stored(values: dict[str, Any], ending: str) -> bytes:
     import cv2
 
-    ending = suffix if suffix in (".xml", ".json") else ".yml"
+    ending = ending if ending in (".xml", ".json") else ".yml"
     storage = cv2.FileStorage(f"calibration{ending}", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     for key, value in values.items():
         if isinstance(value, list):

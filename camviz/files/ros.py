@@ -2,60 +2,56 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.files.format import File, Format, chosen, listed
 from camviz.files.models import Model, expressed
-from camviz.files.opencv import image_size, intrinsics
-from camviz.files.output import as_yaml, only_camera, refuse_own_world
+from camviz.files.opencv import image_size
+from camviz.files.output import as_matrix, as_yaml
 from camviz.files.section import COUNT, Section, explained
-from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens
 
-COUNTS = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}  # sensor_msgs/distortion_models.hpp
-MEANINGS = {
-    "plumb_bob": "k1 k2 p1 p2 k3",
-    "rational_polynomial": "k1 k2 p1 p2 k3 k4 k5 k6",
-    "equidistant": "k1 k2 k3 k4",
-}
+TITLE = "ROS CameraInfo"
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
 RECTIFICATION, PROJECTION = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
 GRID = "fx fy cx cy"
-WRITTEN = [
+MODELS = [  # sensor_msgs/distortion_models.hpp
     Model("plumb_bob", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
     Model("rational_polynomial", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
     Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
 ]
 
 
-def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+def read(file: File) -> Calibration:
     """One camera at the origin; where P tells of a stereo pair, a note gives the baseline."""
-    width, height = image_size(section, size)
-    camera = Camera(intrinsics(section, _key(section, MATRIX), width, height), _lens(section))
+    section = file.section
+    key, size = _key(section, MATRIX), image_size(section, file.size)
+    grid = section.intrinsics(section.matrix(key, 3, 3), section.where(key), size)
     name = section.text("camera_name") if "camera_name" in section else "camera"
-    return Calibration({name: camera}, path, "ROS CameraInfo", notes=_notes(section))
+    return Calibration({name: Camera(grid, _lens(section))}, file.path, TITLE, notes=_notes(section))
 
 
 def _lens(section: Section) -> Lens:
-    model, key = section.text("distortion_model"), _key(section, DISTORTION)
-    if model not in COUNTS:
-        raise section.error("distortion_model", " or ".join(COUNTS), shown(model))
-    count, values = section.array(key).size, section.array(key).ravel()
-    if count != COUNTS[model]:
-        fitting = [f"; {count} belong to {other}" for other in COUNTS if COUNTS[other] == count]
-        expected = f"{COUNTS[model]} numbers ({MEANINGS[model]}) for {model}"
-        error = section.error(key, expected, f"{count}{''.join(fitting)}", COUNT, count)
-        if model == "equidistant" or count not in (4, 5, 8):
+    model, key = chosen(section, "distortion_model", MODELS), _key(section, DISTORTION)
+    names, values = model.names[4:], section.array(key).ravel()
+    if values.size == len(names):
+        values = np.array(section.vector(key, [len(names)], " ".join(names)))
+    else:
+        error = _wrong_count(section, key, model, values.size)
+        if model.lens is KannalaBrandt or values.size not in (4, 5, 8):
             raise error
         section.mend(error)
-    else:
-        values = np.array(section.vector(key, [COUNTS[model]], MEANINGS[model]))
     with explained(section.where(key)):
-        return KannalaBrandt(*values) if model == "equidistant" else BrownConrady.from_coefficients(values)
+        return KannalaBrandt(*values) if model.lens is KannalaBrandt else BrownConrady.from_coefficients(values)
+
+
+def _wrong_count(section: Section, key: str, model: Model, count: int) -> CalibrationError:
+    fitting = "".join(f"; {count} belong to {other.name}" for other in MODELS if len(other.names) == count + 4)
+    names = model.names[4:]
+    expected = f"{len(names)} numbers ({' '.join(names)}) for {model.name}"
+    return section.error(key, expected, f"{count}{fitting}", COUNT, count)
 
 
 def _notes(section: Section) -> tuple[str, ...]:
@@ -97,22 +93,32 @@ def _key(section: Section, names: tuple[str, ...]) -> str:
 
 def write(calibration: Calibration) -> bytes:
     """The file of camera_calibration_parsers, for one camera that is not rectified: R = 1, P = [K 0]."""
-    name, camera = only_camera(calibration, "ROS CameraInfo")
-    refuse_own_world(calibration, "ROS CameraInfo")
-    model, same = expressed(name, camera, WRITTEN, "ROS CameraInfo")
+    ((name, camera),) = calibration.cameras.items()
+    model, same = expressed(name, camera, MODELS, TITLE)
     grid = same.intrinsics
     tree = {
         "image_width": grid.width,
         "image_height": grid.height,
         "camera_name": name,
-        "camera_matrix": _matrix(grid.K),
+        "camera_matrix": as_matrix(grid.K),
         "distortion_model": model.name,
-        "distortion_coefficients": _matrix(np.array([model.values(same, 0.0)[4:]])),
-        "rectification_matrix": _matrix(np.eye(3)),
-        "projection_matrix": _matrix(np.column_stack([grid.K, np.zeros(3)])),
+        "distortion_coefficients": as_matrix(np.array([model.values(same, 0.0)[4:]])),
+        "rectification_matrix": as_matrix(np.eye(3)),
+        "projection_matrix": as_matrix(np.column_stack([grid.K, np.zeros(3)])),
     }
     return as_yaml(tree)
 
 
-def _matrix(values: np.ndarray) -> dict[str, Any]:
-    return {"rows": values.shape[0], "cols": values.shape[1], "data": [float(x) for x in values.ravel()]}
+FORMAT = Format(
+    name="ros",
+    title=TITLE,
+    file="camera.yaml",
+    recognise=lambda file: "distortion_model" in file.section or "projection_matrix" in file.section,
+    read=read,
+    write=write,
+    most_cameras=1,
+    models=listed(MODELS),
+    says="file or message; P[0,3] = −fx B, read as a note",
+    lacks="skew",
+    rank=70,
+)

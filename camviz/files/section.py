@@ -1,4 +1,4 @@
-"""A part of a calibration file that remembers where it stands, so that every complaint names its key and index."""
+"""A part of a calibration file that knows where it stands in it, so that every error names its key and index."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.calibration.types import CalibrationError
+from camviz.cameras import Intrinsics
 from camviz.files.trees import MAX_NODES, shown
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
@@ -20,6 +21,7 @@ from camviz.poses import RigidTransform, Rotation
 LARGEST = 1e9  # larger magnitudes are damage, not metres or pixels
 LARGEST_SIDE = 32768  # pixels
 ROTATION_TOLERANCE = 1e-3  # of R Rᵀ = 1, for files written with few digits
+Size = tuple[int, int]  # width and height in pixels
 NOT_A_ROTATION, BAD_K, COUNT = "not-a-rotation", "bad-k", "coefficient-count"  # findings of the clinic
 
 
@@ -38,9 +40,11 @@ class Section:
         return self.values.get(key) is not None
 
     def where(self, key: str) -> str:
+        """The path of keys that leads to this one."""
         return f"{self.path}.{key}" if self.path else key
 
     def error(self, key: str, expected: str, got: Any, id: str = "", value: float | None = None) -> CalibrationError:
+        """What is wrong under a key: what was expected there and what came."""
         return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}", id, value)
 
     def mend(self, error: CalibrationError) -> None:
@@ -54,17 +58,27 @@ class Section:
         return Section(values, where, self.mended)
 
     def get(self, key: str, expected: str) -> Any:
+        """The value of a key that must be there."""
         if key not in self:
             raise CalibrationError(f"{self.where(key)}: expected {expected}, the key is missing")
         return self.values[key]
 
     def section(self, key: str) -> Section:
+        """A mapping."""
         value = self.get(key, "a mapping")
         if not isinstance(value, dict):
             raise self.error(key, "a mapping", shown(value))
         return self.part(value, self.where(key))
 
+    def sections(self, key: str) -> list[Section]:
+        """The mappings of a list."""
+        held = self.get(key, "a list")
+        if not isinstance(held, list) or not all(isinstance(part, dict) for part in held):
+            raise self.error(key, "a list of mappings", shown(held))
+        return [self.part(part, self.where(f"{key}[{index}]")) for index, part in enumerate(held)]
+
     def text(self, key: str) -> str:
+        """A word."""
         value = self.get(key, "a word")
         if not isinstance(value, str):
             raise self.error(key, "a word", shown(value))
@@ -78,6 +92,7 @@ class Section:
         return value
 
     def number(self, key: str) -> float:
+        """One finite number, bare or as a matrix of one element."""
         value = self.get(key, "a number")
         values = self.array(key) if isinstance(value, (list, dict)) else _as_array(value, self.where(key))
         if values.size != 1:
@@ -86,10 +101,24 @@ class Section:
         return float(values.flat[0])
 
     def whole(self, key: str, largest: int) -> int:
+        """A whole number from 1 to the largest."""
         value = self.number(key)
         if value != int(value) or not 1 <= value <= largest:
             raise self.error(key, f"a whole number from 1 to {largest}", f"{value:g}")
         return int(value)
+
+    def sides(self, wide: str, high: str) -> Size | None:
+        """Width and height from a key each; None where the file has neither."""
+        if wide not in self and high not in self:
+            return None
+        return self.whole(wide, LARGEST_SIDE), self.whole(high, LARGEST_SIDE)
+
+    def size(self, key: str, order: str = "width height") -> Size | None:
+        """Width and height from two numbers under one key, in this order; None where the file has no such key."""
+        if key not in self:
+            return None
+        sides = dict(zip(order.split(), self.vector(key, [2], order), strict=True))
+        return as_size(sides["width"], sides["height"], self.where(key))
 
     def array(self, key: str, damaged: bool = False) -> Array:
         """Numbers in the shape the file gives them; NaN passes only where `damaged` allows it."""
@@ -126,6 +155,7 @@ class Section:
         return values.reshape(rows, columns)
 
     def rotation(self, key: str) -> Rotation:
+        """The rotation of 3×3 numbers."""
         return self._rotation(self.matrix(key, 3, 3), key)
 
     def transform(self, key: str) -> RigidTransform:
@@ -149,20 +179,16 @@ class Section:
             self.mend(error)
         return Rotation.from_quat(quaternion, scalar_first=scalar_first)
 
-    def camera_matrix(self, K: Array, where: str) -> Array:
-        """K (3, 3), which must be upper triangular with K[2, 2] = 1; mended by transposing and by dividing."""
-        if not _is_camera_matrix(K):
-            turned = " (its transpose is)" if _is_camera_matrix(K.T) else ""
-            text = f"{where}: K must be upper triangular with K[2, 2] = 1{turned}, got {K.tolist()}"
-            off = K[2, 2] if K[2, 2] != 1 else K[2, 0] or K[2, 1] or K[1, 0]
-            error = CalibrationError(text, BAD_K, float(off))
-            with np.errstate(invalid="ignore", divide="ignore"):
-                good = next((form for form in (K.T, K / K[2, 2], K.T / K[2, 2]) if _is_camera_matrix(form)), None)
-            if good is None:
-                raise error
-            self.mend(error)
-            K = good
-        return K
+    def intrinsics(self, K: Array, where: str, size: Size) -> Intrinsics:
+        """Those of K (3, 3), upper triangular with K[2, 2] = 1; mended by transposing and by dividing."""
+        with explained(where, BAD_K):
+            if not _is_camera_matrix(K):
+                good, error = _good_camera_matrix(K), _bad_camera_matrix(K, where)
+                if good is None:
+                    raise error
+                self.mend(error)
+                K = good
+            return Intrinsics.from_matrix(K, *size)
 
     def _rotation(self, matrix: Array, key: str) -> Rotation:
         try:
@@ -175,9 +201,38 @@ class Section:
             return Rotation.from_matrix(U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt)
 
 
+def as_size(width: float, height: float, where: str) -> Size:
+    """Two numbers as width and height; CalibrationError where they are no numbers of pixels."""
+    sides = Section({"width": width, "height": height}, where)
+    return sides.whole("width", LARGEST_SIDE), sides.whole("height", LARGEST_SIDE)
+
+
+def agreed_size(held: Size | None, given: Size | None, keys: str) -> Size:
+    """Width and height from the file, or as given where the file is silent; never one against the other."""
+    if held and given and held != given:
+        raise CalibrationError(
+            f"the file says {held[0]}×{held[1]} pixels, the size given is {given[0]}×{given[1]}: leave the size out"
+        )
+    if size := held or given:
+        return size
+    raise CalibrationError(
+        f"the file holds no image size ({keys}): add --size WIDTHxHEIGHT, such as --size 640x480 "
+        "(in Python size=(640, 480))"
+    )
+
+
+@contextmanager
+def named(where: object) -> Iterator[None]:
+    """Puts the name of a file, or of a part of it, before what is wrong in it."""
+    try:
+        yield
+    except CalibrationError as error:
+        raise CalibrationError(f"{where}: {error}", error.id, error.value) from error.__cause__
+
+
 @contextmanager
 def explained(where: str, id: str = "") -> Iterator[None]:
-    """What a constructor complains about, said with the place in the file."""
+    """Turns the ValueError of a constructor into a CalibrationError that names the place in the file."""
     try:
         yield
     except CalibrationError:
@@ -204,6 +259,18 @@ def _is_bottom(row: Array) -> bool:
 
 def _is_camera_matrix(K: Array) -> bool:
     return np.array_equal(K[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1])
+
+
+def _bad_camera_matrix(K: Array, where: str) -> CalibrationError:
+    turned = " (its transpose is)" if _is_camera_matrix(K.T) else ""
+    text = f"{where}: K must be upper triangular with K[2, 2] = 1{turned}, got {K.tolist()}"
+    off = K[2, 2] if K[2, 2] != 1 else K[2, 0] or K[2, 1] or K[1, 0]
+    return CalibrationError(text, BAD_K, float(off))
+
+
+def _good_camera_matrix(K: Array) -> Array | None:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return next((form for form in (K.T, K / K[2, 2], K.T / K[2, 2]) if _is_camera_matrix(form)), None)
 
 
 def _as_matrix(section: Section) -> Array:

@@ -1,4 +1,4 @@
-"""From a path to text, without trusting the path: nothing large, nothing binary, nothing that is not a file."""
+"""From a path to text. Large files, binary files and what is no regular file are refused."""
 
 from __future__ import annotations
 
@@ -29,9 +29,16 @@ _SIGNATURES = {
 }
 
 
-def read_text(path: Path) -> str:
-    """The text of a calibration file; CalibrationError for anything that cannot be one."""
-    return text_of(read_bytes(path), path)
+def refuse_no_file(path: Path) -> None:
+    """CalibrationError for a name under which there is nothing, or can be nothing."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        raise CalibrationError(f"{path}: there is no such file") from None
+    except OSError as error:  # more characters than the system takes, a file where a folder must be …
+        raise CalibrationError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError:  # a NUL in the name
+        raise CalibrationError(f"{str(path)!r} is not a file name") from None
 
 
 def read_bytes(path: Path) -> bytes:
@@ -39,7 +46,7 @@ def read_bytes(path: Path) -> bytes:
     with open_bounded(path, MAX_BYTES) as file:
         content = file.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
-        raise CalibrationError(f"{path}: {_too_large(len(content), MAX_BYTES)}")
+        raise CalibrationError(_too_large(len(content), MAX_BYTES))
     return content
 
 
@@ -47,43 +54,36 @@ def read_bytes(path: Path) -> bytes:
 def open_bounded(path: Path, most: int) -> Iterator[BinaryIO]:
     """A file of at most so many bytes, to be read piece by piece; CalibrationError for anything else."""
     try:
-        _refuse_unreadable(path, most)
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise CalibrationError("expected a calibration file, this is a directory")
+        if not stat.S_ISREG(status.st_mode):
+            raise CalibrationError("expected a calibration file, this is not a regular file")
+        if status.st_size > most:
+            raise CalibrationError(_too_large(status.st_size, most))
         with path.open("rb") as file:
             yield file
-    except OSError as error:
-        raise CalibrationError(f"{path}: cannot be read ({error.strerror})") from error
-
-
-def _refuse_unreadable(path: Path, most: int) -> None:
-    try:
-        status = path.stat()
     except FileNotFoundError:
-        raise CalibrationError(f"{path}: there is no such file") from None
-    except ValueError:  # a NUL in the name
-        raise CalibrationError(f"{str(path)!r} is not a file name") from None
-    if stat.S_ISDIR(status.st_mode):
-        raise CalibrationError(f"{path}: expected a calibration file, this is a directory")
-    if not stat.S_ISREG(status.st_mode):
-        raise CalibrationError(f"{path}: expected a calibration file, this is not a regular file")
-    if status.st_size > most:
-        raise CalibrationError(f"{path}: {_too_large(status.st_size, most)}")
+        raise CalibrationError("there is no such file") from None
+    except OSError as error:
+        raise CalibrationError(f"cannot be read ({error.strerror})") from error
 
 
 def _too_large(size: int, most: int) -> str:
     return f"a calibration file has at most {most // 2**20} MB, this one has {size / 2**20:.0f} MB"
 
 
-def text_of(content: bytes, path: Path) -> str:
+def text_of(content: bytes) -> str:
     """The bytes of a file as text; CalibrationError where they are something else."""
     for signature, what in _SIGNATURES.items():
         if content.startswith(signature):
-            raise CalibrationError(f"{path}: expected a calibration as text (YAML, XML, JSON), this is {what}")
+            raise CalibrationError(f"expected a calibration as text (YAML, XML, JSON), this is {what}")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise CalibrationError(f"{path}: expected text in UTF-8, byte {error.start} is not") from None
+        raise CalibrationError(f"expected text in UTF-8, byte {error.start} is not") from None
     if not text.strip():
-        raise CalibrationError(f"{path}: expected a calibration, the file is empty")
+        raise CalibrationError("expected a calibration, the file is empty")
     if "\0" in text:
-        raise CalibrationError(f"{path}: expected text, this is binary data")
+        raise CalibrationError("expected text, this is binary data")
     return text

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from math import tan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
+from camviz.files.format import File, Format
 from camviz.files.models import Model, expressed
-from camviz.files.output import as_json, rows_of
-from camviz.files.section import Section, explained
-from camviz.files.sizes import agreed_size, two_sides
+from camviz.files.output import as_json, as_rows
+from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
 from camviz.poses import RigidTransform, Rotation
 
+TITLE = "transforms.json"
 FIRST_PIXEL = 0.5
 OPENGL = RigidTransform.from_rotation(Rotation.from_matrix(np.diag([1.0, -1, -1])))  # y up, z backward
 MODELS = [
@@ -30,39 +30,37 @@ GRID_KEYS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_ang
 LENS_KEYS = ("camera_model", "is_fisheye", "k1", "k2", "k3", "k4", "p1", "p2")
 
 
-def is_transforms(section: Section) -> bool:
-    return any(key in section for key in ("fl_x", "camera_angle_x", "frames"))
+def is_transforms(file: File) -> bool:
+    """True for a file of frames, or of one camera under nerfstudio's keys."""
+    return any(key in file.section for key in ("fl_x", "camera_angle_x", "frames"))
 
 
-def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
+def read(file: File) -> Calibration:
     """Every frame as a camera in the file's world; without frames one camera at the origin."""
-    shared = None
+    section, shared = file.section, None
     cameras: dict[str, Camera] = {}
     for name, frame in _frames(section):
         if any(key in frame for key in GRID_KEYS + LENS_KEYS):
-            camera = _camera(section.part({**section.values, **frame.values}, frame.path), size)
+            camera = _camera(section.part({**section.values, **frame.values}, frame.path), file.size)
         else:
-            camera = shared = shared or _camera(section, size)
+            camera = shared = shared or _camera(section, file.size)
         if name in cameras:
             raise frame.error("file_path", "images of different names", f"{shown(name)} twice")
         cameras[name] = camera.at(frame.transform("transform_matrix") * OPENGL)
     notes = ("The world has no unit of its own: lengths are in the file's.",) if cameras else ()
-    return Calibration(cameras or {"camera": _camera(section, size)}, path, "transforms.json", notes=notes)
+    return Calibration(cameras or {"camera": _camera(section, file.size)}, file.path, TITLE, notes=notes)
 
 
 def _frames(section: Section) -> list[tuple[str, Section]]:
-    held = section.values.get("frames") or []
-    if not isinstance(held, list) or not all(isinstance(frame, dict) for frame in held):
-        raise section.error("frames", "a list of mappings", shown(held))
-    frames = [section.part(frame, section.where(f"frames[{index}]")) for index, frame in enumerate(held)]
+    frames = section.sections("frames") if section.values.get("frames") else []
     return [
         (frame.text("file_path") if "file_path" in frame else f"frame{index}", frame)
         for index, frame in enumerate(frames)
     ]
 
 
-def _camera(section: Section, size: tuple[int, int] | None) -> Camera:
-    width, height = agreed_size(two_sides(section, "w", "h"), size, "w, h")
+def _camera(section: Section, given: Size | None) -> Camera:
+    width, height = agreed_size(section.sides("w", "h"), given, "w, h")
     fx = _focal_length(section, "fl_x", "camera_angle_x", width)
     fy = _focal_length(section, "fl_y", "camera_angle_y", height, fx)
     cx, cy = (section.number(key) if key in section else side / 2 for key, side in (("cx", width), ("cy", height)))
@@ -108,14 +106,28 @@ def write(calibration: Calibration) -> bytes:
     if len(models) > 1:
         raise CalibrationError(f"transforms.json holds one camera model for all, these cameras need {sorted(models)}")
     for (name, camera), own in zip(calibration.cameras.items(), intrinsics, strict=True):
-        pose = rows_of(camera.world_from_cam * OPENGL)
+        pose = as_rows(camera.world_from_cam * OPENGL)
         frames.append({"file_path": name, **({} if shared else own), "transform_matrix": pose})
     return as_json({"camera_model": models.pop(), **shared, "frames": frames})
 
 
 def _intrinsics(name: str, camera: Camera) -> dict[str, Any]:
-    model, same = expressed(name, camera, MODELS, "transforms.json")
+    model, same = expressed(name, camera, MODELS, TITLE)
     grid = camera.intrinsics
     values = zip(model.names, model.values(same, FIRST_PIXEL), strict=True)
     held = {KEYS.get(key, key): value for key, value in values}
     return {"camera_model": model.name, "w": grid.width, "h": grid.height, **held}
+
+
+FORMAT = Format(
+    name="nerfstudio",
+    title="nerfstudio's transforms.json",
+    file="transforms.json",
+    recognise=is_transforms,
+    read=read,
+    write=write,
+    own_world=True,
+    models="OPENCV with k1 k2 k3 p1 p2, OPENCV_FISHEYE",
+    says="instant-ngp's too; first pixel's centre at 0.5; camera → world with OpenGL's axes: y and z negated; no unit",
+    lacks="skew, two kinds of lens in one file",
+)

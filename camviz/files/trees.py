@@ -17,6 +17,7 @@ from camviz.calibration.types import CalibrationError
 
 MAX_DEPTH = 32
 MAX_NODES = 1_000_000
+MAX_KEYS = 10_000  # of one mapping: readers go through all of them for each name that has several spellings
 XML_ROOTS = ("opencv_storage", "calibration", "document")
 
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -59,24 +60,26 @@ class Tree:
 
     @property
     def wants_key(self) -> bool:
+        """Whether a mapping is open and its next key has not come."""
         return bool(self._open) and isinstance(self._open[-1][0], dict) and self._keys[-1] is None
 
-    @property
-    def awaits_value(self) -> bool:
-        return bool(self._open) and isinstance(self._open[-1][0], dict) and self._keys[-1] is not None
-
     def key(self, key: str) -> None:
-        if key in self._open[-1][0]:
+        """The key of the value that comes next."""
+        mapping = self._open[-1][0]
+        if key in mapping:
             raise CalibrationError(f"the key {shown(key)} appears twice")
+        refuse_many_keys(len(mapping) + 1)
         self._keys[-1] = key
 
     def leaf(self, value: Any, anchor: str | None = None) -> None:
+        """A value that holds no others."""
         self._count(1)
         self._place(value)
         if anchor:
             self._anchors[anchor] = value, 1
 
     def begin(self, container: Any, anchor: str | None = None) -> None:
+        """The start of a list or mapping, which is empty."""
         if len(self._open) == MAX_DEPTH:
             raise CalibrationError(f"nested more than {MAX_DEPTH} levels deep, which no calibration is")
         self._count(1)
@@ -84,6 +87,7 @@ class Tree:
         self._keys.append(None)
 
     def end(self) -> None:
+        """The end of the list or mapping that began last."""
         container, anchor, start = self._open.pop()
         self._keys.pop()
         if anchor:
@@ -91,6 +95,7 @@ class Tree:
         self._place(container)
 
     def alias(self, anchor: str) -> None:
+        """The value of an anchor once more, counted in full."""
         if anchor not in self._anchors:
             raise CalibrationError(f"the alias {shown(anchor)} points to nothing that came before it")
         value, size = self._anchors[anchor]
@@ -112,6 +117,12 @@ class Tree:
         else:
             parent[key] = value
             self._keys[-1] = None
+
+
+def refuse_many_keys(count: int) -> None:
+    """CalibrationError for more keys than any calibration has in one mapping."""
+    if count > MAX_KEYS:
+        raise CalibrationError(f"expected at most {MAX_KEYS:,} keys in a mapping, got more")
 
 
 def parse_yaml(text: str) -> Any:
@@ -209,6 +220,7 @@ class _XmlBuilder:
         if len(self._open) == MAX_DEPTH:
             raise CalibrationError(f"nested more than {MAX_DEPTH} levels deep, which no calibration is")
         keys = {} if self._opencv else {key: _attribute(key, word) for key, word in attributes.items()}
+        refuse_many_keys(len(keys))
         self._nodes += len(keys)
         self._open.append((name, keys, [], []))
 
@@ -220,7 +232,9 @@ class _XmlBuilder:
         value = self._value(keys, items, "".join(text))
         if not self._open:
             self.root = value if self._opencv else {f"<{name}>": value}
-        elif not self._opencv:
+            return
+        refuse_many_keys(len(self._open[-1][1]) + 1)
+        if not self._opencv:
             _add_element(self._open[-1][1], name, value)
         elif name == "_":
             self._open[-1][2].append(value)

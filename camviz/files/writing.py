@@ -4,52 +4,20 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from camviz.calibration.types import Calibration, CalibrationError
-from camviz.files import basalt, colmap, euroc, kalibr, kitti, matlab, metashape, mrcal, opencv_writing, ros, transforms
+from camviz.files.format import Format
 from camviz.files.loading import load
 from camviz.files.models import same_camera
-
-Content = bytes | dict[str, bytes]  # of a file, or of the files of a folder by name
-
-
-@dataclass(frozen=True)
-class Format:
-    """A format that can be written: for whom, under which name, and how."""
-
-    title: str
-    file: str  # such a file's usual name
-    content: Callable[[Calibration, Path], Content]
-
-
-def _format(title: str, file: str, write: Callable[[Calibration], Content]) -> Format:
-    return Format(title, file, lambda calibration, _: write(calibration))
-
-
-FORMATS: Mapping[str, Format] = MappingProxyType(
-    {
-        "opencv": Format("OpenCV FileStorage", "camera.yml, .xml or .json", opencv_writing.write),
-        "ros": _format("ROS CameraInfo", "camera.yaml", ros.write),
-        "kalibr": _format("Kalibr camchain", "camchain.yaml", kalibr.write),
-        "colmap": _format("COLMAP, as text", "a folder", colmap.write_text),
-        "colmap-bin": _format("COLMAP, binary", "a folder", colmap.write_binary),
-        "mrcal": _format("mrcal", "camera.cameramodel", mrcal.write),
-        "nerfstudio": _format("nerfstudio, instant-ngp", "transforms.json", transforms.write),
-        "euroc": _format("EuRoC", "sensor.yaml", euroc.write),
-        "basalt": _format("Basalt", "calibration.json", basalt.write),
-        "kitti": _format("KITTI, rectified", "calib.txt", kitti.write_rectified),
-        "kitti-raw": _format("KITTI, before rectification", "calib_cam_to_cam.txt", kitti.write_raw),
-        "matlab": _format("MATLAB cameraParameters", "camera.json", matlab.write),
-        "metashape": _format("Metashape", "camera.xml", metashape.write),
-    }
-)
-
+from camviz.files.registry import written
+from camviz.files.section import named
 
 BY_CAMERA = (
     "detections",
@@ -63,21 +31,39 @@ BY_CAMERA = (
 
 
 def write(calibration: Calibration, path: str | PathLike[str], format: str) -> tuple[str, ...]:
-    """Write a calibration in one of FORMATS and return in sentences what the format could not hold beside the cameras.
+    """Write a calibration in a format of this name and return in sentences what it could not hold beside the cameras.
 
     Pixels, lenses and poses are written so that they are read back the same, or not at all: CalibrationError says
     what the format has no place for. The file appears under its name when it is complete; COLMAP's is a folder.
     """
     path = Path(path)
-    if format not in FORMATS:
-        raise CalibrationError(f"format: expected one of {', '.join(FORMATS)}, got {format!r}")
-    try:
-        content = FORMATS[format].content(calibration, path)
-    except CalibrationError as error:
-        raise CalibrationError(f"{path}: {error}") from error.__cause__
+    known = written()
+    if format not in known:
+        raise CalibrationError(f"format: expected one of {', '.join(known)}, got {format!r}")
+    with named(path):
+        _refuse_cameras(calibration, known[format])
+        content = known[format].content(calibration, path.suffix.lower())
     if isinstance(content, dict):
         return _folder(calibration, path, content)
     return _file(calibration, path, content)
+
+
+def _refuse_cameras(calibration: Calibration, format: Format) -> None:
+    """CalibrationError for more cameras, or another world, than the format has a place for."""
+    names, most = list(calibration.cameras), format.most_cameras
+    if most is not None and len(names) > most:
+        shown = ", ".join(names[:4]) + ", …" * (len(names) > 4)
+        raise CalibrationError(
+            f"{format.title} holds {format.holds}, this calibration has {len(names)}: choose one of {shown} "
+            "(--camera NAME)"
+        )
+    first = calibration.cameras[names[0]]
+    if not format.own_world and not np.allclose(first.world_from_cam.as_matrix(), np.eye(4), rtol=0, atol=1e-12):
+        place = ", ".join(f"{x:.3g}" for x in first.centre)
+        raise CalibrationError(
+            f"{format.title} has no world but its first camera's frame, and {names[0]} stands at ({place}) or is "
+            "turned: make its frame the world (--first-as-world)"
+        )
 
 
 def alone(calibration: Calibration, name: str) -> Calibration:

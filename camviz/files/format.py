@@ -1,0 +1,115 @@
+"""What a calibration format is, and the file that it is asked about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from camviz.calibration.types import Calibration, CalibrationError
+from camviz.files.models import Model
+from camviz.files.section import Section
+from camviz.files.text import read_bytes, text_of
+from camviz.files.trees import parse, shown
+from camviz.lenses import BrownConrady
+
+Content = bytes | dict[str, bytes]  # of a file, or of the files of a folder by name
+
+OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}
+
+
+@dataclass(frozen=True)
+class File:
+    """A file or folder that is to be read, and what the caller said of it. Its content is read once, when asked for.
+
+    `size` is (width, height) in pixels, for files that hold none. `mended` is the list of the faults that were cured in
+    reading; where it is None, a fault is an error.
+    """
+
+    path: Path
+    size: tuple[int, int] | None = None
+    mended: list[CalibrationError] | None = None
+
+    @cached_property
+    def content(self) -> bytes:
+        """The bytes; CalibrationError for what cannot be a calibration: a folder, a pipe, a gigabyte."""
+        return read_bytes(self.path)
+
+    @cached_property
+    def text(self) -> str:
+        """The content as text; CalibrationError where it is something else."""
+        return text_of(self.content)
+
+    @cached_property
+    def section(self) -> Section:
+        """The keys of a YAML, JSON or XML text; CalibrationError where it has none."""
+        return self.mapping(parse(self.text))
+
+    def mapping(self, tree: Any) -> Section:
+        """A tree that was read from this file; CalibrationError where it is no mapping."""
+        if not isinstance(tree, dict):
+            what = _KINDS.get(type(tree)) or shown(tree)
+            raise CalibrationError(f"expected a calibration, this is {what} (`camviz show --help` lists what is read)")
+        return Section(tree, mended=self.mended)
+
+
+@dataclass(frozen=True)
+class Format:
+    """One program's calibration file. A module of `camviz.files` that has one as FORMAT adds it everywhere.
+
+    `load` and `write`, the help of the commands, the table in docs/formats.md and the tests read these fields.
+    """
+
+    name: str  # one word, which `camviz convert --to` takes
+    title: str  # the program, or its file, as sentences name it: "ROS CameraInfo"
+    file: str  # what such a file is usually called: "camera.yaml"
+    recognise: Callable[[File], object]  # true for a file of this format; may raise CalibrationError
+    read: Callable[[File], Calibration]  # raises CalibrationError for what it cannot take
+    write: Callable[..., Content] | None = None  # from a Calibration; None where the format is only read
+    endings: tuple[str, ...] = ()  # where these choose between forms, `write` takes the ending as its second argument
+    most_cameras: int | None = None  # how many cameras such a file holds at most
+    own_world: bool = False  # whether the first camera may stand elsewhere than in the world's origin
+    models: str = ""  # the camera models it has
+    says: str = ""  # its own conventions, in which it differs from ours
+    lacks: str = ""  # what beside most_cameras and own_world it has no place for
+    example: bytes = b""  # a small file, where `write` cannot make one
+    rank: int = 50  # lower ranks are asked first: below 20 by name or first bytes, below 40 by text, then by keys
+
+    @property
+    def holds(self) -> str:
+        """How many cameras there is room for, in words; empty where there is no limit."""
+        counts = {1: "one camera", 2: "one camera or a pair", None: ""}
+        return counts.get(self.most_cameras, f"at most {self.most_cameras} cameras")
+
+    def content(self, calibration: Calibration, ending: str) -> Content:
+        """What is written of a calibration; CalibrationError saying what the format has no place for."""
+        if self.write is None:
+            raise CalibrationError(f"{self.title} is read here, and not written")
+        return self.write(calibration, ending) if self.endings else self.write(calibration)
+
+
+def chosen(section: Section, key: str, models: Iterable[Model]) -> Model:
+    """The one of a format's camera models that a word of the file names."""
+    by_name = {model.name: model for model in models}
+    return by_name[section.choice(key, list(by_name))]
+
+
+def coefficients_of(section: Section, key: str, model: Model, first: int) -> tuple[Model, list[float]]:
+    """The distortion coefficients under a key, which are the model's parameters from the `first` on, and the model.
+
+    Where a file is mended, a Brown–Conrady model has as many as there are: 4, 5 or 8 in OpenCV's order.
+    """
+    names = model.names[first:]
+    others = (5, 8) if model.lens is BrownConrady else ()
+    values = section.coefficients(key, [len(names)], " ".join(names), others)
+    if len(values) != len(names):
+        model = replace(model, parameters=" ".join([*model.names[:first], *OPENCV_ORDER[: len(values)]]))
+    return model, values
+
+
+def listed(models: Iterable[Model]) -> str:
+    """The names of a format's camera models, for Format.models."""
+    return ", ".join(dict.fromkeys(model.name for model in models))

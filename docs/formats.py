@@ -1,0 +1,42 @@
+"""The table of formats in docs/formats.md: `python docs/formats.py` makes it from what the formats declare."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from camviz.files.format import Format
+from camviz.files.registry import formats
+
+PAGE = Path(__file__).with_suffix(".md")
+HEAD = "| `--to` | file | camera models | conventions of its own | not written |\n|---|---|---|---|---|\n"
+_TABLE = re.compile(r"^\| `--to` .*\n(?:\|.*\n)*", re.MULTILINE)
+
+
+def table() -> str:
+    """The formats as rows of Markdown; those that are only read have no `--to`."""
+    return HEAD + "".join(f"| {' | '.join(_cells(format))} |\n" for format in formats().values())
+
+
+def renewed(page: str) -> str:
+    """The text of the page with the table as the formats are now; ValueError for a page without one."""
+    made, count = _TABLE.subn(lambda _: table(), page)
+    if count != 1:
+        raise ValueError(f"expected one table that begins with | `--to`, found {count}")
+    return made
+
+
+def _cells(format: Format) -> list[str]:
+    file = format.title if format.file in format.title else f"{format.title}: {format.file}"
+    return [f"`{format.name}`" if format.write else "—", file, format.models, format.says, _not_written(format)]
+
+
+def _not_written(format: Format) -> str:
+    if format.write is None:
+        return "anything: it is only read"
+    several = {None: "", 1: "several cameras"}.get(format.most_cameras, f"more than {format.most_cameras} cameras")
+    return ", ".join(filter(None, [format.lacks, several, "" if format.own_world else "a world of its own"]))
+
+
+if __name__ == "__main__":
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
