@@ -39,7 +39,7 @@ def with_parameters(camera: Camera, values: dict[str, float]) -> Camera:
     )
 
 
-def pixel_slopes(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) -> tuple[Array, Array, Array]:
+def pixel_jacobian(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) -> tuple[Array, Array, Array]:
     """Pixels (..., 2) of points (..., 3) in the camera's own frame, and their derivatives.
 
     By the point, (..., 2, 3), and by the named intrinsic parameters, (..., 2, n): analytic in the camera matrix,
@@ -51,14 +51,16 @@ def pixel_slopes(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) ->
     rays = points_cam / distance
     xy = lens.project(rays)
     focal = np.array([[pixels.fx, pixels.skew], [0, pixels.fy]])
-    by_point = focal @ _ray_slopes(lens, rays) / distance[..., None]
+    by_point = focal @ _ray_jacobian(lens, rays) / distance[..., None]
     by_parameter = np.empty((*xy.shape, len(names)))
     for i, name in enumerate(names):
-        by_parameter[..., i] = _pinhole_slope(name, xy) if name in PINHOLE else _lens_slope(lens, name, rays) @ focal.T
+        by_parameter[..., i] = (
+            _pinhole_jacobian(name, xy) if name in PINHOLE else _lens_jacobian(lens, name, rays) @ focal.T
+        )
     return pixels.to_pixels(xy), by_point, by_parameter
 
 
-def _ray_slopes(lens: Lens, rays: Array) -> Array:
+def _ray_jacobian(lens: Lens, rays: Array) -> Array:
     """∂xy/∂ray, (..., 2, 3)."""
     columns = [(_image(lens, rays + step) - _image(lens, rays - step)) / (2 * STEP) for step in STEP * np.eye(3)]
     return np.stack(columns, axis=-1)
@@ -71,14 +73,14 @@ def _image(lens: Lens, rays: Array) -> Array:
     return lens.project(rays)
 
 
-def _pinhole_slope(name: str, xy: Array) -> Array:
+def _pinhole_jacobian(name: str, xy: Array) -> Array:
     """∂uv/∂name, (..., 2), of u = fx x + skew y + cx, v = fy y + cy."""
     x, y, one, zero = xy[..., 0], xy[..., 1], np.ones_like(xy[..., 0]), np.zeros_like(xy[..., 0])
     columns = {"fx": (x, zero), "fy": (zero, y), "cx": (one, zero), "cy": (zero, one), "skew": (y, zero)}
     return np.stack(columns[name], axis=-1)
 
 
-def _lens_slope(lens: Any, name: str, rays: Array) -> Array:
+def _lens_jacobian(lens: Any, name: str, rays: Array) -> Array:
     """∂xy/∂name, (..., 2); from one side where the parameter is at the end of what the lens takes."""
     value = getattr(lens, name)
     step = STEP * max(1.0, abs(value))
@@ -93,3 +95,14 @@ def _moved(lens: Any, name: str, value: float) -> Any:
         return replace(lens, **{name: value})
     except ValueError:
         return lens
+
+
+def twist_jacobian(points: Array) -> Array:
+    """∂(p + ω × p + τ)/∂(ω, τ) = [-[p]ₓ | 1], (..., 3, 6) of points (..., 3)."""
+    jacobian = np.zeros((*points.shape, 6))
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    jacobian[..., 0, 1], jacobian[..., 0, 2] = z, -y
+    jacobian[..., 1, 0], jacobian[..., 1, 2] = -z, x
+    jacobian[..., 2, 0], jacobian[..., 2, 1] = y, -x
+    jacobian[..., 3:] = np.eye(3)
+    return jacobian

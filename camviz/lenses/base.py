@@ -111,7 +111,7 @@ def on_plane(xy: Array) -> Array:
     return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
 
 
-def times(vectors: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
+def blocked_matmul(vectors: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
     """The products vectors @ matrix, (..., n) times (n, m), some thousands of vectors at a time.
 
     For more at once OpenBLAS wakes threads, which afterwards wait in a busy loop for tens of milliseconds, on the very
