@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment, twisted
 from camviz.calibration.arrowhead import inverse
-from camviz.calibration.jacobian import lens_parameters, pixel_jacobian, with_parameters
+from camviz.calibration.jacobian import pixel_jacobian, with_parameters
 from camviz.calibration.linearisation import sagittas
 from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
@@ -60,7 +60,7 @@ def dense(adjustment):
 def test_slopes_are_those_of_the_projection(lens) -> None:
     """The pixel of a point moved a little, and of a camera changed a little, is foretold to second order."""
     camera = Camera(Intrinsics(640, 480, 400.0, 410.0, 320.0, 240.0, skew=0.7), lens)
-    names = ("fx", "fy", "cx", "cy", "skew", *lens_parameters(lens))
+    names = ("fx", "fy", "cx", "cy", "skew", *lens.parameters())
     rng = np.random.default_rng(0)
     points = rng.uniform([-0.4, -0.3, 0.9], [0.4, 0.3, 1.5], (40, 3))
     uv, by_point, by_parameter = pixel_jacobian(camera, points, names)

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera
-from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import Array, as_points
 
 PINHOLE = ("fx", "fy", "cx", "cy", "skew")
-STEP = np.finfo(float).eps ** (1 / 3)  # where a central difference is exact to STEP², about 4e-11
-
-
-def lens_parameters(lens: Lens) -> tuple[str, ...]:
-    """The names of a lens's own parameters."""
-    return tuple(field.name for field in fields(lens)) if is_dataclass(lens) else ()
 
 
 def parameter(camera: Camera, name: str) -> float:
@@ -43,34 +36,21 @@ def pixel_jacobian(camera: Camera, points_cam: ArrayLike, names: Sequence[str]) 
     """Pixels (..., 2) of points (..., 3) in the camera's own frame, and their derivatives.
 
     By the point, (..., 2, 3), and by the named intrinsic parameters, (..., 2, n): analytic in the camera matrix,
-    central differences through the lens. The pixel is NaN where the point has no image.
+    and as the lens has them. The pixel is NaN where the point has no image.
     """
     points_cam = as_points(points_cam, 3, "points_cam")
-    pixels, lens = camera.intrinsics, camera.lens
+    intrinsics, lens = camera.intrinsics, camera.lens
     distance = np.linalg.norm(points_cam, axis=-1, keepdims=True)
     rays = points_cam / distance
     xy = lens.project(rays)
-    focal = np.array([[pixels.fx, pixels.skew], [0, pixels.fy]])
-    by_point = focal @ _ray_jacobian(lens, rays) / distance[..., None]
+    focal = np.array([[intrinsics.fx, intrinsics.skew], [0, intrinsics.fy]])
+    by_point = focal @ lens.ray_jacobian(rays) / distance[..., None]
     by_parameter = np.empty((*xy.shape, len(names)))
     for i, name in enumerate(names):
         by_parameter[..., i] = (
-            _pinhole_jacobian(name, xy) if name in PINHOLE else _lens_jacobian(lens, name, rays) @ focal.T
+            _pinhole_jacobian(name, xy) if name in PINHOLE else lens.parameter_jacobian(name, rays) @ focal.T
         )
-    return pixels.to_pixels(xy), by_point, by_parameter
-
-
-def _ray_jacobian(lens: Lens, rays: Array) -> Array:
-    """∂xy/∂ray, (..., 2, 3)."""
-    columns = [(_image(lens, rays + step) - _image(lens, rays - step)) / (2 * STEP) for step in STEP * np.eye(3)]
-    return np.stack(columns, axis=-1)
-
-
-def _image(lens: Lens, rays: Array) -> Array:
-    """The lens's image, whether or not its polynomial folds on the way: to ask every lens of a difference is slow."""
-    if isinstance(lens, BrownConrady):
-        return lens.distort(rays[..., :2] / rays[..., 2:])
-    return lens.project(rays)
+    return intrinsics.to_pixels(xy), by_point, by_parameter
 
 
 def _pinhole_jacobian(name: str, xy: Array) -> Array:
@@ -78,23 +58,6 @@ def _pinhole_jacobian(name: str, xy: Array) -> Array:
     x, y, one, zero = xy[..., 0], xy[..., 1], np.ones_like(xy[..., 0]), np.zeros_like(xy[..., 0])
     columns = {"fx": (x, zero), "fy": (zero, y), "cx": (one, zero), "cy": (zero, one), "skew": (y, zero)}
     return np.stack(columns[name], axis=-1)
-
-
-def _lens_jacobian(lens: Any, name: str, rays: Array) -> Array:
-    """∂xy/∂name, (..., 2); from one side where the parameter is at the end of what the lens takes."""
-    value = getattr(lens, name)
-    step = STEP * max(1.0, abs(value))
-    lower, higher = _moved(lens, name, value - step), _moved(lens, name, value + step)
-    width = getattr(higher, name) - getattr(lower, name)
-    return (_image(higher, rays) - _image(lower, rays)) / width
-
-
-def _moved(lens: Any, name: str, value: float) -> Any:
-    """The lens with another value of a parameter; as it was where it does not take that value."""
-    try:
-        return replace(lens, **{name: value})
-    except ValueError:
-        return lens
 
 
 def twist_jacobian(points: Array) -> Array:

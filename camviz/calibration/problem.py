@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.calibration.jacobian import lens_parameters, parameter
+from camviz.calibration.jacobian import parameter
 from camviz.calibration.types import Board, Calibration, Mask
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
@@ -206,7 +206,7 @@ def moved(poses: RigidTransform, points: Array) -> Array:
 
 def assumed_estimated(camera: Camera) -> tuple[str, ...]:
     """The intrinsics that a calibration has estimated as far as its numbers tell: what was not is still 0."""
-    others = [name for name in ("skew", *lens_parameters(camera.lens)) if parameter(camera, name)]
+    others = [name for name in ("skew", *camera.lens.parameters()) if parameter(camera, name)]
     return ("fx", "fy", "cx", "cy", *others)
 
 
