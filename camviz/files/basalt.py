@@ -9,23 +9,13 @@ import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.models import Model, expressed, model_named
+from camviz.files.models import Model, expressed, model_named, models_of
 from camviz.files.output import as_json, refuse_own_world
 from camviz.files.section import LARGEST_SIDE, Section
 from camviz.files.trees import shown
-from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
 from camviz.poses import RigidTransform
 
-GRID = "fx fy cx cy"
-MODELS = [
-    Model("pinhole", Perspective, GRID),
-    Model("pinhole-radtan8", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
-    Model("kb4", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("fov", FieldOfView, f"{GRID} omega"),
-    Model("ds", DoubleSphere, f"{GRID} xi alpha"),
-    Model("ucm", ExtendedUnified, f"{GRID} alpha", {"beta": 1.0}),
-    Model("eucm", ExtendedUnified, f"{GRID} alpha beta"),
-]
+MODELS = models_of("basalt")
 KEYS = {"omega": "w"}
 
 

@@ -7,20 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from camviz.calibration.types import Calibration
-from camviz.files.models import Model, expressed, model_named
+from camviz.files.models import expressed, model_named, models_of
 from camviz.files.output import as_yaml, only_camera, refuse_own_world
 from camviz.files.section import Section
 from camviz.files.sizes import agreed_size, pair_of_sides
 from camviz.files.trees import shown
-from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz.lenses import BrownConrady
 from camviz.poses import RigidTransform
 
 GRID = "fx fy cx cy"
 RADIAL_TANGENTIAL = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
-MODELS = [
-    Model("radial-tangential", BrownConrady, f"{GRID} k1 k2 p1 p2"),
-    Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-]
+MODELS = models_of("euroc")
 
 
 def is_sensor(section: Section) -> bool:

@@ -2,57 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from camviz.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera, Intrinsics
-from camviz.files.models import Model, expressed
+from camviz.cameras import Camera
+from camviz.files.models import Model, expressed, models_of
 from camviz.files.opencv import image_size
 from camviz.files.output import as_yaml, refuse_own_world, rows_of
-from camviz.files.section import Section, explained
+from camviz.files.section import Section
 from camviz.files.trees import shown
-from camviz.lenses import (
-    BrownConrady,
-    DoubleSphere,
-    ExtendedUnified,
-    FieldOfView,
-    KannalaBrandt,
-    Lens,
-    Perspective,
-    UnifiedSphere,
-)
 from camviz.poses import RigidTransform
 
-PROJECTIONS = {
-    "pinhole": "fu fv pu pv",
-    "omni": "xi fu fv pu pv",
-    "eucm": "alpha beta fu fv pu pv",
-    "ds": "xi alpha fu fv pu pv",
-}
-DISTORTIONS = {"radtan": "k1 k2 p1 p2", "equidistant": "k1 k2 k3 k4", "fov": "w", "none": ""}
 SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
-LENSES = {
-    ("pinhole", "radtan"): BrownConrady,
-    ("pinhole", "equidistant"): KannalaBrandt,
-    ("pinhole", "fov"): FieldOfView,
-    ("pinhole", "none"): Perspective,
-    ("omni", "radtan"): UnifiedSphere,
-    ("omni", "none"): UnifiedSphere,
-    ("eucm", "none"): ExtendedUnified,
-    ("ds", "none"): DoubleSphere,
-}
-GRID = "fx fy cx cy"
-WRITTEN = [
-    Model("pinhole none", Perspective, GRID),
-    Model("pinhole radtan", BrownConrady, f"{GRID} k1 k2 p1 p2"),
-    Model("pinhole equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("pinhole fov", FieldOfView, f"{GRID} omega"),
-    Model("omni none", UnifiedSphere, f"xi {GRID}"),
-    Model("omni radtan", UnifiedSphere, f"xi {GRID} k1 k2 p1 p2"),
-    Model("eucm none", ExtendedUnified, f"alpha beta {GRID}"),
-    Model("ds none", DoubleSphere, f"xi alpha {GRID}"),
-]
+# by projection and distortion, such as ("pinhole", "radtan")
+MODELS = {(model.name.split()[0], model.name.split()[1]): model for model in models_of("kalibr")}
+KEYS = {"fx": "fu", "fy": "fv", "cx": "pu", "cy": "pv", "omega": "w"}
 
 
 def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:
@@ -81,32 +47,44 @@ def _chain(section: Section) -> dict[str, Section]:
 
 
 def _camera(part: Section, size: tuple[int, int] | None) -> Camera:
-    projection = _choice(part, "camera_model", PROJECTIONS)
-    values = part.vector("intrinsics", [len(PROJECTIONS[projection].split())], PROJECTIONS[projection])
+    projection = _choice(part, "camera_model", [projection for projection, _ in MODELS])
+    names, _ = _parameters(next(model for (each, _), model in MODELS.items() if each == projection))
+    values = part.vector("intrinsics", [len(names)], _in_its_words(names))
     width, height = image_size(part, size)
-    with explained(part.where("intrinsics")):
-        grid = Intrinsics(width, height, *values[-4:])
-    return Camera(grid, _lens(part, projection, values[:-4]))
-
-
-def _lens(part: Section, projection: str, shape: list[float]) -> Lens:
-    distortion = _choice(part, "distortion_model", DISTORTIONS)
-    lens = LENSES.get((projection, distortion))
-    if lens is None:
-        known = ", ".join(other for model, other in LENSES if model == projection)
-        raise part.error("distortion_model", f"{known} with {projection}", shown(distortion))
-    names = DISTORTIONS[distortion].split()
+    model = _model(part, projection)
+    _, names = _parameters(model)
     held = part.values.get("distortion_coeffs") or names
-    others = (5, 8) if lens is BrownConrady else ()
-    coefficients = part.coefficients("distortion_coeffs", [len(names)], " ".join(names), others) if held else []
-    with explained(part.path):
-        return lens(*shape, *coefficients)
+    others = (5, 8) if names == ["k1", "k2", "p1", "p2"] and projection == "pinhole" else ()
+    coefficients = part.coefficients("distortion_coeffs", [len(names)], _in_its_words(names), others) if held else []
+    if len(coefficients) != len(names):  # mended: more of OpenCV's coefficients, in OpenCV's order
+        more = model.lens.parameters()[len(names) : len(coefficients)]
+        model = replace(model, parameters=" ".join([*model.names, *more]))
+    return model.camera([*values, *coefficients], width, height, 0.0, part.where("intrinsics"))
 
 
-def _choice(part: Section, key: str, known: dict[str, str]) -> str:
+def _model(part: Section, projection: str) -> Model:
+    distortion = _choice(part, "distortion_model", [distortion for _, distortion in MODELS])
+    model = MODELS.get((projection, distortion))
+    if model is None:
+        known = ", ".join(other for each, other in MODELS if each == projection)
+        raise part.error("distortion_model", f"{known} with {projection}", shown(distortion))
+    return model
+
+
+def _parameters(model: Model) -> tuple[list[str], list[str]]:
+    """Those of the projection, which end with cx cy, and those of the distortion."""
+    end = model.names.index("cy") + 1
+    return model.names[:end], model.names[end:]
+
+
+def _in_its_words(names: list[str]) -> str:
+    return " ".join(KEYS.get(name, name) for name in names)
+
+
+def _choice(part: Section, key: str, known: list[str]) -> str:
     value = SYNONYMS.get(part.text(key), part.text(key))
     if value not in known:
-        raise part.error(key, " or ".join(known), shown(value))
+        raise part.error(key, " or ".join(dict.fromkeys(known)), shown(value))
     return value
 
 
@@ -144,10 +122,10 @@ def write(calibration: Calibration) -> bytes:
 
 
 def _written(name: str, camera: Camera) -> dict[str, Any]:
-    model, same = expressed(name, camera, WRITTEN, "Kalibr")
+    model, same = expressed(name, camera, MODELS.values(), "Kalibr")
     projection, distortion = model.name.split()
     values = model.values(same, 0.0)
-    count = len(PROJECTIONS[projection].split())
+    count = len(_parameters(model)[0])
     return {
         "camera_model": projection,
         "intrinsics": values[:count],

@@ -9,15 +9,15 @@ import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.section import BAD_K, LARGEST_SIDE, Section, explained
 from camviz.files.sizes import agreed_size
 from camviz.files.trees import scalar, shown
 from camviz.lenses import BrownConrady, Perspective
 from camviz.poses import RigidTransform
 
-RECTIFIED = [Model("P", Perspective, "fx fy cx cy skew")]
-RAW = [Model("K and D", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3")]
+RECTIFIED = models_of("kitti")
+RAW = models_of("kitti-raw")
 MAX_LINES = 1000
 MOST_WORDS = 64  # more than any line has
 _START = re.compile(r"^(?:P[0-9]|P_rect_[0-9]{2}|K_[0-9]{2}):[ \t]+[-+.0-9]", re.MULTILINE)

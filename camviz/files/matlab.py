@@ -8,7 +8,7 @@ from typing import Any
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
 from camviz.files import matlab_binary
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.output import as_json, only_camera, refuse_own_world
 from camviz.files.section import BAD_K, Section, explained
 from camviz.files.sizes import agreed_size, pair_of_sides
@@ -16,7 +16,7 @@ from camviz.files.trees import shown
 from camviz.lenses import BrownConrady
 
 FIRST_PIXEL = 1.0
-MODELS = [Model("cameraParameters", BrownConrady, "fx fy cx cy skew k1 k2 p1 p2 k3")]
+MODELS = models_of("matlab")
 RADIAL, TANGENTIAL = "RadialDistortion", "TangentialDistortion"
 
 

@@ -11,20 +11,13 @@ import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.section import Section
 from camviz.files.sizes import agreed_size, two_sides
 from camviz.files.trees import Repeated, shown
-from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt
 
-GRID = "fx fy cx cy skew"
-MODELS = [
-    Model("frame", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
-    Model("fisheye", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("spherical", Equirectangular, GRID),
-    Model("cylindrical", Cylindrical, GRID),
-]
-TYPES = {"frame": 0, "fisheye": 1, "equidistant_fisheye": 1, "spherical": 2, "cylindrical": 3}
+MODELS = {model.name: model for model in models_of("metashape")}
+SYNONYMS = {"equidistant_fisheye": "fisheye"}
 COEFFICIENTS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 
 
@@ -89,9 +82,10 @@ def _sensor(sensor: Section, size: tuple[int, int] | None) -> Camera:
 def _camera(section: Section, kind: str, held: tuple[int, int] | None, size: tuple[int, int] | None) -> Camera:
     """u = w/2 + cx + x' (f + b1) + y' b2, v = h/2 + cy + y' f, with the first pixel's centre at 0.5."""
     width, height = agreed_size(held, size, "width, height")
-    if kind not in TYPES:
-        raise section.error("projection", " or ".join(TYPES), shown(kind))
-    model, f = MODELS[TYPES[kind]], section.number("f")
+    model = MODELS.get(SYNONYMS.get(kind, kind))
+    if model is None:
+        raise section.error("projection", " or ".join([*MODELS, *SYNONYMS]), shown(kind))
+    f = section.number("f")
     given = {key: section.number(key) if key in section else 0.0 for key in ("cx", "cy", "b1", "b2", *COEFFICIENTS)}
     for key in COEFFICIENTS:
         if given[key] and key not in model.names:
@@ -128,7 +122,7 @@ def _document(root: str, attributes: str, lines: list[str]) -> bytes:
 
 
 def _elements(name: str, camera: Camera) -> tuple[str, dict[str, Any]]:
-    model, same = expressed(name, camera, MODELS, "Metashape")
+    model, same = expressed(name, camera, MODELS.values(), "Metashape")
     grid = same.intrinsics
     held = dict(zip(model.names, model.values(same, 0.5), strict=True))
     f, fx, skew = held.pop("fy"), held.pop("fx"), held.pop("skew")

@@ -11,22 +11,10 @@ import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.output import refuse_own_world
-from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
 
-GRID = "fx fy cx cy"
-RADIAL = "k1 k2 p1 p2 k3"
-RATIONAL = f"{RADIAL} k4 k5 k6"
-PRISM = f"{RATIONAL} s1 s2 s3 s4"
-MODELS = [
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {RADIAL}"),
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {RATIONAL}"),
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {PRISM}"),
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {PRISM} tau_x tau_y"),
-    Model("cv2.fisheye", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("cv2.omnidir", UnifiedSphere, f"{GRID} skew k1 k2 p1 p2 xi"),
-]
+MODELS = models_of("opencv")
 TITLE = "OpenCV FileStorage"
 
 
@@ -72,7 +60,7 @@ def _camera(name: str, camera: Camera, matrix: str, distortion: str, tag: str) -
     coefficients = dict(zip(model.names, model.values(same, 0.0), strict=True))
     for key in ("fx", "fy", "cx", "cy", "skew"):
         coefficients.pop(key, None)
-    extra: dict[str, Any] = {"fisheye_model": 1} if isinstance(same.lens, KannalaBrandt) else {}
+    extra: dict[str, Any] = {"fisheye_model": 1} if model.name == "cv2.fisheye" else {}
     if "xi" in coefficients:
         extra[f"xi{tag}"] = coefficients.pop("xi")
     return {matrix: same.intrinsics.K, distortion: np.array([list(coefficients.values())]), **extra}

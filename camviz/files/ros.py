@@ -9,7 +9,7 @@ import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.opencv import image_size, intrinsics
 from camviz.files.output import as_yaml, only_camera, refuse_own_world
 from camviz.files.section import COUNT, Section, explained
@@ -24,12 +24,7 @@ MEANINGS = {
 }
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
 RECTIFICATION, PROJECTION = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
-GRID = "fx fy cx cy"
-WRITTEN = [
-    Model("plumb_bob", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
-    Model("rational_polynomial", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
-    Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-]
+WRITTEN = models_of("ros")
 
 
 def read(section: Section, path: Path, size: tuple[int, int] | None) -> Calibration:

@@ -37,7 +37,10 @@ def _found() -> Iterator[type[Lens]]:
                 yield value
 
 
-LENSES: dict[str, type[Lens]] = {re.sub("(?<=[a-z])(?=[A-Z])", "_", lens.__name__).lower(): lens for lens in _found()}
+LENSES: dict[str, type[Lens]] = {  # the pinhole first, the others by their files
+    re.sub("(?<=[a-z])(?=[A-Z])", "_", lens.__name__).lower(): lens
+    for lens in sorted(_found(), key=lambda lens: lens is not Perspective)
+}
 globals().update({lens.__name__: lens for lens in LENSES.values()})
 
 __all__ = ["LENSES", "Lens", "calibration_models", "same_lenses", "spelled"]
