@@ -46,8 +46,8 @@ def depth_uncertainty(
     if not matching_px >= 0:
         raise ValueError(f"matching_px must be a standard deviation in pixels, at least 0, got {matching_px}")
     depth = np.asarray(depths, dtype=float)
-    seen_by = adjustment.cameras[left].intrinsics
-    pixel = as_points([(seen_by.width - 1) / 2, (seen_by.height - 1) / 2] if uv is None else uv, 2, "uv")
+    intrinsics = adjustment.cameras[left].intrinsics
+    pixel = as_points([(intrinsics.width - 1) / 2, (intrinsics.height - 1) / 2] if uv is None else uv, 2, "uv")
     by_depth, by_parameters = _right_pixel_jacobian(adjustment, left, right, pixel, depth)
     along = np.sum(by_depth**2, axis=-1)
     gain = np.einsum("ni,nis->ns", by_depth, by_parameters) / along[:, None]

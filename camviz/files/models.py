@@ -35,23 +35,23 @@ class Model:
         fx, fy = (held.pop(name, focal) for name in ("fx", "fy"))
         cx, cy = held.pop("cx") - first_pixel, held.pop("cy") - first_pixel
         with explained(where):
-            grid = Intrinsics(width, height, fx, fy, cx, cy, held.pop("skew", 0.0))  # type: ignore[arg-type]
-            return Camera(grid, self.lens(**held))
+            intrinsics = Intrinsics(width, height, fx, fy, cx, cy, held.pop("skew", 0.0))  # type: ignore[arg-type]
+            return Camera(intrinsics, self.lens(**held))
 
     def values(self, camera: Camera, first_pixel: float) -> list[float]:
         """The inverse of `camera`, for a camera that the model can hold."""
-        grid = camera.intrinsics
-        held = asdict(grid) | _parameters(camera.lens) | {"f": grid.fx}
-        held |= {"cx": grid.cx + first_pixel, "cy": grid.cy + first_pixel}
+        intrinsics = camera.intrinsics
+        held = asdict(intrinsics) | _parameters(camera.lens) | {"f": intrinsics.fx}
+        held |= {"cx": intrinsics.cx + first_pixel, "cy": intrinsics.cy + first_pixel}
         return [float(held[name]) for name in self.names]
 
     def lacks(self, camera: Camera) -> list[str]:
         """The parameters of a camera with a lens of this model's kind that have no place in the model."""
-        grid = camera.intrinsics
+        intrinsics = camera.intrinsics
         needed = {name: value for name, value in _parameters(camera.lens).items() if value != self.fixed.get(name, 0.0)}
         lacking = [name for name in needed if name not in self.names]
-        lacking += ["skew"] * (grid.skew != 0 and "skew" not in self.names)
-        return lacking + ["fy, which differs from fx,"] * (grid.fx != grid.fy and "f" in self.names)
+        lacking += ["skew"] * (intrinsics.skew != 0 and "skew" not in self.names)
+        return lacking + ["fy, which differs from fx,"] * (intrinsics.fx != intrinsics.fy and "f" in self.names)
 
 
 def models_of(program: str) -> list[Model]:
@@ -104,8 +104,8 @@ def _same_values(a: Camera, b: Camera, tolerance: float) -> bool:
     return bool(np.all(np.abs(first - second) <= tolerance * np.maximum(1, np.abs(first))))
 
 
-def _scaled(grid: Intrinsics, scale: float) -> Intrinsics:
-    return replace(grid, fx=grid.fx * scale, fy=grid.fy * scale, skew=grid.skew * scale)
+def _scaled(intrinsics: Intrinsics, scale: float) -> Intrinsics:
+    return replace(intrinsics, fx=intrinsics.fx * scale, fy=intrinsics.fy * scale, skew=intrinsics.skew * scale)
 
 
 def _parameters(lens: Lens) -> dict[str, float]:
