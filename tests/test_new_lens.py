@@ -1,6 +1,7 @@
-"""A stranger's lens is one file: written into a copy of the package, it appears everywhere that lenses do."""
+"""A stranger's lens is one file: the one of CONTRIBUTING.md, put into a copy of the package, appears everywhere."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -9,59 +10,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 # r = sin(kθ)/k: orthographic at k = 1, equisolid at k = 1/2. It turns back at kθ = 90°.
-SINE = '''
-"""A fisheye between the orthographic and the equisolid one."""
-
-from dataclasses import dataclass
-from math import inf, pi
-
-import numpy as np
-from numpy.typing import ArrayLike
-
-from camviz.lenses.base import Array, CalibrationModel, Example, Fold, Spelling, check_parameters, check_range
-from camviz.lenses.fisheye import Fisheye
-
-
-@dataclass(frozen=True)
-class SineFisheye(Fisheye):
-    """r = sin(kθ)/k for 0 < k ≤ 1, as far as it rises."""
-
-    k: float
-
-    spellings = (
-        Spelling("basalt", "sine", "fx fy cx cy k"),
-        Spelling("colmap", "SINE", "f cx cy k", number=99),
-        Spelling("mrcal", "LENSMODEL_SINE", "fx fy cx cy k"),
-    )
-    calibrations = (CalibrationModel("sine", "sine fisheye", "k", "k of r = sin(kθ)/k", start=(0.6,)),)
-    examples = (Example("wide", (0.55,), 160), Example("narrow", (0.9,), 99))
-    invalid = (((0,), "k must be above 0 and at most 1, got 0"),)
-
-    def __post_init__(self) -> None:
-        check_parameters(self)
-        check_range("k", self.k, 0 < self.k <= 1, "above 0 and at most 1")
-
-    @property
-    def max_angle(self) -> float:
-        return min(pi / (2 * self.k), pi)
-
-    @property
-    def can_fold(self) -> bool:
-        return True
-
-    @property
-    def fold(self) -> Fold | None:
-        angle = pi / (2 * self.k)
-        return Fold(angle, angle if angle < pi else inf, 1 / self.k, "rad")
-
-    def radial(self, theta: ArrayLike) -> Array:
-        return np.sin(self.k * np.asarray(theta, dtype=float)) / self.k
-
-    def angle(self, radius: Array) -> Array:
-        return np.arcsin(self.k * radius) / self.k
-'''
+SINE = re.search(r"\n## A lens\n.*?```python\n(.*?)```\n", CONTRIBUTING, flags=re.DOTALL)[1]
 
 
 @pytest.fixture(scope="module")

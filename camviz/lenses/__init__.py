@@ -11,21 +11,15 @@ from inspect import isabstract
 from pkgutil import iter_modules
 
 # What is found below needs no line here; these tell type checkers of the lenses that camviz itself makes use of.
-from camviz.lenses.base import CalibrationModel, Lens, Spelling
-from camviz.lenses.brown_conrady import BrownConrady as BrownConrady
-from camviz.lenses.fisheye import Equidistant as Equidistant
-from camviz.lenses.fisheye import Equisolid as Equisolid
-from camviz.lenses.fisheye import FieldOfView as FieldOfView
-from camviz.lenses.fisheye import Orthographic as Orthographic
-from camviz.lenses.fisheye import Stereographic as Stereographic
-from camviz.lenses.kannala_brandt import KannalaBrandt as KannalaBrandt
-from camviz.lenses.panoramas import Cylindrical as Cylindrical
-from camviz.lenses.panoramas import Equirectangular as Equirectangular
-from camviz.lenses.perspective import Perspective as Perspective
-from camviz.lenses.spheres import DoubleSphere as DoubleSphere
-from camviz.lenses.spheres import ExtendedUnified as ExtendedUnified
-from camviz.lenses.spheres import UnifiedSphere as UnifiedSphere
-from camviz.lenses.thin_prism_fisheye import ThinPrismFisheye as ThinPrismFisheye
+from camviz.lenses.base import Lens
+from camviz.lenses.brown_conrady import BrownConrady  # noqa: F401
+from camviz.lenses.declarations import CalibrationModel, Spelling
+from camviz.lenses.fisheye import Equidistant, Equisolid, FieldOfView, Orthographic, Stereographic  # noqa: F401
+from camviz.lenses.kannala_brandt import KannalaBrandt  # noqa: F401
+from camviz.lenses.panoramas import Cylindrical, Equirectangular  # noqa: F401
+from camviz.lenses.perspective import Perspective
+from camviz.lenses.spheres import DoubleSphere, ExtendedUnified, UnifiedSphere  # noqa: F401
+from camviz.lenses.thin_prism_fisheye import ThinPrismFisheye  # noqa: F401
 
 
 def _found() -> Iterator[type[Lens]]:

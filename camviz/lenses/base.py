@@ -7,15 +7,16 @@ body what the rest of camviz has to know of it. `camviz.lenses` finds the file; 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
 from math import isfinite
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
+
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
 Array = NDArray[np.float64]
 
@@ -24,64 +25,6 @@ ALONE = 1 << 17  # multiplications of a matrix product that OpenBLAS does withou
 BLOCK = 16384  # points worked on at a time, so that the temporaries stay in the processor's cache
 STEP = np.finfo(float).eps ** (1 / 3)  # where a central difference is exact to STEP², about 4e-11
 NO_DENOMINATOR = Polynomial([1.0])
-
-
-# What a lens declares
-
-
-@dataclass(frozen=True)
-class Spelling:
-    """How a program writes a lens in its files: the camera model's name, and the parameters in the program's order.
-
-    `program` is the format's name in camviz. `parameters` are names of the lens and of `Intrinsics`, with f where one
-    focal length serves as fx and fy. `fixed` are parameters that the program leaves out, and their values. `number` is
-    the model's number, for a program that counts its models.
-    """
-
-    program: str
-    model: str
-    parameters: str
-    fixed: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    number: int = -1
-
-
-@dataclass(frozen=True)
-class CalibrationModel:
-    """A choice of `camviz calibrate --model`: which parameters are solved for beside fx, fy, cx and cy, and how.
-
-    `solver` is the function of OpenCV that solves first, with `flags` of its own. Without one the calibration begins
-    with the lens of parameters `start`, at the focal length that fits the boards best.
-    """
-
-    name: str
-    title: str
-    parameters: str
-    says: str  # one line of the command's help
-    solver: str = ""
-    flags: str = ""
-    start: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class Example:
-    """Parameters with which the contract tests try a lens.
-
-    With them it sees rays up to `widest_deg` degrees from its axis, in every direction or nearly.
-    """
-
-    label: str
-    parameters: tuple[float, ...]
-    widest_deg: float
-
-
-@dataclass(frozen=True)
-class Fold:
-    """Where a lens's radial equation turns back: rays farther out would share their images with rays before it."""
-
-    radius: float  # in the variable of the equation: r on the plane z = 1, or the angle θ
-    angle: float  # in radians between the axis and the ray there; infinity where no ray gets there
-    image: float  # in focal lengths from the principal point
-    unit: str = "focal lengths"  # of the radius
 
 
 class Lens(ABC):

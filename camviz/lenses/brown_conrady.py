@@ -9,18 +9,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import (
-    Array,
-    CalibrationModel,
-    Example,
-    Fold,
-    Lens,
-    Spelling,
-    as_points,
-    blockwise,
-    check_parameters,
-    check_range,
-)
+from camviz.lenses.base import Array, Lens, as_points, blockwise, check_parameters, check_range
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 from camviz.lenses.perspective import Perspective
 from camviz.lenses.roots import first_positive_root
 

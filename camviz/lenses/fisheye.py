@@ -7,7 +7,8 @@ from math import pi, tan
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, Example, Lens, Spelling, check_parameters, check_range, up_to
+from camviz.lenses.base import Array, Lens, check_parameters, check_range, up_to
+from camviz.lenses.declarations import Example, Spelling
 
 
 class Fisheye(Lens):

@@ -7,7 +7,8 @@ from math import inf, pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, CalibrationModel, Example, Fold, Spelling, check_parameters
+from camviz.lenses.base import Array, check_parameters
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 from camviz.lenses.fisheye import Equidistant, Fisheye
 from camviz.lenses.roots import first_positive_root, solve_rising
 

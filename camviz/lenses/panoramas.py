@@ -5,7 +5,8 @@ from math import pi
 
 import numpy as np
 
-from camviz.lenses.base import Array, Example, Lens, Spelling, up_to
+from camviz.lenses.base import Array, Lens, up_to
+from camviz.lenses.declarations import Example, Spelling
 
 
 @dataclass(frozen=True)

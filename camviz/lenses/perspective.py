@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camviz.lenses.base import Array, Example, Lens, Spelling
+from camviz.lenses.base import Array, Lens
+from camviz.lenses.declarations import Example, Spelling
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,9 @@ from math import atan2, inf, isfinite, sqrt
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from camviz.lenses.base import (
-    NO_DENOMINATOR,
-    ROUNDING,
-    Array,
-    CalibrationModel,
-    Example,
-    Fold,
-    Lens,
-    Spelling,
-    check_parameters,
-    check_range,
-)
+from camviz.lenses.base import NO_DENOMINATOR, ROUNDING, Array, Lens, check_parameters, check_range
 from camviz.lenses.brown_conrady import BrownConrady
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from math import inf, pi
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from camviz.lenses.base import Array, Example, Fold, Lens, Spelling, check_parameters
+from camviz.lenses.base import Array, Lens, check_parameters
 from camviz.lenses.brown_conrady import BrownConrady
+from camviz.lenses.declarations import Example, Fold, Spelling
 from camviz.lenses.fisheye import Equidistant
 
 _EQUIDISTANT = Equidistant()
