@@ -23,8 +23,9 @@ from kernel import median_ms, table
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration import calibrate, detect
-from camviz.calibration.adjustment import Adjustment, moved
+from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.difference import pixel_grid
+from camviz.calibration.problem import moved
 from camviz.calibration.types import Board
 from camviz.calibration.uncertainty import projection_uncertainty
 from camviz.cameras import Camera, Intrinsics

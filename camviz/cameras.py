@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.lenses import Lens, Perspective
-from camviz.lenses.base import Array, as_points, times, unit
+from camviz.lenses.base import Array, as_points, blocked_matmul, unit
 from camviz.poses import RigidTransform, Rotation
 
 
@@ -162,13 +162,13 @@ class Camera:
     def project(self, points_world: ArrayLike) -> Array:
         """Pixels (..., 2) of world points (..., 3) in metres, K ∘ lens ∘ cam_from_world; NaN where there is none."""
         R, t = self.extrinsics
-        points_cam = times(as_points(points_world, 3, "points_world"), R.T) + t
+        points_cam = blocked_matmul(as_points(points_world, 3, "points_world"), R.T) + t
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
     def unproject(self, uv: ArrayLike) -> Array:
         """Unit rays (..., 3) in the world, from the centre through pixels (..., 2); NaN where there is no ray."""
         R, _ = self.extrinsics
-        return times(self.lens.unproject(self.intrinsics.from_pixels(uv)), R)
+        return blocked_matmul(self.lens.unproject(self.intrinsics.from_pixels(uv)), R)
 
     def rays(self) -> Array:
         """The unit ray (height, width, 3) in the world of every pixel."""
@@ -226,9 +226,9 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> R
 def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
     """Points (..., 3) taken by a rigid transform; scipy's `apply` takes only (n, 3)."""
     matrix = to_from.as_matrix()
-    return times(as_points(points, 3, "points"), matrix[:3, :3].T) + matrix[:3, 3]
+    return blocked_matmul(as_points(points, 3, "points"), matrix[:3, :3].T) + matrix[:3, 3]
 
 
 def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:
     """Vectors (..., 3) turned by a rotation."""
-    return times(as_points(vectors, 3, "vectors"), rotation.as_matrix().T)
+    return blocked_matmul(as_points(vectors, 3, "vectors"), rotation.as_matrix().T)

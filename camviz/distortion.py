@@ -1,58 +1,41 @@
 """What a distortion does to a picture: where it folds, how far it moves a pixel, how to take it back. For any lens."""
 
-from math import atan, inf, isfinite, pi, radians, tan
+from math import inf, pi, radians, sqrt, tan
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics, rotate
-from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective, UnifiedSphere
-from camviz.lenses.base import Array, as_points, on_plane
+from camviz.lenses import Lens, Perspective
+from camviz.lenses.base import Array, on_plane
+from camviz.lenses.roots import first_positive_root
 from camviz.poses import Rotation
 
 WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more than stretch
 
 
-def bends(lens: Lens) -> bool:
-    """False for a perspective lens, also where it is written as another kind whose coefficients are all at rest."""
-    return lens not in (Perspective(), BrownConrady(), UnifiedSphere(0.0))
-
-
-def polynomial(lens: Lens) -> BrownConrady | None:
-    """The Brown-Conrady polynomial inside a lens, None if it has none."""
-    if isinstance(lens, UnifiedSphere):
-        return lens.distortion
-    return lens if isinstance(lens, BrownConrady) else None
-
-
 def fold_radius(lens: Lens) -> float:
-    """The ideal radius where a lens's radial polynomial turns back: the first positive root of g', unless a pole comes
-    before it; else infinity.
+    """The ideal radius where a lens's radial equation turns back, unless a pole comes before it; else infinity.
 
-    In the polynomial's own variable: r of the plane it acts on, or for Kannala-Brandt the angle θ in radians.
+    In the equation's own variable: r on the plane z = 1, or for Kannala-Brandt the angle θ in radians.
     """
-    if isinstance(lens, KannalaBrandt):
-        return lens.fold_angle
-    bending = polynomial(lens)
-    return bending.fold_radius if bending else inf
+    return lens.fold.radius if lens.fold else inf
 
 
 def fold_angle(lens: Lens) -> float:
     """The angle in radians between the axis and the ray at which a lens folds; infinity if it never does."""
-    fold = fold_radius(lens)
-    if isinstance(lens, KannalaBrandt):
-        return fold if fold < pi else inf
-    if isinstance(lens, UnifiedSphere):
-        x, _, z = UnifiedSphere(lens.xi).unproject([min(fold, 1e9), 0.0])
-        return float(np.arctan2(x, z)) if isfinite(fold) and isfinite(z) else inf
-    return atan(fold) if isfinite(fold) else inf
+    return lens.fold.angle if lens.fold else inf
 
 
 def pole_radius(lens: Lens) -> float:
     """The ideal radius where a rational polynomial is infinite, the first positive root of D(r²); infinity if none."""
-    bending = polynomial(lens)
-    return bending.pole_radius if bending else inf
+    return sqrt(first_positive_root(lens.denominator.coef))
+
+
+def is_rational(lens: Lens) -> bool:
+    """True for a lens whose polynomial is divided by another, so that it may have a pole."""
+    return bool(np.any(lens.denominator.coef[1:]))
 
 
 def weakest_denominator(lens: Lens, radius: float) -> tuple[float, float]:
@@ -60,13 +43,10 @@ def weakest_denominator(lens: Lens, radius: float) -> tuple[float, float]:
 
     A D far below 1 is a near-pole: the polynomial has no root there, yet throws the picture about. (0, 1) without D.
     """
-    bending = polynomial(lens)
-    if bending is None:
-        return 0.0, 1.0
-    turns = bending.denominator.deriv().roots()
+    turns = lens.denominator.deriv().roots()
     turns = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0) & (turns.real < radius**2)]
     candidates = np.concatenate([[0.0], turns, [radius**2]])
-    values = bending.denominator(candidates)
+    values = lens.denominator(candidates)
     return float(np.sqrt(candidates[values.argmin()])), float(values.min())
 
 
@@ -98,14 +78,11 @@ def ideal_image_radius(camera: Camera) -> float:
 def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
     """The determinant (...) of the map from ideal points (..., 2) on the plane z = 1 to the image; below 0 it mirrors.
 
-    Exact for `BrownConrady`, beyond its fold as well; by central differences for any other lens, good to about 1e-9.
+    By the lens's own Jacobian: of `BrownConrady` exact, beyond its fold as well; of most others good to about 1e-9.
     """
-    xy = as_points(xy, 2, "xy")
-    if isinstance(lens, BrownConrady):
-        return _determinant(lens.jacobian(xy))
-    step = 6e-6 * (1 + np.linalg.norm(xy, axis=-1))[..., None, None] * np.eye(2)
-    ahead, behind = (lens.project(on_plane(xy[..., None, :] + sign * step)) for sign in (1, -1))
-    return _determinant((ahead - behind) / (2 * step.max(axis=-1, keepdims=True)))
+    J = lens.jacobian(xy)
+    with np.errstate(all="ignore"):
+        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
 
 
 def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
@@ -216,11 +193,6 @@ def _rectangle(intrinsics: Intrinsics, samples: int) -> Array:
 def _ideal(camera: Camera, uv: Array) -> Array:
     """The points (..., 2) of the plane z = 1 that pixels (..., 2) show; NaN where they show none."""
     return Perspective().project(camera.lens.unproject(camera.intrinsics.from_pixels(uv)))
-
-
-def _determinant(J: Array) -> Array:
-    with np.errstate(all="ignore"):
-        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
 
 
 def _centred(size: int, step: float) -> Array:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.adjustment import Adjustment, moved
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.problem import moved
 from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady

@@ -9,9 +9,10 @@ from boards import BOARD, CAMERA, ESTIMATED, RIGHT, board_poses, noisy, truth
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.adjustment import Adjustment, sagittas, twisted
+from camviz.calibration.adjustment import Adjustment, twisted
 from camviz.calibration.arrowhead import inverse
-from camviz.calibration.slopes import lens_parameters, pixel_slopes, with_parameters
+from camviz.calibration.jacobian import pixel_jacobian, with_parameters
+from camviz.calibration.linearisation import sagittas
 from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, UnifiedSphere
@@ -59,10 +60,10 @@ def dense(adjustment):
 def test_slopes_are_those_of_the_projection(lens) -> None:
     """The pixel of a point moved a little, and of a camera changed a little, is foretold to second order."""
     camera = Camera(Intrinsics(640, 480, 400.0, 410.0, 320.0, 240.0, skew=0.7), lens)
-    names = ("fx", "fy", "cx", "cy", "skew", *lens_parameters(lens))
+    names = ("fx", "fy", "cx", "cy", "skew", *lens.parameters())
     rng = np.random.default_rng(0)
     points = rng.uniform([-0.4, -0.3, 0.9], [0.4, 0.3, 1.5], (40, 3))
-    uv, by_point, by_parameter = pixel_slopes(camera, points, names)
+    uv, by_point, by_parameter = pixel_jacobian(camera, points, names)
     assert np.allclose(uv, camera.project(points), rtol=0, atol=1e-9)
     h = 1e-4
     for i, shift in enumerate(h * np.eye(3)):
@@ -80,7 +81,7 @@ def test_a_parameter_at_the_end_of_its_range_has_a_slope_too() -> None:
     camera = Camera(Intrinsics(640, 480, 400.0, 400.0, 320.0, 240.0), UnifiedSphere(0.0))
     point = np.array([0.3, -0.2, 1.1])
     expected = -400 * point[:2] / point[2] * np.linalg.norm(point) / point[2]
-    assert np.allclose(pixel_slopes(camera, point, ("xi",))[2][:, 0], expected, rtol=1e-4)
+    assert np.allclose(pixel_jacobian(camera, point, ("xi",))[2][:, 0], expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize("problem", ["solved", "pair"])

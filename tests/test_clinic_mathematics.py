@@ -12,6 +12,7 @@ from camviz.calibration.board_warp import warp_test
 from camviz.calibration.cross_validation import halves, held_out
 from camviz.calibration.difference import difference
 from camviz.calibration.guidance import candidate_poses, next_board_poses, outline, tilt_deg
+from camviz.calibration.jacobian import with_parameters
 from camviz.calibration.residual_statistics import (
     board_displacements,
     correlation,
@@ -24,7 +25,6 @@ from camviz.calibration.residual_statistics import (
     robust_z,
     view_rms,
 )
-from camviz.calibration.slopes import with_parameters
 from camviz.calibration.stereo_depth import depth_uncertainty
 from camviz.cameras import transform
 from camviz.twoview import triangulate

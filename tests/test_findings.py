@@ -131,7 +131,7 @@ def test_what_columns_explain_is_what_dense_least_squares_says(healthy):
     """The same sums of squares from one matrix of all parameters, poses and columns."""
     _, calibration = healthy
     best = Evidence(calibration).observed["camera"].best
-    by_shared, by_pose = best.slopes("camera")
+    by_shared, by_pose = best.jacobian("camera")
     views, corners = best.used["camera"].shape
     poses = np.zeros((views, corners, 2, 6 * views))
     for view in range(views):

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from camviz import lenses
 from camviz.lenses import (
     LENSES,
     BrownConrady,
@@ -23,59 +24,24 @@ from camviz.lenses import (
     Orthographic,
     Perspective,
     Stereographic,
-    ThinPrismFisheye,
     UnifiedSphere,
+    same_lenses,
 )
-from camviz.lenses.base import unit
+from camviz.lenses.base import on_plane, unit
 
 FOCAL_PX = 500
 TOLERANCE = 1e-9 / FOCAL_PX  # 1e-9 px
 
-# Each lens by example: (lens, the largest angle in degrees from its axis that it sees in every direction, or nearly).
+# Every lens by the examples that it declares: (lens, the largest angle in degrees from its axis that it sees in every
+# direction, or nearly).
 EXAMPLES = {
-    "perspective": (Perspective(), 89),
-    "brown_conrady_none": (BrownConrady(), 88),
-    "brown_conrady_barrel": (BrownConrady(-0.3), 46),
-    "brown_conrady_5": (BrownConrady(-0.28, 0.07, 1e-3, -5e-4, 0.01), 60),
-    "brown_conrady_8": (BrownConrady(0.5, 0.1, 1e-3, -5e-4, 0.01, 0.6, 0.2, 0.02), 60),
-    "brown_conrady_12": (BrownConrady(-0.2, 0.1, 1e-3, -2e-3, 0.01, 0.1, 0, 0, 1e-2, -2e-3, -4e-3, 3e-3), 45),
-    "brown_conrady_14": (BrownConrady(-0.2, 0.1, 1e-3, -2e-3, 0, 0, 0, 0, 1e-2, -2e-3, -4e-3, 3e-3, 0.1, -0.07), 45),
-    "brown_conrady_only_tangential": (BrownConrady(p1=0.1, p2=-0.05), 40),
-    "brown_conrady_folding_early": (BrownConrady(0.296, -1.035, 0.01, -0.02), 32),
-    "brown_conrady_before_a_pole": (BrownConrady(k1=0.1, k4=-0.8), 45),
-    "brown_conrady_strong": (BrownConrady(k1=30, k2=-2, k3=-400), 10),
-    "kannala_brandt": (KannalaBrandt(0.00693023, -0.0013828, -0.000272596, -0.000452646), 100),
-    "kannala_brandt_folding": (KannalaBrandt(-0.1), 100),
-    "kannala_brandt_none": (KannalaBrandt(), 180),
-    "thin_prism_fisheye": (ThinPrismFisheye(0.02, -0.01, 1e-3, -5e-4, 2e-3, -3e-4, 1e-3, -2e-3), 100),
-    "thin_prism_fisheye_folding": (ThinPrismFisheye(-0.1, p1=1e-3, sx1=2e-3), 100),
-    "equidistant": (Equidistant(), 180),
-    "equisolid": (Equisolid(), 180),
-    "orthographic": (Orthographic(), 90),
-    "stereographic": (Stereographic(), 180),
-    "unified_pinhole": (UnifiedSphere(0), 89),
-    "unified_hyperbolic": (UnifiedSphere(0.8), 140),
-    "unified_parabolic": (UnifiedSphere(1), 170),
-    "unified_beyond": (UnifiedSphere(2.5), 110),
-    "unified_distorted": (UnifiedSphere(0.9, -0.1, 0.02, 1e-3, -2e-3), 90),
-    "extended_unified": (ExtendedUnified(0.6, 1.1), 120),
-    "extended_unified_narrow": (ExtendedUnified(0.3, 0.5), 100),
-    "extended_unified_orthographic": (ExtendedUnified(1, 1), 90),
-    "extended_unified_pinhole": (ExtendedUnified(0, 2), 89),
-    "double_sphere": (DoubleSphere(-0.2, 0.6), 120),
-    "double_sphere_low_alpha": (DoubleSphere(-0.5, 0.2), 75),
-    "double_sphere_positive": (DoubleSphere(0.5, 0.4), 110),
-    "double_sphere_one": (DoubleSphere(1, 1), 130),
-    "field_of_view": (FieldOfView(0.93), 180),
-    "field_of_view_weak": (FieldOfView(1e-6), 89),
-    "field_of_view_strong": (FieldOfView(3.0), 180),
-    "equirectangular": (Equirectangular(), 180),
-    "cylindrical": (Cylindrical(), 89),
+    "_".join(filter(None, (name, example.label))): (lens(*example.parameters), example.widest_deg)
+    for name, lens in LENSES.items()
+    for example in lens.examples
 }
-PANORAMAS = {"equirectangular", "cylindrical"}
 
 every_lens = pytest.mark.parametrize(("lens", "widest_deg"), EXAMPLES.values(), ids=EXAMPLES)
-ROUND = {name: example for name, example in EXAMPLES.items() if name not in PANORAMAS}
+ROUND = {name: example for name, example in EXAMPLES.items() if not example[0].goes_round}
 every_round_lens = pytest.mark.parametrize(("lens", "widest_deg"), ROUND.values(), ids=ROUND)
 
 
@@ -214,9 +180,18 @@ def test_a_lens_is_a_value(lens, widest_deg):
         lens.k1 = 0.5
 
 
-def test_every_lens_has_a_name_and_every_name_is_exercised():
+def test_every_lens_has_a_name_and_examples_with_labels_of_their_own():
     assert set(LENSES.values()) == {type(lens) for lens, _ in EXAMPLES.values()}
-    assert len(LENSES) == 14
+    assert len(EXAMPLES) == sum(len(lens.examples) for lens in LENSES.values())
+
+
+def test_the_lenses_that_camviz_has_always_had_are_found():
+    assert set(LENSES) >= {
+        *("perspective", "brown_conrady", "kannala_brandt", "thin_prism_fisheye", "equidistant", "equisolid"),
+        *("orthographic", "stereographic", "unified_sphere", "extended_unified", "double_sphere", "field_of_view"),
+        *("equirectangular", "cylindrical"),
+    }
+    assert [name for name in lenses.__all__ if not hasattr(lenses, name)] == []
 
 
 @pytest.mark.parametrize("cls", [cls for cls in LENSES.values() if cls.__dataclass_fields__], ids=lambda c: c.__name__)
@@ -229,22 +204,22 @@ def test_parameters_must_be_finite(cls, bad):
 
 
 @pytest.mark.parametrize(
+    ("lens", "parameters", "message"), [(lens, *each) for lens in LENSES.values() for each in lens.invalid]
+)
+def test_parameters_outside_their_published_range_are_refused(lens, parameters, message):
+    with pytest.raises(ValueError, match=message):
+        lens(*parameters)
+
+
+@pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: UnifiedSphere(-0.1), "xi must be at least 0, got -0.1"),
         (lambda: UnifiedSphere.from_alpha(1), "alpha must be at least 0 and below 1, got 1"),
-        (lambda: ExtendedUnified(1.1, 1), "alpha must be between 0 and 1, got 1.1"),
-        (lambda: ExtendedUnified(0.5, 0), "beta must be positive, got 0"),
-        (lambda: DoubleSphere(-1, 0.5), "xi must be above -1 and at most 1, got -1"),
-        (lambda: DoubleSphere(0, -0.1), "alpha must be between 0 and 1, got -0.1"),
-        (lambda: FieldOfView(0), "omega must be an angle between 0 and π radians, got 0"),
-        (lambda: FieldOfView(pi), "omega must be an angle between 0 and π radians, got 3.14"),
-        (lambda: BrownConrady(tau_x=1.6), "tau_x must be an angle between -π/2 and π/2 radians, got 1.6"),
         (lambda: BrownConrady.from_coefficients([0.1] * 6), "coefficients must be 4, 5, 8, 12 or 14 numbers, got 6"),
         (lambda: BrownConrady.from_coefficients([]), "coefficients must be 4, 5, 8, 12 or 14 numbers, got 0"),
     ],
 )
-def test_parameters_outside_their_published_range_are_refused(make, message):
+def test_other_ways_to_make_a_lens_refuse_what_they_cannot_take(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 
@@ -295,6 +270,56 @@ def test_no_ray_arrives_beyond_the_edge_of_the_image(lens, radius):
     rim = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
     assert np.isfinite(lens.unproject(radius * (1 - 1e-9) * rim)).all()
     assert np.isnan(lens.unproject(radius * (1 + 1e-9) * rim)).all()
+
+
+FOLDING = {name: lens for name, (lens, _) in EXAMPLES.items() if lens.fold and lens.fold.angle < inf}
+
+
+@pytest.mark.parametrize("lens", FOLDING.values(), ids=FOLDING)
+def test_a_fold_ends_the_field_and_its_image_is_the_farthest(lens):
+    """Where the tangential part of a polynomial mirrors before, the field ends there."""
+    angle = lens.fold.angle
+    beyond = directions(angle + np.array([1e-6, 1e-3, 0.1]), 0.0)
+    assert np.isnan(lens.project(beyond)).all()
+    seen = lens.project(directions(np.linspace(0, angle * (1 - 1e-9), 50), 0.0))
+    radii = np.linalg.norm(seen[np.isfinite(seen[:, 0])], axis=-1)
+    assert (np.diff(radii) > 0).all()
+    if not any(getattr(lens, name, 0) for name in ("p1", "p2", "s1", "s2", "s3", "s4", "sx1", "sy1", "tau_x")):
+        assert radii[-1] == pytest.approx(lens.fold.image, rel=1e-6)
+
+
+@every_lens
+def test_only_a_lens_that_can_fold_folds(lens, widest_deg):
+    assert lens.can_fold or lens.fold is None
+
+
+@every_lens
+def test_the_same_lens_under_another_name_has_the_same_images(lens, widest_deg):
+    """At its own focal length: a pinhole is Brown-Conrady without coefficients, a unified sphere with ξ is α's."""
+    rays = directions(np.radians(0.9 * widest_deg) * np.linspace(0, 1, 9)[:, None], np.linspace(0, 6, 7))
+    for other, scale in same_lenses(lens):
+        np.testing.assert_allclose(scale * other.project(rays), lens.project(rays), rtol=1e-12, atol=1e-15)
+        assert any(type(lens) is type(back) for back, _ in same_lenses(other))
+
+
+@every_lens
+def test_the_jacobian_foretells_how_far_an_image_moves(lens, widest_deg):
+    xy = np.tan(np.radians(min(widest_deg, 60) * 0.4)) * np.array([[0.5, 0.3], [-0.2, 0.6], [0.1, -0.1]])
+    step = 1e-5 * np.eye(2)
+    ahead, behind = (lens.project(on_plane(xy[:, None] + way * step)) for way in (1, -1))
+    numeric = np.swapaxes((ahead - behind) / 2e-5, -1, -2)
+    np.testing.assert_allclose(lens.jacobian(xy), numeric, rtol=1e-5, atol=1e-7)
+
+
+@every_lens
+def test_the_spellings_of_a_lens_name_parameters_that_it_has(lens, widest_deg):
+    """A program's list and what it fixes are of the lens's parameters and a camera's, none of them twice."""
+    known = {"f", "fx", "fy", "cx", "cy", "skew", *lens.parameters()}
+    for spelling in lens.spellings:
+        names = [*spelling.parameters.split(), *spelling.fixed]
+        assert len(names) == len(set(names)), spelling
+        assert set(names) <= known, spelling
+        assert {"cx", "cy"} <= set(names), spelling
 
 
 def test_a_point_behind_a_pinhole_has_no_image():

@@ -17,11 +17,11 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.difference import aligned, difference, pixel_grid
-from camviz.calibration.slopes import pixel_slopes
+from camviz.calibration.jacobian import pixel_jacobian
 from camviz.calibration.uncertainty import (
     mean_deviation,
     projection_covariance,
-    projection_slopes,
+    projection_jacobian,
     projection_uncertainty,
     worst_deviation,
 )
@@ -301,12 +301,12 @@ def test_slopes_are_those_of_the_mean_opinion(distance) -> None:
 
     steps = 1e-5 * np.eye(len(exact.parameters) + 6)
     expected = np.stack([(seen(step) - seen(-step)) / 2e-5 for step in steps], axis=-1)
-    assert np.allclose(projection_slopes(exact, uv, distance, "right"), expected, rtol=1e-4, atol=0.02)
+    assert np.allclose(projection_jacobian(exact, uv, distance, "right"), expected, rtol=1e-4, atol=0.02)
 
 
 def test_poses_held_fixed_would_say_something_else(solved) -> None:
     """The covariance of the intrinsics alone, carried to the pixel, is several times off in the middle."""
     camera = solved.cameras["camera"]
-    _, _, slopes = pixel_slopes(camera, camera.unproject(PIXELS[:1]), OPENCV5)
+    _, _, slopes = pixel_jacobian(camera, camera.unproject(PIXELS[:1]), OPENCV5)
     naive = worst_deviation(slopes @ solved.covariance[:9, :9] @ np.swapaxes(slopes, 1, 2))
     assert naive > 3 * projection_uncertainty(solved, PIXELS[:1])

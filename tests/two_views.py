@@ -7,24 +7,24 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import Lens
 
 LEFT_PIXELS = Intrinsics(640, 480, 520.0, 540.0, 300.0, 250.0, skew=1.5)
 RIGHT_PIXELS = Intrinsics(800, 600, 610.0, 600.0, 410.0, 290.0)
 
 
 @dataclass(frozen=True)
-class Equidistant:
+class Equidistant(Lens):
     """r = θ: enough of a fisheye to hold what is said of any lens."""
 
-    def project(self, points_cam):
-        x, y, z = np.moveaxis(np.asarray(points_cam, dtype=float), -1, 0)
+    def image(self, x, y, z):
         r = np.hypot(x, y)
         scale = np.where(r > 0, np.arctan2(r, z) / np.where(r > 0, r, 1), 1 / z)
-        return np.stack([x * scale, y * scale], axis=-1)
+        return x * scale, y * scale
 
-    def unproject(self, xy):
-        theta = np.linalg.norm(xy, axis=-1, keepdims=True)
-        return np.concatenate([xy * np.sinc(theta / np.pi), np.cos(theta)], axis=-1)
+    def ray(self, x, y):
+        theta = np.hypot(x, y)
+        return x * np.sinc(theta / np.pi), y * np.sinc(theta / np.pi), np.cos(theta)
 
 
 def stereo(lens=None, baseline=(0.5, 0.05, -0.08), turn=(0.03, -0.12, 0.05)):

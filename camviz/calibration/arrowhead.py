@@ -66,14 +66,14 @@ class Arrowhead:
         return inverse(self.blocks)
 
     @cached_property
-    def levers(self) -> Array:
+    def pose_response(self) -> Array:
         """Wᵢ = Cᵢ⁻¹ Bᵢᵀ, (v, m, s): a view's parameters follow an error δ of the shared ones by -Wᵢ δ."""
         return self.block_inverses @ np.swapaxes(self.border, 1, 2)
 
     @cached_property
     def information(self) -> Array:
         """A - Σ Bᵢ Cᵢ⁻¹ Bᵢᵀ, (s, s): what the views say of the shared parameters, their own being free to follow."""
-        return self.shared - np.einsum("vsm,vmt->st", self.border, self.levers)
+        return self.shared - np.einsum("vsm,vmt->st", self.border, self.pose_response)
 
     @cached_property
     def covariance(self) -> Array:
@@ -85,8 +85,8 @@ class Arrowhead:
         views = np.einsum("vmn,vn->vm", self.block_inverses, self.gradients)
         if only_views:
             return np.zeros_like(self.shared_gradient), views
-        shared = self.covariance @ (self.shared_gradient - np.einsum("vms,vm->s", self.levers, self.gradients))
-        return shared, views - self.levers @ shared
+        shared = self.covariance @ (self.shared_gradient - np.einsum("vms,vm->s", self.pose_response, self.gradients))
+        return shared, views - self.pose_response @ shared
 
 
 def inverse(matrices: Array) -> Array:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from camviz.calibration.adjustment import Adjustment, Mask
+from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.difference import Difference, difference, pixel_grid
-from camviz.calibration.types import Board
+from camviz.calibration.types import Board, Mask
 from camviz.calibration.uncertainty import mean_deviation, projection_covariance
 from camviz.lenses.base import Array
 
@@ -157,8 +157,8 @@ def _foretold_variances(there: Adjustment, solution: Adjustment, name: str) -> A
     the pose follows by -Wᵢ (`Arrowhead`).
     """
     normal = there.normal_equations
-    by_shared, by_pose = there.slopes(name)
-    by_cameras = by_shared - by_pose @ normal.levers[:, None]
+    by_shared, by_pose = there.jacobian(name)
+    by_cameras = by_shared - by_pose @ normal.pose_response[:, None]
     variances = np.full((there.views, *by_pose.shape[1:3]), np.nan)
     of_pose = np.einsum("vcim,vmn,vcin->vci", by_pose, normal.block_inverses, by_pose)
     of_cameras = np.einsum("vcis,st,vcit->vci", by_cameras, solution.normal_equations.covariance, by_cameras)

@@ -7,8 +7,9 @@ from math import inf, isinf
 
 import numpy as np
 
-from camviz.calibration.adjustment import twist_slopes, twisted
+from camviz.calibration.adjustment import twisted
 from camviz.calibration.arrowhead import inverse
+from camviz.calibration.jacobian import twist_jacobian
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
@@ -144,7 +145,7 @@ def _slope_and_curvature(
     direction = there / length
     e = direction - rays
     # ∂(p/|p|)/∂ξ = (1 - n nᵀ) [-[p]ₓ | 1] / |p|
-    E = twist_slopes(there)[..., :free] / length[..., None]
+    E = twist_jacobian(there)[..., :free] / length[..., None]
     E -= direction[..., None] * np.einsum("ni,nij->nj", direction, E)[:, None]
     square = np.sum(e * e, axis=-1)
     Ee = np.einsum("nij,ni->nj", E, e)

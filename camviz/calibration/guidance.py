@@ -10,11 +10,12 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.calibration.adjustment import Adjustment, moved
+from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.arrowhead import inverse
 from camviz.calibration.difference import pixel_grid
+from camviz.calibration.problem import moved
 from camviz.calibration.types import Board
-from camviz.calibration.uncertainty import projection_slopes, worst_deviation
+from camviz.calibration.uncertainty import projection_jacobian, worst_deviation
 from camviz.cameras import Camera
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation
@@ -59,12 +60,12 @@ def next_board_poses(
         hidden = np.flatnonzero(~whole).tolist()
         raise ValueError(f"candidates must show the whole board in the picture of {name}; numbers {hidden} do not")
     pixels = pixel_grid(seen_by.intrinsics, (12, 9)).reshape(-1, 2) if uv is None else as_points(uv, 2, "uv")
-    slopes = projection_slopes(adjustment, pixels, distance, name)
-    slopes = slopes[np.isfinite(slopes).all(axis=(1, 2))]
-    before = _mean_uncertainty(slopes, adjustment.mean_twist_covariance)
+    jacobian = projection_jacobian(adjustment, pixels, distance, name)
+    jacobian = jacobian[np.isfinite(jacobian).all(axis=(1, 2))]
+    before = _mean_uncertainty(jacobian, adjustment.mean_twist_covariance)
     changed = _with_one_more(adjustment, seen_by.world_from_cam * candidates)
     tilts = tilt_deg(candidates, adjustment.board)
-    after = [_mean_uncertainty(slopes, covariance) for covariance in changed]
+    after = [_mean_uncertainty(jacobian, covariance) for covariance in changed]
     return tuple(Candidate(candidates[i], float(tilts[i]), before, after[i]) for i in np.argsort(after))
 
 
@@ -145,11 +146,11 @@ def _blocks(held: Adjustment, name: str) -> tuple[Array, Array, Array]:
     """What camera `name` alone contributes to each view's A, B and C: by the corners that lie in its picture."""
     seen = held.cameras[name].intrinsics.contains(held.projected(name))[..., None, None]
     by_shared, by_pose = (
-        np.where(seen, slopes, 0).reshape(held.views, 2 * seen.shape[1], -1) for slopes in held.slopes(name)
+        np.where(seen, jacobian, 0).reshape(held.views, 2 * seen.shape[1], -1) for jacobian in held.jacobian(name)
     )
     transposed = np.swapaxes(by_shared, 1, 2)
     return transposed @ by_shared, transposed @ by_pose, np.swapaxes(by_pose, 1, 2) @ by_pose
 
 
-def _mean_uncertainty(slopes: Array, covariance: Array) -> float:
-    return float(np.mean(worst_deviation(slopes @ covariance @ np.swapaxes(slopes, 1, 2))))
+def _mean_uncertainty(jacobian: Array, covariance: Array) -> float:
+    return float(np.mean(worst_deviation(jacobian @ covariance @ np.swapaxes(jacobian, 1, 2))))

@@ -12,12 +12,11 @@ import numpy as np
 from camviz.calibration.detection import CannotCalibrate
 from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
-from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
+from camviz.lenses import CalibrationModel, Lens, calibration_models
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
 
 PIXELS = ("fx", "fy", "cx", "cy")
-STANDARD = (*PIXELS, "k1", "k2", "p1", "p2", "k3")
 CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
 FOCAL_LENGTHS = np.geomspace(0.1, 4, 25)  # in image widths, tried as a fisheye's
 
@@ -101,59 +100,70 @@ def _poses(rvecs: Any, tvecs: Any) -> RigidTransform:
     return RigidTransform.from_components(np.reshape(tvecs, (-1, 3)), Rotation.from_rotvec(np.reshape(rvecs, (-1, 3))))
 
 
-def _pinhole(flags: int) -> Callable[[Views, tuple[str, ...]], Solution]:
+def _from_start(start: Lens, views: Views) -> Solution:
+    """The lens as it is given, at the focal length that makes the boards flattest; the adjustment does the rest."""
+    camera = _begun(start, views)
+    return camera, poses_from_rays(camera, views.points, views.pixels)
+
+
+def _calibrate_camera(lens: type[Any], flags: int, views: Views, fixed: tuple[str, ...]) -> Solution:
     """cv2.calibrateCamera, with the flags of a model.
 
     A rational solution may fold, or have its pole, among the very corners: then the plain one is the better beginning.
     """
-
-    def solve(views: Views, fixed: tuple[str, ...]) -> Solution:
-        held = sum(flag for flag, names in GROUPS.items() if names <= set(fixed))
-        points, pixels = ([each.astype(np.float32) for each in lists] for lists in (views.points, views.pixels))
-        _, K, coefficients, rvecs, tvecs = cv2.calibrateCamera(
-            points, pixels, views.size, None, None, flags=flags | held, criteria=CRITERIA
-        )
-        lens = BrownConrady.from_coefficients(np.ravel(coefficients)[:14])
-        camera, poses = Camera(Intrinsics.from_matrix(K, *views.size), lens), _poses(rvecs, tvecs)
-        seen = np.concatenate(
-            [camera.project(pose.apply(each)) for pose, each in zip(poses, views.points, strict=True)]
-        )
-        return (camera, poses) if not flags or np.isfinite(seen).all() else _pinhole(0)(views, fixed)
-
-    return solve
+    held = sum(flag for flag, names in GROUPS.items() if names <= set(fixed))
+    points, pixels = ([each.astype(np.float32) for each in lists] for lists in (views.points, views.pixels))
+    _, K, coefficients, rvecs, tvecs = cv2.calibrateCamera(
+        points, pixels, views.size, None, None, flags=flags | held, criteria=CRITERIA
+    )
+    camera = Camera(Intrinsics.from_matrix(K, *views.size), lens(*np.ravel(coefficients)[:14].tolist()))
+    poses = _poses(rvecs, tvecs)
+    seen = np.concatenate([camera.project(pose.apply(each)) for pose, each in zip(poses, views.points, strict=True)])
+    return (camera, poses) if not flags or np.isfinite(seen).all() else _calibrate_camera(lens, 0, views, fixed)
 
 
-def _fisheye(views: Views, fixed: tuple[str, ...]) -> Solution:
+def _calibrate_fisheye(lens: type[Any], flags: int, views: Views, fixed: tuple[str, ...]) -> Solution:
     """cv2.fisheye.calibrate from the focal length that makes the boards flattest, which it must be given.
 
     Its poses go wrong for boards that reach to the side of the camera, where its projection mirrors: they are found
     anew from the rays, and where it fails altogether the beginning is kept.
     """
-    begun = _equidistant(views)
-    flags = _fisheye_flag("RECOMPUTE_EXTRINSIC") | _fisheye_flag("FIX_SKEW") | _fisheye_flag("USE_INTRINSIC_GUESS")
+    begun = _begun(lens(), views)
+    flags |= _fisheye_flag("RECOMPUTE_EXTRINSIC") | _fisheye_flag("FIX_SKEW") | _fisheye_flag("USE_INTRINSIC_GUESS")
     try:
         _, K, coefficients, *_ = cv2.fisheye.calibrate(
-            [each.reshape(1, -1, 3) for each in views.points],
-            [each.reshape(1, -1, 2) for each in views.pixels],
-            views.size,
-            begun.intrinsics.K,
-            np.zeros(4),
-            flags=flags,
-            criteria=CRITERIA,
+            *_rows(views), views.size, begun.intrinsics.K, np.zeros(4), flags=flags, criteria=CRITERIA
         )
-        solved = Camera(Intrinsics.from_matrix(K, *views.size), KannalaBrandt(*np.ravel(coefficients).tolist()))
+        solved = Camera(Intrinsics.from_matrix(K, *views.size), lens(*np.ravel(coefficients).tolist()))
         camera = min(begun, solved, key=lambda one: _misfit(one, views))
     except (cv2.error, ValueError):
         camera = begun
     return camera, poses_from_rays(camera, views.points, views.pixels)
 
 
-def _equidistant(views: Views) -> Camera:
-    """The equidistant fisheye, looking through the middle of the image, that fits the views best."""
+def _calibrate_omnidir(lens: type[Any], flags: int, views: Views, fixed: tuple[str, ...]) -> Solution:
+    """cv2.omnidir.calibrate, which begins by itself, heeds no guess, and leaves out views that it cannot begin with."""
+    if not hasattr(cv2, "omnidir"):
+        raise CannotCalibrate("the model omni needs OpenCV's contributed modules: pip install opencv-contrib-python")
+    flags |= cv2.omnidir.CALIB_FIX_SKEW
+    _, K, xi, coefficients, *_ = cv2.omnidir.calibrate(*_rows(views), views.size, None, None, None, flags, CRITERIA)
+    K = np.asarray(K) * np.array([[1, 0, 1], [0, 1, 1], [1, 1, 1]])
+    solved = lens(float(np.ravel(xi)[0]), *np.ravel(coefficients)[:4].tolist())
+    camera = Camera(Intrinsics.from_matrix(K, *views.size), solved)
+    return camera, poses_from_rays(camera, views.points, views.pixels)
+
+
+def _rows(views: Views) -> tuple[list[Array], list[Array]]:
+    """Points and pixels as the fisheye and omnidir modules take them, (1, n, 3) and (1, n, 2)."""
+    return [each.reshape(1, -1, 3) for each in views.points], [each.reshape(1, -1, 2) for each in views.pixels]
+
+
+def _begun(lens: Lens, views: Views) -> Camera:
+    """The camera with this lens, looking through the middle of the image, that fits the views best."""
     middle = (views.width - 1) / 2, (views.height - 1) / 2
     every = -(-len(views.points) // 20)  # twenty views are enough to begin with
     views = Views(views.points[::every], views.pixels[::every], *views.size)
-    cameras = [Camera(Intrinsics(*views.size, f, f, *middle), KannalaBrandt()) for f in FOCAL_LENGTHS * views.width]
+    cameras = [Camera(Intrinsics(*views.size, f, f, *middle), lens) for f in FOCAL_LENGTHS * views.width]
     return min(cameras, key=lambda camera: _misfit(camera, views))
 
 
@@ -175,32 +185,23 @@ def _fisheye_flag(name: str) -> int:
     return int(getattr(cv2.fisheye, f"CALIB_{name}", getattr(cv2, f"CALIB_{name}", 0)))
 
 
-def _omni(views: Views, fixed: tuple[str, ...]) -> Solution:
-    """cv2.omnidir.calibrate, which begins by itself, heeds no guess, and leaves out views that it cannot begin with."""
-    if not hasattr(cv2, "omnidir"):
-        raise CannotCalibrate("the model omni needs OpenCV's contributed modules: pip install opencv-contrib-python")
-    _, K, xi, coefficients, *_ = cv2.omnidir.calibrate(
-        [each.reshape(1, -1, 3) for each in views.points],
-        [each.reshape(1, -1, 2) for each in views.pixels],
-        views.size,
-        None,
-        None,
-        None,
-        cv2.omnidir.CALIB_FIX_SKEW,
-        CRITERIA,
-    )
-    K = np.asarray(K) * np.array([[1, 0, 1], [0, 1, 1], [1, 1, 1]])
-    lens: Lens = UnifiedSphere(float(np.ravel(xi)[0]), *np.ravel(coefficients)[:4].tolist())
-    camera = Camera(Intrinsics.from_matrix(K, *views.size), lens)
-    return camera, poses_from_rays(camera, views.points, views.pixels)
-
-
-MODELS = {
-    "standard": Model("Brown-Conrady", STANDARD, _pinhole(0)),
-    "rational": Model("Brown-Conrady, rational", (*STANDARD, "k4", "k5", "k6"), _pinhole(cv2.CALIB_RATIONAL_MODEL)),
-    "thin-prism": Model(
-        "Brown-Conrady with thin prisms", (*STANDARD, "s1", "s2", "s3", "s4"), _pinhole(cv2.CALIB_THIN_PRISM_MODEL)
-    ),
-    "fisheye": Model("Kannala-Brandt", (*PIXELS, "k1", "k2", "k3", "k4"), _fisheye),
-    "omni": Model("unified sphere", (*PIXELS, "xi", "k1", "k2", "p1", "p2"), _omni),
+SOLVERS = {
+    "calibrateCamera": _calibrate_camera,
+    "fisheye.calibrate": _calibrate_fisheye,
+    "omnidir.calibrate": _calibrate_omnidir,
 }
+
+
+def _model(lens: type[Any], declared: CalibrationModel) -> Model:
+    """The model that a lens declares."""
+
+    def solve(views: Views, fixed: tuple[str, ...]) -> Solution:
+        if not declared.solver:
+            return _from_start(lens(*declared.start), views)
+        flags = getattr(cv2, declared.flags) if declared.flags else 0
+        return SOLVERS[declared.solver](lens, flags, views, fixed)
+
+    return Model(declared.title, (*PIXELS, *declared.parameters.split()), solve)
+
+
+MODELS = {name: _model(lens, declared) for name, (lens, declared) in calibration_models().items()}

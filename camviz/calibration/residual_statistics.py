@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.calibration.adjustment import POSE, Adjustment, Mask, twist_slopes
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.jacobian import twist_jacobian
+from camviz.calibration.problem import POSE
+from camviz.calibration.types import Mask
 from camviz.cameras import transform
 from camviz.lenses.base import Array, as_points
 
@@ -84,7 +87,7 @@ def board_displacements(adjustment: Adjustment, name: str) -> Array:
     has no say. Its mean over the views is what the board does the same in all of them.
     """
     by_pose = np.full((adjustment.views, len(adjustment.corners), 2, len(POSE)), np.nan)
-    by_pose[adjustment.posed] = adjustment.slopes(name)[1]
+    by_pose[adjustment.posed] = adjustment.jacobian(name)[1]
     axes = adjustment.first_from_board.rotation.as_matrix()[:, None, :, :2]
     by_board = by_pose[..., 3:] @ axes  # a shift of the board is a shift of the point
     residuals = np.where(adjustment.used[name][..., None], adjustment.residuals[name], np.nan)
@@ -121,7 +124,7 @@ def correlation_with_depth(adjustment: Adjustment, name: str, view: int) -> tupl
     lengths and Z then say almost the same.
     """
     middle = transform(adjustment.first_from_board[view], adjustment.corners.mean(axis=0))
-    by_twist = twist_slopes(middle)[2]
+    by_twist = twist_jacobian(middle)[2]
     place = adjustment.intrinsics_of(name)
     across = by_twist @ adjustment.cross_covariance[view][:, place]
     own = by_twist @ adjustment.pose_covariance[view] @ by_twist

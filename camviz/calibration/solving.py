@@ -11,9 +11,9 @@ import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.detection import CannotCalibrate, Detections, seen
+from camviz.calibration.jacobian import with_parameters
 from camviz.calibration.models import MODELS, Model, Views, poses_from_rays
 from camviz.calibration.outliers import Masks, outliers, sentences
-from camviz.calibration.slopes import with_parameters
 from camviz.calibration.types import Board, Calibration, Mask
 from camviz.cameras import Camera
 from camviz.lenses.base import Array

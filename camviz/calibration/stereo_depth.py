@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.calibration.adjustment import Adjustment, twist_slopes
-from camviz.calibration.slopes import pixel_slopes
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz.cameras import transform
 from camviz.lenses.base import Array, as_points
 
@@ -46,28 +46,28 @@ def depth_uncertainty(
     if not matching_px >= 0:
         raise ValueError(f"matching_px must be a standard deviation in pixels, at least 0, got {matching_px}")
     depth = np.asarray(depths, dtype=float)
-    seen_by = adjustment.cameras[left].intrinsics
-    pixel = as_points([(seen_by.width - 1) / 2, (seen_by.height - 1) / 2] if uv is None else uv, 2, "uv")
-    by_depth, by_parameters = _right_pixel_slopes(adjustment, left, right, pixel, depth)
+    intrinsics = adjustment.cameras[left].intrinsics
+    pixel = as_points([(intrinsics.width - 1) / 2, (intrinsics.height - 1) / 2] if uv is None else uv, 2, "uv")
+    by_depth, by_parameters = _right_pixel_jacobian(adjustment, left, right, pixel, depth)
     along = np.sum(by_depth**2, axis=-1)
     gain = np.einsum("ni,nis->ns", by_depth, by_parameters) / along[:, None]
     variance = np.einsum("ns,st,nt->n", gain, adjustment.covariance, gain)
     return DepthUncertainty(depth, np.sqrt(variance), matching_px / np.sqrt(along))
 
 
-def _right_pixel_slopes(
+def _right_pixel_jacobian(
     adjustment: Adjustment, left: str, right: str, pixel: Array, depth: Array
 ) -> tuple[Array, Array]:
     """How the right pixel of what the left one shows at each depth follows that depth, (n, 2), and b, (n, 2, s)."""
     first, second = adjustment.cameras[left], adjustment.cameras[right]
     ray = first.lens.unproject(first.intrinsics.from_pixels(pixel))
     ray = ray / ray[2]  # so that Z ray has the depth Z
-    ray_by_left = _ray_slopes(adjustment, left, ray)
+    ray_by_left = _ray_jacobian(adjustment, left, ray)
 
     points_left = depth[:, None] * ray
     points_world = transform(first.world_from_cam, points_left)
     points_right = transform(second.cam_from_world, points_world)
-    _, by_right, by_intrinsics = pixel_slopes(second, points_right, adjustment.estimated[right])
+    _, by_right, by_intrinsics = pixel_jacobian(second, points_right, adjustment.estimated[right])
     by_left = by_right @ (second.cam_from_world.rotation * first.world_from_cam.rotation).as_matrix()
 
     by_parameters = np.zeros((len(depth), 2, len(adjustment.parameters)))
@@ -76,14 +76,14 @@ def _right_pixel_slopes(
     if place := adjustment.place_of(
         left
     ):  # its twist turns the world against the left camera, so the point the other way
-        by_parameters[..., place] = -by_left @ twist_slopes(points_left)
+        by_parameters[..., place] = -by_left @ twist_jacobian(points_left)
     if place := adjustment.place_of(right):
-        by_parameters[..., place] = by_right @ twist_slopes(points_right)
+        by_parameters[..., place] = by_right @ twist_jacobian(points_right)
     return by_left @ ray, by_parameters
 
 
-def _ray_slopes(adjustment: Adjustment, name: str, ray: Array) -> Array:
+def _ray_jacobian(adjustment: Adjustment, name: str, ray: Array) -> Array:
     """How the ray (x, y, 1) of a pixel that stays follows the intrinsics b, (3, n): J_ray dray + J_b db = 0."""
-    _, by_ray, by_intrinsics = pixel_slopes(adjustment.cameras[name], ray, adjustment.estimated[name])
+    _, by_ray, by_intrinsics = pixel_jacobian(adjustment.cameras[name], ray, adjustment.estimated[name])
     follow = -np.linalg.solve(by_ray[:, :2], by_intrinsics)
     return np.vstack([follow, np.zeros(follow.shape[1])])

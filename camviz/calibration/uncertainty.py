@@ -10,8 +10,8 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.calibration.adjustment import Adjustment, twist_slopes
-from camviz.calibration.slopes import pixel_slopes
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz.cameras import rotate
 from camviz.lenses.base import Array, as_points
 
@@ -26,8 +26,8 @@ def projection_covariance(
     (mrcal's recipe, mrcal.secretsauce.net/uncertainty.html). With the camera's own frame held fixed instead, a shift of
     its principal point would count as an error, though the camera need only be turned to make up for it.
     """
-    slopes = projection_slopes(adjustment, uv, distance, camera)
-    return slopes @ adjustment.mean_twist_covariance @ np.swapaxes(slopes, -1, -2)
+    jacobian = projection_jacobian(adjustment, uv, distance, camera)
+    return jacobian @ adjustment.mean_twist_covariance @ np.swapaxes(jacobian, -1, -2)
 
 
 def projection_uncertainty(
@@ -49,7 +49,9 @@ def worst_deviation(covariance: Array) -> Array:
     return np.sqrt(mean + np.hypot(half, covariance[..., 0, 1]))
 
 
-def projection_slopes(adjustment: Adjustment, uv: ArrayLike, distance: float = inf, camera: str | None = None) -> Array:
+def projection_jacobian(
+    adjustment: Adjustment, uv: ArrayLike, distance: float = inf, camera: str | None = None
+) -> Array:
     """∂q⁺/∂(shared parameters, mean twist of the boards), (..., 2, s + 6), at pixels uv (..., 2).
 
     A board's twist (ω, τ) takes the point p it holds, in the first camera's frame, to p + ω × p + τ, whichever board
@@ -62,19 +64,19 @@ def projection_slopes(adjustment: Adjustment, uv: ArrayLike, distance: float = i
     intrinsics, place = adjustment.intrinsics_of(name), adjustment.place_of(name)
     seen_by = adjustment.cameras[name]
     rays_cam = seen_by.lens.unproject(seen_by.intrinsics.from_pixels(as_points(uv, 2, "uv")))
-    _, by_ray, by_intrinsics = pixel_slopes(seen_by, rays_cam, adjustment.estimated[name])
+    _, by_ray, by_intrinsics = pixel_jacobian(seen_by, rays_cam, adjustment.estimated[name])
 
-    slopes = np.zeros((*rays_cam.shape[:-1], 2, len(adjustment.parameters) + 6))
-    slopes[..., intrinsics] = by_intrinsics
+    jacobian = np.zeros((*rays_cam.shape[:-1], 2, len(adjustment.parameters) + 6))
+    jacobian[..., intrinsics] = by_intrinsics
     if place:
-        slopes[..., place] = by_ray @ _scaled_twist_slopes(rays_cam, distance)
+        jacobian[..., place] = by_ray @ _scaled_twist_jacobian(rays_cam, distance)
     rays_first = rotate(seen_by.world_from_cam.rotation, rays_cam) + seen_by.centre / distance
     by_first = by_ray @ seen_by.cam_from_world.rotation.as_matrix()
-    slopes[..., -6:] = by_first @ _scaled_twist_slopes(rays_first, distance)
-    return slopes
+    jacobian[..., -6:] = by_first @ _scaled_twist_jacobian(rays_first, distance)
+    return jacobian
 
 
-def _scaled_twist_slopes(points: Array, distance: float) -> Array:
-    slopes = twist_slopes(points)
-    slopes[..., 3:] /= distance
-    return slopes
+def _scaled_twist_jacobian(points: Array, distance: float) -> Array:
+    jacobian = twist_jacobian(points)
+    jacobian[..., 3:] /= distance
+    return jacobian

@@ -13,29 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, as_points
+from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
-from camviz.twoview import normalising_transform, to_homogeneous
+from camviz.twoview import homography
+
+__all__ = ["board_pose", "camera_matrix", "constraints", "focal_lengths", "homography"]
 
 _UNDECIDED = 1e-10  # of the largest singular value: below this, rounding is all that an equation still says
-
-
-def homography(board_xy: ArrayLike, uv: ArrayLike) -> Array:
-    """H (3, 3) with H[2, 2] = 1 from board points (n, 2) to pixels (n, 2), by DLT on normalised coordinates.
-
-    Points with a NaN are left out. Raises ValueError for fewer than four, or when they leave H undetermined.
-    """
-    board_xy, uv = _seen(board_xy, uv)
-    T_board, T_image = normalising_transform(board_xy), normalising_transform(uv)
-    X = to_homogeneous(board_xy) @ T_board.T
-    u, v = ((to_homogeneous(uv) @ T_image.T)[:, :2]).T[..., None]
-    # u (h₃·X) = h₁·X and v (h₃·X) = h₂·X: two rows of A for each point, and A h = 0.
-    A = np.block([[X, 0 * X, -u * X], [0 * X, X, -v * X], [np.zeros((1, 9))]])  # 4 points too need a ninth row
-    _, s, Vt = np.linalg.svd(A, full_matrices=False)
-    if not s[7] > _UNDECIDED * s[0]:
-        raise ValueError(f"{len(uv)} points leave the homography undetermined: all but one of them lie on a line")
-    H = np.linalg.inv(T_image) @ Vt[-1].reshape(3, 3) @ T_board
-    return H / H[2, 2]
 
 
 def constraints(H: ArrayLike) -> Array:
@@ -137,13 +121,3 @@ def _matrix(M: ArrayLike, name: str) -> Array:
     if M.shape != (3, 3) or not np.isfinite(M).all():
         raise ValueError(f"{name} must be a finite matrix of shape (3, 3), got {M.tolist()}")
     return M
-
-
-def _seen(board_xy: ArrayLike, uv: ArrayLike) -> tuple[Array, Array]:
-    board_xy, uv = as_points(board_xy, 2, "board_xy"), as_points(uv, 2, "uv")
-    if board_xy.shape != uv.shape or uv.ndim != 2:
-        raise ValueError(f"a homography takes two arrays of one shape (n, 2), got {board_xy.shape} and {uv.shape}")
-    known = np.isfinite(board_xy).all(axis=1) & np.isfinite(uv).all(axis=1)
-    if known.sum() < 4:
-        raise ValueError(f"a homography takes at least four points, got {known.sum()}")
-    return board_xy[known], uv[known]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import astuple
-from math import cos, degrees, isfinite, pi, radians
+from collections.abc import Callable, Iterator
+from math import cos, degrees, inf, isfinite, pi, radians
 
 import cv2
 import numpy as np
@@ -13,16 +12,13 @@ from camviz.cameras import Camera
 from camviz.clinic.catalogue import Finding, Lacking, Outcome, found
 from camviz.clinic.evidence import Evidence, border_pixels
 from camviz.distortion import (
-    fold_angle,
-    fold_radius,
     ideal_image_radius,
     image_corner_radius,
-    polynomial,
+    is_rational,
     valid_region,
     weakest_denominator,
 )
-from camviz.lenses import BrownConrady, KannalaBrandt
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, Lens, on_plane
 
 WEAKEST = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
@@ -31,15 +27,10 @@ NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z 
 
 def near_pole(evidence: Evidence) -> Outcome:
     """D(r²) out to the farthest ray that this image, or an undistorted one with the same K, asks for."""
-    rational = {name: camera for name, camera in evidence.cameras.items() if _is_rational(camera)}
+    rational = {name: camera for name, camera in evidence.cameras.items() if is_rational(camera.lens)}
     if not rational:
         return Lacking("no lens here has a denominator (k4 k5 k6)")
     return [finding for name, camera in rational.items() for finding in _near_pole(name, camera)]
-
-
-def _is_rational(camera: Camera) -> bool:
-    bending = polynomial(camera.lens)
-    return bending is not None and bool(bending.k4 or bending.k5 or bending.k6)
 
 
 def _near_pole(name: str, camera: Camera) -> Iterator[Finding]:
@@ -56,40 +47,33 @@ def _near_pole(name: str, camera: Camera) -> Iterator[Finding]:
 
 def fold(evidence: Evidence) -> Outcome:
     """Pixels along the border at which no ray arrives, because the lens turns back on the way there."""
-    bent = {name: camera for name, camera in evidence.cameras.items() if _has_polynomial(camera)}
+    bent = {name: camera for name, camera in evidence.cameras.items() if camera.lens.can_fold}
     if not bent:
         return Lacking("no lens here has a polynomial that could turn back")
     return [finding for name, camera in bent.items() for finding in _fold(evidence, name, camera)]
 
 
-def _has_polynomial(camera: Camera) -> bool:
-    return polynomial(camera.lens) is not None or isinstance(camera.lens, KannalaBrandt)
-
-
 def _fold(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
-    lens, grid = camera.lens, camera.intrinsics
-    turns = isfinite(fold_radius(lens)) and (not isinstance(lens, KannalaBrandt) or lens.fold_angle < pi)
-    if _seen(camera, border_pixels(camera)).all() or not (turns or isinstance(lens, BrownConrady)):
+    lens, fold = camera.lens, camera.lens.fold
+    turns = fold is not None and fold.angle < inf
+    if _seen(camera, border_pixels(camera)).all() or not (turns or lens.may_mirror):
         return
-    lost = 1 - float(valid_region(camera, max(1, grid.width // 128)).mean())
-    severity = "note" if turns and fold_angle(lens) >= pi / 2 and not _corners_lost(evidence, name, camera) else None
+    lost = 1 - float(valid_region(camera, max(1, camera.intrinsics.width // 128)).mean())
     sentence = f"{name}: the distortion {_where(camera)}; {_share(lost)} of the pixels have no ray of their own."
-    value, unit = (fold_radius(lens), "rad" if isinstance(lens, KannalaBrandt) else "focal lengths")
-    yield found("fold", sentence, value if turns else lost, unit if turns else "", name, severity=severity)
+    if fold is None or not turns:
+        yield found("fold", sentence, lost, "", name)
+        return
+    severity = "note" if fold.angle >= pi / 2 and not _corners_lost(evidence, name, camera) else None
+    yield found("fold", sentence, fold.radius, fold.unit, name, severity=severity)
 
 
 def _where(camera: Camera) -> str:
-    lens, corner = camera.lens, image_corner_radius(camera.intrinsics)
-    turn, bending = fold_radius(lens), polynomial(lens)
-    if isinstance(lens, KannalaBrandt):
-        image = float(lens.radial(turn))
-    elif bending is not None and isfinite(turn):
-        image = float(bending.radial(turn))
-    else:
+    fold, corner = camera.lens.fold, image_corner_radius(camera.intrinsics)
+    if fold is None:
         return "mirrors part of the image (the determinant of its Jacobian reaches 0)"
-    radius = "" if isinstance(lens, KannalaBrandt) else f"at r = {turn:.4g}, "
+    radius = "" if fold.unit == "rad" else f"at r = {fold.radius:.4g}, "
     return (
-        f"turns back {radius}{degrees(fold_angle(lens)):.1f}° from the axis, whose image is {image:.3g} focal lengths "
+        f"turns back {radius}{degrees(fold.angle):.1f}° from the axis, whose image is {fold.image:.3g} focal lengths "
         f"from the principal point, and the farthest corner is at {corner:.3g}"
     )
 
@@ -112,8 +96,7 @@ def _corners_lost(evidence: Evidence, name: str, camera: Camera) -> bool:
 
 def inverse_not_converged(evidence: Evidence) -> Outcome:
     """Border pixels through OpenCV's inverse as it is called without criteria, and forward again."""
-    lenses = (BrownConrady, KannalaBrandt)
-    known = {name: camera for name, camera in evidence.cameras.items() if isinstance(camera.lens, lenses)}
+    known = {name: camera for name, camera in evidence.cameras.items() if _opencv_model(camera.lens) in INVERSES}
     if not known:
         return Lacking("OpenCV's undistortPoints is not for these lenses")
     findings = []
@@ -130,21 +113,40 @@ def inverse_not_converged(evidence: Evidence) -> Outcome:
 
 def default_round_trip(camera: Camera) -> float:
     """The largest distance in pixels between a border pixel and its return from OpenCV's inverse with its defaults."""
-    grid, lens = camera.intrinsics, camera.lens
+    intrinsics, lens = camera.intrinsics, camera.lens
     pixels = border_pixels(camera)
-    forward = lens.unproject(grid.from_pixels(pixels))[..., 2]  # NaN where the lens folds
+    forward = lens.unproject(intrinsics.from_pixels(pixels))[..., 2]  # NaN where the lens folds
     pixels = pixels[forward > NEARLY_SIDEWAYS]
     if not len(pixels):
         return 0.0
-    points = pixels.reshape(-1, 1, 2)
     with np.errstate(all="ignore"):
-        if isinstance(lens, KannalaBrandt):
-            k = np.array(astuple(lens))
-            ideal = cv2.fisheye.undistortPoints(points, grid.K, k).reshape(-1, 2)
-            back = cv2.fisheye.distortPoints(ideal.reshape(-1, 1, 2), grid.K, k).reshape(-1, 2)
-        else:
-            assert isinstance(lens, BrownConrady)
-            ideal = cv2.undistortPoints(points, grid.K, np.array(astuple(lens))).reshape(-1, 2)
-            back = grid.to_pixels(lens.distort(ideal))
+        back = INVERSES[_opencv_model(lens)](camera, pixels)
         error = float(np.linalg.norm(back - pixels, axis=-1).max())
     return error if isfinite(error) else 1e6
+
+
+def _opencv_model(lens: Lens) -> str:
+    """What OpenCV calls a lens; nothing if it has none such."""
+    return next((each.model for each in lens.spellings if each.program == "opencv"), "")
+
+
+def _calib3d_and_back(camera: Camera, pixels: Array) -> Array:
+    K, coefficients = camera.intrinsics.K, np.array(_values(camera.lens))
+    ideal = cv2.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients).reshape(-1, 2)
+    return camera.intrinsics.to_pixels(camera.lens.project_unchecked(on_plane(ideal)))
+
+
+def _fisheye_and_back(camera: Camera, pixels: Array) -> Array:
+    K, coefficients = camera.intrinsics.K, np.array(_values(camera.lens))
+    ideal = cv2.fisheye.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients)
+    return cv2.fisheye.distortPoints(ideal.reshape(-1, 1, 2), K, coefficients).reshape(-1, 2)
+
+
+def _values(lens: Lens) -> list[float]:
+    return [getattr(lens, name) for name in lens.parameters()]
+
+
+INVERSES: dict[str, Callable[[Camera, Array], Array]] = {
+    "distortion_coefficients": _calib3d_and_back,
+    "cv2.fisheye": _fisheye_and_back,
+}

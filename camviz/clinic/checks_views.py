@@ -127,7 +127,7 @@ def _lengths_left_out(observed: Observed, lines: Sequence[Array]) -> list[list[A
     which the noise of the others comes through to a corner beyond them.
     """
     adjustment = observed.adjustment
-    _, by_pose = adjustment.slopes(observed.name)
+    _, by_pose = adjustment.jacobian(observed.name)
     lengths: list[list[Array]] = [[np.empty(0) for _ in lines] for _ in range(adjustment.views)]
     for row, view in enumerate(np.flatnonzero(adjustment.posed)):
         seen = np.isfinite(observed.residuals[view]).all(axis=-1)

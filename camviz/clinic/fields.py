@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from camviz.calibration.adjustment import Adjustment, sagittas
-from camviz.calibration.slopes import pixel_slopes
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.jacobian import pixel_jacobian
+from camviz.calibration.linearisation import sagittas
 from camviz.lenses.base import Array
 
 DEGREE = 5  # of the smooth field over the image, in u and in v
@@ -28,6 +29,6 @@ def warp_columns(adjustment: Adjustment, name: str) -> Array:
     """∂pixel/∂(the board's two sagittas), (views, corners, 2, 2)."""
     camera = adjustment.cameras[name]
     points = np.stack([pose.apply(adjustment.corners) for pose in adjustment.first_from_board])
-    _, by_point, _ = pixel_slopes(camera, points, ())
+    _, by_point, _ = pixel_jacobian(camera, points, ())
     normals = adjustment.first_from_board.rotation.as_matrix()[:, None, :, 2:]
     return np.nan_to_num((by_point @ normals) * sagittas(adjustment.board)[:, None, :])

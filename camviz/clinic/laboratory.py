@@ -15,8 +15,8 @@ import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.difference import Difference, difference, pixel_grid
+from camviz.calibration.jacobian import with_parameters
 from camviz.calibration.residual_statistics import view_rms
-from camviz.calibration.slopes import with_parameters
 from camviz.calibration.types import Board, Calibration
 from camviz.calibration.uncertainty import mean_deviation, projection_covariance
 from camviz.cameras import Camera, Intrinsics

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.slopes import pixel_slopes
+from camviz.calibration.jacobian import pixel_jacobian
 from camviz.cameras import Camera, transform
 from camviz.lenses.base import Array
 
@@ -113,7 +113,7 @@ def unexplained(adjustment: Adjustment, name: str, *also: Array) -> tuple[Array,
     used = adjustment.used[name][adjustment.posed]
     residuals = np.zeros((*used.shape, 2))
     residuals[used] = _projected(adjustment, name, also[-1], also)[0].reshape(-1, 2)
-    return residuals, adjustment.slopes(name)[1], used
+    return residuals, adjustment.jacobian(name)[1], used
 
 
 def _projected(
@@ -121,7 +121,7 @@ def _projected(
 ) -> tuple[Array, Array, Array, int]:
     """Residuals (n,) and columns (n, e) with poses, parameters and `also` taken out; the columns' lengths before; how
     many directions `also` had."""
-    by_shared, by_pose = adjustment.slopes(name)
+    by_shared, by_pose = adjustment.jacobian(name)
     views, used = adjustment.posed, adjustment.used[name][adjustment.posed]
     groups = [by_shared, *(columns[views] for columns in also), extra[views]]
     lengths = [np.sqrt(np.sum(np.where(used[..., None, None], group, 0) ** 2, axis=(0, 1, 2))) for group in groups]
@@ -155,7 +155,7 @@ def parameter_columns(adjustment: Adjustment, name: str, names: Sequence[str]) -
     """∂pixel/∂parameter (views, corners, 2, n) of intrinsics that the adjustment need not estimate."""
     camera = adjustment.cameras[name]
     points = np.stack([transform(pose, adjustment.corners) for pose in adjustment.first_from_board])
-    return pixel_slopes(camera, points, names)[2]
+    return pixel_jacobian(camera, points, names)[2]
 
 
 def robust_sigma(residuals: Array) -> float:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, refuse_output, write_whole
+from camviz.lenses import calibration_models
 
 if TYPE_CHECKING:
     from camviz.files import Board, Calibration
@@ -27,31 +28,25 @@ kept in the file. What is written is OpenCV's YAML, with all that a later inspec
 The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
 (left07.jpg and right07.jpg), else by their order.
 """
-EPILOG = """\
-models:
-  standard    k1 k2 p1 p2 k3: most cameras
-  rational    and k4 k5 k6: wide angles, with many views that reach into the corners of the image
-  thin-prism  and s1 s2 s3 s4 beside the standard ones: tilted or decentred lenses
-  fisheye     k1 k2 k3 k4 of Kannala and Brandt, as cv2.fisheye has it
-  omni        xi k1 k2 p1 p2 of the unified sphere, as cv2.omnidir has it
-
+MODELS = {name: model.says for name, (_, model) in calibration_models().items()}
+EXAMPLES = """\
 examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
 """
-MODELS = ("standard", "rational", "thin-prism", "fisheye", "omni")
 FINDERS = ("auto", "sectors", "classic")
 PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
 
 
 def add(commands: Any) -> None:
     command = add_command(commands, "calibrate", calibrate, "calibrate a camera or a pair from pictures", CALIBRATE)
-    command.epilog = EPILOG
+    models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
+    command.epilog = f"models:\n{models}\n{EXAMPLES}"
     command.add_argument("images", metavar="IMAGES", nargs="+", help="pictures, folders of them, or patterns")
     command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
     add_board(command)
-    command.add_argument("--model", choices=MODELS, default="standard", help="which lens (default: standard)")
+    command.add_argument("--model", choices=list(MODELS), default="standard", help="which lens (default: standard)")
     command.add_argument("--fix", metavar="NAMES", default="", help="parameters not to solve for, such as k3 or p1,p2")
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
     command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")

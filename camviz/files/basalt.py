@@ -7,22 +7,12 @@ from typing import Any
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format, chosen, listed
-from camviz.files.models import Model, expressed
+from camviz.files.models import Model, expressed, models_of
 from camviz.files.output import as_json
 from camviz.files.section import Section, Size, as_size
-from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, Perspective
 from camviz.poses import RigidTransform
 
-GRID = "fx fy cx cy"
-MODELS = [
-    Model("pinhole", Perspective, GRID),
-    Model("pinhole-radtan8", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
-    Model("kb4", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("fov", FieldOfView, f"{GRID} omega"),
-    Model("ds", DoubleSphere, f"{GRID} xi alpha"),
-    Model("ucm", ExtendedUnified, f"{GRID} alpha", {"beta": 1.0}),
-    Model("eucm", ExtendedUnified, f"{GRID} alpha beta"),
-]
+MODELS = models_of("basalt")
 KEYS = {"omega": "w"}
 
 

@@ -12,42 +12,20 @@ import numpy as np
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format, listed
-from camviz.files.models import Model, expressed, model_named
+from camviz.files.models import Model, expressed, model_named, models_of
 from camviz.files.section import COUNT, LARGEST, ROTATION_TOLERANCE, Section, agreed_size, named
 from camviz.files.text import HEAD, MAX_BYTES, open_bounded, read_bytes, text_of
 from camviz.files.trees import scalar, shown
-from camviz.lenses import (
-    BrownConrady,
-    Equidistant,
-    ExtendedUnified,
-    FieldOfView,
-    KannalaBrandt,
-    Perspective,
-    ThinPrismFisheye,
-)
 from camviz.poses import RigidTransform, Rotation
 
 FIRST_PIXEL = 0.5  # "the upper left corner is (0, 0), the centre of the first pixel (0.5, 0.5)"
 MAX_IMAGES = 100_000
 MOST_WORDS = 32  # more than any line of cameras.txt has
-MODELS = {  # by COLMAP's number for it, in COLMAP's order of parameters (colmap/sensor/models.h)
-    0: Model("SIMPLE_PINHOLE", Perspective, "f cx cy"),
-    1: Model("PINHOLE", Perspective, "fx fy cx cy"),
-    2: Model("SIMPLE_RADIAL", BrownConrady, "f cx cy k1"),
-    3: Model("RADIAL", BrownConrady, "f cx cy k1 k2"),
-    4: Model("OPENCV", BrownConrady, "fx fy cx cy k1 k2 p1 p2"),
-    5: Model("OPENCV_FISHEYE", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"),
-    6: Model("FULL_OPENCV", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6"),
-    7: Model("FOV", FieldOfView, "fx fy cx cy omega"),
-    8: Model("SIMPLE_RADIAL_FISHEYE", KannalaBrandt, "f cx cy k1"),
-    9: Model("RADIAL_FISHEYE", KannalaBrandt, "f cx cy k1 k2"),
-    10: Model("THIN_PRISM_FISHEYE", ThinPrismFisheye, "fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1"),
-    14: Model("SIMPLE_FISHEYE", Equidistant, "f cx cy"),
-    15: Model("FISHEYE", Equidistant, "fx fy cx cy"),
-    16: Model("EUCM", ExtendedUnified, "fx fy cx cy alpha beta"),
+MODELS = {  # by COLMAP's number for it (colmap/sensor/models.h)
+    model.number: model for model in sorted(models_of("colmap"), key=lambda model: model.number)
 }
-# What every COLMAP reads; the last three, of its newest releases, are written only where nothing else will do.
-WRITTEN = [model for number, model in MODELS.items() if number < 14] + [MODELS[16]]
+# What every COLMAP reads, and EUCM of its newest releases; their plain fisheyes are written as OPENCV_FISHEYE.
+WRITTEN = [model for number, model in MODELS.items() if number not in (14, 15)]
 UNNAMED = {11: "RAD_TAN_THIN_PRISM_FISHEYE", 12: "SIMPLE_DIVISION", 13: "DIVISION"}
 UNNAMED |= {17: "EQUIRECTANGULAR"}
 _CAMERA_LINE = re.compile(r"(?:[ \t]*(?:#[^\r\n]*)?\r?\n)*[ \t]*\d+[ \t]+[A-Z][A-Z0-9_]{2,40}[ \t]+\d+[ \t]+\d+[ \t]")

@@ -6,18 +6,13 @@ from typing import Any
 
 from camviz.calibration.types import Calibration
 from camviz.files.format import File, Format, chosen, coefficients_of, listed
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.output import as_matrix, as_yaml
 from camviz.files.section import agreed_size
 from camviz.files.trees import shown
-from camviz.lenses import BrownConrady, KannalaBrandt
 
 TITLE = "EuRoC sensor.yaml"
-GRID = "fx fy cx cy"
-MODELS = [
-    Model("radial-tangential", BrownConrady, f"{GRID} k1 k2 p1 p2"),
-    Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-]
+MODELS = models_of("euroc")
 
 
 def is_sensor(file: File) -> bool:

@@ -8,36 +8,17 @@ from typing import Any
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format, coefficients_of
-from camviz.files.models import Model, expressed
+from camviz.files.models import Model, expressed, models_of
 from camviz.files.opencv import image_size
 from camviz.files.output import as_rows, as_yaml
 from camviz.files.section import Section, Size
 from camviz.files.trees import shown
-from camviz.lenses import (
-    BrownConrady,
-    DoubleSphere,
-    ExtendedUnified,
-    FieldOfView,
-    KannalaBrandt,
-    Perspective,
-    UnifiedSphere,
-)
 from camviz.poses import RigidTransform
 
 WORDS = ("camera_model", "distortion_model")
 SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
 TITLE = "Kalibr camchain"
-GRID = "fx fy cx cy"
-MODELS = [  # camera_model and distortion_model; Kalibr's fu fv pu pv are the grid, and its w is omega
-    Model("pinhole none", Perspective, GRID),
-    Model("pinhole radtan", BrownConrady, f"{GRID} k1 k2 p1 p2"),
-    Model("pinhole equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("pinhole fov", FieldOfView, f"{GRID} omega"),
-    Model("omni none", UnifiedSphere, f"xi {GRID}"),
-    Model("omni radtan", UnifiedSphere, f"xi {GRID} k1 k2 p1 p2"),
-    Model("eucm none", ExtendedUnified, f"alpha beta {GRID}"),
-    Model("ds none", DoubleSphere, f"xi alpha {GRID}"),
-]
+MODELS = models_of("kalibr")  # camera_model and distortion_model; Kalibr's fu fv pu pv are fx fy cx cy, its w is omega
 
 
 def read(file: File) -> Calibration:

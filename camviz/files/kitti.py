@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.section import Section, agreed_size
 from camviz.files.trees import scalar, shown
 from camviz.lenses import Perspective
 from camviz.poses import RigidTransform
 
 TITLE = "KITTI calib.txt"
-MODELS = [Model("P", Perspective, "fx fy cx cy skew")]
+MODELS = models_of("kitti")
 MAX_LINES = 1000
 MOST_WORDS = 64  # more than any line has
 _START = re.compile(r"^(?:P[0-9]|P_rect_[0-9]{2}):[ \t]+[-+.0-9]", re.MULTILINE)

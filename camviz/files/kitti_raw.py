@@ -9,13 +9,13 @@ from camviz.calibration.types import Calibration
 from camviz.cameras import Camera
 from camviz.files.format import File, Format
 from camviz.files.kitti import as_lines, lines_of
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.section import agreed_size, explained
 from camviz.lenses import BrownConrady
 from camviz.poses import RigidTransform
 
 TITLE = "KITTI calib_cam_to_cam.txt"
-MODELS = [Model("K and D", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3")]
+MODELS = models_of("kitti-raw")
 _START = re.compile(r"^K_[0-9]{2}:[ \t]+[-+.0-9]", re.MULTILINE)
 
 

@@ -7,14 +7,14 @@ from typing import Any
 from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.format import File, Format
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.output import as_json
 from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.lenses import BrownConrady
 
 TITLE = "MATLAB cameraParameters"
 FIRST_PIXEL = 1.0
-MODELS = [Model("cameraParameters", BrownConrady, "fx fy cx cy skew k1 k2 p1 p2 k3")]
+MODELS = models_of("matlab")
 RADIAL, TANGENTIAL = "RadialDistortion", "TangentialDistortion"
 
 

@@ -11,18 +11,11 @@ import numpy as np
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.format import File, Format
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.section import Section, Size, agreed_size
 from camviz.files.trees import Repeated, shown
-from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt
 
-GRID = "fx fy cx cy skew"
-MODELS = [
-    Model("frame", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
-    Model("fisheye", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("spherical", Equirectangular, GRID),
-    Model("cylindrical", Cylindrical, GRID),
-]
+MODELS = models_of("metashape")
 TYPES = {"frame": 0, "fisheye": 1, "equidistant_fisheye": 1, "spherical": 2, "cylindrical": 3}
 COEFFICIENTS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,7 @@ import numpy as np
 from camviz.calibration.types import CalibrationError
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.section import explained
-from camviz.lenses import BrownConrady, Equidistant, ExtendedUnified, KannalaBrandt, Lens, Perspective, UnifiedSphere
-
-PLAIN = {BrownConrady: Perspective, KannalaBrandt: Equidistant}  # what is left where all coefficients are zero
+from camviz.lenses import Lens, same_lenses, spelled
 
 
 @dataclass(frozen=True)
@@ -24,6 +22,7 @@ class Model:
     lens: type[Any]
     parameters: str
     fixed: Mapping[str, float] = field(default_factory=dict)
+    number: int = -1  # of the model, in a format that counts its models
 
     @property
     def names(self) -> list[str]:
@@ -36,23 +35,28 @@ class Model:
         fx, fy = (held.pop(name, focal) for name in ("fx", "fy"))
         cx, cy = held.pop("cx") - first_pixel, held.pop("cy") - first_pixel
         with explained(where):
-            grid = Intrinsics(width, height, fx, fy, cx, cy, held.pop("skew", 0.0))  # type: ignore[arg-type]
-            return Camera(grid, self.lens(**held))
+            intrinsics = Intrinsics(width, height, fx, fy, cx, cy, held.pop("skew", 0.0))  # type: ignore[arg-type]
+            return Camera(intrinsics, self.lens(**held))
 
     def values(self, camera: Camera, first_pixel: float) -> list[float]:
         """The inverse of `camera`, for a camera that the model can hold."""
-        grid = camera.intrinsics
-        held = asdict(grid) | _parameters(camera.lens) | {"f": grid.fx}
-        held |= {"cx": grid.cx + first_pixel, "cy": grid.cy + first_pixel}
+        intrinsics = camera.intrinsics
+        held = asdict(intrinsics) | _parameters(camera.lens) | {"f": intrinsics.fx}
+        held |= {"cx": intrinsics.cx + first_pixel, "cy": intrinsics.cy + first_pixel}
         return [float(held[name]) for name in self.names]
 
     def lacks(self, camera: Camera) -> list[str]:
         """The parameters of a camera with a lens of this model's kind that have no place in the model."""
-        grid = camera.intrinsics
+        intrinsics = camera.intrinsics
         needed = {name: value for name, value in _parameters(camera.lens).items() if value != self.fixed.get(name, 0.0)}
         lacking = [name for name in needed if name not in self.names]
-        lacking += ["skew"] * (grid.skew != 0 and "skew" not in self.names)
-        return lacking + ["fy, which differs from fx,"] * (grid.fx != grid.fy and "f" in self.names)
+        lacking += ["skew"] * (intrinsics.skew != 0 and "skew" not in self.names)
+        return lacking + ["fy, which differs from fx,"] * (intrinsics.fx != intrinsics.fy and "f" in self.names)
+
+
+def models_of(program: str) -> list[Model]:
+    """The models of a format, as the lenses declare them."""
+    return [Model(each.model, lens, each.parameters, each.fixed, each.number) for lens, each in spelled(program)]
 
 
 def expressed(name: str, camera: Camera, models: Iterable[Model], title: str) -> tuple[Model, Camera]:
@@ -79,18 +83,8 @@ def model_named(name: str, models: Iterable[Model]) -> Model | None:
 def equals(camera: Camera) -> Iterator[Camera]:
     """The camera, and then the same camera under the other names that its lens has."""
     yield camera
-    lens, grid = camera.lens, camera.intrinsics
-    for rich, plain in PLAIN.items():
-        if lens == rich():
-            yield replace(camera, lens=plain())
-        elif isinstance(lens, plain):
-            yield replace(camera, lens=rich())
-    if isinstance(lens, UnifiedSphere) and not lens.distortion:  # α = ξ/(1 + ξ), f = γ/(1 + ξ)
-        scale = 1 + lens.xi
-        yield Camera(_scaled(grid, 1 / scale), ExtendedUnified(lens.xi / scale, 1.0), camera.world_from_cam)
-    if isinstance(lens, ExtendedUnified) and lens.beta == 1 and lens.alpha < 1:
-        scale = 1 / (1 - lens.alpha)
-        yield Camera(_scaled(grid, scale), UnifiedSphere.from_alpha(lens.alpha), camera.world_from_cam)
+    for lens, scale in same_lenses(camera.lens):
+        yield replace(camera, intrinsics=_scaled(camera.intrinsics, scale), lens=lens)
 
 
 def same_camera(a: Camera, b: Camera, tolerance: float = 1e-11) -> bool:
@@ -110,9 +104,9 @@ def _same_values(a: Camera, b: Camera, tolerance: float) -> bool:
     return bool(np.all(np.abs(first - second) <= tolerance * np.maximum(1, np.abs(first))))
 
 
-def _scaled(grid: Intrinsics, scale: float) -> Intrinsics:
-    return replace(grid, fx=grid.fx * scale, fy=grid.fy * scale, skew=grid.skew * scale)
+def _scaled(intrinsics: Intrinsics, scale: float) -> Intrinsics:
+    return replace(intrinsics, fx=intrinsics.fx * scale, fy=intrinsics.fy * scale, skew=intrinsics.skew * scale)
 
 
 def _parameters(lens: Lens) -> dict[str, float]:
-    return {each.name: getattr(lens, each.name) for each in fields(lens)}  # type: ignore[arg-type]
+    return {name: getattr(lens, name) for name in lens.parameters()}

@@ -7,24 +7,14 @@ import re
 from camviz.calibration.types import Calibration
 from camviz.files.format import File, Format, listed
 from camviz.files.literal import parse_literal
-from camviz.files.models import Model, expressed, model_named
+from camviz.files.models import expressed, model_named, models_of
 from camviz.files.section import COUNT, Section, agreed_size
 from camviz.files.text import HEAD
 from camviz.files.trees import shown
-from camviz.lenses import BrownConrady, Equirectangular, Perspective, Stereographic
 from camviz.poses import RigidTransform, Rotation
 
 TITLE = "mrcal cameramodel"
-GRID = "fx fy cx cy"
-MODELS = [
-    Model("LENSMODEL_PINHOLE", Perspective, GRID),
-    Model("LENSMODEL_OPENCV4", BrownConrady, f"{GRID} k1 k2 p1 p2"),
-    Model("LENSMODEL_OPENCV5", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
-    Model("LENSMODEL_OPENCV8", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
-    Model("LENSMODEL_OPENCV12", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4"),
-    Model("LENSMODEL_STEREOGRAPHIC", Stereographic, GRID),
-    Model("LENSMODEL_LONLAT", Equirectangular, GRID),
-]
+MODELS = models_of("mrcal")
 POSES = ("rt_cam_ref", "extrinsics")  # the second until mrcal 2.4
 _KEY = re.compile(r"""(?:\s|#[^\n]*\n)*\{(?:\s|#[^\n]*\n)*['"](?:lensmodel|[a-z_]+)['"]\s*:""")
 

@@ -10,21 +10,10 @@ import numpy as np
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.models import Model, expressed
-from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
+from camviz.files.models import expressed, models_of
+from camviz.lenses import KannalaBrandt
 
-GRID = "fx fy cx cy"
-RADIAL = "k1 k2 p1 p2 k3"
-RATIONAL = f"{RADIAL} k4 k5 k6"
-PRISM = f"{RATIONAL} s1 s2 s3 s4"
-MODELS = [
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {RADIAL}"),
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {RATIONAL}"),
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {PRISM}"),
-    Model("distortion_coefficients", BrownConrady, f"{GRID} {PRISM} tau_x tau_y"),
-    Model("cv2.fisheye", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-    Model("cv2.omnidir", UnifiedSphere, f"{GRID} skew k1 k2 p1 p2 xi"),
-]
+MODELS = models_of("opencv")
 TITLE = "OpenCV FileStorage"
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format, chosen, listed
-from camviz.files.models import Model, expressed
+from camviz.files.models import Model, expressed, models_of
 from camviz.files.opencv import image_size
 from camviz.files.output import as_matrix, as_yaml
 from camviz.files.section import COUNT, Section, explained
@@ -16,12 +16,7 @@ from camviz.lenses import BrownConrady, KannalaBrandt, Lens
 TITLE = "ROS CameraInfo"
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
 RECTIFICATION, PROJECTION = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
-GRID = "fx fy cx cy"
-MODELS = [  # sensor_msgs/distortion_models.hpp
-    Model("plumb_bob", BrownConrady, f"{GRID} k1 k2 p1 p2 k3"),
-    Model("rational_polynomial", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6"),
-    Model("equidistant", KannalaBrandt, f"{GRID} k1 k2 k3 k4"),
-]
+MODELS = models_of("ros")
 
 
 def read(file: File) -> Calibration:

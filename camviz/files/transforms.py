@@ -10,7 +10,7 @@ import numpy as np
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.format import File, Format
-from camviz.files.models import Model, expressed
+from camviz.files.models import expressed, models_of
 from camviz.files.output import as_json, as_rows
 from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.files.trees import shown
@@ -20,10 +20,7 @@ from camviz.poses import RigidTransform, Rotation
 TITLE = "transforms.json"
 FIRST_PIXEL = 0.5
 OPENGL = RigidTransform.from_rotation(Rotation.from_matrix(np.diag([1.0, -1, -1])))  # y up, z backward
-MODELS = [
-    Model("OPENCV", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3"),
-    Model("OPENCV_FISHEYE", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"),
-]
+MODELS = models_of("nerfstudio")
 STRAIGHT = ("PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")
 KEYS = {"fx": "fl_x", "fy": "fl_y"}
 GRID_KEYS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_angle_y")

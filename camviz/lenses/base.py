@@ -1,42 +1,50 @@
-"""What every lens is: a map between directions in front of the camera and points on its image, at focal length 1."""
+"""What every lens is: a map between directions in front of the camera and points on its image, at focal length 1.
+
+A lens is one file in this folder: a frozen dataclass under `Lens` that has `image` and `ray`, and declares in its class
+body what the rest of camviz has to know of it. `camviz.lenses` finds the file; nothing else names it.
+"""
+
+from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import fields
+from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
+
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-12  # how far beyond the rim of its image a point may lie and still be a rounded point of the rim
 ALONE = 1 << 17  # multiplications of a matrix product that OpenBLAS does without threads; they begin at twice as many
 BLOCK = 16384  # points worked on at a time, so that the temporaries stay in the processor's cache
+STEP = np.finfo(float).eps ** (1 / 3)  # where a central difference is exact to STEP², about 4e-11
+NO_DENOMINATOR = Polynomial([1.0])
 
 
-class Lens(Protocol):
+class Lens(ABC):
     """A lens bends directions: `project` sends a direction to the image, `unproject` brings it back.
 
     A lens knows neither pixels nor poses. Its image is measured in focal lengths from the principal point, x to the
     right and y down; `Intrinsics` turns that into pixels. It acts on rays rather than on the plane z = 1, so that a
     fisheye may look behind itself. A direction without an image and an image point without a direction are NaN.
+
+    A subclass is a frozen dataclass whose fields are its parameters. It writes its two equations, `image` and `ray`,
+    on coordinates (n,), and declares the rest where the default does not hold.
     """
 
-    def project(self, points_cam: ArrayLike) -> Array:
-        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where there is none."""
-        ...
-
-    def unproject(self, xy: ArrayLike) -> Array:
-        """Unit rays (..., 3) of image points (..., 2) in focal lengths; NaN where no ray arrives."""
-        ...
-
-    def __hash__(self) -> int: ...
-
-
-class RayLens(ABC):
-    """A lens written as its two equations, on coordinates (n,): `image` and `ray`. The shapes are seen to here."""
+    spellings: ClassVar[tuple[Spelling, ...]] = ()
+    calibrations: ClassVar[tuple[CalibrationModel, ...]] = ()
+    examples: ClassVar[tuple[Example, ...]] = ()
+    invalid: ClassVar[tuple[tuple[tuple[float, ...], str], ...]] = ()  # parameters, and the error's message
+    plain: ClassVar[type[Lens] | None] = None  # the lens without parameters that it is where all of its own are 0
+    goes_round: ClassVar[bool] = False  # true of a panorama, which sees straight behind itself
+    may_mirror: ClassVar[bool] = False  # true where part of the image may be mirrored without a radial fold
 
     def project(self, points_cam: ArrayLike) -> Array:
         """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where there is none."""
@@ -58,6 +66,78 @@ class RayLens(ABC):
         x, y, z = self.ray(x, y)
         scale = 1 / np.sqrt(x * x + y * y + z * z)
         return x * scale, y * scale, z * scale
+
+    # What else it is called
+
+    @classmethod
+    def parameters(cls) -> tuple[str, ...]:
+        """The names of the lens's own parameters."""
+        return tuple(each.name for each in fields(cls))  # type: ignore[arg-type]
+
+    def same_as(self) -> Iterator[tuple[Lens, float]]:
+        """The same lens under other names, each with the factor from this one's focal lengths to that one's."""
+        if self.plain is not None and self == type(self)():
+            yield self.plain(), 1.0
+
+    @property
+    def is_distorted(self) -> bool:
+        """False for a perspective lens, also where it is written as another kind with all its coefficients at rest."""
+        return True
+
+    # Where it ends
+
+    @property
+    def can_fold(self) -> bool:
+        """True where the lens has a polynomial, or another equation, that could turn back."""
+        return False
+
+    @property
+    def fold(self) -> Fold | None:
+        """Where the lens folds; None where it never does, or has a pole before."""
+        return None
+
+    @property
+    def denominator(self) -> Polynomial:
+        """D(s), s = r², at whose roots the lens has its poles; 1 for a lens without a denominator."""
+        return NO_DENOMINATOR
+
+    # Its derivatives. A lens with a closed form overrides the central differences here.
+
+    def project_unchecked(self, rays: Array) -> Array:
+        """Image points (..., 2) of rays (..., 3), also beyond a fold if the equation goes on there: quicker to ask."""
+        return self.project(rays)
+
+    def jacobian(self, xy: ArrayLike) -> Array:
+        """The derivative (..., 2, 2) of the map from points (..., 2) of the plane z = 1 to the image, good to 1e-9."""
+        xy = as_points(xy, 2, "xy")
+        step = 6e-6 * (1 + np.linalg.norm(xy, axis=-1))[..., None, None] * np.eye(2)
+        ahead, behind = (self.project(on_plane(xy[..., None, :] + sign * step)) for sign in (1, -1))
+        return np.swapaxes((ahead - behind) / (2 * step.max(axis=-1, keepdims=True)), -1, -2)
+
+    def ray_jacobian(self, rays: Array) -> Array:
+        """∂xy/∂ray, (..., 2, 3), at unit rays (..., 3)."""
+        moved = STEP * np.eye(3)
+        columns = [(self.project_unchecked(rays + to) - self.project_unchecked(rays - to)) / (2 * STEP) for to in moved]
+        return np.stack(columns, axis=-1)
+
+    def parameter_jacobian(self, name: str, rays: Array) -> Array:
+        """∂xy/∂name, (..., 2), at unit rays (..., 3); from one side at the end of what the parameter may be."""
+        value = getattr(self, name)
+        step = STEP * max(1.0, abs(value))
+        lower, higher = self._with(name, value - step), self._with(name, value + step)
+        width = getattr(higher, name) - getattr(lower, name)
+        return (higher.project_unchecked(rays) - lower.project_unchecked(rays)) / width
+
+    def _with(self, name: str, value: float) -> Lens:
+        """The lens with another value of a parameter; as it was where it does not take that value."""
+        lens: Any = self
+        try:
+            return replace(lens, **{name: value})
+        except ValueError:
+            return self
+
+
+# What lenses are written with
 
 
 def blockwise(function: Callable[..., tuple[Array, ...]], points: Array, size: int) -> Array:
@@ -84,12 +164,12 @@ def up_to(limit: float, values: Array) -> Array:
     return np.where(values <= limit * (1 + ROUNDING), np.minimum(values, limit), np.nan)
 
 
-def check_parameters(lens: Any, limit: float = 1e15) -> None:
+def check_parameters(lens: Lens, limit: float = 1e15) -> None:
     """Raises ValueError naming the first parameter of a lens that is not a number of sensible size."""
-    for field in fields(lens):
-        value = getattr(lens, field.name)
+    for name in lens.parameters():
+        value = getattr(lens, name)
         if not (isfinite(value) and abs(value) <= limit):
-            raise ValueError(f"{field.name} must be a finite number, at most {limit:g} in size, got {value}")
+            raise ValueError(f"{name} must be a finite number, at most {limit:g} in size, got {value}")
 
 
 def check_range(name: str, value: float, inside: bool, takes: str) -> None:
@@ -111,7 +191,7 @@ def on_plane(xy: Array) -> Array:
     return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
 
 
-def times(vectors: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
+def blocked_matmul(vectors: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
     """The products vectors @ matrix, (..., n) times (n, m), some thousands of vectors at a time.
 
     For more at once OpenBLAS wakes threads, which afterwards wait in a busy loop for tens of milliseconds, on the very

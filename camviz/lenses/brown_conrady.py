@@ -9,17 +9,24 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, RayLens, as_points, blockwise, check_parameters, check_range
+from camviz.lenses.base import Array, Lens, as_points, blockwise, check_parameters, check_range
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
+from camviz.lenses.perspective import Perspective
 from camviz.lenses.roots import first_positive_root
 
 STEEPEST = np.deg2rad(89.5)  # the tables end here where the polynomial itself has no end
 UNBOUNDED = 1e150  # a radius beyond all images whose square is still a number
 NEARLY_FLAT = 0.01  # a determinant, 1 on the axis, below which the map may fold close by
+
+GRID = "fx fy cx cy"
+RADTAN = "k1 k2 p1 p2"
+RATIONAL = f"{RADTAN} k3 k4 k5 k6"
+PRISM = f"{RATIONAL} s1 s2 s3 s4"
 CLOSE = 1e-13  # focal lengths, relative beyond 1: how well an inverse must return
 
 
 @dataclass(frozen=True)
-class BrownConrady(RayLens):
+class BrownConrady(Lens):
     """From the ideal (x, y) = (X/Z, Y/Z), with r² = x² + y², to the distorted
 
     x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²) + s1 r² + s2 r⁴
@@ -45,6 +52,66 @@ class BrownConrady(RayLens):
     tau_x: float = 0.0
     tau_y: float = 0.0
 
+    spellings = (
+        Spelling("basalt", "pinhole-radtan8", f"{GRID} {RATIONAL}"),
+        Spelling("colmap", "SIMPLE_RADIAL", "f cx cy k1", number=2),
+        Spelling("colmap", "RADIAL", "f cx cy k1 k2", number=3),
+        Spelling("colmap", "OPENCV", f"{GRID} {RADTAN}", number=4),
+        Spelling("colmap", "FULL_OPENCV", f"{GRID} {RATIONAL}", number=6),
+        Spelling("euroc", "radial-tangential", f"{GRID} {RADTAN}"),
+        Spelling("kalibr", "pinhole radtan", f"{GRID} {RADTAN}"),
+        Spelling("kitti-raw", "K and D", f"{GRID} {RADTAN} k3"),
+        Spelling("matlab", "cameraParameters", f"{GRID} skew {RADTAN} k3"),
+        Spelling("metashape", "frame", f"{GRID} skew {RADTAN} k3"),
+        Spelling("mrcal", "LENSMODEL_OPENCV4", f"{GRID} {RADTAN}"),
+        Spelling("mrcal", "LENSMODEL_OPENCV5", f"{GRID} {RADTAN} k3"),
+        Spelling("mrcal", "LENSMODEL_OPENCV8", f"{GRID} {RATIONAL}"),
+        Spelling("mrcal", "LENSMODEL_OPENCV12", f"{GRID} {PRISM}"),
+        Spelling("nerfstudio", "OPENCV", f"{GRID} {RADTAN} k3"),
+        Spelling("opencv", "distortion_coefficients", f"{GRID} {RADTAN} k3"),
+        Spelling("opencv", "distortion_coefficients", f"{GRID} {RATIONAL}"),
+        Spelling("opencv", "distortion_coefficients", f"{GRID} {PRISM}"),
+        Spelling("opencv", "distortion_coefficients", f"{GRID} {PRISM} tau_x tau_y"),
+        Spelling("ros", "plumb_bob", f"{GRID} {RADTAN} k3"),
+        Spelling("ros", "rational_polynomial", f"{GRID} {RATIONAL}"),
+    )
+    calibrations = (
+        CalibrationModel(
+            "standard", "Brown-Conrady", f"{RADTAN} k3", "k1 k2 p1 p2 k3: most cameras", "calibrateCamera"
+        ),
+        CalibrationModel(
+            "rational",
+            "Brown-Conrady, rational",
+            RATIONAL,
+            "and k4 k5 k6: wide angles, with many views that reach into the corners of the image",
+            "calibrateCamera",
+            "CALIB_RATIONAL_MODEL",
+        ),
+        CalibrationModel(
+            "thin-prism",
+            "Brown-Conrady with thin prisms",
+            f"{RADTAN} k3 s1 s2 s3 s4",
+            "and s1 s2 s3 s4 beside the standard ones: tilted or decentred lenses",
+            "calibrateCamera",
+            "CALIB_THIN_PRISM_MODEL",
+        ),
+    )
+    examples = (
+        Example("none", (), 88),
+        Example("barrel", (-0.3,), 46),
+        Example("5", (-0.28, 0.07, 1e-3, -5e-4, 0.01), 60),
+        Example("8", (0.5, 0.1, 1e-3, -5e-4, 0.01, 0.6, 0.2, 0.02), 60),
+        Example("12", (-0.2, 0.1, 1e-3, -2e-3, 0.01, 0.1, 0, 0, 1e-2, -2e-3, -4e-3, 3e-3), 45),
+        Example("14", (-0.2, 0.1, 1e-3, -2e-3, 0, 0, 0, 0, 1e-2, -2e-3, -4e-3, 3e-3, 0.1, -0.07), 45),
+        Example("only_tangential", (0, 0, 0.1, -0.05), 40),
+        Example("folding_early", (0.296, -1.035, 0.01, -0.02), 32),
+        Example("before_a_pole", (0.1, 0, 0, 0, 0, -0.8), 45),
+        Example("strong", (30, -2, 0, 0, -400), 10),
+    )
+    invalid = (((0,) * 12 + (1.6,), "tau_x must be an angle between -π/2 and π/2 radians, got 1.6"),)
+    plain = Perspective
+    may_mirror = True
+
     def __post_init__(self) -> None:
         check_parameters(self)
         for name in ("tau_x", "tau_y"):
@@ -58,6 +125,10 @@ class BrownConrady(RayLens):
         if len(values) not in (4, 5, 8, 12, 14):
             raise ValueError(f"coefficients must be 4, 5, 8, 12 or 14 numbers, got {len(values)}")
         return cls(*values)
+
+    @property
+    def is_distorted(self) -> bool:
+        return self != type(self)()
 
     # The polynomial itself, without regard to its domain: how it folds can be looked at.
 
@@ -74,11 +145,24 @@ class BrownConrady(RayLens):
     def jacobian(self, xy: ArrayLike) -> Array:
         """The derivative (..., 2, 2) of `distort` at ideal points (..., 2)."""
         xy = as_points(xy, 2, "xy")
-        bent = blockwise(lambda x, y: self._bend_and_slopes(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
+        bent = blockwise(lambda x, y: self._bend_and_derivatives(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
         with np.errstate(all="ignore"):
             return self._tilt_jacobian(blockwise(self._polynomial, xy, 2)) @ bent
 
+    def project_unchecked(self, rays: Array) -> Array:
+        return self.distort(rays[..., :2] / rays[..., 2:])
+
     # Its domain.
+
+    @property
+    def can_fold(self) -> bool:
+        return True
+
+    @property
+    def fold(self) -> Fold | None:
+        """Where the radial part turns back."""
+        r = self.fold_radius
+        return Fold(r, atan(r), float(self.radial(r))) if r < inf else None
 
     @cached_property
     def numerator(self) -> Polynomial:
@@ -175,7 +259,7 @@ class BrownConrady(RayLens):
             y * m + s * (self.p1 + self.s3 + s * self.s4),
         )
 
-    def _bend_and_slopes(self, x: Array, y: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    def _bend_and_derivatives(self, x: Array, y: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
         """x', y' and ∂x'/∂x, ∂x'/∂y, ∂y'/∂x, ∂y'/∂y, before the tilt."""
         s = x * x + y * y
         ratio = self._ratio(s)
@@ -238,7 +322,7 @@ class BrownConrady(RayLens):
 
     def _orientation(self, x: Array, y: Array) -> Array:
         """The Jacobian's determinant before the tilt; negative also where the tilted sensor is not in front."""
-        u, v, u_x, u_y, v_x, v_y = self._bend_and_slopes(x, y)
+        u, v, u_x, u_y, v_x, v_y = self._bend_and_derivatives(x, y)
         determinant = u_x * v_y - u_y * v_x
         return determinant if self._tilt is None else np.where(_homography(self._tilt, u, v)[2] > 0, determinant, -1)
 
@@ -337,7 +421,7 @@ class BrownConrady(RayLens):
 
     def _step(self, x: Array, y: Array, u: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         """Newton's step from (x, y) towards the point whose image is (u, v), the error of its image now, and det J."""
-        bent_x, bent_y, u_x, u_y, v_x, v_y = self._bend_and_slopes(x, y)
+        bent_x, bent_y, u_x, u_y, v_x, v_y = self._bend_and_derivatives(x, y)
         du, dv = u - bent_x, v - bent_y
         determinant = u_x * v_y - u_y * v_x
         dx, dy = (v_y * du - u_y * dv) / determinant, (u_x * dv - v_x * du) / determinant

@@ -7,10 +7,11 @@ from math import pi, tan
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, RayLens, check_parameters, check_range, up_to
+from camviz.lenses.base import Array, Lens, check_parameters, check_range, up_to
+from camviz.lenses.declarations import Example, Spelling
 
 
-class Fisheye(RayLens):
+class Fisheye(Lens):
     """A lens symmetric about its axis: a ray at θ = atan2(√(X² + Y²), Z) arrives `radial(θ)` from the image's centre.
 
     Rays beyond `max_angle` have no image; nor has the ray straight backwards, whose image would be a whole circle.
@@ -49,6 +50,12 @@ class Fisheye(RayLens):
 class Equidistant(Fisheye):
     """r = θ: equal angles, equal distances."""
 
+    spellings = (
+        Spelling("colmap", "SIMPLE_FISHEYE", "f cx cy", number=14),
+        Spelling("colmap", "FISHEYE", "fx fy cx cy", number=15),
+    )
+    examples = (Example("", (), 180),)
+
     def radial(self, theta: ArrayLike) -> Array:
         return np.asarray(theta, dtype=float)
 
@@ -60,6 +67,8 @@ class Equidistant(Fisheye):
 class Equisolid(Fisheye):
     """r = 2 sin(θ/2): equal solid angles, equal areas."""
 
+    examples = (Example("", (), 180),)
+
     def radial(self, theta: ArrayLike) -> Array:
         return 2 * np.sin(np.asarray(theta, dtype=float) / 2)
 
@@ -70,6 +79,8 @@ class Equisolid(Fisheye):
 @dataclass(frozen=True)
 class Orthographic(Fisheye):
     """r = sin θ: the hemisphere seen from far above; nothing beyond 90°."""
+
+    examples = (Example("", (), 90),)
 
     @property
     def max_angle(self) -> float:
@@ -85,6 +96,9 @@ class Orthographic(Fisheye):
 @dataclass(frozen=True)
 class Stereographic(Fisheye):
     """r = 2 tan(θ/2): circles on the sphere stay circles."""
+
+    spellings = (Spelling("mrcal", "LENSMODEL_STEREOGRAPHIC", "fx fy cx cy"),)
+    examples = (Example("", (), 180),)
 
     def radial(self, theta: ArrayLike) -> Array:
         return 2 * np.tan(np.asarray(theta, dtype=float) / 2)
@@ -109,6 +123,17 @@ class FieldOfView(Fisheye):
     """r = atan(2 tan θ tan(ω/2)) / ω, continued behind 90° by atan2 (Devernay & Faugeras 2001, eq. 13); 0 < ω < π."""
 
     omega: float
+
+    spellings = (
+        Spelling("basalt", "fov", "fx fy cx cy omega"),
+        Spelling("colmap", "FOV", "fx fy cx cy omega", number=7),
+        Spelling("kalibr", "pinhole fov", "fx fy cx cy omega"),
+    )
+    examples = (Example("", (0.93,), 180), Example("weak", (1e-6,), 89), Example("strong", (3.0,), 180))
+    invalid = (
+        ((0,), "omega must be an angle between 0 and π radians, got 0"),
+        ((pi,), "omega must be an angle between 0 and π radians, got 3.14"),
+    )
 
     def __post_init__(self) -> None:
         check_parameters(self)

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array, check_parameters
-from camviz.lenses.fisheye import Fisheye
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
+from camviz.lenses.fisheye import Equidistant, Fisheye
 from camviz.lenses.roots import first_positive_root, solve_rising
 
 
@@ -20,6 +21,34 @@ class KannalaBrandt(Fisheye):
     k2: float = 0.0
     k3: float = 0.0
     k4: float = 0.0
+
+    spellings = (
+        Spelling("basalt", "kb4", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("colmap", "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4", number=5),
+        Spelling("colmap", "SIMPLE_RADIAL_FISHEYE", "f cx cy k1", number=8),
+        Spelling("colmap", "RADIAL_FISHEYE", "f cx cy k1 k2", number=9),
+        Spelling("euroc", "equidistant", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("kalibr", "pinhole equidistant", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("metashape", "fisheye", "fx fy cx cy skew k1 k2 k3 k4"),
+        Spelling("nerfstudio", "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("opencv", "cv2.fisheye", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("ros", "equidistant", "fx fy cx cy k1 k2 k3 k4"),
+    )
+    calibrations = (
+        CalibrationModel(
+            "fisheye",
+            "Kannala-Brandt",
+            "k1 k2 k3 k4",
+            "k1 k2 k3 k4 of Kannala and Brandt, as cv2.fisheye has it",
+            "fisheye.calibrate",
+        ),
+    )
+    examples = (
+        Example("", (0.00693023, -0.0013828, -0.000272596, -0.000452646), 100),
+        Example("folding", (-0.1,), 100),
+        Example("none", (), 180),
+    )
+    plain = Equidistant
 
     def __post_init__(self) -> None:
         check_parameters(self)
@@ -39,6 +68,16 @@ class KannalaBrandt(Fisheye):
     def fold_angle(self) -> float:
         """The smallest positive root of θ_d', in radians, where the polynomial turns back; infinity if none."""
         return sqrt(first_positive_root(np.array([1, 3 * self.k1, 5 * self.k2, 7 * self.k3, 9 * self.k4])))
+
+    @property
+    def can_fold(self) -> bool:
+        return True
+
+    @property
+    def fold(self) -> Fold | None:
+        """Where θ_d turns back; the angle is infinite where that is beyond straight behind."""
+        theta = self.fold_angle
+        return Fold(theta, theta if theta < pi else inf, float(self.radial(theta)), "rad") if theta < inf else None
 
     @cached_property
     def max_angle(self) -> float:

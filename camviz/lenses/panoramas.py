@@ -5,15 +5,23 @@ from math import pi
 
 import numpy as np
 
-from camviz.lenses.base import Array, RayLens, up_to
+from camviz.lenses.base import Array, Lens, up_to
+from camviz.lenses.declarations import Example, Spelling
 
 
 @dataclass(frozen=True)
-class Equirectangular(RayLens):
+class Equirectangular(Lens):
     """(x, y) = (longitude, latitude) in radians: atan2(X, Z) and, downwards, atan2(Y, √(X² + Z²)) (Snyder 1987, p. 90).
 
     It sees everything. The two poles, images of a whole line each, are given the longitude 0.
     """
+
+    spellings = (
+        Spelling("metashape", "spherical", "fx fy cx cy skew"),
+        Spelling("mrcal", "LENSMODEL_LONLAT", "fx fy cx cy"),
+    )
+    examples = (Example("", (), 180),)
+    goes_round = True
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         ground = np.hypot(x, z)
@@ -27,11 +35,15 @@ class Equirectangular(RayLens):
 
 
 @dataclass(frozen=True)
-class Cylindrical(RayLens):
+class Cylindrical(Lens):
     """x = atan2(X, Z) in radians, y = Y / √(X² + Z²): upright lines stay straight (Szeliski 2022, eq. 8.42).
 
     It sees all but straight up and straight down.
     """
+
+    spellings = (Spelling("metashape", "cylindrical", "fx fy cx cy skew"),)
+    examples = (Example("", (), 89),)
+    goes_round = True
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         ground = np.hypot(x, z)

@@ -4,12 +4,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camviz.lenses.base import Array, RayLens
+from camviz.lenses.base import Array, Lens
+from camviz.lenses.declarations import Example, Spelling
 
 
 @dataclass(frozen=True)
-class Perspective(RayLens):
+class Perspective(Lens):
     """x = X/Z, y = Y/Z for everything in front of the camera (Hartley & Zisserman 2004, eq. 6.1)."""
+
+    spellings = (
+        Spelling("basalt", "pinhole", "fx fy cx cy"),
+        Spelling("colmap", "SIMPLE_PINHOLE", "f cx cy", number=0),
+        Spelling("colmap", "PINHOLE", "fx fy cx cy", number=1),
+        Spelling("kalibr", "pinhole none", "fx fy cx cy"),
+        Spelling("kitti", "P", "fx fy cx cy skew"),
+        Spelling("mrcal", "LENSMODEL_PINHOLE", "fx fy cx cy"),
+    )
+    examples = (Example("", (), 89),)
+
+    @property
+    def is_distorted(self) -> bool:
+        return False
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         z = np.where(z > 0, z, np.nan)

@@ -1,17 +1,20 @@
 """Lenses by way of a sphere: one formula from the pinhole to mirrors and fisheyes that look behind themselves."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, sqrt
+from math import atan2, inf, isfinite, sqrt
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
-from camviz.lenses.base import ROUNDING, Array, RayLens, check_parameters, check_range
+from camviz.lenses.base import NO_DENOMINATOR, ROUNDING, Array, Lens, check_parameters, check_range
 from camviz.lenses.brown_conrady import BrownConrady
+from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
 
 @dataclass(frozen=True)
-class UnifiedSphere(RayLens):
+class UnifiedSphere(Lens):
     """(x, y) = (X, Y) / (Z + ξ D) with D = |(X, Y, Z)|, then distorted by k1 k2 p1 p2 (Mei & Rives 2007, sec. II.B).
 
     The point goes to the unit sphere and is seen from ξ behind its centre: ξ = 0 is a pinhole, ξ = 1 the stereographic
@@ -24,6 +27,29 @@ class UnifiedSphere(RayLens):
     k2: float = 0.0
     p1: float = 0.0
     p2: float = 0.0
+
+    spellings = (
+        Spelling("kalibr", "omni none", "xi fx fy cx cy"),
+        Spelling("kalibr", "omni radtan", "xi fx fy cx cy k1 k2 p1 p2"),
+        Spelling("opencv", "cv2.omnidir", "fx fy cx cy skew k1 k2 p1 p2 xi"),
+    )
+    calibrations = (
+        CalibrationModel(
+            "omni",
+            "unified sphere",
+            "xi k1 k2 p1 p2",
+            "xi k1 k2 p1 p2 of the unified sphere, as cv2.omnidir has it",
+            "omnidir.calibrate",
+        ),
+    )
+    examples = (
+        Example("pinhole", (0,), 89),
+        Example("hyperbolic", (0.8,), 140),
+        Example("parabolic", (1,), 170),
+        Example("beyond", (2.5,), 110),
+        Example("distorted", (0.9, -0.1, 0.02, 1e-3, -2e-3), 90),
+    )
+    invalid = (((-0.1,), "xi must be at least 0, got -0.1"),)
 
     def __post_init__(self) -> None:
         check_parameters(self)
@@ -41,6 +67,31 @@ class UnifiedSphere(RayLens):
         coefficients = (self.k1, self.k2, self.p1, self.p2)
         return BrownConrady(*coefficients) if any(coefficients) else None
 
+    @property
+    def is_distorted(self) -> bool:
+        return self != UnifiedSphere(0.0)
+
+    def same_as(self) -> Iterator[tuple[Lens, float]]:
+        if not self.distortion:  # α = ξ/(1 + ξ), f = γ/(1 + ξ)
+            yield ExtendedUnified(self.xi / (1 + self.xi), 1.0), 1 / (1 + self.xi)
+
+    @property
+    def can_fold(self) -> bool:
+        return self.distortion is not None
+
+    @property
+    def fold(self) -> Fold | None:
+        """Where the polynomial turns back; the angle is infinite where the sphere shows no ray there."""
+        fold = self.distortion.fold if self.distortion else None
+        if fold is None:
+            return None
+        x, _, z = UnifiedSphere(self.xi).unproject([min(fold.radius, 1e9), 0.0])
+        return replace(fold, angle=atan2(x, z) if isfinite(z) else inf)
+
+    @property
+    def denominator(self) -> Polynomial:
+        return self.distortion.denominator if self.distortion else NO_DENOMINATOR
+
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         distance = np.sqrt(x * x + y * y + z * z)
         depth = np.where(_seen(z, self.xi, distance), z + self.xi * distance, np.nan)
@@ -57,7 +108,7 @@ class UnifiedSphere(RayLens):
 
 
 @dataclass(frozen=True)
-class ExtendedUnified(RayLens):
+class ExtendedUnified(Lens):
     """(x, y) = (X, Y) / (α D + (1 - α) Z) with D² = β (X² + Y²) + Z² (Khomutenko et al. 2016, eq. 11).
 
     0 ≤ α ≤ 1 and β > 0: an ellipsoid in place of the sphere.
@@ -66,10 +117,31 @@ class ExtendedUnified(RayLens):
     alpha: float
     beta: float
 
+    spellings = (
+        Spelling("basalt", "ucm", "fx fy cx cy alpha", {"beta": 1.0}),
+        Spelling("basalt", "eucm", "fx fy cx cy alpha beta"),
+        Spelling("colmap", "EUCM", "fx fy cx cy alpha beta", number=16),
+        Spelling("kalibr", "eucm none", "alpha beta fx fy cx cy"),
+    )
+    examples = (
+        Example("", (0.6, 1.1), 120),
+        Example("narrow", (0.3, 0.5), 100),
+        Example("orthographic", (1, 1), 90),
+        Example("pinhole", (0, 2), 89),
+    )
+    invalid = (
+        ((1.1, 1), "alpha must be between 0 and 1, got 1.1"),
+        ((0.5, 0), "beta must be positive, got 0"),
+    )
+
     def __post_init__(self) -> None:
         check_parameters(self)
         check_range("alpha", self.alpha, 0 <= self.alpha <= 1, "between 0 and 1")
         check_range("beta", self.beta, self.beta > 0, "positive")
+
+    def same_as(self) -> Iterator[tuple[Lens, float]]:
+        if self.beta == 1 and self.alpha < 1:
+            yield UnifiedSphere.from_alpha(self.alpha), 1 / (1 - self.alpha)
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         distance = np.sqrt(self.beta * (x * x + y * y) + z * z)
@@ -81,7 +153,7 @@ class ExtendedUnified(RayLens):
 
 
 @dataclass(frozen=True)
-class DoubleSphere(RayLens):
+class DoubleSphere(Lens):
     """(x, y) = (X, Y) / (α D₂ + (1 - α) (ξ D₁ + Z)) (Usenko et al. 2018, eq. 40-45), -1 < ξ ≤ 1 and 0 ≤ α ≤ 1.
 
     D₁ = |(X, Y, Z)| and D₂ = |(X, Y, ξ D₁ + Z)|: onto one sphere, then onto another, ξ further on.
@@ -89,6 +161,21 @@ class DoubleSphere(RayLens):
 
     xi: float
     alpha: float
+
+    spellings = (
+        Spelling("basalt", "ds", "fx fy cx cy xi alpha"),
+        Spelling("kalibr", "ds none", "xi alpha fx fy cx cy"),
+    )
+    examples = (
+        Example("", (-0.2, 0.6), 120),
+        Example("low_alpha", (-0.5, 0.2), 75),
+        Example("positive", (0.5, 0.4), 110),
+        Example("one", (1, 1), 130),
+    )
+    invalid = (
+        ((-1, 0.5), "xi must be above -1 and at most 1, got -1"),
+        ((0, -0.1), "alpha must be between 0 and 1, got -0.1"),
+    )
 
     def __post_init__(self) -> None:
         check_parameters(self)

@@ -1,21 +1,22 @@
 """The fisheye of COLMAP and of ETH3D's cameras: equal angles first, then Brown-Conrady's polynomial of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi
+from math import inf, pi
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from camviz.lenses.base import Array, RayLens, check_parameters
+from camviz.lenses.base import Array, Lens, check_parameters
 from camviz.lenses.brown_conrady import BrownConrady
+from camviz.lenses.declarations import Example, Fold, Spelling
 from camviz.lenses.fisheye import Equidistant
 
 _EQUIDISTANT = Equidistant()
 
 
 @dataclass(frozen=True)
-class ThinPrismFisheye(RayLens):
+class ThinPrismFisheye(Lens):
     """With (u, v) the image of an equidistant lens and θ² = u² + v², (Schöps et al. 2017, "ETH3D")
 
     x = u (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) + 2 p1 u v + p2 (θ² + 2 u²) + sx1 θ²
@@ -33,6 +34,12 @@ class ThinPrismFisheye(RayLens):
     sx1: float = 0.0
     sy1: float = 0.0
 
+    spellings = (Spelling("colmap", "THIN_PRISM_FISHEYE", "fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1", number=10),)
+    examples = (
+        Example("", (0.02, -0.01, 1e-3, -5e-4, 2e-3, -3e-4, 1e-3, -2e-3), 100),
+        Example("folding", (-0.1, 0, 1e-3, 0, 0, 0, 2e-3), 100),
+    )
+
     def __post_init__(self) -> None:
         check_parameters(self)
 
@@ -40,6 +47,16 @@ class ThinPrismFisheye(RayLens):
     def polynomial(self) -> BrownConrady:
         """What bends the image of the equidistant lens."""
         return _Polynomial(self.k1, self.k2, self.p1, self.p2, self.k3, s1=self.sx1, s3=self.sy1, eighth=self.k4)
+
+    @property
+    def can_fold(self) -> bool:
+        return True
+
+    @property
+    def fold(self) -> Fold | None:
+        """Where the polynomial of θ turns back; the angle is infinite where that is beyond straight behind."""
+        fold = self.polynomial.fold
+        return fold and replace(fold, angle=fold.radius if fold.radius < pi else inf, unit="rad")
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         return self.polynomial.bend(*_EQUIDISTANT.image(x, y, z))

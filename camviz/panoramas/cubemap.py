@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.lenses.base import Array, RayLens
+from camviz.lenses.base import Array, Lens
 from camviz.poses import RigidTransform, Rotation
 
 FACES = ("front", "right", "back", "left", "up", "down")
@@ -65,7 +65,7 @@ class Layout(Enum):
 
 
 @dataclass(frozen=True)
-class Cubemap(RayLens):
+class Cubemap(Lens):
     """The faces of a cube around the camera, as perspective pictures of 90° each (Greene 1986).
 
     Its image is measured in focal lengths, half the side of a face; the origin is the middle of the front face. A gap

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Cylindrical, Equirectangular
-from camviz.lenses.base import Array, times
+from camviz.lenses.base import Array, blocked_matmul
 from camviz.panoramas.cubemap import Cubemap, cells, joined
 from camviz.poses import RigidTransform, Rotation
 
@@ -97,7 +97,7 @@ def equirectangular_camera(width: int, height: int) -> Camera:
 def source_pixels(source: Camera, target: Camera, uv: Array) -> Array:
     """The pixels (..., 2) of `source` that belong at pixels `uv` (..., 2) of `target`; NaN where it sees nothing."""
     pixels = source.intrinsics
-    seen = pixels.to_pixels(source.lens.project(times(target.unproject(uv), source.extrinsics[0].T)))
+    seen = pixels.to_pixels(source.lens.project(blocked_matmul(target.unproject(uv), source.extrinsics[0].T)))
     if _goes_round(source):
         seen[..., 0] = (seen[..., 0] + 0.5) % pixels.width - 0.5
     seen[~pixels.contains(seen)] = np.nan

@@ -31,6 +31,7 @@ from camviz.twoview.estimate import (
     recover_pose,
 )
 from camviz.twoview.matching import METHODS, MatchingScore, disparity, left_right_check, matching_score
+from camviz.twoview.plane import homography
 from camviz.twoview.rectify import (
     RectifiedPair,
     depth_error,
@@ -61,6 +62,7 @@ __all__ = [
     "essential_from_fundamental",
     "from_homogeneous",
     "fundamental",
+    "homography",
     "left_right_check",
     "line_distance",
     "linear_fundamental",

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.distortion import bends
 from camviz.lenses.base import Array, as_points, unit
 from camviz.poses import RigidTransform
 
@@ -32,7 +31,7 @@ def cross_matrix(v: ArrayLike) -> Array:
 
 def projection_matrix(camera: Camera) -> Array:
     """P = K [R | t] (3, 4) of a perspective camera (eq. 6.8). Raises ValueError for a lens that bends."""
-    if bends(camera.lens):
+    if camera.lens.is_distorted:
         lens = type(camera.lens).__name__
         raise ValueError(f"only a Perspective lens keeps straight lines straight and has a matrix, got {lens}")
     return camera.intrinsics.K @ camera.cam_from_world.as_matrix()[:3]

@@ -106,21 +106,20 @@ def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tole
 
 
 def _block_matching(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:
-    matcher = cv2.StereoBM.create(numDisparities=disparities, blockSize=block_size)
-    matcher.setUniquenessRatio(_UNIQUE)
-    matcher.setDisp12MaxDiff(1)
-    matcher.setSpeckleWindowSize(_SPECKLE[0])
-    matcher.setSpeckleRange(_SPECKLE[1])
-    return matcher.compute(left, right)
+    return _strict(cv2.StereoBM.create(numDisparities=disparities, blockSize=block_size)).compute(left, right)
 
 
 def _semi_global(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:
-    matcher = _semi_global_matcher(disparities, block_size)
+    return _strict(_semi_global_matcher(disparities, block_size)).compute(left, right)
+
+
+def _strict(matcher: Any) -> Any:
+    """The matcher, told to leave out what is ambiguous, what does not lead back, and small islands."""
     matcher.setUniquenessRatio(_UNIQUE)
     matcher.setDisp12MaxDiff(1)
     matcher.setSpeckleWindowSize(_SPECKLE[0])
     matcher.setSpeckleRange(_SPECKLE[1])
-    return matcher.compute(left, right)
+    return matcher
 
 
 def _filtered(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.slopes import parameter
+from camviz.calibration.jacobian import parameter
 from camviz.calibration.types import Board
 from camviz.calibration.zhang import board_pose, camera_matrix, focal_lengths, homography
 from camviz.cameras import Camera, Intrinsics, transform

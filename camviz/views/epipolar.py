@@ -15,7 +15,6 @@ import numpy as np
 from camviz import twoview
 from camviz.cameras import Camera, transform
 from camviz.course.yours import tried
-from camviz.distortion import bends
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, photograph
 from camviz.draw.picture import Picture, jpeg
@@ -396,7 +395,7 @@ def _far(uv: Array, camera: Camera) -> str:
     away = float(np.linalg.norm(uv - np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2))
     if away < 1e6:
         return f"{away:,.0f} px"
-    return "beyond the lens’s field" if bends(camera.lens) else "at infinity"
+    return "beyond the lens’s field" if camera.lens.is_distorted else "at infinity"
 
 
 def _infinity(at: Array) -> str:

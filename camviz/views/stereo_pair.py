@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
-from camviz.distortion import bends
 from camviz.lenses import BrownConrady, Lens, Perspective
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
@@ -104,7 +103,7 @@ def seen_from_there(camera: Camera, other: Camera, uv: ArrayLike) -> Array:
 
 
 def _weakened(lens: Lens, share: float) -> Lens:
-    if not isinstance(lens, BrownConrady) or not bends(lens):
+    if not isinstance(lens, BrownConrady) or not lens.is_distorted:
         return Perspective()
     return BrownConrady(**{one.name: share * getattr(lens, one.name) for one in fields(lens)})
 
@@ -142,7 +141,7 @@ def _resampled(image: np.ndarray, original: Camera, camera: Camera, how: int, ou
     """What `camera` sees, made of the `image` that `original` took in the same place."""
     side = max(image.shape[:2])
     old, new = original.intrinsics.within(side), camera.intrinsics.within(side)
-    if not (bends(original.lens) or bends(camera.lens)):
+    if not (original.lens.is_distorted or camera.lens.is_distorted):
         H = old.K @ original.extrinsics[0] @ camera.extrinsics[0].T @ np.linalg.inv(new.K)
         size = (new.width, new.height)
         return cv2.warpPerspective(image, H, size, flags=how | cv2.WARP_INVERSE_MAP, borderValue=outside)

@@ -10,7 +10,6 @@ import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
-from camviz.distortion import bends
 from camviz.lenses import BrownConrady, Equidistant, Perspective
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
@@ -121,7 +120,7 @@ class TwoCameras(View):
     @cached_property
     def F(self) -> Array | None:
         """The fundamental matrix (3, 3) of unit norm; None without a baseline or where a lens bends lines."""
-        if bends(self.left.lens) or bends(self.right.lens) or not self.baseline:
+        if self.left.lens.is_distorted or self.right.lens.is_distorted or not self.baseline:
             return None
         F = twoview.fundamental(self.left, self.right)
         return F / np.linalg.norm(F)

@@ -51,8 +51,7 @@ class FoldView(View):
 
     @property
     def _rational(self) -> bool:
-        bending = distortion.polynomial(self.camera.lens)
-        return bending is not None and any((bending.k4, bending.k5, bending.k6))
+        return distortion.is_rational(self.camera.lens)
 
     def sentences(self) -> list[str]:
         """What the numbers mean, in words."""
@@ -134,8 +133,7 @@ class FoldView(View):
 
     def _denominator(self) -> str:
         """D(r²) out to beyond the picture, where the model has one."""
-        bending = distortion.polynomial(self.camera.lens)
-        if bending is None or not self._rational:
+        if not self._rational:
             words = (
                 "The model has no denominator, so it can have no pole: only the numerator of g(r), above, can "
                 "turn back."
@@ -147,7 +145,7 @@ class FoldView(View):
             )
         n = self.numbers()
         r = np.linspace(0, 1.5 * n["ideal_radius"], 241)
-        D = bending.denominator(r**2)
+        D = self.camera.lens.denominator(r**2)
         inside = D[r <= n["ideal_radius"]]
         panel = plot.plot_panel(
             "denominator",

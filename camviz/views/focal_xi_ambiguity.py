@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from camviz.calibration.valley import Valley
+from camviz.calibration.focal_xi_ambiguity import FocalXiAmbiguity
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
 
 
-def valley_picture(*maps: tuple[str, Valley], true_xi: float | None = None, true_focal: float | None = None) -> Picture:
+def focal_xi_ambiguity_picture(
+    *maps: tuple[str, FocalXiAmbiguity], true_xi: float | None = None, true_focal: float | None = None
+) -> Picture:
     """Maps of the misfit side by side under their captions, with the line f/(1 + ξ) = const through each camera.
 
     The cross is the calibrated camera; a ring is the truth, where it is known. One scale of colours serves all maps.
@@ -38,7 +40,7 @@ def valley_picture(*maps: tuple[str, Valley], true_xi: float | None = None, true
     return Picture(body + scale, 960, 400, "The valley along f/(1 + ξ)", words, attached | picture)
 
 
-def _line(panel: Panel, one: Valley) -> str:
+def _line(panel: Panel, one: FocalXiAmbiguity) -> str:
     lens, pixels = one.camera.lens, one.camera.intrinsics
     f = pixels.fx / (1 + lens.xi) * (1 + one.xi)  # type: ignore[attr-defined]
     line = panel.place(np.stack([one.xi, f], axis=-1))

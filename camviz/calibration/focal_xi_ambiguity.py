@@ -21,7 +21,7 @@ HELD = 1e-12  # added to their normal equations: where a board has run away, it 
 
 
 @dataclass(frozen=True, eq=False)
-class Valley:
+class FocalXiAmbiguity:
     """The RMS misfit in pixels (m, n) that is left at `xi` (m,) and `focal` (n,) once every board has its best pose.
 
     NaN where some corner has no image. `camera` is the one the map was drawn around.
@@ -42,9 +42,9 @@ class Valley:
         return self.focal[at[:, 0]] + off * (self.focal[1] - self.focal[0])
 
 
-def valley(
+def focal_xi_ambiguity(
     camera: Camera, board: Board, corners: ArrayLike, cam_from_board: RigidTransform, xi: ArrayLike, focal: ArrayLike
-) -> Valley:
+) -> FocalXiAmbiguity:
     """The map over `xi` (m,) and `focal` (n,), evenly spaced, of corners (views, n, 2) in pixels, NaN where not seen.
 
     `camera`, a calibrated unified sphere, gives the principal point, fy/fx, and the distortion, which is taken off the
@@ -59,7 +59,7 @@ def valley(
     start = poses[:, :3, :3] @ board.corners.T + poses[:, :3, 3:]  # (views, 3, corners)
     sizes = focal / camera.intrinsics.fx
     misfit = np.stack([_row(start, poses[:, :3, 3], seen, camera.lens.xi, one, sizes) for one in xi])
-    return Valley(xi, focal, camera.intrinsics.fx * misfit, camera)
+    return FocalXiAmbiguity(xi, focal, camera.intrinsics.fx * misfit, camera)
 
 
 def _ideal(camera: Camera, lens: UnifiedSphere, corners: Array) -> Array:
@@ -72,10 +72,10 @@ def _row(start: Array, places: Array, seen: Array, xi_was: float, xi: float, siz
     nearer = sizes * (1 + xi_was) / (1 + xi)  # a board looks as large at once, at this multiple of its distance
     points = start + (nearer[:, None, None] - 1)[..., None] * places[..., None]  # (n, views, 3, corners)
     for _ in range(STEPS):
-        residuals, slopes = _fitted(points, seen, xi, sizes)
-        across = slopes.swapaxes(-1, -2)
+        residuals, jacobian = _fitted(points, seen, xi, sizes)
+        across = jacobian.swapaxes(-1, -2)
         twist = np.asarray(
-            np.linalg.solve(across @ slopes + HELD * np.eye(6), across @ residuals[..., None]), dtype=float
+            np.linalg.solve(across @ jacobian + HELD * np.eye(6), across @ residuals[..., None]), dtype=float
         )[..., 0]
         points = _turned(points, twist)
     residuals, _ = _fitted(points, seen, xi, sizes)
@@ -84,7 +84,7 @@ def _row(start: Array, places: Array, seen: Array, xi_was: float, xi: float, siz
 
 
 def _fitted(points: Array, seen: Array, xi: float, sizes: Array) -> tuple[Array, Array]:
-    """Residuals (n, views, 2 corners), 0 where no corner was seen, and their slopes (…, 6) by twists of the boards."""
+    """Residuals (n, views, 2 corners), 0 where no corner was seen; their derivatives (…, 6) by twists of the boards."""
     x, y, z = np.moveaxis(points, -2, 0)
     distance = np.sqrt(x * x + y * y + z * z)
     depth = z + xi * distance

@@ -7,14 +7,14 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.calibration import Detections, calibrate, find_corners
-from camviz.calibration.valley import valley
+from camviz.calibration.focal_xi_ambiguity import focal_xi_ambiguity
 from camviz.cameras import Camera, Intrinsics
 from camviz.files import Board
 from camviz.lenses import Perspective, UnifiedSphere
 from camviz.scenes import Scene, Texture, render, to_display
 from camviz.scenes.paint import checkerboard
 from camviz.scenes.surfaces import Rectangle
-from camviz.views.valley import valley_picture
+from camviz.views.focal_xi_ambiguity import focal_xi_ambiguity_picture
 
 BOARD = Board(8, 5, 0.03)
 CAMERA = Camera(Intrinsics(800, 640, 560, 563, 402, 317), UnifiedSphere(1.1))
@@ -80,7 +80,7 @@ def test_the_misfit_is_what_a_least_squares_solver_and_opencv_s_projection_leave
 
         begun = np.concatenate([pose.rotation.as_rotvec(), pose.translation])
         squares += 2 * least_squares(off, begun, x_scale="jac", xtol=1e-14, ftol=1e-14).cost
-    found = valley(CAMERA, BOARD, uv, poses, [1.1, xi], [560.0, f, 660.0])
+    found = focal_xi_ambiguity(CAMERA, BOARD, uv, poses, [1.1, xi], [560.0, f, 660.0])
     assert found.misfit[1, 1] == pytest.approx(
         np.sqrt(squares / uv[..., 0].size), rel=2e-3
     )  # fy ≠ fx by half a percent
@@ -92,7 +92,7 @@ def test_at_the_truth_nothing_is_left_but_the_noise_also_with_distortion_and_cor
     poses = boards(rng, 4, 0.6)
     uv = corners_of(camera, poses, rng, 0.0)
     uv[1, :7] = np.nan
-    found = valley(camera, BOARD, uv, poses, [1.0, 1.1], [540.0, 560.0, 580.0])
+    found = focal_xi_ambiguity(camera, BOARD, uv, poses, [1.0, 1.1], [540.0, 560.0, 580.0])
     assert found.misfit[1, 1] < 1e-6
     assert np.delete(found.misfit.ravel(), 4).min() > 0.05
 
@@ -104,7 +104,7 @@ def test_boards_near_the_axis_leave_a_valley_along_f_over_one_plus_xi_and_boards
         rng = np.random.default_rng(4)
         poses = boards(rng, 6, spread, away=away)
         uv = corners_of(CAMERA, poses, rng, 0.1)
-        maps[spread] = valley(CAMERA, BOARD, uv, poses, xi, np.linspace(250, 1000, 61))
+        maps[spread] = focal_xi_ambiguity(CAMERA, BOARD, uv, poses, xi, np.linspace(250, 1000, 61))
     floor = maps[0.1].floor() / (1 + xi)
     np.testing.assert_allclose(floor, 560 / 2.1, rtol=0.04)  # while f itself goes from 373 to 853
     along = {spread: np.nanmin(one.misfit, axis=1) for spread, one in maps.items()}
@@ -116,15 +116,15 @@ def test_only_a_unified_sphere_has_such_a_valley():
     camera = Camera(CAMERA.intrinsics, Perspective())
     poses = boards(np.random.default_rng(1), 1, 0.1)
     with pytest.raises(ValueError, match="camera must have a UnifiedSphere lens, got Perspective"):
-        valley(camera, BOARD, np.zeros((1, 40, 2)), poses, [1.0], [500.0])
+        focal_xi_ambiguity(camera, BOARD, np.zeros((1, 40, 2)), poses, [1.0], [500.0])
 
 
 def test_the_drawing_of_a_valley_says_its_least_misfit_and_marks_the_calibrated_camera():
     rng = np.random.default_rng(6)
     poses = boards(rng, 3, 0.5)
     uv = corners_of(CAMERA, poses, rng, 0.1)
-    found = valley(CAMERA, BOARD, uv, poses, np.linspace(0.5, 1.7, 7), np.linspace(400, 720, 9))
-    picture = valley_picture(("three boards", found), true_xi=1.1, true_focal=560)
+    found = focal_xi_ambiguity(CAMERA, BOARD, uv, poses, np.linspace(0.5, 1.7, 7), np.linspace(400, 720, 9))
+    picture = focal_xi_ambiguity_picture(("three boards", found), true_xi=1.1, true_focal=560)
     assert f"three boards: least {found.misfit.min():.2f} px" in picture.description
     assert picture.body.count("ink thick") >= 1
     assert set(picture.photographs) == {"valley0", "scale"}

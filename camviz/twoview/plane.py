@@ -1,0 +1,46 @@
+"""The homography between a plane and its image, or between two images of the plane."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.lenses.base import Array, as_points
+from camviz.twoview.epipolar import to_homogeneous
+from camviz.twoview.estimate import normalising_transform
+
+UNDETERMINED = 1e-10  # of the largest singular value: below this, rounding is all that an equation still says
+
+
+def homography(xy: ArrayLike, uv: ArrayLike) -> Array:
+    """H (3, 3) with H[2, 2] = 1 from points (n, 2) of a plane to pixels (n, 2), by DLT on normalised coordinates.
+
+    λ (u, v, 1)ᵀ = H (x, y, 1)ᵀ. Points with a NaN are left out. Raises ValueError for fewer than four points, or when
+    they leave H undetermined (Hartley & Zisserman 2004, algorithm 4.2).
+
+    >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> H = homography(square, 100 * square + [20, 30])
+    >>> np.allclose(H, [[100, 0, 20], [0, 100, 30], [0, 0, 1]])
+    True
+    """
+    xy, uv = _seen(xy, uv)
+    T_plane, T_image = normalising_transform(xy), normalising_transform(uv)
+    X = to_homogeneous(xy) @ T_plane.T
+    u, v = ((to_homogeneous(uv) @ T_image.T)[:, :2]).T[..., None]
+    # u (h₃·X) = h₁·X and v (h₃·X) = h₂·X: two rows of A for each point, and A h = 0.
+    A = np.block([[X, 0 * X, -u * X], [0 * X, X, -v * X], [np.zeros((1, 9))]])  # 4 points too need a ninth row
+    _, s, Vt = np.linalg.svd(A, full_matrices=False)
+    if not s[7] > UNDETERMINED * s[0]:
+        raise ValueError(f"{len(uv)} points leave the homography undetermined: all but one of them lie on a line")
+    H = np.linalg.inv(T_image) @ Vt[-1].reshape(3, 3) @ T_plane
+    return H / H[2, 2]
+
+
+def _seen(xy: ArrayLike, uv: ArrayLike) -> tuple[Array, Array]:
+    xy, uv = as_points(xy, 2, "xy"), as_points(uv, 2, "uv")
+    if xy.shape != uv.shape or uv.ndim != 2:
+        raise ValueError(f"a homography takes two arrays of one shape (n, 2), got {xy.shape} and {uv.shape}")
+    known = np.isfinite(xy).all(axis=1) & np.isfinite(uv).all(axis=1)
+    if known.sum() < 4:
+        raise ValueError(f"a homography takes at least four points, got {known.sum()}")
+    return xy[known], uv[known]
