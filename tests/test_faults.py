@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from camviz.clinic import inspect, kinds
-from camviz.clinic.catalogue import SEVERITIES
-from camviz.clinic.faults import FAULTS
-from camviz.clinic.injections import healthy, parallel_boards
-from camviz.clinic.statistics import PAGE, TABLES, alarms, healthy_pair_case, healthy_single_case, page
-from camviz.clinic.virtual import MARGIN, pair, single
+from camviz.clinic import Inspection, faults, inspect, kinds
+from camviz.clinic.evidence import Evidence
+from camviz.clinic.registry import SEVERITIES
+from camviz.clinic.statistics import PAGE, TABLES, alarms, page
+from camviz.clinic.virtual import MARGIN, healthy, healthy_pair, pair, single
 
+FAULTS = faults()
 SEED = 20_003
 
 
 def found(name: str, strength: float, seed: int = SEED):
     """The findings that a fault must lead to."""
-    inspection = FAULTS[name].inject(np.random.default_rng(seed), strength).inspected()
+    inspection = Inspection.of(FAULTS[name].inject(np.random.default_rng(seed), strength))
     return [finding for finding in inspection.findings if finding.id == FAULTS[name].finding]
 
 
@@ -35,17 +35,18 @@ def test_every_finding_has_a_fault_that_leads_to_it():
 
 @pytest.mark.parametrize("seed", range(20_100, 20_106))
 def test_nothing_is_found_in_a_healthy_camera(seed):
-    assert alarms(healthy_single_case(np.random.default_rng(seed))) == []
+    assert alarms(Evidence(healthy(np.random.default_rng(seed)))) == []
 
 
 @pytest.mark.parametrize("seed", [20_100, 20_101])
 def test_nothing_is_found_in_a_healthy_pair(seed):
-    assert alarms(healthy_pair_case(np.random.default_rng(seed))) == []
+    assert alarms(Evidence(healthy_pair(np.random.default_rng(seed)))) == []
 
 
 def test_a_set_up_is_the_same_whatever_the_strength():
     """Two injections with one seed differ by the fault alone: the parallel boards are at the same places."""
-    first, second = (parallel_boards(np.random.default_rng(3), strength).calibration for strength in (2.0, 2.5))
+    inject = FAULTS["parallel boards"].inject
+    first, second = (inject(np.random.default_rng(3), strength).calibration for strength in (2.0, 2.5))
     middles = [each.board.corners.mean(axis=0) for each in (first, second)]
     places = [
         np.stack([pose.apply(middle) for pose in each.cam_from_board["camera"]])
@@ -107,14 +108,14 @@ def test_the_bend_of_a_board_is_found_within_a_tenth():
     """2 % of the longer side, along the rows."""
     case = FAULTS["warped board"].inject(np.random.default_rng(SEED), 2)
     board = case.calibration.board
-    (finding,) = [each for each in case.inspected().findings if each.id == "board-warp"]
+    (finding,) = [each for each in Inspection.of(case).findings if each.id == "board-warp"]
     side = (max(board.columns, board.rows) - 1) * board.square_size
     assert finding.value == pytest.approx(0.02 * side * 1000, rel=0.1)
 
 
 def test_a_turn_of_the_whole_world_changes_nothing():
     """Findings are about cameras, not about where the file puts its origin."""
-    _, calibration = healthy(np.random.default_rng(SEED))
+    calibration = healthy(np.random.default_rng(SEED))
     camera = calibration.cameras["camera"]
     moved = RigidTransform.from_components([1, 2, 3], camera.world_from_cam.rotation)
     turned = type(calibration)(

@@ -1,0 +1,224 @@
+"""What a lens does inside its own image: whether it folds, comes near a pole, and can be inverted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import astuple, replace
+from math import cos, degrees, isfinite, pi, radians
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.types import Calibration
+from camviz.cameras import Camera, Intrinsics
+from camviz.clinic.evidence import Evidence, NotChecked
+from camviz.clinic.registry import Finding, Rng, finding
+from camviz.clinic.virtual import alone, healthy
+from camviz.distortion import (
+    fold_angle,
+    fold_radius,
+    ideal_image_radius,
+    image_corner_radius,
+    polynomial,
+    valid_region,
+    weakest_denominator,
+)
+from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz.lenses.base import Array
+
+WEAKEST = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
+CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
+NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z = 1 worth the name
+
+
+@finding(
+    "fold",
+    severity="fault",
+    view="fold-map",
+    symptom="The border mirrors or folds back after undistortion.",
+    causes=("a distortion polynomial that turns back inside the image", "no corners near the border in the fit"),
+    remedy="Fix k3 to 0 (or take fewer terms) and solve again with more views that reach the border.",
+    evidence="The check looks for pixels at which no ray arrives. "
+    "The way there from the axis passes a root of g'(r) or of the Jacobian's determinant.",
+    threshold="Any such pixel lies on the border. "
+    "For a fisheye that turns back beyond 90° it is a note, because its picture may end before.",
+)
+def fold(evidence: Evidence) -> Iterator[Finding]:
+    bent = {name: camera for name, camera in evidence.cameras.items() if _has_polynomial(camera)}
+    if not bent:
+        raise NotChecked("no lens here has a polynomial that could turn back")
+    for name, camera in bent.items():
+        yield from _fold(evidence, name, camera)
+
+
+def _has_polynomial(camera: Camera) -> bool:
+    return polynomial(camera.lens) is not None or isinstance(camera.lens, KannalaBrandt)
+
+
+def _fold(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
+    lens, grid = camera.lens, camera.intrinsics
+    turns = isfinite(fold_radius(lens)) and (not isinstance(lens, KannalaBrandt) or lens.fold_angle < pi)
+    if _seen(camera, border_pixels(camera)).all() or not (turns or isinstance(lens, BrownConrady)):
+        return
+    lost = 1 - float(valid_region(camera, max(1, grid.width // 128)).mean())
+    share = f"{lost:.0%}" if lost >= 0.01 else "less than 1 %"
+    severity = "note" if turns and fold_angle(lens) >= pi / 2 and not _corners_lost(evidence, name, camera) else None
+    sentence = f"{name}: {share} of the pixels have no ray of their own. The distortion {_where(camera)}."
+    value, unit = (fold_radius(lens), "rad" if isinstance(lens, KannalaBrandt) else "focal lengths")
+    yield fold.found(sentence, value if turns else lost, unit if turns else "", name, severity=severity)
+
+
+def _where(camera: Camera) -> str:
+    lens, corner = camera.lens, image_corner_radius(camera.intrinsics)
+    turn, bending = fold_radius(lens), polynomial(lens)
+    if isinstance(lens, KannalaBrandt):
+        image = float(lens.radial(turn))
+    elif bending is not None and isfinite(turn):
+        image = float(bending.radial(turn))
+    else:
+        return "mirrors part of the image (the determinant of its Jacobian reaches 0)"
+    radius = "" if isinstance(lens, KannalaBrandt) else f"at r = {turn:.4g}, "
+    return (
+        f"turns back {radius}{degrees(fold_angle(lens)):.1f}° from the axis, which is {image:.3g} focal lengths from "
+        f"the principal point in the image. The farthest corner is at {corner:.3g}"
+    )
+
+
+def _seen(camera: Camera, pixels: Array) -> np.ndarray:
+    return np.isfinite(camera.lens.unproject(camera.intrinsics.from_pixels(pixels))[..., 0])
+
+
+def _corners_lost(evidence: Evidence, name: str, camera: Camera) -> bool:
+    pixels = evidence.calibration.detections.get(name)
+    return pixels is not None and not _seen(camera, pixels[np.isfinite(pixels).all(axis=-1)]).all()
+
+
+def border_pixels(camera: Camera, samples: int = 16) -> Array:
+    """The centres of pixels all along the border (n, 2)."""
+    grid = camera.intrinsics
+    return np.asarray(np.clip(grid.border(samples), [0, 0], [grid.width - 1, grid.height - 1]))
+
+
+@fold.fault(
+    "folding polynomial",
+    "the polynomial turns back at",
+    "of the corner's radius",
+    (1.6, 0.95, 0.8),
+    promised=0.95,
+    beyond_doubt=(0.7, 0.9),
+)
+def folding(rng: Rng, strength: float) -> Evidence:
+    """A k3 that makes g'(r) = 0 at so much of the farthest corner's radius."""
+    solved = healthy(rng)
+    camera = solved.cameras["camera"]
+    lens = BrownConrady(k1=-0.2, k2=0.04)
+    r = strength * ideal_image_radius(replace(camera, lens=lens))
+    k3 = -(1 + 3 * lens.k1 * r**2 + 5 * lens.k2 * r**4) / (7 * r**6)
+    return Evidence(alone(solved, replace(camera, lens=replace(lens, k3=k3))))
+
+
+@finding(
+    "near-pole",
+    severity="fault",
+    view="fold-map",
+    symptom="The undistorted picture shows a ring or garbage.",
+    causes=(
+        "a rational model whose denominator comes close to zero in or near the image",
+        "more coefficients than the corners can determine",
+    ),
+    remedy="Solve again with fewer terms (the standard model), or with corners out to the edge of the image.",
+    evidence="The check follows the denominator D(r²) = 1 + k4 r² + k5 r⁴ + k6 r⁶ out to the farthest ray that an "
+    "undistorted picture asks for.",
+    threshold="D falls below 0.2, where every error of the numerator counts five times, or there is a pole.",
+)
+def near_pole(evidence: Evidence) -> Iterator[Finding]:
+    rational = {name: camera for name, camera in evidence.cameras.items() if _is_rational(camera)}
+    if not rational:
+        raise NotChecked("no lens here has a denominator (k4 k5 k6)")
+    for name, camera in rational.items():
+        reach = float(np.nanmax([ideal_image_radius(camera), image_corner_radius(camera.intrinsics)]))
+        radius, least = weakest_denominator(camera.lens, reach)
+        if least < WEAKEST:
+            what = "passes through 0, which is a pole," if least <= 0 else f"falls to {least:.3g}"
+            sentence = (
+                f"{name}: the denominator of the rational model {what} at r = {radius:.3g} focal lengths. "
+                f"The image reaches to {reach:.3g}."
+            )
+            yield near_pole.found(sentence, least, "", name)
+
+
+def _is_rational(camera: Camera) -> bool:
+    bending = polynomial(camera.lens)
+    return bending is not None and bool(bending.k4 or bending.k5 or bending.k6)
+
+
+@near_pole.fault(
+    "near-pole rational model", "the denominator at the farthest corner's ray", "", (0.5, 0.15, 0.05), promised=0.15
+)
+def close_to_a_pole(rng: Rng, strength: float) -> Evidence:
+    """It fits the corners: N = D (1 + k1 s + k2 s² + k3 s³) up to s³, with D = 1 + k4 s, adjusted with that k4."""
+    solved = healthy(rng)
+    camera = solved.cameras["camera"]
+    lens = camera.lens
+    assert isinstance(lens, BrownConrady)
+    k4 = -(1 - strength) / ideal_image_radius(camera) ** 2
+    k1, k2, k3 = lens.k1 + k4, lens.k2 + lens.k1 * k4, lens.k3 + lens.k2 * k4
+    start = replace(camera, lens=replace(lens, k1=k1, k2=k2, k3=k3, k4=k4))
+    best = replace(Adjustment.of(solved), cameras={"camera": start}).refined()
+    return Evidence(replace(solved, cameras=best.cameras, cam_from_board={"camera": best.first_from_board}))
+
+
+@finding(
+    "inverse-not-converged",
+    severity="note",
+    view="undistorted",
+    symptom="Undistorted points are wrong at the border.",
+    causes=("cv2.undistortPoints, which stops after 5 iterations unless it is told otherwise",),
+    remedy="Pass criteria to undistortPoints, such as (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, 100, 1e-9), "
+    "and project the result back.",
+    evidence="The check sends border pixels through OpenCV's inverse with its default criteria, and forward again "
+    "through the polynomial.",
+    threshold="A pixel and its return are 0.5 px apart.",
+)
+def inverse_not_converged(evidence: Evidence) -> Iterator[Finding]:
+    lenses = (BrownConrady, KannalaBrandt)
+    known = {name: camera for name, camera in evidence.cameras.items() if isinstance(camera.lens, lenses)}
+    if not known:
+        raise NotChecked("OpenCV's undistortPoints is not for these lenses")
+    for name, camera in known.items():
+        error = default_round_trip(camera)
+        if not error <= CLOSE_PX:
+            off = f"{error:.2g} px" if error < 1000 else "more than 1000 px"
+            sentence = f"{name}: cv2.undistortPoints without criteria leaves points at the border {off} off."
+            yield inverse_not_converged.found(sentence, min(error, 1e6), "px", name)
+
+
+def default_round_trip(camera: Camera) -> float:
+    """The largest distance in pixels between a border pixel and its return from OpenCV's inverse with its defaults."""
+    grid, lens = camera.intrinsics, camera.lens
+    pixels = border_pixels(camera)
+    forward = lens.unproject(grid.from_pixels(pixels))[..., 2]  # NaN where the lens folds
+    pixels = pixels[forward > NEARLY_SIDEWAYS]
+    if not len(pixels):
+        return 0.0
+    points = pixels.reshape(-1, 1, 2)
+    with np.errstate(all="ignore"):
+        if isinstance(lens, KannalaBrandt):
+            k = np.array(astuple(lens))
+            ideal = cv2.fisheye.undistortPoints(points, grid.K, k).reshape(-1, 2)
+            back = cv2.fisheye.distortPoints(ideal.reshape(-1, 1, 2), grid.K, k).reshape(-1, 2)
+        else:
+            assert isinstance(lens, BrownConrady)
+            ideal = cv2.undistortPoints(points, grid.K, np.array(astuple(lens))).reshape(-1, 2)
+            back = grid.to_pixels(lens.distort(ideal))
+        error = float(np.linalg.norm(back - pixels, axis=-1).max())
+    return error if isfinite(error) else 1e6
+
+
+@inverse_not_converged.fault("strong lens", "a barrel lens, 80° wide", "-k1", (0.1, 0.25, 0.35), promised=0.35)
+def strong_lens(rng: Rng, strength: float) -> Evidence:
+    lens = BrownConrady(k1=-strength, k2=0.5 * strength**2)
+    camera = Camera(Intrinsics.from_fov(1280, 960, 80), lens)
+    return Evidence(Calibration({"camera": camera}, Path("virtual"), "OpenCV FileStorage"))
