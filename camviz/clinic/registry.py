@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from inspect import cleandoc
 from typing import Any
 
 import numpy as np
@@ -120,13 +121,19 @@ class Kind:
         rated = severity or self.severity
         return Finding(self.id, rated, sentence, number, unit, camera, self.view, self.causes, self.remedy, pictures)
 
-    def fault(
-        self, name: str, sentence: str, unit: str, strengths: tuple[float, ...], **more: Any
-    ) -> Callable[[Inject], Fault]:
-        """Declare the decorated function as a Fault of this kind; `more` are the other fields of Fault."""
-        return lambda inject: Fault(name, self.id, sentence, unit, strengths, inject=inject, **more)
+    def fault(self, name: str, unit: str, strengths: tuple[float, ...], **more: Any) -> Callable[[Inject], Fault]:
+        """Declare the decorated function as a Fault of this kind, whose sentence is the first line of its docstring.
+
+        `more` are the other fields of Fault.
+        """
+        return lambda inject: Fault(
+            name, self.id, cleandoc(inject.__doc__ or "").split("\n")[0], unit, strengths, inject=inject, **more
+        )
 
 
 def finding(id: str, **words: Any) -> Callable[[Callable[[Evidence], Iterable[Finding]]], Kind]:
-    """Declare the decorated check as a Kind of finding; `words` are the other fields of Kind."""
-    return lambda check: Kind(id, check=check, **words)
+    """Declare the decorated check as a Kind of finding, whose evidence its docstring tells.
+
+    `words` are the other fields of Kind.
+    """
+    return lambda check: Kind(id, check=check, evidence=" ".join((check.__doc__ or "").split()), **words)

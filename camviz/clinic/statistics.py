@@ -113,8 +113,8 @@ def _row(fault: Fault, results: list[Hits]) -> str:
         shown.append(f"**{said}**" if result.strength == fault.promised else said)
     promised = next(result for result in results if result.strength == fault.promised)
     others = ", ".join(f"`{id}` {count}" for id, count in promised.others.most_common())
-    unit = f" ({fault.unit})" if fault.unit else ""
-    return f"| {fault.name}: {fault.sentence}{unit} | `{fault.finding}` | {', '.join(shown)} | {others} |"
+    unit = f" [{fault.unit}]" if fault.unit else ""
+    return f"| {fault.name}{unit}: {fault.sentence} | `{fault.finding}` | {', '.join(shown)} | {others} |"
 
 
 def page(tables: str) -> str:

@@ -34,10 +34,10 @@ MOVING = 0.7  # of the noise: what a rolling shutter must explain to be named
     symptom="The board was seen in too little of the image.",
     causes=("views that all show the board in the same part of the image, or far away",),
     remedy="Add views with the board close to each border and corner of the image.",
-    evidence="The check lays the outlines of the board in all views over the image.",
     threshold="They cover less than two fifths of the image.",
 )
 def low_coverage(evidence: Evidence) -> Iterator[Finding]:
+    """The check lays the outlines of the board in all views over the image."""
     if not evidence.calibration.detections:
         raise NotChecked("the file holds no detected corners of a known board")
     for name, pixels in evidence.calibration.detections.items():
@@ -62,7 +62,6 @@ def coverage(pixels: Array, width: int, height: int) -> float:
 
 @low_coverage.fault(
     "boards in the middle",
-    "the boards stay inside this part of the sides",
     "of a side",
     (0.15, 0.25, 0.4),
     promised=0.25,
@@ -75,6 +74,8 @@ def coverage(pixels: Array, width: int, height: int) -> float:
     ),
 )
 def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
+    """The boards stay inside this part of the sides."""
+
     def gathered(set_up: SetUp) -> SetUp:
         return replace(set_up, cam_from_board=spread_boards(rng, set_up.cameras, set_up.board, 15, (15, 40), strength))
 
@@ -88,10 +89,10 @@ def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
     symptom="The focal length is uncertain, and correlated with the distance of the boards.",
     causes=("boards that were all held parallel to each other, usually to the image",),
     remedy="Add views with the board tilted by 30° to 45°, to different sides.",
-    evidence="The check compares the normals of the boards in the camera's frame.",
     threshold="No two boards are more than 20° apart, or the focal length is uncertain by more than 1 %.",
 )
 def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares the normals of the boards in the camera's frame."""
     poses = {name: pose for name, pose in evidence.cam_from_board.items() if not pose.single and len(pose) > 1}
     if not poses:
         raise NotChecked("it needs the poses of at least two boards, and the file has none")
@@ -122,7 +123,6 @@ def _share_of_noise(evidence: Evidence, name: str) -> float:
 
 @parallel_boards.fault(
     "parallel boards",
-    "no board is tilted by more",
     "°",
     (0.5, 3, 8),
     promised=8,
@@ -135,6 +135,7 @@ def _share_of_noise(evidence: Evidence, name: str) -> float:
     ),
 )
 def all_parallel(rng: Rng, strength: float) -> Evidence:
+    """No board is tilted by more."""
     set_up = single(rng, tilt_deg=(0, strength))
     return Evidence(set_up.solved(set_up.observed(rng)))
 
@@ -151,12 +152,13 @@ def all_parallel(rng: Rng, strength: float) -> Evidence:
     ),
     remedy="Solve again with tilted boards at varied distances and a still camera. "
     "Trust held-out corners rather than the error of the fit.",
-    evidence="The check fits each view's pose to one half of its corners and tries it on the other half. "
-    "It also fits six velocities of the board to every view, as a rolling shutter would show them.",
     threshold="The errors are twice as large as noise makes them, in the median of the views. "
     "Or the velocities explain at least 0.7 of the noise, by chance in one set of a million.",
 )
 def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
+    """The check fits each view's pose to one half of its corners and tries it on the other half. It also fits six
+    velocities of the board to every view, as a rolling shutter would show them.
+    """
     for name, observed in evidence.with_corners().items():
         ratio = held_out_ratio(observed)
         if ratio > HELD_OUT:
@@ -230,7 +232,6 @@ def moving(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
 
 @pose_absorbs_error.fault(
     "rolling shutter",
-    "the board moves while the image is read out",
     "px",
     (1, 3, 10, 30),
     promised=30,
@@ -241,6 +242,7 @@ def moving(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     ),
 )
 def rolling_shutter(rng: Rng, strength: float) -> Evidence:
+    """The board moves while the image is read out."""
     return solved(rng, lambda set_up: moving(rng, set_up, strength))
 
 
@@ -254,7 +256,6 @@ def centre_moved(solution: Adjustment, strength: float) -> Adjustment:
 
 @pose_absorbs_error.fault(
     "moved centre",
-    "the principal point was moved, the poses follow",
     "% of the width",
     (0.3, 1, 3, 8),
     promised=8,
@@ -262,6 +263,7 @@ def centre_moved(solution: Adjustment, strength: float) -> Adjustment:
     lab=LabFault(8, "cx is moved by {0:.1f} % of the width, and the poses follow", solution=centre_moved),
 )
 def moved_centre(rng: Rng, strength: float) -> Evidence:
+    """The principal point was moved, and the poses follow."""
     calibration = healthy(rng)
     best = centre_moved(Adjustment.of(calibration), strength)
     shifted = changed(calibration, cx=best.cameras["camera"].intrinsics.cx)

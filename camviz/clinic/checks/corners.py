@@ -27,11 +27,11 @@ VISIBLE_PX = 1.5  # less than this is no wrong detection
     symptom="One view has many times the error of the rest.",
     causes=("a wrong detection", "motion blur", "a board that moved while the shutter was open"),
     remedy="Look at that picture. Take it again or leave it out, and solve again.",
-    evidence="The check compares the errors of the views, and those of the single corners.",
     threshold="A view has three times the median error of all views. "
     "Or a corner is ten standard deviations and more than 1.5 px off.",
 )
 def outlier_view(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares the errors of the views, and those of the single corners."""
     known = evidence.calibration.per_view_errors
     if not evidence.observed and not any(len(errors) > 2 for errors in known.values()):
         raise NotChecked("the file holds no errors of views")
@@ -88,13 +88,13 @@ def one_corner_off(rng: Rng, corners: Array, shape: tuple[int, int], strength: f
 
 @outlier_view.fault(
     "outlier corner",
-    "one corner of one view is off",
     "px",
     (1, 3, 10, 30),
     promised=10,
     lab=LabFault(30, "one corner of one view is {0:.1f} px off", corners=one_corner_off),
 )
 def outlier_corner(rng: Rng, strength: float) -> Evidence:
+    """One corner of one view is off."""
     return solved(rng, spoil=lambda corners, shape: one_corner_off(rng, corners, shape, strength))
 
 
@@ -106,7 +106,6 @@ def one_view_blurred(rng: Rng, corners: Array, shape: tuple[int, int], strength:
 
 @outlier_view.fault(
     "blurred view",
-    "one view's corners scatter",
     "px",
     (0.3, 1, 3, 10),
     promised=3,
@@ -114,6 +113,7 @@ def one_view_blurred(rng: Rng, corners: Array, shape: tuple[int, int], strength:
     lab=LabFault(6, "the corners of one view scatter by {0:.1f} px more", corners=one_view_blurred),
 )
 def blurred_view(rng: Rng, strength: float) -> Evidence:
+    """The corners of one view scatter."""
     return solved(rng, spoil=lambda corners, shape: one_view_blurred(rng, corners, shape, strength))
 
 
@@ -124,10 +124,10 @@ def blurred_view(rng: Rng, strength: float) -> Evidence:
     symptom="A whole row or column of corners is off.",
     causes=("a line of the board that was taken for its neighbour", "a board half hidden or cut off by the border"),
     remedy="Detect that picture's corners again, or leave the view out, and solve again.",
-    evidence="The check compares every row and column of every view with a pose fitted to the rest of that view.",
     threshold="At least half of a line's corners are off by eight standard deviations and by more than 1.5 px.",
 )
 def outlier_line(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares every row and column of every view with a pose fitted to the rest of that view."""
     for observed in evidence.with_corners().values():
         limit = max(FAR_LINE * observed.scatter, VISIBLE_PX)
         lines = _lines(observed)
@@ -195,7 +195,6 @@ def one_column_off(rng: Rng, corners: Array, shape: tuple[int, int], strength: f
 
 @outlier_line.fault(
     "column off",
-    "a column is taken for its neighbour",
     "squares",
     (0.02, 0.1, 0.5, 1),
     promised=0.5,
@@ -203,12 +202,13 @@ def one_column_off(rng: Rng, corners: Array, shape: tuple[int, int], strength: f
     lab=LabFault(1, "in one view a column of corners is {0:.2f} squares off", corners=one_column_off),
 )
 def column_off(rng: Rng, strength: float) -> Evidence:
+    """A column is taken for its neighbour."""
     return solved(rng, spoil=lambda corners, shape: one_column_off(rng, corners, shape, strength))
 
 
-@outlier_line.fault("rows swapped", "two rows are exchanged", "views", (1, 2, 3), promised=1)
+@outlier_line.fault("rows swapped", "views", (1, 2, 3), promised=1)
 def rows_swapped(rng: Rng, strength: float) -> Evidence:
-    """Neighbouring rows, in so many views."""
+    """Two neighbouring rows are exchanged."""
 
     def exchange(corners: Array, shape: tuple[int, int]) -> None:
         for view in rng.permutation(len(corners))[: round(strength)]:

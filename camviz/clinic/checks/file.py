@@ -33,16 +33,17 @@ def named(evidence: Evidence, id: str) -> list[CalibrationError]:
     symptom="R is not a rotation: its rows are not orthonormal, its determinant is -1, or its bottom row is off.",
     causes=("a matrix that was transposed, mirrored or edited by hand", "too few digits"),
     remedy="Write the rotation with all its digits: orthonormal rows, determinant 1, and bottom row 0 0 0 1.",
-    evidence="The check reads the rotations in the file.",
     threshold="An element of R Rᵀ - 1 or of the bottom row, or the length of a quaternion, is off by 0.001.",
 )
 def not_a_rotation(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads the rotations in the file."""
     for fault in named(evidence, "not-a-rotation"):
         yield not_a_rotation.found(f"{fault}.", fault.value)
 
 
-@not_a_rotation.fault("edited rotation", "an element of R is changed", "", (0.0002, 0.01, 0.3), promised=0.01)
+@not_a_rotation.fault("edited rotation", "", (0.0002, 0.01, 0.3), promised=0.01)
 def edited_rotation(rng: Rng, strength: float) -> Evidence:
+    """An element of R is changed."""
     solved = healthy_pair(rng)
     cameras = {name: replace(camera, lens=_without_k3(camera)) for name, camera in solved.cameras.items()}
     tree = yaml.safe_load(kalibr.write(replace(solved, cameras=cameras)))
@@ -62,16 +63,17 @@ def _without_k3(camera: Camera) -> BrownConrady:
     symptom="K is transposed, or K[2, 2] is not 1.",
     causes=("MATLAB's IntrinsicMatrix, which is the transpose of K", "a matrix that was scaled as a whole"),
     remedy="Transpose K, or divide it by K[2, 2].",
-    evidence="The check reads the camera matrix in the file.",
     threshold="K is not upper triangular, its last element is not 1, or a focal length is not positive.",
 )
 def bad_k(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads the camera matrix in the file."""
     for fault in named(evidence, "bad-k"):
         yield bad_k.found(f"{fault}.", fault.value)
 
 
-@bad_k.fault("transposed K", "K is transposed (1), or multiplied", "times", (1, 2, 0.001), promised=1)
+@bad_k.fault("transposed K", "times", (1, 2, 0.001), promised=1)
 def transposed(rng: Rng, strength: float) -> Evidence:
+    """K is transposed (1), or multiplied."""
     solved = healthy(rng)
     tree, K = yaml.safe_load(ros.write(solved)), solved.cameras["camera"].intrinsics.K
     tree["camera_matrix"]["data"] = (K.T if strength == 1 else strength * K).ravel().tolist()
@@ -85,18 +87,17 @@ def transposed(rng: Rng, strength: float) -> Evidence:
     symptom="The number of distortion coefficients does not fit the name of the model.",
     causes=("coefficients of one model under the name of another, such as 8 as plumb_bob",),
     remedy="Write the name that fits the coefficients (8: rational_polynomial), or solve with the model you meant.",
-    evidence="The check reads the coefficients and the name of the model in the file.",
     threshold="The model has another number of coefficients.",
 )
 def coefficient_count(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads the coefficients and the name of the model in the file."""
     for fault in named(evidence, "coefficient-count"):
         yield coefficient_count.found(f"{fault}.", fault.value, "coefficients")
 
 
-@coefficient_count.fault(
-    "mislabelled coefficients", "another number than the name has", "numbers", (4, 5, 8), promised=4
-)
+@coefficient_count.fault("mislabelled coefficients", "numbers", (4, 5, 8), promised=4)
 def mislabelled(rng: Rng, strength: float) -> Evidence:
+    """The file has another number of coefficients than the model's name."""
     tree = yaml.safe_load(ros.write(healthy(rng)))
     held = tree["distortion_coefficients"]
     held["data"] = [*held["data"], 1e-3, 1e-4, 1e-5][: round(strength)]
@@ -113,10 +114,10 @@ def mislabelled(rng: Rng, strength: float) -> Evidence:
     causes=("coefficients that were never estimated, or not kept", "a picture that was undistorted before"),
     remedy="Keep the coefficients that the calibration returns. If the pictures are undistorted already, "
     "say so where the file can (rectified, PINHOLE).",
-    evidence="The check reads the coefficients of a model that has some. Corners tell whether k1 would fit better.",
     threshold="All are zero and, where there are corners, k1 is at least five standard deviations from 0.",
 )
 def zero_distortion(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads the coefficients of a model that has some. Corners tell whether k1 would fit better."""
     if all(isinstance(camera.lens, Perspective) for camera in evidence.cameras.values()):
         raise NotChecked("the file describes pinholes, which have no distortion coefficients")
     for name, camera in evidence.cameras.items():
@@ -137,11 +138,9 @@ def _zero(evidence: Evidence, name: str) -> Iterator[Finding]:
         )
 
 
-@zero_distortion.fault(
-    "zeroed distortion", "the coefficients were not kept", "of k1 = -0.2", (0.002, 0.3, 1), promised=0.3
-)
+@zero_distortion.fault("zeroed distortion", "of k1 = -0.2", (0.002, 0.3, 1), promised=0.3)
 def zeroed(rng: Rng, strength: float) -> Evidence:
-    """The corners were seen through so much of the lens."""
+    """The coefficients were not kept. The corners were seen through so much of the lens."""
     set_up = single(rng)
     camera = replace(set_up.camera, lens=BrownConrady(k1=-0.2 * strength))
     set_up = replace(set_up, cameras=(camera,))
@@ -157,11 +156,10 @@ def zeroed(rng: Rng, strength: float) -> Evidence:
     symptom="fx and fy differ.",
     causes=("pictures resized by different factors in width and height", "a camera matrix scaled along one axis only"),
     remedy="Rescale fx and cx by the width's factor, and fy and cy by the height's.",
-    evidence="The check divides fx by fy. Pixels of sensors are square to a few thousandths.",
     threshold="The ratio is 2 % from 1 and, where the file's corners tell it, five standard deviations.",
 )
 def aspect(evidence: Evidence) -> Iterator[Finding]:
-    """fx/fy is the ratio of a pixel's height to its width."""
+    """The check divides fx by fy. Pixels of sensors are square to a few thousandths."""
     cameras = {name: each for name, each in evidence.cameras.items() if not isinstance(each.lens, PANORAMAS)}
     if not cameras:
         raise NotChecked("the pixels of a panorama are angles")
@@ -173,8 +171,9 @@ def aspect(evidence: Evidence) -> Iterator[Finding]:
             yield aspect.found(f"{name}: fx/fy = {ratio:.4g}, as if pixels were {wider} than high.", ratio, "", name)
 
 
-@aspect.fault("uneven resize", "pictures were resized in width alone", "times", (1.01, 1.05, 1.33), promised=1.05)
+@aspect.fault("uneven resize", "times", (1.01, 1.05, 1.33), promised=1.05)
 def resized_unevenly(rng: Rng, strength: float) -> Evidence:
+    """Pictures were resized in width alone."""
     solved = healthy(rng)
     camera: Camera = solved.cameras["camera"]
     grid = camera.intrinsics.resized(round(camera.intrinsics.width * strength), camera.intrinsics.height)

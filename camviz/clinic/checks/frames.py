@@ -81,19 +81,21 @@ def bare(calibration: Calibration) -> Calibration:
     symptom="A transform goes the wrong way round.",
     causes=("left_from_right written for right_from_left", "camera to world written for world to camera"),
     remedy="Invert the transform: R' = Rᵀ, t' = -Rᵀ t.",
-    evidence="The check holds the transform and its inverse against the board poses of both cameras, or against the "
-    "other calibration.",
     threshold="The inverse fits at least five times better.",
 )
 def inverted_transform(evidence: Evidence) -> Iterator[Finding]:
+    """The check holds the transform and its inverse against the board poses of both cameras, or against the other
+    calibration.
+    """
     known = list(references(evidence))
     if not known:
         raise NotChecked("it needs boards seen by both cameras of a pair, or another calibration (--compare)")
     yield from changed(inverted_transform, known, RigidTransform.inv, "when it is inverted")
 
 
-@inverted_transform.fault("inverted transform", "beside its corners (1), beside another (2)", "", (1, 2), promised=1)
+@inverted_transform.fault("inverted transform", "", (1, 2), promised=1)
 def inverted(rng: Rng, strength: float) -> Evidence:
+    """The transform of the pair is inverted, beside its corners (1) or beside another calibration (2)."""
     solved = healthy_pair(rng)
     wrong = with_right(solved, solved.cameras["right"].world_from_cam)
     return Evidence(wrong) if strength == 1 else Evidence(bare(wrong), solved)
@@ -106,11 +108,12 @@ def inverted(rng: Rng, strength: float) -> Evidence:
     symptom="The path of the camera looks mirrored, or boards stand behind the camera.",
     causes=("OpenGL's axes (y up, z backward) taken for OpenCV's (y down, z forward)",),
     remedy="Negate the y and z columns of every camera-to-world matrix.",
-    evidence="The check looks for boards behind the camera, and compares the poses with the other calibration. "
-    "In a transforms.json it looks for cameras that look away from each other with their tops down.",
     threshold="It is so in the majority of the views.",
 )
 def mirrored_frame(evidence: Evidence) -> Iterator[Finding]:
+    """The check looks for boards behind the camera, and compares the poses with the other calibration. In a
+    transforms.json it looks for cameras that look away from each other with their tops down.
+    """
     boards = {name: pose for name, pose in evidence.cam_from_board.items() if not pose.single}
     known = list(references(evidence))
     worlds = evidence.calibration.format == "transforms.json" and len(evidence.calibration.cameras) >= 4
@@ -151,8 +154,9 @@ def _outwards(evidence: Evidence) -> Iterator[Finding]:
         yield mirrored_frame.found(sentence, behind * 100, "%")
 
 
-@mirrored_frame.fault("OpenGL axes", "of the boards (1), of the pair (2)", "", (1, 2), promised=1)
+@mirrored_frame.fault("OpenGL axes", "", (1, 2), promised=1)
 def in_opengl(rng: Rng, strength: float) -> Evidence:
+    """The axes are OpenGL's, of the boards (1) or of the pair (2)."""
     if strength == 1:
         solved = healthy(rng)
         poses = {"camera": FLIPPED * solved.cam_from_board["camera"]}
@@ -170,10 +174,10 @@ def in_opengl(rng: Rng, strength: float) -> Evidence:
     symptom="Both cameras are fine, and the pair is wrong.",
     causes=("corners of one camera that run the other way round: a symmetric board has two orders",),
     remedy="Use a board without symmetry (one side odd, the other even), or ChArUco. Turn the order of those views.",
-    evidence="The check finds the pair's relative pose from every view, from the corners of each camera alone.",
     threshold="A view is more than 45° from the rest, and agrees with them once its order is turned.",
 )
 def corner_order(evidence: Evidence) -> Iterator[Finding]:
+    """The check finds the pair's relative pose from every view, from the corners of each camera alone."""
     stereo = [pair for pair in evidence.pairs if pair.by_view is not None and len(pair.views) > 2]
     if not stereo:
         raise NotChecked("it needs corners of at least three views that both cameras of a pair saw")
@@ -217,8 +221,9 @@ def orders(board: Board) -> list[NDArray[np.intp]]:
     return [np.rot90(index, turn).ravel() for turn in turns]
 
 
-@corner_order.fault("order flipped", "the right camera's corners are counted backwards", "views", (1, 2, 3), promised=1)
+@corner_order.fault("order flipped", "views", (1, 2, 3), promised=1)
 def other_order(rng: Rng, strength: float) -> Evidence:
+    """The right camera's corners are counted backwards."""
     set_up = virtual.pair(rng)
     left, right = set_up.observed(rng)
     views = rng.permutation(len(right))[: round(strength)]

@@ -40,12 +40,13 @@ NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z 
     symptom="The border mirrors or folds back after undistortion.",
     causes=("a distortion polynomial that turns back inside the image", "no corners near the border in the fit"),
     remedy="Fix k3 to 0 (or take fewer terms) and solve again with more views that reach the border.",
-    evidence="The check looks for pixels at which no ray arrives. "
-    "The way there from the axis passes a root of g'(r) or of the Jacobian's determinant.",
     threshold="Any such pixel lies on the border. "
     "For a fisheye that turns back beyond 90° it is a note, because its picture may end before.",
 )
 def fold(evidence: Evidence) -> Iterator[Finding]:
+    """The check looks for pixels at which no ray arrives. The way there from the axis passes a root of g'(r) or of the
+    Jacobian's determinant.
+    """
     bent = {name: camera for name, camera in evidence.cameras.items() if _has_polynomial(camera)}
     if not bent:
         raise NotChecked("no lens here has a polynomial that could turn back")
@@ -101,16 +102,9 @@ def border_pixels(camera: Camera, samples: int = 16) -> Array:
     return np.asarray(np.clip(grid.border(samples), [0, 0], [grid.width - 1, grid.height - 1]))
 
 
-@fold.fault(
-    "folding polynomial",
-    "the polynomial turns back at",
-    "of the corner's radius",
-    (1.6, 0.95, 0.8),
-    promised=0.95,
-    beyond_doubt=(0.7, 0.9),
-)
+@fold.fault("folding polynomial", "of the corner's radius", (1.6, 0.95, 0.8), promised=0.95, beyond_doubt=(0.7, 0.9))
 def folding(rng: Rng, strength: float) -> Evidence:
-    """A k3 that makes g'(r) = 0 at so much of the farthest corner's radius."""
+    """The polynomial turns back: k3 makes g'(r) = 0 there."""
     solved = healthy(rng)
     camera = solved.cameras["camera"]
     lens = BrownConrady(k1=-0.2, k2=0.04)
@@ -129,11 +123,12 @@ def folding(rng: Rng, strength: float) -> Evidence:
         "more coefficients than the corners can determine",
     ),
     remedy="Solve again with fewer terms (the standard model), or with corners out to the edge of the image.",
-    evidence="The check follows the denominator D(r²) = 1 + k4 r² + k5 r⁴ + k6 r⁶ out to the farthest ray that an "
-    "undistorted picture asks for.",
     threshold="D falls below 0.2, where every error of the numerator counts five times, or there is a pole.",
 )
 def near_pole(evidence: Evidence) -> Iterator[Finding]:
+    """The check follows the denominator D(r²) = 1 + k4 r² + k5 r⁴ + k6 r⁶ out to the farthest ray that an undistorted
+    picture asks for.
+    """
     rational = {name: camera for name, camera in evidence.cameras.items() if _is_rational(camera)}
     if not rational:
         raise NotChecked("no lens here has a denominator (k4 k5 k6)")
@@ -154,11 +149,12 @@ def _is_rational(camera: Camera) -> bool:
     return bending is not None and bool(bending.k4 or bending.k5 or bending.k6)
 
 
-@near_pole.fault(
-    "near-pole rational model", "the denominator at the farthest corner's ray", "", (0.5, 0.15, 0.05), promised=0.15
-)
+@near_pole.fault("near-pole rational model", "", (0.5, 0.15, 0.05), promised=0.15)
 def close_to_a_pole(rng: Rng, strength: float) -> Evidence:
-    """It fits the corners: N = D (1 + k1 s + k2 s² + k3 s³) up to s³, with D = 1 + k4 s, adjusted with that k4."""
+    """The denominator has this value at the farthest corner's ray.
+
+    It fits the corners: N = D (1 + k1 s + k2 s² + k3 s³) up to s³, with D = 1 + k4 s, adjusted with that k4.
+    """
     solved = healthy(rng)
     camera = solved.cameras["camera"]
     lens = camera.lens
@@ -178,11 +174,12 @@ def close_to_a_pole(rng: Rng, strength: float) -> Evidence:
     causes=("cv2.undistortPoints, which stops after 5 iterations unless it is told otherwise",),
     remedy="Pass criteria to undistortPoints, such as (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, 100, 1e-9), "
     "and project the result back.",
-    evidence="The check sends border pixels through OpenCV's inverse with its default criteria, and forward again "
-    "through the polynomial.",
     threshold="A pixel and its return are 0.5 px apart.",
 )
 def inverse_not_converged(evidence: Evidence) -> Iterator[Finding]:
+    """The check sends border pixels through OpenCV's inverse with its default criteria, and forward again through the
+    polynomial.
+    """
     lenses = (BrownConrady, KannalaBrandt)
     known = {name: camera for name, camera in evidence.cameras.items() if isinstance(camera.lens, lenses)}
     if not known:
@@ -217,8 +214,9 @@ def default_round_trip(camera: Camera) -> float:
     return error if isfinite(error) else 1e6
 
 
-@inverse_not_converged.fault("strong lens", "a barrel lens, 80° wide", "-k1", (0.1, 0.25, 0.35), promised=0.35)
+@inverse_not_converged.fault("strong lens", "-k1", (0.1, 0.25, 0.35), promised=0.35)
 def strong_lens(rng: Rng, strength: float) -> Evidence:
+    """A barrel lens is 80° wide."""
     lens = BrownConrady(k1=-strength, k2=0.5 * strength**2)
     camera = Camera(Intrinsics.from_fov(1280, 960, 80), lens)
     return Evidence(Calibration({"camera": camera}, Path("virtual"), "OpenCV FileStorage"))

@@ -39,10 +39,10 @@ STANDARD_ERRORS = 5.0
     symptom="The residuals swirl or point outward.",
     causes=("a lens model with too few terms", "a fisheye solved with a polynomial", "a board that is not flat"),
     remedy="Solve again with a richer model (rational, fisheye), and check that the board is flat.",
-    evidence="The check fits a smooth field over the image to all residuals. The board's bend takes its share first.",
     threshold="The field explains more than noise would in one set of a million, and at least half of the noise.",
 )
 def model_too_simple(evidence: Evidence) -> Iterator[Finding]:
+    """The check fits a smooth field over the image to all residuals. The board's bend takes its share first."""
     for name, observed in evidence.with_corners().items():
         best = observed.best
         field = explained(best, name, smooth_field(best, name), warp_columns(best, name))
@@ -66,7 +66,6 @@ def richer(rng: Rng, set_up: SetUp, strength: float, *, widest: float, views: in
 
 @model_too_simple.fault(
     "lens too rich",
-    "an r⁵ term is left to a model with k1 alone",
     "px at the corner",
     (0.3, 3, 10, 30),
     promised=30,
@@ -80,6 +79,7 @@ def richer(rng: Rng, set_up: SetUp, strength: float, *, widest: float, views: in
     ),
 )
 def lens_too_rich(rng: Rng, strength: float) -> Evidence:
+    """An r⁵ term is left to a model with k1 alone."""
     set_up = richer(rng, single(rng), strength, widest=strength, views=15)
     return Evidence(set_up.solved(set_up.observed(rng), fixed=("k2", "p1", "p2", "k3")))
 
@@ -91,11 +91,11 @@ def lens_too_rich(rng: Rng, strength: float) -> Evidence:
     symptom="The residuals are bowed across the board.",
     causes=("a board that is not flat: paper on cardboard, or a sheet that hangs",),
     remedy="Mount the board on glass or aluminium, or solve for its warp as well.",
-    evidence="The check compares the joint solution with and without two parameters for the bend of the board.",
     threshold="Noise would show the bend in one set of a million, "
     "and it is at least half a percent of the board's longer side.",
 )
 def board_warp(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares the joint solution with and without two parameters for the bend of the board."""
     for name, observed in evidence.with_corners().items():
         board = observed.adjustment.board
         bend = explained(observed.best, name, warp_columns(observed.best, name), smooth_field(observed.best, name))
@@ -118,18 +118,16 @@ def bent(set_up: SetUp, strength: float) -> SetUp:
 
 @board_warp.fault(
     "warped board",
-    "the board is bent along its rows",
     "% of its length",
     (0.1, 0.5, 1, 2),
     promised=1,
     beyond_doubt=(1.5, 2),
     lab=LabFault(
-        2,
-        "the board is bent by {0:.2f} % of its length",
-        set_up=lambda _, set_up, amount: bent(set_up, amount),
+        2, "the board is bent by {0:.2f} % of its length", set_up=lambda _, set_up, amount: bent(set_up, amount)
     ),
 )
 def warped_board(rng: Rng, strength: float) -> Evidence:
+    """The board is bent along its rows."""
     return solved(rng, lambda set_up: bent(set_up, strength))
 
 
@@ -140,12 +138,13 @@ def warped_board(rng: Rng, strength: float) -> Evidence:
     symptom="The two halves of the set disagree.",
     causes=("a focus or zoom that changed between the views", "too few views for the model"),
     remedy="Lock focus and zoom, switch stabilisation off, take more views, and solve again.",
-    evidence="The check solves for a focal length that changes evenly over the views. "
-    "It also compares the cameras from the earlier and the later views, and from every other view.",
     threshold="The focal length changes by 0.3 %, or the cameras differ by at least a pixel (median over the image). "
     "Noise would show it in one set of a million.",
 )
 def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
+    """The check solves for a focal length that changes evenly over the views. It also compares the cameras from the
+    earlier and the later views, and from every other view.
+    """
     enough = [each for each in evidence.with_corners().values() if each.best.posed.sum() >= FEWEST_VIEWS]
     if not enough:
         raise NotChecked(f"it needs at least {FEWEST_VIEWS} views")
@@ -191,7 +190,6 @@ def zoomed(set_up: SetUp, strength: float) -> SetUp:
 
 @split_disagreement.fault(
     "autofocus drift",
-    "the focal length grows from the first view to the last",
     "%",
     (0.2, 1, 3, 10),
     promised=10,
@@ -203,6 +201,7 @@ def zoomed(set_up: SetUp, strength: float) -> SetUp:
     ),
 )
 def autofocus_drift(rng: Rng, strength: float) -> Evidence:
+    """The focal length grows from the first view to the last."""
     return solved(rng, lambda set_up: zoomed(set_up, strength))
 
 
@@ -213,11 +212,11 @@ def autofocus_drift(rng: Rng, strength: float) -> Evidence:
     symptom="Everything is shifted by a constant half pixel.",
     causes=("a program that wrote the centre of the first pixel as (0.5, 0.5) or (1, 1)",),
     remedy="Subtract 0.5 (COLMAP, nerfstudio) or 1 (MATLAB) from cx and cy, or from the corners.",
-    evidence="The check takes the mean of all residuals, or the shift between two calibrations.",
     threshold="The shift is the same in x and y, within 0.1 px of a half or a whole pixel. "
     "It is at least five standard errors from none.",
 )
 def half_pixel(evidence: Evidence) -> Iterator[Finding]:
+    """The check takes the mean of all residuals, or the shift between two calibrations."""
     others = list(evidence.counterparts())
     if not evidence.observed and not others:
         raise NotChecked("it needs detected corners with the poses of the board, or another calibration (--compare)")
@@ -267,21 +266,21 @@ def first_pixel_elsewhere(solution: Adjustment, strength: float) -> Adjustment:
 
 @half_pixel.fault(
     "half pixel",
-    "cx and cy are counted from elsewhere",
     "px",
     (0.5, 1),
     promised=0.5,
     lab=LabFault(1, "cx and cy are counted from {0:.2f} px elsewhere", solution=first_pixel_elsewhere),
 )
 def counted_from_elsewhere(rng: Rng, strength: float) -> Evidence:
+    """cx and cy are counted from elsewhere."""
     calibration = healthy(rng)
     grid = calibration.cameras["camera"].intrinsics
     return Evidence(changed(calibration, cx=grid.cx + strength, cy=grid.cy + strength))
 
 
-@half_pixel.fault("half pixel between two", "the same beside another calibration", "px", (0.5, 1), promised=0.5)
+@half_pixel.fault("half pixel between two", "px", (0.5, 1), promised=0.5)
 def half_pixel_against(rng: Rng, strength: float) -> Evidence:
-    """Without corners, beside the calibration as it was."""
+    """The same without corners, beside the calibration as it was."""
     calibration = healthy(rng)
     grid = calibration.cameras["camera"].intrinsics
     shifted = changed(calibration, cx=grid.cx + strength, cy=grid.cy + strength)

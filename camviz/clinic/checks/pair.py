@@ -32,10 +32,10 @@ TURNED_DEG = 35.0
     symptom="The baseline has the wrong sign.",
     causes=("a left and a right camera that were swapped",),
     remedy="Swap the cameras, or the roles of the files, and solve again.",
-    evidence="The check reads t.x of right_from_left. It is negative when the right camera stands on the right.",
     threshold="t.x is above 0 and the larger part of the baseline.",
 )
 def baseline_sign(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads t.x of right_from_left. It is negative when the right camera stands on the right."""
     of_file = named(evidence, "baseline-sign")
     declared = [pair for pair in evidence.pairs if pair.declared and pair.baseline > 0]
     if not declared and not of_file:
@@ -55,12 +55,12 @@ def _is_inverted(pair: StereoPair) -> bool:
 
 
 def _exchanged(rng: Rng, strength: float) -> Evidence:
-    """Left and right exchanged, without the corners."""
+    """Left is right, and the file has no corners."""
     left, right = healthy_pair(rng).cameras.values()
     return Evidence(Calibration({"left": right, "right": left}, Path("virtual"), "OpenCV FileStorage, stereo"))
 
 
-swapped = baseline_sign.fault("swapped cameras", "left is right", "", (1,), promised=1)(_exchanged)
+swapped = baseline_sign.fault("swapped cameras", "", (1,), promised=1)(_exchanged)
 
 
 @finding(
@@ -74,12 +74,13 @@ swapped = baseline_sign.fault("swapped cameras", "left is right", "", (1,), prom
     ),
     remedy="Give the side of the board's squares in metres (camviz calibrate: --square-mm) and solve again, "
     "or scale all translations.",
-    evidence="The check compares the baseline with the board poses of the same file, with the other calibration, "
-    "and with the size of things.",
     threshold="The baseline is 2 % off other evidence, above 10 m or below 1 mm. "
     "Or a square is above half a metre or below half a millimetre.",
 )
 def baseline_scale(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares the baseline with the board poses of the same file, with the other calibration, and with the
+    size of things.
+    """
     board, own_unit = evidence.calibration.board, evidence.calibration.format in OWN_UNIT
     stereo = [] if own_unit else [pair for pair in evidence.pairs if pair.baseline > 0]
     if board is None and not stereo:
@@ -136,14 +137,16 @@ def _known_lengths(evidence: Evidence, pair: StereoPair) -> Iterator[tuple[float
             yield length, "the other calibration"
 
 
-@baseline_scale.fault("square in millimetres", "the square is taken for", "times itself", (1000,), promised=1000)
+@baseline_scale.fault("square in millimetres", "times itself", (1000,), promised=1000)
 def square_in_millimetres(rng: Rng, strength: float) -> Evidence:
+    """The square is taken for so many times itself."""
     set_up = virtual.pair(rng)
     return Evidence(set_up.solved(set_up.observed(rng), square=strength))
 
 
-@baseline_scale.fault("wrong square", "beside a calibration with the right one", "%", (0.5, 4, 20), promised=4)
+@baseline_scale.fault("wrong square", "%", (0.5, 4, 20), promised=4)
 def wrong_square(rng: Rng, strength: float) -> Evidence:
+    """The square is wrong, beside a calibration with the right one."""
     set_up = virtual.pair(rng)
     good, bad = (set_up.solved(set_up.observed(rng), square=1 + off / 100) for off in (0, strength))
     return Evidence(bad, good)
@@ -156,11 +159,12 @@ def wrong_square(rng: Rng, strength: float) -> Evidence:
     symptom="The rectified pair is black or turned.",
     causes=("swapped cameras", "a distortion model that folds", "a transform that belongs to another pair"),
     remedy="Check the order of the cameras and the direction of their transform, then the lens models.",
-    evidence="The check asks where each pixel of the rectified pictures comes from, and how far rectification turns "
-    "the cameras.",
     threshold="More than 40 % of a rectified picture have no original, or the turn is more than 35°.",
 )
 def rectified_black(evidence: Evidence) -> Iterator[Finding]:
+    """The check asks where each pixel of the rectified pictures comes from, and how far rectification turns the
+    cameras.
+    """
     stereo = [pair for pair in evidence.pairs if pair.baseline > 0]
     if not stereo:
         raise NotChecked("the file holds no stereo pair")
@@ -198,12 +202,10 @@ def black_share(rectified: RectifiedPair, side: str, samples: int = 48) -> float
     return float(1 - original.intrinsics.contains(pixels).mean())
 
 
-swapped_rectified = rectified_black.fault("swapped cameras, rectified", "left is right", "", (1,), promised=1)(
-    _exchanged
-)
+swapped_rectified = rectified_black.fault("swapped cameras, rectified", "", (1,), promised=1)(_exchanged)
 
 
-@rectified_black.fault("right camera turned", "the transform of another pair", "°", (5, 60, 90), promised=60)
+@rectified_black.fault("right camera turned", "°", (5, 60, 90), promised=60)
 def turned_away(rng: Rng, strength: float) -> Evidence:
     """The right camera is turned in the file alone."""
     solved = healthy_pair(rng)

@@ -29,13 +29,12 @@ ALIKE = 0.06  # how well a clean factor must fit both axes
     causes=("a camera matrix for another resolution or crop", "a focal length in millimetres taken for pixels"),
     remedy="Rescale the camera matrix to the size of the pictures, c' = s c + (s - 1)/2 and f' = s f, "
     "or give the size it belongs to.",
-    evidence="The check holds the camera matrix against the image size, the pictures, the corners and the other "
-    "calibration.",
     threshold="Both axes share a ratio of whole numbers up to 4 within 6 %. "
     "Or a factor against the other calibration is beyond 12 %. "
     "Or pictures have another size, corners lie outside the image, or the field of view is above 170°.",
 )
 def wrong_size(evidence: Evidence) -> list[Finding]:
+    """The check holds the camera matrix against the image size, the pictures, the corners and the other calibration."""
     findings = [
         *_other_pictures(evidence),
         *_corners_outside(evidence),
@@ -123,18 +122,18 @@ def _other_scale(evidence: Evidence) -> Iterator[Finding]:
             yield wrong_size.found(sentence, factor, "times", name)
 
 
-@wrong_size.fault(
-    "resized K", "K is for pictures of another size", "times", (0.5, 1.5, 2), promised=1.5, beyond_doubt=(2, 2)
-)
+@wrong_size.fault("resized K", "times", (0.5, 1.5, 2), promised=1.5, beyond_doubt=(2, 2))
 def resized(rng: Rng, strength: float) -> Evidence:
+    """K is for pictures of another size."""
     solved = healthy(rng)
     grid = solved.cameras["camera"].intrinsics
     large = grid.resized(round(grid.width * strength), round(grid.height * strength))
     return Evidence(alone(changed(solved, fx=large.fx, fy=large.fy, cx=large.cx, cy=large.cy)))
 
 
-@wrong_size.fault("resized pictures", "the pictures have another size", "times", (0.5, 1.25, 2), promised=1.25)
+@wrong_size.fault("resized pictures", "times", (0.5, 1.25, 2), promised=1.25)
 def resized_pictures(rng: Rng, strength: float) -> Evidence:
+    """The pictures have another size."""
     solved = healthy(rng)
     grid = solved.cameras["camera"].intrinsics
     size = round(grid.width * strength), round(grid.height * strength)
@@ -152,10 +151,10 @@ def resized_pictures(rng: Rng, strength: float) -> Evidence:
     ),
     remedy="Check whether the pictures were cropped. If not, fix the principal point or add tilted views, "
     "and solve again.",
-    evidence="The check compares cx and cy with the middle of the image.",
     threshold="They are a tenth of the image's longer side apart.",
 )
 def principal_point(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares cx and cy with the middle of the image."""
     for name, camera in evidence.cameras.items():
         grid = camera.intrinsics
         distance = float(np.hypot(grid.cx - (grid.width - 1) / 2, grid.cy - (grid.height - 1) / 2))
@@ -169,16 +168,9 @@ def principal_point(evidence: Evidence) -> Iterator[Finding]:
             yield principal_point.found(sentence, distance, "px", name)
 
 
-@principal_point.fault(
-    "crop",
-    "pictures were cropped at the left",
-    "% of the width",
-    (5, 30, 40),
-    promised=30,
-    beyond_doubt=(30, 38),
-)
+@principal_point.fault("crop", "% of the width", (5, 30, 40), promised=30, beyond_doubt=(30, 38))
 def uncropped(rng: Rng, strength: float) -> Evidence:
-    """The camera matrix does not know of the crop."""
+    """Pictures were cropped at the left, and the camera matrix was not."""
     solved = healthy(rng)
     camera, grid = solved.cameras["camera"], solved.cameras["camera"].intrinsics
     width = round(grid.width * (1 - strength / 100))
