@@ -11,6 +11,7 @@ from camviz.clinic.evidence import Evidence
 from camviz.clinic.registry import SEVERITIES
 from camviz.clinic.statistics import PAGE, TABLES, alarms, page
 from camviz.clinic.virtual import MARGIN, healthy, healthy_pair, pair, single
+from camviz.course.reading import LONGEST_SENTENCE, paragraphs, sentences
 
 FAULTS = faults()
 SEED = 20_003
@@ -137,6 +138,29 @@ VIEWS = {  # those that the report has
     *("uncertainty-range", "difference", "distortion", "fold-map", "undistorted", "boards", "epipolar-pairs"),
     *("rectified", "depth-error", "cross-validation", "correlation", "board-residuals", "numbers"),
 }
+
+
+def test_no_sentence_about_a_finding_is_longer_than_a_reader_keeps_in_mind():
+    """The declarations, and the whole of docs/clinic.md; sentences begin with a capital and end with a full stop."""
+    for kind in kinds().values():
+        for said in (kind.symptom, kind.remedy, kind.evidence, kind.threshold):
+            assert said.endswith(".")
+            assert not said[0].islower() or said.startswith(("cx", "fx", "t.x"))
+        assert not any(cause.endswith(".") for cause in kind.causes)
+    assert all(fault.sentence.endswith(".") for fault in FAULTS.values())
+    words = {
+        sentence: len(sentence.split())
+        for paragraph in paragraphs(PAGE.read_text(encoding="utf-8"))
+        for sentence in sentences(paragraph)
+    }
+    assert {sentence for sentence, count in words.items() if count > LONGEST_SENTENCE} == set()
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_an_inspection_says_is_short_and_begins_with_the_claim(name):
+    for finding in found(name, FAULTS[name].promised):
+        assert all(len(sentence.split()) <= LONGEST_SENTENCE for sentence in sentences(finding.sentence))
+        assert finding.sentence.endswith((".", "?"))
 
 
 def test_every_finding_has_a_view_of_the_report_a_cause_and_a_remedy():

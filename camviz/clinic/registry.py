@@ -132,8 +132,23 @@ class Kind:
 
 
 def finding(id: str, **words: Any) -> Callable[[Callable[[Evidence], Iterable[Finding]]], Kind]:
-    """Declare the decorated check as a Kind of finding, whose evidence its docstring tells.
+    """Declare the decorated check as a Kind of finding; its docstring tells the evidence, `words` are the other fields.
 
-    `words` are the other fields of Kind.
+    >>> @finding(
+    ...     "portrait",
+    ...     severity="note",
+    ...     view="numbers",
+    ...     symptom="The image is higher than wide.",
+    ...     causes=("a camera on its side",),
+    ...     remedy="Turn the camera.",
+    ...     threshold="The height is more than the width.",
+    ... )
+    ... def portrait(evidence):
+    ...     "The check reads the image size."
+    ...     for name, camera in evidence.cameras.items():
+    ...         if camera.intrinsics.height > camera.intrinsics.width:
+    ...             yield portrait.found(f"{name}: the image is higher than wide.", camera=name)
+    >>> portrait.evidence
+    'The check reads the image size.'
     """
     return lambda check: Kind(id, check=check, evidence=" ".join((check.__doc__ or "").split()), **words)

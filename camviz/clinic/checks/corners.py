@@ -56,7 +56,7 @@ def _bad_views(evidence: Evidence, name: str, errors: Array, counts: Array) -> I
         bad = np.flatnonzero(errors > limit * median)
     for view in map(int, bad):
         sentence = (
-            f"{evidence.picture(name, view)}: the error is {errors[view]:.3g} px, {errors[view] / median:.1f} times "
+            f"{evidence.picture(name, view)}: its error is {errors[view]:.3g} px, {errors[view] / median:.1f} times "
             f"the median of all {len(errors)} views ({median:.3g} px)."
         )
         yield outlier_view.found(sentence, errors[view], "px", name, pictures=(view,))
