@@ -1,8 +1,10 @@
 """A finding that a stranger adds is one file, and everything that tells of findings tells of it."""
 
 import json
+import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,3 +128,19 @@ def test_the_ward_knows_its_name(folder):
     ward = module("16", "ward")
     patient = ward.Patient("Patient 1", "", Inspection, "fold")
     assert "portrait" in ward.reply(patient, "flu", 1).message
+
+
+def test_a_declaration_that_cannot_be_is_refused_in_words():
+    kind = kinds()["fold"]
+    with pytest.raises(ValueError, match="severity must be one of fault, warning, note, got 'alarm'"):
+        replace(kind, severity="alarm")
+    with pytest.raises(ValueError, match="stage must be one of '', 'set-up', 'corners', 'solution', got 'scene'"):
+        kind.fault("toy", "px", (1,), promised=1, stage="scene")(lambda rng, strength: None)
+
+
+def test_every_check_and_every_fault_needs_nothing_that_draws():
+    """The modules that declare are found when they are asked for, not when the clinic is imported."""
+    code = "import sys; from camviz.clinic import faults, kinds, laboratory, statistics, words; kinds(), faults(); "
+    code += "print(*{'matplotlib', 'ipywidgets', 'pyvista', 'vtkmodules', 'IPython', 'camviz.views'} & {*sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

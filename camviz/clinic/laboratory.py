@@ -116,17 +116,19 @@ def experiment(fault: str, strength: float, noise: float, seed: int) -> Experime
     """
     if fault not in lab_faults():
         raise ValueError(f"fault must be one of {', '.join(lab_faults())}, got {fault!r}")
-    lab, rng = lab_faults()[fault], np.random.default_rng([seed, 1])
+    lab, declared, rng = lab_faults()[fault], faults()[fault], np.random.default_rng([seed, 1])
     amount = lab.amount(strength)
     set_up = _set_up(seed, **(lab.spread(strength) if lab.spread else {}))
     if lab.set_up:
         set_up = lab.set_up(seed, set_up, amount)
+    elif declared.stage == "set-up":
+        set_up = declared.make(np.random.default_rng([seed, 2]), set_up, amount)
     corners = set_up.corners[0] + noise * rng.normal(size=set_up.corners[0].shape)
-    if lab.corners:
-        lab.corners(rng, corners, (BOARD.rows, BOARD.columns), amount)
+    if declared.stage == "corners":
+        declared.make(rng, corners, (BOARD.rows, BOARD.columns), amount)
     solved = _solved(set_up, corners, lab.estimated)
-    if lab.solution:
-        solved = lab.solution(solved, amount)
+    if declared.stage == "solution":
+        solved = declared.make(solved, amount)
     return Experiment(set_up.camera, solved, lab.words.format(amount))
 
 

@@ -7,21 +7,20 @@ that an inspection, its words, the report, docs/clinic.md, the fault lab and the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import cleandoc
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.clinic.evidence import Evidence
-from camviz.clinic.virtual import SetUp
-from camviz.lenses.base import Array
+from camviz.clinic.virtual import SetUp, single
 
 SEVERITIES = ("fault", "warning", "note")  # the worst first
 
 Rng = np.random.Generator
-Inject = Callable[[Rng, float], Evidence]
+STAGES = ("", "set-up", "corners", "solution")
 
 
 @dataclass(frozen=True)
@@ -46,18 +45,16 @@ class Finding:
 
 @dataclass(frozen=True)
 class LabFault:
-    """How the fault lab makes a fault: it grows from `none` to `gross`, and `words` name it, with the amount as {0}.
+    """How the fault lab shows a fault: it grows from `none` to `gross`, and `words` name it, with the amount as {0}.
 
-    The other fields say what is changed on the way from the boards to the solution; only what is given is changed.
+    `spread` gives the options of `spread_boards` for a strength, `set_up` a set-up for a seed, a set-up and an amount.
     """
 
     gross: float
     words: str
     none: float = 0.0
-    spread: Callable[[float], Mapping[str, Any]] | None = None  # from a strength to options of `spread_boards`
-    set_up: Callable[[int, SetUp, float], SetUp] | None = None  # from a seed, the set-up and an amount
-    corners: Callable[[Rng, Array, tuple[int, int], float], None] | None = None  # in place, by (rows, columns)
-    solution: Callable[[Adjustment, float], Adjustment] | None = None
+    spread: Callable[[float], Mapping[str, Any]] | None = None
+    set_up: Callable[[int, SetUp, float], SetUp] | None = None
     estimated: tuple[str, ...] = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
 
     def amount(self, strength: float) -> float:
@@ -71,17 +68,49 @@ class Fault:
 
     `strengths` run from slight to gross in `unit`. From `promised` on, an inspection names the fault. Where the ward
     and the fault lab have it, `beyond_doubt` is the range of strengths of the one, and `lab` tells of the other.
+
+    `make` is what the fault does. It takes random numbers and a strength and gives Evidence, unless a `stage` is
+    named:
+
+    - "set-up": it takes random numbers, a set-up and a strength, and gives another set-up.
+    - "corners": it takes random numbers, corners, their (rows, columns) and a strength, and changes them in place.
+    - "solution": it takes an Adjustment and a strength, and gives another Adjustment.
     """
 
     name: str
     finding: str
-    sentence: str
     unit: str
     strengths: tuple[float, ...]
     promised: float
-    inject: Inject
+    make: Callable[..., Any]
+    stage: str = ""
     beyond_doubt: tuple[float, float] | None = None
     lab: LabFault | None = None
+
+    def __post_init__(self) -> None:
+        if self.stage not in STAGES:
+            raise ValueError(f"stage must be one of {', '.join(map(repr, STAGES))}, got {self.stage!r}")
+
+    @property
+    def sentence(self) -> str:
+        """What the fault is: the first line of its function's docstring."""
+        return cleandoc(self.make.__doc__ or "").split("\n")[0]
+
+    def inject(self, rng: Rng, strength: float) -> Evidence:
+        """A random camera or pair with this fault, solved."""
+        if not self.stage:
+            return cast(Evidence, self.make(rng, strength))
+        set_up = single(rng)
+        if self.stage == "set-up":
+            set_up = self.make(rng, set_up, strength)
+        (corners,) = set_up.observed(rng)
+        if self.stage == "corners":
+            self.make(rng, corners, (set_up.board.rows, set_up.board.columns), strength)
+        solved = set_up.solved((corners,))
+        if self.stage == "solution":
+            best = self.make(Adjustment.of(solved), strength)
+            solved = replace(solved, cameras=best.cameras, cam_from_board={"camera": best.first_from_board})
+        return Evidence(solved)
 
 
 @dataclass(frozen=True)
@@ -121,14 +150,11 @@ class Kind:
         rated = severity or self.severity
         return Finding(self.id, rated, sentence, number, unit, camera, self.view, self.causes, self.remedy, pictures)
 
-    def fault(self, name: str, unit: str, strengths: tuple[float, ...], **more: Any) -> Callable[[Inject], Fault]:
-        """Declare the decorated function as a Fault of this kind, whose sentence is the first line of its docstring.
-
-        `more` are the other fields of Fault.
-        """
-        return lambda inject: Fault(
-            name, self.id, cleandoc(inject.__doc__ or "").split("\n")[0], unit, strengths, inject=inject, **more
-        )
+    def fault(
+        self, name: str, unit: str, strengths: tuple[float, ...], **more: Any
+    ) -> Callable[[Callable[..., Any]], Fault]:
+        """Declare the decorated function as a Fault of this kind; `more` are the other fields of Fault."""
+        return lambda make: Fault(name, self.id, unit, strengths, make=make, **more)
 
 
 def finding(id: str, **words: Any) -> Callable[[Callable[[Evidence], Iterable[Finding]]], Kind]:

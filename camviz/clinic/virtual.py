@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import radians
@@ -125,18 +124,6 @@ def healthy_pair(rng: np.random.Generator) -> Calibration:
     """The calibration of such a pair."""
     set_up = pair(rng)
     return set_up.solved(set_up.observed(rng))
-
-
-def solved(
-    rng: np.random.Generator,
-    change: Callable[[SetUp], SetUp] = lambda set_up: set_up,
-    spoil: Callable[[Array, tuple[int, int]], None] = lambda corners, shape: None,
-) -> Evidence:
-    """A camera solved after a change of the set-up, from corners that `spoil` damages in place, given their shape."""
-    set_up = change(single(rng))
-    observed = set_up.observed(rng)
-    spoil(observed[0], (set_up.board.rows, set_up.board.columns))
-    return Evidence(set_up.solved(observed))
 
 
 def alone(calibration: Calibration, camera: Camera | None = None) -> Calibration:

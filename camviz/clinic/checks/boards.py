@@ -15,7 +15,7 @@ from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.fields import smooth_field, warp_columns
 from camviz.clinic.observed import APART, BY_CHANCE, Observed, unexplained
 from camviz.clinic.registry import Finding, LabFault, Rng, finding
-from camviz.clinic.virtual import SetUp, changed, healthy, single, solved, spread_boards
+from camviz.clinic.virtual import SetUp, single, spread_boards
 from camviz.lenses.base import Array
 
 COVERED = 0.4  # of the image: the outermost corners are a square inside the board
@@ -75,11 +75,10 @@ def coverage(pixels: Array, width: int, height: int) -> float:
 )
 def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
     """The boards stay inside this part of the sides."""
-
-    def gathered(set_up: SetUp) -> SetUp:
-        return replace(set_up, cam_from_board=spread_boards(rng, set_up.cameras, set_up.board, 15, (15, 40), strength))
-
-    return solved(rng, gathered)
+    set_up = single(rng)
+    poses = spread_boards(rng, set_up.cameras, set_up.board, 15, (15, 40), strength)
+    set_up = replace(set_up, cam_from_board=poses)
+    return Evidence(set_up.solved(set_up.observed(rng)))
 
 
 @finding(
@@ -218,8 +217,19 @@ def held_out_ratio(observed: Observed) -> float:
     return float(np.sqrt(np.median(np.nanmean(squares[known], axis=1))))
 
 
-def moving(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
-    """Boards that move by so many pixels, sideways and turning, from the first row of the image to the last."""
+@pose_absorbs_error.fault(
+    "rolling shutter",
+    "px",
+    (1, 3, 10, 30),
+    promised=30,
+    stage="set-up",
+    lab=LabFault(30, "boards move by {0:.1f} px while a picture is read out"),
+)
+def rolling_shutter(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
+    """The board moves while the image is read out.
+
+    It goes sideways and turns by so many pixels, from the first row of the image to the last.
+    """
     fx, motions = set_up.camera.intrinsics.fx, []
     for pose in set_up.cam_from_board:
         depth = pose.apply(set_up.board.corners)[:, 2].mean()
@@ -231,40 +241,17 @@ def moving(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
 
 
 @pose_absorbs_error.fault(
-    "rolling shutter",
-    "px",
-    (1, 3, 10, 30),
-    promised=30,
-    lab=LabFault(
-        30,
-        "boards move by {0:.1f} px while a picture is read out",
-        set_up=lambda seed, set_up, amount: moving(np.random.default_rng([seed, 2]), set_up, amount),
-    ),
-)
-def rolling_shutter(rng: Rng, strength: float) -> Evidence:
-    """The board moves while the image is read out."""
-    return solved(rng, lambda set_up: moving(rng, set_up, strength))
-
-
-def centre_moved(solution: Adjustment, strength: float) -> Adjustment:
-    """cx moved by so many percent of the width, and poses that make the best of it."""
-    ((name, camera),) = solution.cameras.items()
-    grid = camera.intrinsics
-    shifted = replace(camera, intrinsics=replace(grid, cx=grid.cx + strength / 100 * grid.width))
-    return replace(solution, cameras={name: shifted}).refined(only_poses=True)
-
-
-@pose_absorbs_error.fault(
     "moved centre",
     "% of the width",
     (0.3, 1, 3, 8),
     promised=8,
     beyond_doubt=(8, 10),
-    lab=LabFault(8, "cx is moved by {0:.1f} % of the width, and the poses follow", solution=centre_moved),
+    stage="solution",
+    lab=LabFault(8, "cx is moved by {0:.1f} % of the width, and the poses follow"),
 )
-def moved_centre(rng: Rng, strength: float) -> Evidence:
+def moved_centre(solution: Adjustment, strength: float) -> Adjustment:
     """The principal point was moved, and the poses follow."""
-    calibration = healthy(rng)
-    best = centre_moved(Adjustment.of(calibration), strength)
-    shifted = changed(calibration, cx=best.cameras["camera"].intrinsics.cx)
-    return Evidence(replace(shifted, cam_from_board={"camera": best.first_from_board}))
+    ((name, camera),) = solution.cameras.items()
+    grid = camera.intrinsics
+    shifted = replace(camera, intrinsics=replace(grid, cx=grid.cx + strength / 100 * grid.width))
+    return replace(solution, cameras={name: shifted}).refined(only_poses=True)

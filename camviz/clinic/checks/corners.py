@@ -10,7 +10,6 @@ from scipy.special import chdtri
 from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.observed import Observed
 from camviz.clinic.registry import Finding, LabFault, Rng, finding
-from camviz.clinic.virtual import solved
 from camviz.lenses.base import Array
 
 MANY_TIMES = 3.0  # the median error: twice happens between sharp and less sharp pictures
@@ -79,29 +78,19 @@ def _bad_corners(evidence: Evidence, observed: Observed, named: set[int]) -> Ite
         yield outlier_view.found(sentence, lengths[view, worst], "px", observed.name, pictures=(view,))
 
 
-def one_corner_off(rng: Rng, corners: Array, shape: tuple[int, int], strength: float) -> None:
-    """One of the corners (views, corners, 2) moved by so many pixels."""
-    angle = rng.uniform(0, 2 * np.pi)
-    place = rng.integers(len(corners)), rng.integers(corners.shape[1])
-    corners[place] += strength * np.array([np.cos(angle), np.sin(angle)])
-
-
 @outlier_view.fault(
     "outlier corner",
     "px",
     (1, 3, 10, 30),
     promised=10,
-    lab=LabFault(30, "one corner of one view is {0:.1f} px off", corners=one_corner_off),
+    stage="corners",
+    lab=LabFault(30, "one corner of one view is {0:.1f} px off"),
 )
-def outlier_corner(rng: Rng, strength: float) -> Evidence:
+def outlier_corner(rng: Rng, corners: Array, shape: tuple[int, int], strength: float) -> None:
     """One corner of one view is off."""
-    return solved(rng, spoil=lambda corners, shape: one_corner_off(rng, corners, shape, strength))
-
-
-def one_view_blurred(rng: Rng, corners: Array, shape: tuple[int, int], strength: float) -> None:
-    """The corners of one view scattered by so many pixels."""
-    view = rng.integers(len(corners))
-    corners[view] += rng.normal(0, strength, corners[view].shape)
+    angle = rng.uniform(0, 2 * np.pi)
+    place = rng.integers(len(corners)), rng.integers(corners.shape[1])
+    corners[place] += strength * np.array([np.cos(angle), np.sin(angle)])
 
 
 @outlier_view.fault(
@@ -110,11 +99,13 @@ def one_view_blurred(rng: Rng, corners: Array, shape: tuple[int, int], strength:
     (0.3, 1, 3, 10),
     promised=3,
     beyond_doubt=(3, 8),
-    lab=LabFault(6, "the corners of one view scatter by {0:.1f} px more", corners=one_view_blurred),
+    stage="corners",
+    lab=LabFault(6, "the corners of one view scatter by {0:.1f} px more"),
 )
-def blurred_view(rng: Rng, strength: float) -> Evidence:
+def blurred_view(rng: Rng, corners: Array, shape: tuple[int, int], strength: float) -> None:
     """The corners of one view scatter."""
-    return solved(rng, spoil=lambda corners, shape: one_view_blurred(rng, corners, shape, strength))
+    view = rng.integers(len(corners))
+    corners[view] += rng.normal(0, strength, corners[view].shape)
 
 
 @finding(
@@ -185,34 +176,26 @@ def _median(lengths: Array) -> float:
     return float(np.median(lengths)) if len(lengths) else 0.0
 
 
-def one_column_off(rng: Rng, corners: Array, shape: tuple[int, int], strength: float) -> None:
-    """A column taken for a line beside it, so many squares away."""
-    grid = corners[rng.integers(len(corners))].reshape(*shape, 2)
-    column = rng.integers(shape[1])
-    towards = column - 1 if column else 1
-    grid[:, column] += strength * (grid[:, towards] - grid[:, column])
-
-
 @outlier_line.fault(
     "column off",
     "squares",
     (0.02, 0.1, 0.5, 1),
     promised=0.5,
     beyond_doubt=(0.5, 1),
-    lab=LabFault(1, "in one view a column of corners is {0:.2f} squares off", corners=one_column_off),
+    stage="corners",
+    lab=LabFault(1, "in one view a column of corners is {0:.2f} squares off"),
 )
-def column_off(rng: Rng, strength: float) -> Evidence:
+def column_off(rng: Rng, corners: Array, shape: tuple[int, int], strength: float) -> None:
     """A column is taken for its neighbour."""
-    return solved(rng, spoil=lambda corners, shape: one_column_off(rng, corners, shape, strength))
+    grid = corners[rng.integers(len(corners))].reshape(*shape, 2)
+    column = rng.integers(shape[1])
+    towards = column - 1 if column else 1
+    grid[:, column] += strength * (grid[:, towards] - grid[:, column])
 
 
-@outlier_line.fault("rows swapped", "views", (1, 2, 3), promised=1)
-def rows_swapped(rng: Rng, strength: float) -> Evidence:
+@outlier_line.fault("rows swapped", "views", (1, 2, 3), promised=1, stage="corners")
+def rows_swapped(rng: Rng, corners: Array, shape: tuple[int, int], strength: float) -> None:
     """Two neighbouring rows are exchanged."""
-
-    def exchange(corners: Array, shape: tuple[int, int]) -> None:
-        for view in rng.permutation(len(corners))[: round(strength)]:
-            grid, row = corners[view].reshape(*shape, 2), rng.integers(shape[0] - 1)
-            grid[[row, row + 1]] = grid[[row + 1, row]]
-
-    return solved(rng, spoil=exchange)
+    for view in rng.permutation(len(corners))[: round(strength)]:
+        grid, row = corners[view].reshape(*shape, 2), rng.integers(shape[0] - 1)
+        grid[[row, row + 1]] = grid[[row + 1, row]]

@@ -15,7 +15,7 @@ from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.fields import smooth_field, warp_columns
 from camviz.clinic.observed import BY_CHANCE, Observed, explained, parameter_columns
 from camviz.clinic.registry import Finding, LabFault, Rng, finding
-from camviz.clinic.virtual import SetUp, alone, changed, healthy, single, solved, spread_boards
+from camviz.clinic.virtual import SetUp, alone, changed, healthy, single, spread_boards
 from camviz.distortion import image_corner_radius
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
@@ -110,25 +110,19 @@ def board_warp(evidence: Evidence) -> Iterator[Finding]:
             yield board_warp.found(sentence, abs(worst) * 1000, "mm", name)
 
 
-def bent(set_up: SetUp, strength: float) -> SetUp:
-    """A board bent along its rows, by so many percent of its longer side."""
-    side = (max(set_up.board.columns, set_up.board.rows) - 1) * set_up.board.square_size
-    return replace(set_up, warp=(strength / 100 * side, 0.0))
-
-
 @board_warp.fault(
     "warped board",
     "% of its length",
     (0.1, 0.5, 1, 2),
     promised=1,
     beyond_doubt=(1.5, 2),
-    lab=LabFault(
-        2, "the board is bent by {0:.2f} % of its length", set_up=lambda _, set_up, amount: bent(set_up, amount)
-    ),
+    stage="set-up",
+    lab=LabFault(2, "the board is bent by {0:.2f} % of its length"),
 )
-def warped_board(rng: Rng, strength: float) -> Evidence:
+def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     """The board is bent along its rows."""
-    return solved(rng, lambda set_up: bent(set_up, strength))
+    side = (max(set_up.board.columns, set_up.board.rows) - 1) * set_up.board.square_size
+    return replace(set_up, warp=(strength / 100 * side, 0.0))
 
 
 @finding(
@@ -183,26 +177,18 @@ def _disagreement(observed: Observed) -> Iterator[Finding]:
         yield split_disagreement.found(sentence, apart[said], "px", observed.name)
 
 
-def zoomed(set_up: SetUp, strength: float) -> SetUp:
-    """A focal length that grows by so many percent from the first view to the last."""
-    return replace(set_up, zoom=1 + strength / 100 * np.linspace(-0.5, 0.5, len(set_up.cam_from_board)))
-
-
 @split_disagreement.fault(
     "autofocus drift",
     "%",
     (0.2, 1, 3, 10),
     promised=10,
     beyond_doubt=(3, 4),
-    lab=LabFault(
-        3,
-        "the focal length grows by {0:.2f} % from first view to last",
-        set_up=lambda _, set_up, amount: zoomed(set_up, amount),
-    ),
+    stage="set-up",
+    lab=LabFault(3, "the focal length grows by {0:.2f} % from first view to last"),
 )
-def autofocus_drift(rng: Rng, strength: float) -> Evidence:
+def autofocus_drift(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     """The focal length grows from the first view to the last."""
-    return solved(rng, lambda set_up: zoomed(set_up, strength))
+    return replace(set_up, zoom=1 + strength / 100 * np.linspace(-0.5, 0.5, len(set_up.cam_from_board)))
 
 
 @finding(
@@ -256,26 +242,20 @@ def _shift_found(name: str, shift: Array, where: str) -> Finding:
     return half_pixel.found(sentence, float(np.abs(shift).mean()), "px", name)
 
 
-def first_pixel_elsewhere(solution: Adjustment, strength: float) -> Adjustment:
-    """cx and cy larger by so much, as in programs whose first pixel is not at 0."""
-    ((name, camera),) = solution.cameras.items()
-    grid = camera.intrinsics
-    shifted = replace(camera, intrinsics=replace(grid, cx=grid.cx + strength, cy=grid.cy + strength))
-    return replace(solution, cameras={name: shifted})
-
-
 @half_pixel.fault(
     "half pixel",
     "px",
     (0.5, 1),
     promised=0.5,
-    lab=LabFault(1, "cx and cy are counted from {0:.2f} px elsewhere", solution=first_pixel_elsewhere),
+    stage="solution",
+    lab=LabFault(1, "cx and cy are counted from {0:.2f} px elsewhere"),
 )
-def counted_from_elsewhere(rng: Rng, strength: float) -> Evidence:
+def counted_from_elsewhere(solution: Adjustment, strength: float) -> Adjustment:
     """cx and cy are counted from elsewhere."""
-    calibration = healthy(rng)
-    grid = calibration.cameras["camera"].intrinsics
-    return Evidence(changed(calibration, cx=grid.cx + strength, cy=grid.cy + strength))
+    ((name, camera),) = solution.cameras.items()
+    grid = camera.intrinsics
+    shifted = replace(camera, intrinsics=replace(grid, cx=grid.cx + strength, cy=grid.cy + strength))
+    return replace(solution, cameras={name: shifted})
 
 
 @half_pixel.fault("half pixel between two", "px", (0.5, 1), promised=0.5)
