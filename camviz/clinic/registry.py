@@ -136,19 +136,12 @@ class Kind:
             raise ValueError(f"severity must be one of {', '.join(SEVERITIES)}, got {self.severity!r}")
 
     def found(
-        self,
-        sentence: str,
-        value: float | None = None,
-        unit: str = "",
-        camera: str | None = None,
-        *,
-        severity: str | None = None,
-        pictures: tuple[int, ...] = (),
+        self, sentence: str, value: float | None = None, unit: str = "", camera: str | None = None, **more: Any
     ) -> Finding:
-        """A finding of this kind; `severity` where this one is milder or worse than most."""
+        """A finding of this kind; `more` are other fields of Finding, such as a severity milder than most."""
         number = None if value is None else float(value)
-        rated = severity or self.severity
-        return Finding(self.id, rated, sentence, number, unit, camera, self.view, self.causes, self.remedy, pictures)
+        common = {name: getattr(self, name) for name in ("severity", "view", "causes", "remedy")}
+        return Finding(self.id, sentence=sentence, value=number, unit=unit, camera=camera, **common | more)
 
     def fault(
         self, name: str, unit: str, strengths: tuple[float, ...], **more: Any

@@ -65,7 +65,9 @@ def _fold(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
         return
     lost = 1 - float(valid_region(camera, max(1, grid.width // 128)).mean())
     share = f"{lost:.0%}" if lost >= 0.01 else "less than 1 %"
-    severity = "note" if turns and fold_angle(lens) >= pi / 2 and not _corners_lost(evidence, name, camera) else None
+    severity = (
+        "note" if turns and fold_angle(lens) >= pi / 2 and not _corners_lost(evidence, name, camera) else fold.severity
+    )
     sentence = f"{name}: {share} of the pixels have no ray of their own. The distortion {_where(camera)}."
     value, unit = (fold_radius(lens), "rad" if isinstance(lens, KannalaBrandt) else "focal lengths")
     yield fold.found(sentence, value if turns else lost, unit if turns else "", name, severity=severity)
