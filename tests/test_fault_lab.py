@@ -6,7 +6,8 @@ import pytest
 
 from camviz.calibration.difference import difference
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.laboratory import ILLNESSES, VIEWS, experiment
+from camviz.clinic import faults
+from camviz.clinic.laboratory import VIEWS, experiment, lab_faults
 from camviz.course.material import module
 from camviz.views.fault_lab import FaultLabView, grouped
 
@@ -18,10 +19,10 @@ def names(made):
     return {finding.id for finding in made.inspection.findings}
 
 
-@pytest.mark.parametrize("fault", ILLNESSES)
+@pytest.mark.parametrize("fault", lab_faults())
 def test_every_fault_at_full_strength_is_named_by_the_inspection(fault):
     for seed in (1, 2):
-        assert ILLNESSES[fault].finding in names(experiment(fault, 1.0, 0.15, seed))
+        assert faults()[fault].finding in names(experiment(fault, 1.0, 0.15, seed))
 
 
 def test_a_blurred_view_is_not_blamed_on_the_tilts_of_the_boards():
@@ -134,7 +135,7 @@ def test_the_clinic_finds_what_every_patient_has(ward):
 
 
 def test_another_ward_has_its_patients_in_another_order_and_the_same_one_is_the_same(ward):
-    orders = {tuple(each.fault if each else HEALTHY for each in Ward(number)._complaints) for number in range(12)}
+    orders = {tuple(each or HEALTHY for each in Ward(number)._complaints) for number in range(12)}
     assert len(orders) == 12
     again = Ward(16)
     assert [again[i].finding for i in (1, 2)] == [ward[i].finding for i in (1, 2)]
@@ -146,7 +147,7 @@ def test_the_story_does_not_give_the_fault_away():
     for number in range(40):
         ward = Ward(number)
         for story, complaint in zip(ward._stories, ward._complaints, strict=False):
-            told.setdefault(story, set()).add(complaint.fault if complaint else HEALTHY)
+            told.setdefault(story, set()).add(complaint or HEALTHY)
     assert min(map(len, told.values())) >= len(COMPLAINTS) / 2
 
 

@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from camviz.clinic import inspect, kinds
-from camviz.clinic.catalogue import SEVERITIES
-from camviz.clinic.faults import FAULTS
-from camviz.clinic.injections import healthy, parallel_boards
-from camviz.clinic.statistics import PAGE, TABLES, alarms, healthy_pair_case, healthy_single_case, page
-from camviz.clinic.virtual import MARGIN, pair, single
+from camviz.clinic import Inspection, faults, inspect, kinds
+from camviz.clinic.evidence import Evidence
+from camviz.clinic.registry import SEVERITIES
+from camviz.clinic.statistics import PAGE, TABLES, alarms, page
+from camviz.clinic.virtual import MARGIN, healthy, healthy_pair, pair, single
+from camviz.course.reading import LONGEST_SENTENCE, paragraphs, sentences
 
+FAULTS = faults()
 SEED = 20_003
 
 
 def found(name: str, strength: float, seed: int = SEED):
     """The findings that a fault must lead to."""
-    inspection = FAULTS[name].inject(np.random.default_rng(seed), strength).inspected()
+    inspection = Inspection.of(FAULTS[name].inject(np.random.default_rng(seed), strength))
     return [finding for finding in inspection.findings if finding.id == FAULTS[name].finding]
 
 
@@ -35,17 +36,18 @@ def test_every_finding_has_a_fault_that_leads_to_it():
 
 @pytest.mark.parametrize("seed", range(20_100, 20_106))
 def test_nothing_is_found_in_a_healthy_camera(seed):
-    assert alarms(healthy_single_case(np.random.default_rng(seed))) == []
+    assert alarms(Evidence(healthy(np.random.default_rng(seed)))) == []
 
 
 @pytest.mark.parametrize("seed", [20_100, 20_101])
 def test_nothing_is_found_in_a_healthy_pair(seed):
-    assert alarms(healthy_pair_case(np.random.default_rng(seed))) == []
+    assert alarms(Evidence(healthy_pair(np.random.default_rng(seed)))) == []
 
 
 def test_a_set_up_is_the_same_whatever_the_strength():
     """Two injections with one seed differ by the fault alone: the parallel boards are at the same places."""
-    first, second = (parallel_boards(np.random.default_rng(3), strength).calibration for strength in (2.0, 2.5))
+    inject = FAULTS["parallel boards"].inject
+    first, second = (inject(np.random.default_rng(3), strength).calibration for strength in (2.0, 2.5))
     middles = [each.board.corners.mean(axis=0) for each in (first, second)]
     places = [
         np.stack([pose.apply(middle) for pose in each.cam_from_board["camera"]])
@@ -107,14 +109,14 @@ def test_the_bend_of_a_board_is_found_within_a_tenth():
     """2 % of the longer side, along the rows."""
     case = FAULTS["warped board"].inject(np.random.default_rng(SEED), 2)
     board = case.calibration.board
-    (finding,) = [each for each in case.inspected().findings if each.id == "board-warp"]
+    (finding,) = [each for each in Inspection.of(case).findings if each.id == "board-warp"]
     side = (max(board.columns, board.rows) - 1) * board.square_size
     assert finding.value == pytest.approx(0.02 * side * 1000, rel=0.1)
 
 
 def test_a_turn_of_the_whole_world_changes_nothing():
     """Findings are about cameras, not about where the file puts its origin."""
-    _, calibration = healthy(np.random.default_rng(SEED))
+    calibration = healthy(np.random.default_rng(SEED))
     camera = calibration.cameras["camera"]
     moved = RigidTransform.from_components([1, 2, 3], camera.world_from_cam.rotation)
     turned = type(calibration)(
@@ -136,6 +138,29 @@ VIEWS = {  # those that the report has
     *("uncertainty-range", "difference", "distortion", "fold-map", "undistorted", "boards", "epipolar-pairs"),
     *("rectified", "depth-error", "cross-validation", "correlation", "board-residuals", "numbers"),
 }
+
+
+def test_no_sentence_about_a_finding_is_longer_than_a_reader_keeps_in_mind():
+    """The declarations, and the whole of docs/clinic.md; sentences begin with a capital and end with a full stop."""
+    for kind in kinds().values():
+        for said in (kind.symptom, kind.remedy, kind.evidence, kind.threshold):
+            assert said.endswith(".")
+            assert not said[0].islower() or said.startswith(("cx", "fx", "t.x"))
+        assert not any(cause.endswith(".") for cause in kind.causes)
+    assert all(fault.sentence.endswith(".") for fault in FAULTS.values())
+    words = {
+        sentence: len(sentence.split())
+        for paragraph in paragraphs(PAGE.read_text(encoding="utf-8"))
+        for sentence in sentences(paragraph)
+    }
+    assert {sentence for sentence, count in words.items() if count > LONGEST_SENTENCE} == set()
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_an_inspection_says_is_short_and_begins_with_the_claim(name):
+    for finding in found(name, FAULTS[name].promised):
+        assert all(len(sentence.split()) <= LONGEST_SENTENCE for sentence in sentences(finding.sentence))
+        assert finding.sentence.endswith((".", "?"))
 
 
 def test_every_finding_has_a_view_of_the_report_a_cause_and_a_remedy():

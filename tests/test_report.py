@@ -10,8 +10,7 @@ import pytest
 from calibrations import bare, pair, sick, single
 
 import camviz
-from camviz.clinic import inspect, inspect_file
-from camviz.clinic.findings import Inspection, kinds
+from camviz.clinic import Inspection, inspect, inspect_file, kinds
 from camviz.report.inspection import MOST_VIEWS, report, write_report
 from camviz.views.clinic.catalogue import ALIASES, VIEWS
 from camviz.widgets.inspection import LiveInspection

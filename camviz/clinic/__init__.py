@@ -1,5 +1,7 @@
 """The clinic: what is wrong with a calibration, and what to do about it."""
 
-from camviz.clinic.findings import Finding, Inspection, inspect, inspect_file, kinds
+from camviz.clinic.checks import faults, kinds
+from camviz.clinic.inspection import Inspection, inspect, inspect_file
+from camviz.clinic.registry import Finding
 
-__all__ = ["Finding", "Inspection", "inspect", "inspect_file", "kinds"]
+__all__ = ["Finding", "Inspection", "faults", "inspect", "inspect_file", "kinds"]

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.models import poses_from_rays
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
-from camviz.clinic.catalogue import Lacking
 from camviz.clinic.observed import Observed
-from camviz.lenses import Cylindrical, Equirectangular
-from camviz.lenses.base import Array
+from camviz.clinic.rig import StereoPair, board_poses, pairs
 from camviz.poses import RigidTransform
 
-if TYPE_CHECKING:
-    from camviz.clinic.rig import Pair
+Made = TypeVar("Made")
 
-PANORAMAS = (Cylindrical, Equirectangular)
+
+class NotChecked(Exception):  # noqa: N818 - it is an answer, not an error
+    """Why a check cannot be made: what the calibration does not hold, as a clause that follows "Not checked, "."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +31,7 @@ class Evidence:
     compare: Calibration | None = None
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     board: Board | None = None
+    _made: dict[tuple[str, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def cameras(self) -> dict[str, Camera]:
@@ -41,6 +40,18 @@ class Evidence:
         for name, camera in self.calibration.cameras.items():
             distinct.setdefault((camera.intrinsics, camera.lens), name)
         return {name: self.calibration.cameras[name] for name in distinct.values()}
+
+    def adjustment(self, *names: str) -> Adjustment:
+        """The adjustment of some cameras, or of all, made once.
+
+        Raises ValueError where the file holds no board, no corners or no poses of these cameras.
+        """
+        return self._once(("adjustment", *names), lambda: Adjustment.of(self.calibration, *names))
+
+    def _once(self, key: tuple[str, ...], make: Callable[[], Made]) -> Made:
+        if key not in self._made:
+            self._made[key] = make()
+        return cast(Made, self._made[key])
 
     def counterparts(self) -> Iterator[tuple[str, Camera, Camera]]:
         """As `matched`, without cameras that share their pixels and lens with one before."""
@@ -52,9 +63,7 @@ class Evidence:
             return
         ours, others = self.calibration.cameras, self.compare.cameras
         if set(ours) & set(others):
-            for name in ours:
-                if name in others:
-                    yield name, ours[name], others[name]
+            yield from ((name, ours[name], others[name]) for name in ours if name in others)
         elif len(ours) == len(others):
             for (name, camera), other in zip(ours.items(), others.values(), strict=True):
                 yield name, camera, other
@@ -63,31 +72,44 @@ class Evidence:
     def cam_from_board(self) -> dict[str, RigidTransform]:
         """The board's poses by camera: the file's, or found from its corners where it has none."""
         calibration, poses = self.calibration, dict(self.calibration.cam_from_board)
-        if calibration.board is not None:
-            for name, pixels in calibration.detections.items():
-                if name not in poses and pixels.shape[1] == calibration.board.columns * calibration.board.rows:
-                    poses[name] = board_poses(calibration.cameras[name], calibration.board, pixels)
+        for name, pixels in calibration.detections.items():
+            if name not in poses and self._are_of_the_board(name):
+                assert calibration.board is not None
+                poses[name] = board_poses(calibration.cameras[name], calibration.board, pixels)
         return poses
 
-    @cached_property
-    def pairs(self) -> list[Pair]:
-        """The stereo pairs."""
-        from camviz.clinic.rig import pairs
+    def _are_of_the_board(self, name: str) -> bool:
+        """Whether a camera's corners are as many as the board has."""
+        board = self.calibration.board
+        return board is not None and self.calibration.detections[name].shape[1] == board.columns * board.rows
 
-        return pairs(self)
+    @cached_property
+    def pairs(self) -> list[StereoPair]:
+        """The stereo pairs."""
+        return pairs(self.calibration)
 
     @cached_property
     def observed(self) -> dict[str, Observed]:
         """The cameras whose corners, board and poses are known."""
-        calibration = replace(self.calibration, cam_from_board=self.cam_from_board)
         found = {}
-        for name, pixels in calibration.detections.items():
-            board = calibration.board
-            if board is not None and name in self.cam_from_board and pixels.shape[1] == board.columns * board.rows:
-                observed = Observed(name, Adjustment.of(calibration, name))
+        for name in self.calibration.detections:
+            if name in self.cam_from_board and self._are_of_the_board(name):
+                observed = Observed(name, self._posed(name))
                 if observed.adjustment.posed.any():
                     found[name] = observed
         return found
+
+    def _posed(self, name: str) -> Adjustment:
+        """A camera's adjustment, also where the file does not hold the board's poses."""
+        if name in self.calibration.cam_from_board:
+            return self.adjustment(name)
+        return Adjustment.of(replace(self.calibration, cam_from_board=self.cam_from_board), name)
+
+    def with_corners(self) -> dict[str, Observed]:
+        """As `observed`. Raises NotChecked where there is no such camera."""
+        if not self.observed:
+            raise NotChecked("the file holds no detected corners of a known board")
+        return self.observed
 
     def picture(self, name: str, view: int) -> str:
         """What to call a view: the name of its picture, or its number."""
@@ -111,30 +133,6 @@ class Evidence:
         return float(np.sqrt(max(adjustment.covariance[place, place], 0)))
 
     def focal_uncertainty(self, name: str) -> float | None:
-        """σ of fx over fx; None where it cannot be told."""
+        """The standard deviation of fx over fx; None where it is unknown."""
         sigma = self.sigma_of(name, "fx")
         return None if sigma is None else sigma / self.calibration.cameras[name].intrinsics.fx
-
-
-def no_corners(evidence: Evidence, what: str = "detected corners of a known board") -> Lacking:
-    """That a check needs what only the solution's own views hold."""
-    return Lacking(f"the file holds no {what}")
-
-
-def board_poses(camera: Camera, board: Board, pixels: Array) -> RigidTransform:
-    """cam_from_board of views (v, n, 2) from their rays; a view without enough corners has the board ahead."""
-    ahead = RigidTransform.from_translation([0, 0, 10 * board.columns * board.square_size])
-    poses = []
-    for view in pixels:
-        seen = np.isfinite(view).all(axis=-1)
-        try:
-            poses.append(poses_from_rays(camera, [board.corners[seen]], [view[seen]])[0])
-        except (ValueError, np.linalg.LinAlgError):  # too few corners, on one line, or without rays
-            poses.append(ahead)
-    return RigidTransform.concatenate(poses)
-
-
-def border_pixels(camera: Camera, samples: int = 16) -> Array:
-    """The centres of pixels all along the border (n, 2)."""
-    grid = camera.intrinsics
-    return np.asarray(np.clip(grid.border(samples), [0, 0], [grid.width - 1, grid.height - 1]))

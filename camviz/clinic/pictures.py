@@ -11,7 +11,7 @@ from camviz.calibration import Detections
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.finding import read_gray
 from camviz.calibration.types import Board, Calibration
-from camviz.clinic.evidence import board_poses
+from camviz.clinic.rig import board_poses
 
 
 def sizes_of(paths: Sequence[str | PathLike[str]]) -> dict[str, tuple[int, int]]:

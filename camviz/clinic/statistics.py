@@ -14,9 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from camviz.clinic.catalogue import Finding, Kind, kinds
-from camviz.clinic.faults import FAULTS, Case, Fault
-from camviz.clinic.injections import healthy, healthy_pair
+from camviz.calibration.types import Calibration
+from camviz.clinic.checks import faults, kinds
+from camviz.clinic.evidence import Evidence
+from camviz.clinic.inspection import Inspection
+from camviz.clinic.registry import Fault, Finding, Kind
+from camviz.clinic.virtual import healthy, healthy_pair
 
 PAGE = Path(__file__).parents[2] / "docs" / "clinic.md"
 TABLES = "<!-- The tables below are counted by: python -m camviz.clinic.statistics -->"
@@ -35,34 +38,28 @@ class Hits:
     others: Counter[str]
 
 
-def false_alarms(make: Callable[[np.random.Generator], Case], count: int, seed: int = SEED) -> Counter[str]:
+def false_alarms(
+    make: Callable[[np.random.Generator], Calibration], count: int = HEALTHY, seed: int = SEED
+) -> Counter[str]:
     """In how many of `count` healthy calibrations each id was found, notes left out."""
     found: Counter[str] = Counter()
     for number in range(count):
-        found.update({finding.id for finding in alarms(make(np.random.default_rng(seed + number)))})
+        evidence = Evidence(make(np.random.default_rng(seed + number)))
+        found.update({finding.id for finding in alarms(evidence)})
     return found
 
 
-def alarms(case: Case) -> list[Finding]:
-    """The findings of a case that are worse than notes."""
-    return [finding for finding in case.inspected().findings if finding.severity in RATED]
+def alarms(evidence: Evidence) -> list[Finding]:
+    """The findings that are worse than notes."""
+    return [finding for finding in Inspection.of(evidence).findings if finding.severity in RATED]
 
 
-def healthy_single_case(rng: np.random.Generator) -> Case:
-    return Case(healthy(rng)[1])
-
-
-def healthy_pair_case(rng: np.random.Generator) -> Case:
-    return Case(healthy_pair(rng)[1])
-
-
-def hits(fault: Fault, strength: float, count: int, seed: int = SEED) -> Hits:
+def hits(fault: Fault, strength: float, count: int = REPEATS, seed: int = SEED) -> Hits:
     """How often a fault is named."""
     named, others = 0, Counter[str]()
     for number in range(count):
-        ids = {
-            finding.id for finding in fault.inject(np.random.default_rng(seed + number), strength).inspected().findings
-        }
+        evidence = fault.inject(np.random.default_rng(seed + number), strength)
+        ids = {finding.id for finding in Inspection.of(evidence).findings}
         named += fault.finding in ids
         others.update(ids - {fault.finding})
     return Hits(strength, named, count, others)
@@ -70,13 +67,13 @@ def hits(fault: Fault, strength: float, count: int, seed: int = SEED) -> Hits:
 
 def count_all(progress: Callable[[str], object] = print) -> str:
     """Both tables as Markdown."""
-    single, stereo = (false_alarms(make, HEALTHY) for make in (healthy_single_case, healthy_pair_case))
+    single, stereo = (false_alarms(make) for make in (healthy, healthy_pair))
     progress(f"healthy: {dict(single)}, {dict(stereo)}")
     rows = []
-    for name, fault in FAULTS.items():
-        results = [hits(fault, strength, REPEATS) for strength in fault.strengths]
-        progress(f"{name}: {[(each.strength, each.hits, dict(each.others)) for each in results]}")
-        rows.append(_row(name, fault, results))
+    for fault in faults().values():
+        results = [hits(fault, strength) for strength in fault.strengths]
+        progress(f"{fault.name}: {[(each.strength, each.hits, dict(each.others)) for each in results]}")
+        rows.append(_row(fault, results))
     return "\n".join([*_healthy_table(single, stereo), "", *_faults_table(rows)]) + "\n"
 
 
@@ -84,9 +81,10 @@ def _healthy_table(single: Counter[str], stereo: Counter[str]) -> Iterator[str]:
     yield f"### {2 * HEALTHY} healthy calibrations"
     yield ""
     yield (
-        f"{HEALTHY} cameras and {HEALTHY} pairs at random: 0.3 to 2 megapixels, 50° to 70° wide, barrel to slightly "
-        "pincushion lenses, noise of 0.05 to 0.3 px, three boards, 10 to 20 views. Solved with the standard model. "
-        "Counted are findings worse than a note."
+        f"These are {HEALTHY} cameras and {HEALTHY} pairs at random, of 0.3 to 2 megapixels. "
+        "Their lenses are 50° to 70° wide, with barrel to slightly pincushion distortion. The noise is 0.05 to 0.3 px. "
+        "There are three boards, and 10 to 20 views. All are solved with the standard model. "
+        "Findings worse than a note are counted."
     )
     yield ""
     yield "| finding | false alarms, one camera | false alarms, pair |"
@@ -99,8 +97,8 @@ def _faults_table(rows: list[str]) -> Iterator[str]:
     yield "### Faults"
     yield ""
     yield (
-        f"{REPEATS} set-ups for each fault (`camviz.clinic.faults`) and strength. **Bold**: the strength at which the "
-        "tests hold that it is named. *Also found* counts, at that strength, what else an inspection names."
+        f"Each fault and strength is put into {REPEATS} set-ups. **Bold** is the strength at which the tests hold that "
+        "the fault is named. *Also found* counts, at that strength, what else an inspection names."
     )
     yield ""
     yield "| fault | must be named | strength: named | also found |"
@@ -108,15 +106,15 @@ def _faults_table(rows: list[str]) -> Iterator[str]:
     yield from rows
 
 
-def _row(name: str, fault: Fault, results: list[Hits]) -> str:
+def _row(fault: Fault, results: list[Hits]) -> str:
     shown = []
     for result in results:
         said = f"{result.strength:g}: {result.hits}/{result.count}"
         shown.append(f"**{said}**" if result.strength == fault.promised else said)
     promised = next(result for result in results if result.strength == fault.promised)
     others = ", ".join(f"`{id}` {count}" for id, count in promised.others.most_common())
-    unit = f" ({fault.unit})" if fault.unit else ""
-    return f"| {name}: {fault.sentence}{unit} | `{fault.finding}` | {', '.join(shown)} | {others} |"
+    unit = f" [{fault.unit}]" if fault.unit else ""
+    return f"| {fault.name}{unit}: {fault.sentence} | `{fault.finding}` | {', '.join(shown)} | {others} |"
 
 
 def page(tables: str) -> str:
@@ -128,10 +126,10 @@ def page(tables: str) -> str:
 def _entry(kind: Kind) -> str:
     return (
         f'<a id="{kind.id}"></a>\n### `{kind.id}`\n\n'
-        f"{kind.symptom[0].upper()}{kind.symptom[1:]} ({kind.severity}; view: {kind.view}).\n\n"
+        f"**{kind.severity.capitalize()}.** {kind.symptom} View: `{kind.view}`.\n\n"
         f"- Likely: {'; '.join(kind.causes)}.\n"
-        f"- Judged by: {kind.evidence}.\n"
-        f"- Named from: {kind.threshold}.\n"
+        f"- Evidence: {kind.evidence}\n"
+        f"- Named when: {kind.threshold}\n"
         f"- Remedy: {kind.remedy}"
     )
 
@@ -139,33 +137,38 @@ def _entry(kind: Kind) -> str:
 HEAD = """\
 # The clinic
 
-<!-- Made from camviz/clinic/findings.toml by: python -m camviz.clinic.statistics --page -->
+<!-- Made from camviz/clinic/checks by: python -m camviz.clinic.statistics --page -->
 
 `camviz inspect FILE` and `camviz.inspect(camviz.load(path))` say what is wrong with a calibration. Every finding has a
-stable id, one sentence, the number that shows it, the view that shows it, its likely causes and a remedy. Nothing is
-guessed: a check whose evidence the file does not hold is listed as not made, with the reason. `camviz calibrate` writes
-files that hold all of it: corners, poses of the board, what was estimated and how well. With `--images` and `--board`
-the corners are looked for in pictures, and `--compare` holds a second calibration of the same cameras beside the first.
+stable id, one sentence, the number that shows it, the view that shows it, its likely causes and a remedy.
 
-A *fault* makes the calibration wrong, a *warning* makes it doubtful, a *note* is something to know when it is used.
+The clinic does not guess. A check whose evidence the file does not hold is listed as not made, with the reason. The
+command `camviz calibrate` writes files that hold all of it: corners, poses of the board, what was estimated and how
+well. With `--images` and `--board` the corners are looked for in pictures. `--compare` holds a second calibration of
+the same cameras beside the first.
+
+A *fault* makes the calibration wrong. A *warning* makes it doubtful. A *note* is something to know when it is used.
 The exit status of `camviz inspect` is 0 when nothing is worse than a note, 1 when something is, and 2 when a file
 cannot be read.
 
-As JSON (`--json`): `{"cameras": [{name, model, width, height, fx, fy, cx, cy, distortion, rms}], "findings": [{id,
-severity, sentence, value, unit, camera, view, causes, remedy}], "checked": [id, …], "skipped": [{id, why}]}`. Of
-several files it is a list of these, each with its `file`.
+With `--json` the output is `{"cameras": [{name, model, width, height, fx, fy, cx, cy, distortion, rms}], "findings":
+[{id, severity, sentence, value, unit, camera, view, causes, remedy}], "checked": [id, …], "skipped": [{id, why}]}`.
+Of several files it is a list of these, each with its `file`.
 
 ## Findings
 """
 MIDDLE = """\
 ## How often it is right
 
-Where the theory of least squares gives the chance of a false alarm, the threshold is that chance: one in a million for
-every F- and χ²-test (`model-too-simple`, `board-warp`, `split-disagreement`, the rolling shutter of
-`pose-absorbs-error`), one in ten thousand for a whole set of views with few corners (`outlier-view`). It holds for
-independent Gaussian noise. Because real corners are neither, and because in a large set every small error of a real
-lens is beyond chance, there is a least effect beside each: it decides in practice. Rules about the numbers of a file
-have no chance in them. No alarm in 120 means a rate below 2.5 % with 95 % confidence (1 - 0.05^(1/120)).
+Where the theory of least squares gives the chance of a false alarm, the threshold is that chance. It is one in a
+million for every F- and χ²-test: `model-too-simple`, `board-warp`, `split-disagreement`, and the rolling shutter of
+`pose-absorbs-error`. It is one in ten thousand for a whole set of views with few corners (`outlier-view`).
+
+The chance holds for independent Gaussian noise, and real corners are neither. In a large set, every small error of a
+real lens is also beyond chance. So each threshold has a least effect beside it, which decides in practice. Rules about
+the numbers of a file have no chance in them.
+
+No alarm in 120 means a rate below 2.5 % with 95 % confidence (1 - 0.05^(1/120)).
 """
 
 

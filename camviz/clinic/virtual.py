@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import radians
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from camviz.calibration import Detections, calibrate, calibrate_pair
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Intrinsics
+from camviz.clinic.evidence import Evidence
+from camviz.files import load
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
@@ -27,7 +32,8 @@ class SetUp:
     """What is true: cameras in place (the left one first), a board, its poses in the left camera's frame, and noise.
 
     `noise` is the standard deviation in pixels of a detected corner's coordinates, `warp` the board's sagittas in
-    metres, `zoom` what each view (views,) multiplies the focal lengths by.
+    metres, `zoom` what each view (views,) multiplies the focal lengths by. `motion` (views, 6) is how far the board
+    turns [rad] and shifts [m] while a rolling shutter reads the image from the first row to the last.
     """
 
     cameras: tuple[Camera, ...]
@@ -36,6 +42,7 @@ class SetUp:
     noise: float
     warp: tuple[float, float] = (0.0, 0.0)
     zoom: Array | None = field(default=None, repr=False)
+    motion: Array | None = field(default=None, repr=False)
 
     @property
     def camera(self) -> Camera:
@@ -49,9 +56,22 @@ class SetUp:
         return tuple(self._seen(camera, in_left) for camera in self.cameras)
 
     def _seen(self, camera: Camera, points: Array) -> Array:
+        if self.motion is not None:
+            return self._read_by_rows(camera, points)
         if self.zoom is None:
             return camera.project(points)
         return np.stack([_zoomed(camera, by).project(view) for by, view in zip(self.zoom, points, strict=True)])
+
+    def _read_by_rows(self, camera: Camera, points: Array) -> Array:
+        """Each corner is seen when its row is read, up to half a frame early or late."""
+        assert self.motion is not None
+        corners: Array = camera.project(points)
+        for view, (pose, motion) in enumerate(zip(self.cam_from_board, self.motion, strict=True)):
+            for _ in range(3):
+                late = corners[view, :, 1, None] / camera.intrinsics.height - 0.5
+                turned = Rotation.from_rotvec(late * motion[:3]).apply(points[view] - pose.translation)
+                corners[view] = camera.project(turned + pose.translation + late * motion[3:])
+        return corners
 
     def observed(self, rng: np.random.Generator) -> tuple[Array, ...]:
         """The corners of each camera with noise."""
@@ -92,6 +112,39 @@ def pair(rng: np.random.Generator, *, views: int | None = None) -> SetUp:
     cameras = (left, right.at(left_from_right))
     poses = spread_boards(rng, cameras, board, views or int(rng.integers(10, 21)), (15, 40))
     return SetUp(cameras, board, poses, float(rng.uniform(0.05, 0.3)))
+
+
+def healthy(rng: np.random.Generator) -> Calibration:
+    """The calibration of such a camera."""
+    set_up = single(rng)
+    return set_up.solved(set_up.observed(rng))
+
+
+def healthy_pair(rng: np.random.Generator) -> Calibration:
+    """The calibration of such a pair."""
+    set_up = pair(rng)
+    return set_up.solved(set_up.observed(rng))
+
+
+def alone(calibration: Calibration, camera: Camera | None = None) -> Calibration:
+    """The numbers of one camera, the calibration's own unless given, and nothing else, as most files have them."""
+    name, own = next(iter(calibration.cameras.items()))
+    return Calibration({name: camera or own}, Path("virtual"), calibration.format)
+
+
+def changed(calibration: Calibration, **values: Any) -> Calibration:
+    """A calibration with other numbers in the camera matrix of its first camera."""
+    name, camera = next(iter(calibration.cameras.items()))
+    other = replace(camera, intrinsics=replace(camera.intrinsics, **values))
+    return replace(calibration, cameras={**calibration.cameras, name: other})
+
+
+def as_file(text: str) -> Evidence:
+    """What a YAML file of this text holds, read as `camviz inspect` reads it, in spite of its faults."""
+    with tempfile.TemporaryDirectory() as room:
+        path = Path(room) / "camera.yaml"
+        path.write_text(text, encoding="utf-8")
+        return Evidence(load(path, mend=True))
 
 
 def _camera(rng: np.random.Generator, size: tuple[int, int] | None = None, view_deg: float | None = None) -> Camera:

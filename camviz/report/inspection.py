@@ -8,11 +8,13 @@ from html import escape
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camviz.cameras import transform
+from camviz.clinic.inspection import Inspection
+from camviz.clinic.registry import Finding
+from camviz.clinic.words import verdict
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Label, Line
 from camviz.draw.page import document, figure
@@ -20,22 +22,18 @@ from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
 from camviz.poses import RigidTransform
+from camviz.report.findings import findings_html
 from camviz.report.page import numbers_table
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline
-from camviz.views.clinic.catalogue import ALIASES, LARGEST, VIEWS, Case, Entry
+from camviz.views.clinic.catalogue import ALIASES, VIEWS, Case, Entry, title_of
 from camviz.views.clinic.missing import MissingView
 from camviz.views.clinic.observations import Observations, short_names
 from camviz.views.clinic.residuals import ResidualsView, bars_panel
 
-if TYPE_CHECKING:
-    from camviz.clinic.findings import Finding, Inspection
-
 MOST_VIEWS = 24  # pictures of views that a page holds: the worst of them
 MOST_CAMERAS = 4
 MOST_BOARDS = 20  # of views whose pictures are not on the page
-
-_MARKS = {"fault": "✗ fault", "warning": "! warning", "note": "· note"}
 
 
 def write_report(
@@ -51,9 +49,10 @@ def report(inspection: Inspection, *, images: str | PathLike[str] | None = None)
         (files("camviz.report") / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
     )
     if inspection.calibration is None:
-        body = _findings(inspection) + _missing(dict.fromkeys(_wanted(inspection), _UNREAD))
+        views = (finding.view for finding in inspection.findings)
+        body = _findings(inspection) + _missing(dict.fromkeys(views, _UNREAD))
         return document("A calibration that could not be read", body, layout=layout, script=script)
-    case = Case(inspection.calibration, inspection.compare, None if images is None else Path(images), LARGEST)
+    case = Case(inspection.calibration, inspection.compare, images=None if images is None else Path(images))
     sections: list[tuple[Entry, str]] = []
     missing: dict[str, str] = {}
     for entry in VIEWS.values():
@@ -76,41 +75,14 @@ _STILL = RigidTransform.identity()
 _UNREAD = "The file could not be read beyond the fault above."
 
 
-def _wanted(inspection: Inspection) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(finding.view for finding in inspection.findings))
-
-
-# The findings --------------------------------------------------------------------------------------------------------
-
-
 def _findings(inspection: Inspection) -> str:
-    counts = {severity: sum(f.severity == severity for f in inspection.findings) for severity in _MARKS}
-    told = ", ".join(f"{count} {severity}{'s' * (count != 1)}" for severity, count in counts.items() if count)
-    items = "".join(_finding(inspection, finding) for finding in inspection.findings)
-    found = f'<ol class="findings">{items}</ol>' if items else ""
-    return f'<section id="findings"><h2>{told or "Nothing found"}</h2>{found}{_checked(inspection)}</section>'
-
-
-def _finding(inspection: Inspection, finding: Finding) -> str:
-    number = (
-        ""
-        if finding.value is None
-        else f' <data value="{finding.value!r}">{finding.value:.4g} {escape(finding.unit)}</data>'
-    )
-    where = f" <span class=camera>{escape(finding.camera)}</span>" if finding.camera else ""
-    causes = f"<dt>likely</dt><dd>{escape('; '.join(finding.causes))}</dd>" if finding.causes else ""
-    remedy = f"<dt>remedy</dt><dd>{escape(finding.remedy)}</dd>" if finding.remedy else ""
-    return (
-        f'<li class="{finding.severity}"><p><strong>{_MARKS[finding.severity]}</strong> '
-        f"<code>{escape(finding.id)}</code>{where}: "
-        f"{escape(finding.sentence)}{number} {_see(inspection, finding)}</p><dl>{causes}{remedy}</dl></li>"
-    )
+    listed = findings_html(inspection, lambda finding: _see(inspection, finding))
+    return f'<section id="findings"><h2>{verdict(inspection.findings)}</h2>{listed}</section>'
 
 
 def _see(inspection: Inspection, finding: Finding) -> str:
     """Links to the view that shows a finding, and to the pictures that it is about."""
-    entry = VIEWS.get(ALIASES.get(finding.view, finding.view))
-    links = [f'<a href="#view-{finding.view}">{escape(entry.title if entry else finding.view)}</a>']
+    links = [f'<a href="#view-{finding.view}">{escape(title_of(finding.view))}</a>']
     calibration = inspection.calibration
     camera = finding.camera or (next(iter(calibration.cameras)) if calibration else "")
     if calibration and camera in calibration.detections:
@@ -118,21 +90,7 @@ def _see(inspection: Inspection, finding: Finding) -> str:
         for view in finding.pictures[:6]:
             name = pictures[view] if view < len(pictures) else f"view {view + 1}"
             links.append(f'<a href="#{_id(camera)}-{view + 1}">{escape(Path(name).name)}</a>')
-    return f"<span class=see>→ {', '.join(links)}</span>"
-
-
-def _checked(inspection: Inspection) -> str:
-    skipped: dict[str, list[str]] = {}
-    for id, why in inspection.skipped:
-        skipped.setdefault(why, []).append(id)
-    rows = "".join(f"<li>Not checked, {escape(why)}: {escape(', '.join(ids))}.</li>" for why, ids in skipped.items())
-    return (
-        f"<details><summary>{len(inspection.checked)} checks made, {len(inspection.skipped)} not</summary><ul>"
-        f"<li>Checked: {escape(', '.join(inspection.checked) or 'nothing')}.</li>{rows}</ul></details>"
-    )
-
-
-# The views -----------------------------------------------------------------------------------------------------------
+    return f"→ {', '.join(links)}"
 
 
 def _section(case: Case, entry: Entry) -> tuple[str, str]:
@@ -149,35 +107,24 @@ def _section(case: Case, entry: Entry) -> tuple[str, str]:
             shown += figure(name if len(cameras) > 1 else "", view.figure())
     if not shown:
         return "", why
-    left_out = case.names[MOST_CAMERAS:]
-    more = (
-        f'<p class="note">Shown for {MOST_CAMERAS} of {len(case.names)} cameras.</p>'
-        if left_out and not entry.of_all
-        else ""
-    )
-    anchors = "".join(f'<span id="view-{alias}"></span>' for alias, name in ALIASES.items() if name == entry.name)
-    return (
-        "<section "
-        f'id="view-{entry.name}">{anchors}<h2>{escape(entry.title)}</h2><p>{escape(entry.purpose)}</p>{shown}{more}</section>',
-        "",
-    )
+    if len(case.names) > MOST_CAMERAS and not entry.of_all:
+        shown += f'<p class="note">Shown for {MOST_CAMERAS} of {len(case.names)} cameras.</p>'
+    head = f"{_anchors(entry.name)}<h2>{escape(entry.title)}</h2><p>{escape(entry.purpose)}</p>"
+    return f'<section id="view-{entry.name}">{head}{shown}</section>', ""
+
+
+def _anchors(name: str) -> str:
+    """Where links to a view's other names lead."""
+    return "".join(f'<span id="view-{alias}"></span>' for alias, of in ALIASES.items() if of == name)
 
 
 def _missing(missing: Mapping[str, str]) -> str:
     """The views that could not be made, each with its anchor and the reason."""
-    if not missing:
-        return ""
-    items = []
-    for name, why in missing.items():
-        entry = VIEWS.get(ALIASES.get(name, name))
-        anchors = "".join(
-            f'<span id="view-{alias}"></span>' for alias, of in ALIASES.items() if of == name and alias not in missing
-        )
-        items.append(
-            f'<li id="view-{name}">{anchors}<strong>{escape(entry.title if entry else name)}</strong>: '
-            f"{escape(why)}</li>"
-        )
-    return f'<section id="missing"><h2>What could not be shown</h2><ul>{"".join(items)}</ul></section>'
+    items = "".join(
+        f'<li id="view-{name}">{_anchors(name)}<strong>{escape(title_of(name))}</strong>: {escape(why)}</li>'
+        for name, why in missing.items()
+    )
+    return f'<section id="missing"><h2>What could not be shown</h2><ul>{items}</ul></section>' if items else ""
 
 
 # A bar → its picture → its board -------------------------------------------------------------------------------------

@@ -12,8 +12,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz.clinic.catalogue import Finding
-from camviz.clinic.laboratory import BOARD, ILLNESSES, VIEWS, Experiment, experiment
+from camviz.clinic.laboratory import BOARD, VIEWS, Experiment, experiment, lab_faults
+from camviz.clinic.registry import Finding
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel
@@ -46,7 +46,7 @@ class FaultLabView(View):
 
     title: ClassVar[str] = "Fault lab"
 
-    fault: str = choice(next(iter(ILLNESSES)), *list(ILLNESSES)[1:], help="what is wrong")
+    fault: str = choice(*lab_faults(), help="what is wrong")
     strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
     noise: float = slider(0.15, 0.02, 0.5, 0.01, unit="px", help="standard deviation of a corner's coordinates")
     seed: int = slider(1, 1, 20, 1, label="camera", help="another camera, other boards, other noise")

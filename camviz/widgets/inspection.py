@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import fields
-from html import escape
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,11 @@ from typing import Any
 from IPython.display import display
 from ipywidgets import Dropdown, HBox, Layout, VBox
 
-from camviz import clinic
-from camviz.calibration.types import Calibration
-from camviz.clinic.findings import Inspection
+from camviz.calibration.types import Board, Calibration
+from camviz.clinic.evidence import Evidence
+from camviz.clinic.inspection import Inspection
+from camviz.clinic.words import verdict
+from camviz.report.findings import findings_html
 from camviz.views.base import View
 from camviz.views.clinic.catalogue import ALIASES, VIEWS, Case
 from camviz.views.distortion import DistortionView
@@ -22,7 +23,6 @@ from camviz.widgets.explorer import Explorer, explore
 
 _LARGEST = 800  # pixels, of the longer side of a photograph
 _OF_DISTORTION = ("show", "hide_fold")  # the sliders would make it another lens
-_COLOURS = {"fault": "#c2185b", "warning": "#c05300", "note": "#5b6577"}
 
 
 class ShownInspection(Inspection):
@@ -36,10 +36,15 @@ class ShownInspection(Inspection):
         self.explore()._ipython_display_()
 
 
-def inspect(calibration: Calibration, **options: Any) -> ShownInspection:
-    """What is wrong with a calibration, and what to do: `camviz.clinic.inspect` with its options, for a notebook."""
-    found = clinic.inspect(calibration, **options)
-    return ShownInspection(**{field.name: getattr(found, field.name) for field in fields(Inspection)})
+def inspect(
+    calibration: Calibration,
+    *,
+    compare: Calibration | None = None,
+    pictures: Mapping[str, tuple[int, int]] | None = None,
+    board: Board | None = None,
+) -> ShownInspection:
+    """What is wrong with a calibration, and what to do: `camviz.clinic.inspect` for a notebook."""
+    return ShownInspection.of(Evidence(calibration, compare, pictures or {}, board))
 
 
 class LiveInspection:
@@ -54,7 +59,8 @@ class LiveInspection:
         self.widget: VBox | None = None
         if inspection.calibration is None:
             return
-        self.case = Case(inspection.calibration, inspection.compare, None if images is None else Path(images), _LARGEST)
+        folder = None if images is None else Path(images)
+        self.case = Case(inspection.calibration, inspection.compare, images=folder, largest=_LARGEST)
         self._view = Dropdown(
             options=self._options(), value=self._first(), description="view", layout=Layout(width="28em")
         )
@@ -115,7 +121,11 @@ class LiveInspection:
             before.close()
 
     def _ipython_display_(self) -> None:
-        words = {"text/html": findings_html(self.inspection), "text/plain": self.inspection.as_text()}
+        html = f"<p><b>{verdict(self.inspection.findings)}</b></p>{findings_html(self.inspection)}"
+        self.display({"text/html": html, "text/plain": self.inspection.as_text()})
+
+    def display(self, words: Mapping[str, str]) -> None:
+        """Show words, given by their MIME types, then a still picture to be saved, then the live view."""
         display(words, raw=True)
         if self.explorer is None or self.widget is None:
             return
@@ -126,24 +136,3 @@ class LiveInspection:
         kept = f'<div data-camviz-still="{self.still_id}">{still["text/html"]}</div>'
         display({**still, "text/html": kept}, raw=True)
         display(self.widget)
-
-
-def findings_html(inspection: Inspection) -> str:
-    """The findings as HTML that needs no style sheet."""
-    items = []
-    for finding in inspection.findings:
-        causes = f"<br>likely: {escape('; '.join(finding.causes))}" if finding.causes else ""
-        entry = VIEWS.get(ALIASES.get(finding.view, finding.view))
-        seen = f" (view: {escape(entry.title)})" if entry else ""
-        items.append(
-            f'<li style="border-left:4px solid {_COLOURS[finding.severity]};padding-left:.7em;margin:.4em '
-            '0;list-style:none">'
-            f"<b>{finding.severity}</b> <code>{escape(finding.id)}</code>: {escape(finding.sentence)}{seen}{causes}"
-            f"<br>remedy: {escape(finding.remedy)}</li>"
-        )
-    found = f'<ul style="padding:0;margin:0">{"".join(items)}</ul>' if items else "<p><b>Nothing found.</b></p>"
-    checked = escape(", ".join(inspection.checked)) or "nothing"
-    return (
-        f"{found}<p style='opacity:.75'>Checked: {checked}. Not checked: {len(inspection.skipped)} for want of "
-        "evidence.</p>"
-    )

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from camviz.calibration.difference import pixel_grid
-from camviz.clinic.laboratory import GRID, ILLNESSES
+from camviz.clinic.laboratory import GRID, lab_faults
 from camviz.views.fault_lab import FaultLabView
 
 EXCEPTIONS: dict[str, str] = {
@@ -61,7 +61,7 @@ def off(view):
 
 def test_eleven_faults_and_their_families(says):
     says("put eleven faults into a camera, diagnose eight patients")
-    assert len(ILLNESSES) == 11
+    assert len(lab_faults()) == 11
     says("corner, blurred view, column off |")
     says("| the corners leave something open | parallel boards, boards in the middle |")
     says(
@@ -71,7 +71,7 @@ def test_eleven_faults_and_their_families(says):
     )
     listed = "outlier corner, blurred view, column off, parallel boards, boards in the middle, warped board, "
     listed += "autofocus drift, rolling shutter, lens too rich, moved centre, half pixel"
-    assert set(listed.split(", ")) == set(ILLNESSES)
+    assert set(listed.split(", ")) == set(lab_faults())
 
 
 def test_anna_and_ben(says):
@@ -126,7 +126,7 @@ def test_a_board_of_paper(says):
     assert sigma == solved(PAPER)[2]
     corners = PAPER.experiment.solved.board.corners
     assert bulge == 1000 * 0.01 * np.ptp(corners[:, 0])
-    assert ILLNESSES["warped board"].amount(0.5) == 1.0
+    assert lab_faults()["warped board"].amount(0.5) == 1.0
     (again,) = says("Exactly at 538.7: the bulge averages out over many views.")
     assert again == f.value
     says("in the lab f is off by seventeen pixels, and the bars know nothing of it")

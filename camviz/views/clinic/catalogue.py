@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.types import Calibration
+from camviz.clinic.evidence import Evidence
 from camviz.views.base import View
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.board_residuals import BoardResidualsView, tested
@@ -43,17 +43,14 @@ LARGEST = 640  # pixels, of the longer side of a photograph as it is shown
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """A calibration with what goes with it: another one to compare it with, and the folder of its pictures.
+class Case(Evidence):
+    """The evidence about a calibration as views show it: with the folder of its pictures.
 
     What several views need is made once. `largest` is how many pixels the longer side of a shown photograph has.
     """
 
-    calibration: Calibration
-    compare: Calibration | None = None
     images: Path | None = None
     largest: int = LARGEST
-    _made: dict[tuple[str, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -65,7 +62,7 @@ class Case:
         return tuple(distinct.values())
 
     def adjustment(self, *names: str) -> Adjustment:
-        """The adjustment of some cameras, all of them when none is named. Raises Missing."""
+        """The adjustment of some cameras, or of all, made once. Raises Missing."""
         return self._once(("adjustment", *names), lambda: adjusted(self.calibration, *names))
 
     def observations(self, name: str) -> Observations:
@@ -73,11 +70,6 @@ class Case:
         return self._once(
             ("observations", name), lambda: Observations.of(self.calibration, name, self.photographs(name))
         )
-
-    def _once(self, key: tuple[str, ...], make: Callable[[], Any]) -> Any:
-        if key not in self._made:
-            self._made[key] = make()
-        return self._made[key]
 
     def photographs(self, name: str, *, full: bool = False) -> Photographs:
         """The pictures of a camera's views as they are shown, or in `full` size; None for one that is not at hand."""
@@ -302,6 +294,12 @@ _ENTRIES = (
 
 VIEWS: Mapping[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 ALIASES: Mapping[str, str] = {"per-view-errors": "residual-vectors"}  # the bars are part of that view
+
+
+def title_of(name: str) -> str:
+    """The title of the view that a finding names; the name itself where there is no such view."""
+    entry = VIEWS.get(ALIASES.get(name, name))
+    return entry.title if entry else name
 
 
 def _read(path: Path) -> NDArray[np.uint8] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
@@ -11,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from camviz.calibration.types import Calibration
-from camviz.clinic.catalogue import kinds
-from camviz.clinic.faults import FAULTS, Case
-from camviz.clinic.findings import Inspection
-from camviz.clinic.injections import healthy
+from camviz.clinic import Inspection, faults, kinds
+from camviz.clinic.evidence import Evidence
+from camviz.clinic.virtual import healthy
 from camviz.course.checks import Verdict
 
 if TYPE_CHECKING:
@@ -23,25 +21,17 @@ if TYPE_CHECKING:
 HEALTHY = "healthy"
 
 
-@dataclass(frozen=True)
-class Complaint:
-    """A fault that brings patients, and how strong it is then (low … high): beyond doubt."""
-
-    fault: str
-    strengths: tuple[float, float]
-
-
-COMPLAINTS = (
-    Complaint("blurred view", (3, 8)),
-    Complaint("column off", (0.5, 1)),
-    Complaint("parallel boards", (3, 8)),
-    Complaint("warped board", (1.5, 2)),
-    Complaint("autofocus drift", (3, 4)),
-    Complaint("absurd centre", (8, 10)),
-    Complaint("folding polynomial", (0.7, 0.9)),
-    Complaint("resized K", (2, 2)),
-    Complaint("crop", (30, 38)),
-    Complaint("boards in the middle", (0.25, 0.35)),
+COMPLAINTS = (  # the faults that bring patients, each as strong as is beyond doubt
+    "blurred view",
+    "column off",
+    "parallel boards",
+    "warped board",
+    "autofocus drift",
+    "moved centre",
+    "folding polynomial",
+    "resized K",
+    "crop",
+    "boards in the middle",
 )
 STORIES = (  # any patient may come with any of them: what owners say does not tell what is wrong
     "It worked last year. I changed nothing.",
@@ -69,7 +59,7 @@ class Ward:
         if not 2 <= patients <= len(COMPLAINTS) + 1:
             raise ValueError(f"patients must be 2 to {len(COMPLAINTS) + 1}, got {patients}")
         self.number = number
-        chosen: list[Complaint | None] = [*np.random.default_rng(number).permutation(np.array(COMPLAINTS, object))]
+        chosen: list[str | None] = [*np.random.default_rng(number).permutation(np.array(COMPLAINTS, object))]
         chosen = [*chosen[: patients - 1], None]
         order = np.random.default_rng([number, 1]).permutation(patients)
         self._complaints = [chosen[i] for i in order]
@@ -104,38 +94,25 @@ class Patient:
 
     name: str
     story: str
-    case: Case
+    evidence: Evidence
     finding: str
 
     @property
     def calibration(self) -> Calibration:
-        held = self.case.calibration
-        assert held is not None  # every complaint is of a calibration, none of a file's text
-        return held
+        return self.evidence.calibration
 
     def inspected(self) -> Inspection:
         """What the clinic says."""
-        return self.case.inspected()
+        return Inspection.of(self.evidence)
 
     def _ipython_display_(self) -> None:
-        from IPython.display import display
-
         from camviz.widgets.inspection import LiveInspection
 
         words = f"<p><b>{escape(self.name)}.</b> “{escape(self.story)}”</p>"
-        display({"text/html": words, "text/plain": f"{self.name}. “{self.story}”"}, raw=True)
         live = LiveInspection(Inspection(self.calibration, (), ()))
         if not self.calibration.detections:
             live.show("numbers")
-        if live.explorer is None:
-            return
-        still: dict[str, Any] = live.explorer.still()
-        if os.environ.get("CAMVIZ_STATIC"):
-            display(still, raw=True)
-            return
-        kept = f'<div data-camviz-still="{live.still_id}">{still["text/html"]}</div>'
-        display({**still, "text/html": kept}, raw=True)
-        display(live.widget)
+        live.display({"text/html": words, "text/plain": f"{self.name}. “{self.story}”"})
 
 
 def anna_and_ben() -> tuple[FaultLabView, FaultLabView]:
@@ -146,12 +123,14 @@ def anna_and_ben() -> tuple[FaultLabView, FaultLabView]:
     return anna, anna.but(strength=0.0, noise=0.39)
 
 
-def _admitted(ward: int, patient: int, complaint: Complaint | None, story: str) -> Patient:
+def _admitted(ward: int, patient: int, complaint: str | None, story: str) -> Patient:
     rng = np.random.default_rng([ward, 2, patient])
     name = f"Patient {patient}"
     if complaint is None:
-        return Patient(name, story, Case(healthy(rng)[1]), HEALTHY)
-    fault, strength = FAULTS[complaint.fault], float(rng.uniform(*complaint.strengths))
+        return Patient(name, story, Evidence(healthy(rng)), HEALTHY)
+    fault = faults()[complaint]
+    assert fault.beyond_doubt is not None
+    strength = float(rng.uniform(*fault.beyond_doubt))
     return Patient(name, story, fault.inject(rng, strength), fault.finding)
 
 
@@ -169,29 +148,26 @@ def reply(patient: Patient, answer: Any, attempt: int) -> Verdict:
         return Verdict(patient.name, "wrong", f"{patient.name} is not well, however good the fit.", hint)
     kind = kinds()[answer]
     if patient.finding == HEALTHY:
-        said = f"With `{answer}` one sees this: {kind.symptom}. Look for it: it is not there."
+        said = f"`{answer}` looks like this: {kind.symptom} Look for it: it is not there."
         return Verdict(patient.name, "wrong", said, "How large would it have to be, to be more than noise?")
     if answer in {finding.id for finding in patient.inspected().findings}:
         said = f"The clinic names `{answer}` too, but as what follows from something else. What would cause it?"
         return Verdict(patient.name, "wrong", said, hint)
-    seen = f"With `{answer}` one sees this: {kind.symptom}. The evidence is {kind.evidence}."
-    said = f"{seen} Here it is not so, or another fault makes it so."
+    said = (
+        f"`{answer}` looks like this: {kind.symptom} {kind.evidence} Here it is not so, or another fault makes it so."
+    )
     return Verdict(patient.name, "wrong", said, hint)
 
 
 def _hint(finding: str, attempt: int) -> str:
     if finding == HEALTHY:
         return "Go through the views one by one. What do you see that noise would not do?"
+    from camviz.views.clinic.catalogue import title_of
+
     kind = kinds()[finding]
     if attempt == 1:
-        return f"Look at the view {_title(kind.view)!r} (`{kind.view}`)."
-    return f"What is seen there: {kind.symptom}."
-
-
-def _title(view: str) -> str:
-    from camviz.views.clinic.catalogue import ALIASES, VIEWS
-
-    return VIEWS[ALIASES.get(view, view)].title
+        return f"Look at the view {title_of(kind.view)!r} (`{kind.view}`)."
+    return f"There you see this: {kind.symptom}"
 
 
 def _confirmed(patient: Patient) -> str:

@@ -1,0 +1,267 @@
+"""What is left over: residuals that a richer lens, a bent board, another half of the views would explain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.cross_validation import halves
+from camviz.calibration.difference import pixel_grid
+from camviz.cameras import Camera
+from camviz.clinic.evidence import Evidence, NotChecked
+from camviz.clinic.fields import smooth_field, warp_columns
+from camviz.clinic.observed import BY_CHANCE, Observed, explained, parameter_columns
+from camviz.clinic.registry import Finding, LabFault, Rng, finding
+from camviz.clinic.virtual import SetUp, alone, changed, healthy, single, spread_boards
+from camviz.distortion import image_corner_radius
+from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
+
+SYSTEMATIC = 0.5  # of the noise: what remains of a real lens under the standard model is a third of it
+BENT = 0.005  # of the board's longer side
+FEWEST_VIEWS = 6  # to be parted in two
+DRIFTING = 0.003  # of the focal length
+APART_PX = 1.0  # the median difference of the halves over the image
+COARSE = (16, 12)  # points of the image at which they are compared
+FINE = (24, 18)  # the same for two calibrations
+SHIFTS = (0.5, 1.0)  # what conventions for the first pixel's centre differ by
+CLOSE_TO_SHIFT = 0.1
+STANDARD_ERRORS = 5.0
+
+
+@finding(
+    "model-too-simple",
+    severity="warning",
+    view="residual-radius",
+    symptom="The residuals swirl or point outward.",
+    causes=("a lens model with too few terms", "a fisheye solved with a polynomial", "a board that is not flat"),
+    remedy="Solve again with a richer model (rational, fisheye), and check that the board is flat.",
+    threshold="The field explains more than noise would in one set of a million, and at least half of the noise.",
+)
+def model_too_simple(evidence: Evidence) -> Iterator[Finding]:
+    """The check fits a smooth field over the image to all residuals. The board's bend takes its share first."""
+    for name, observed in evidence.with_corners().items():
+        best = observed.best
+        field = explained(best, name, smooth_field(best, name), warp_columns(best, name))
+        if field.chance < BY_CHANCE and field.part > SYSTEMATIC:
+            sentence = (
+                f"{name}: the lens model is too simple. A smooth pattern over the image makes up "
+                f"{field.part * best.sigma:.2g} px of the residuals ({field.part:.0%} of the noise)."
+            )
+            yield model_too_simple.found(sentence, field.part * best.sigma, "px", name)
+
+
+def richer(rng: Rng, set_up: SetUp, strength: float, *, widest: float, views: int) -> SetUp:
+    """A lens whose r⁵ term moves the image's corner by so many pixels; boards have room in its `widest` picture."""
+    grid = set_up.camera.intrinsics
+    wide, own = (
+        replace(set_up.camera, lens=BrownConrady(0.05, px / (grid.fx * image_corner_radius(grid) ** 5)))
+        for px in (widest, strength)
+    )
+    return replace(set_up, cameras=(own,), cam_from_board=spread_boards(rng, (wide,), set_up.board, views, (15, 40)))
+
+
+@model_too_simple.fault(
+    "lens too rich",
+    "px at the corner",
+    (0.3, 3, 10, 30),
+    promised=30,
+    lab=LabFault(
+        30,
+        "an r⁵ term of {0:.1f} px, at the corner, and a model with k1 only",
+        set_up=lambda seed, set_up, amount: richer(
+            np.random.default_rng(seed), set_up, amount, widest=30, views=len(set_up.cam_from_board)
+        ),
+        estimated=("fx", "fy", "cx", "cy", "k1"),
+    ),
+)
+def lens_too_rich(rng: Rng, strength: float) -> Evidence:
+    """An r⁵ term is left to a model with k1 alone."""
+    set_up = richer(rng, single(rng), strength, widest=strength, views=15)
+    return Evidence(set_up.solved(set_up.observed(rng), fixed=("k2", "p1", "p2", "k3")))
+
+
+@finding(
+    "board-warp",
+    severity="warning",
+    view="board-residuals",
+    symptom="The residuals are bowed across the board.",
+    causes=("a board that is not flat: paper on cardboard, or a sheet that hangs",),
+    remedy="Mount the board on glass or aluminium, or solve for its warp as well.",
+    threshold="Noise would show the bend in one set of a million, "
+    "and it is at least half a percent of the board's longer side.",
+)
+def board_warp(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares the joint solution with and without two parameters for the bend of the board."""
+    for name, observed in evidence.with_corners().items():
+        board = observed.adjustment.board
+        bend = explained(observed.best, name, warp_columns(observed.best, name), smooth_field(observed.best, name))
+        side = (max(board.columns, board.rows) - 1) * board.square_size
+        worst = bend.values[np.abs(bend.values).argmax()]
+        if bend.chance < BY_CHANCE and abs(worst) > BENT * side:
+            along, across = bend.values * 1000
+            sentence = (
+                f"{name}: the board is bent, by {along:.2g} mm along its rows and {across:.2g} mm along its columns. "
+                f"This is {abs(worst) / side:.1%} of its length."
+            )
+            yield board_warp.found(sentence, abs(worst) * 1000, "mm", name)
+
+
+@board_warp.fault(
+    "warped board",
+    "% of its length",
+    (0.1, 0.5, 1, 2),
+    promised=1,
+    beyond_doubt=(1.5, 2),
+    stage="set-up",
+    lab=LabFault(2, "the board is bent by {0:.2f} % of its length"),
+)
+def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
+    """The board is bent along its rows."""
+    side = (max(set_up.board.columns, set_up.board.rows) - 1) * set_up.board.square_size
+    return replace(set_up, warp=(strength / 100 * side, 0.0))
+
+
+@finding(
+    "split-disagreement",
+    severity="warning",
+    view="cross-validation",
+    symptom="The two halves of the set disagree.",
+    causes=("a focus or zoom that changed between the views", "too few views for the model"),
+    remedy="Lock focus and zoom, switch stabilisation off, take more views, and solve again.",
+    threshold="The focal length changes by 0.3 %, or the cameras differ by at least a pixel (median over the image). "
+    "Noise would show it in one set of a million.",
+)
+def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
+    """The check solves for a focal length that changes evenly over the views. It also compares the cameras from the
+    earlier and the later views, and from every other view.
+    """
+    enough = [each for each in evidence.with_corners().values() if each.best.posed.sum() >= FEWEST_VIEWS]
+    if not enough:
+        raise NotChecked(f"it needs at least {FEWEST_VIEWS} views")
+    for observed in enough:
+        yield from list(_drift(observed)) or _disagreement(observed)
+
+
+def _drift(observed: Observed) -> Iterator[Finding]:
+    """A focal length that changes evenly from the first view to the last, as one more parameter."""
+    best, name = observed.best, observed.name
+    grid = best.cameras[name].intrinsics
+    time = np.linspace(-0.5, 0.5, best.views)[:, None, None, None]
+    stretch = parameter_columns(best, name, ["fx", "fy"]) @ [[grid.fx], [grid.fy]]
+    drift = explained(best, name, np.nan_to_num(time * stretch))
+    if drift.chance < BY_CHANCE and abs(drift.values[0]) > DRIFTING:
+        sentence = (
+            f"{name}: the focal length {'grows' if drift.values[0] > 0 else 'falls'} by {abs(drift.values[0]):.2%} "
+            f"(± {drift.sigmas[0]:.2%}) from the first view to the last."
+        )
+        yield split_disagreement.found(sentence, drift.values[0] * 100, "%", name)
+
+
+def _disagreement(observed: Observed) -> Iterator[Finding]:
+    """The camera of each half of the views against their own uncertainties, parted in time and by turns."""
+    best, views = observed.best, np.cumsum(observed.best.posed)
+    splits = {"the earlier and from the later views": views <= views[-1] // 2, "every other view": views % 2 == 0}
+    results = {said: halves(best, first, camera=observed.name, grid=COARSE) for said, first in splits.items()}
+    apart = {said: float(np.nanmedian(each.difference.length)) for said, each in results.items()}
+    certain = [said for said, each in results.items() if each.probability < BY_CHANCE and apart[said] > APART_PX]
+    if certain:
+        said = max(certain, key=lambda each: apart[each])
+        sentence = (
+            f"{observed.name}: solved from {said}, the camera differs by {apart[said]:.2g} px over the image (median). "
+            f"Noise alone does that less than once in {1 / BY_CHANCE:,.0f} times."
+        )
+        yield split_disagreement.found(sentence, apart[said], "px", observed.name)
+
+
+@split_disagreement.fault(
+    "autofocus drift",
+    "%",
+    (0.2, 1, 3, 10),
+    promised=10,
+    beyond_doubt=(3, 4),
+    stage="set-up",
+    lab=LabFault(3, "the focal length grows by {0:.2f} % from first view to last"),
+)
+def autofocus_drift(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
+    """The focal length grows from the first view to the last."""
+    return replace(set_up, zoom=1 + strength / 100 * np.linspace(-0.5, 0.5, len(set_up.cam_from_board)))
+
+
+@finding(
+    "half-pixel",
+    severity="warning",
+    view="difference",
+    symptom="Everything is shifted by a constant half pixel.",
+    causes=("a program that wrote the centre of the first pixel as (0.5, 0.5) or (1, 1)",),
+    remedy="Subtract 0.5 (COLMAP, nerfstudio) or 1 (MATLAB) from cx and cy, or from the corners.",
+    threshold="The shift is the same in x and y, within 0.1 px of a half or a whole pixel. "
+    "It is at least five standard errors from none.",
+)
+def half_pixel(evidence: Evidence) -> Iterator[Finding]:
+    """The check takes the mean of all residuals, or the shift between two calibrations."""
+    others = list(evidence.counterparts())
+    if not evidence.observed and not others:
+        raise NotChecked("it needs detected corners with the poses of the board, or another calibration (--compare)")
+    findings = [finding for observed in evidence.observed.values() for finding in _shifted_corners(observed)]
+    yield from findings
+    for name, camera, other in others:
+        if name not in {finding.camera for finding in findings}:
+            yield from _shifted_camera(name, camera, other)
+
+
+def _shifted_corners(observed: Observed) -> Iterator[Finding]:
+    residuals = observed.residuals[observed.adjustment.used[observed.name]]
+    mean = residuals.mean(axis=0)
+    error = residuals.std(axis=0) / np.sqrt(len(residuals))
+    if _is_shift(mean) and (np.abs(mean) > STANDARD_ERRORS * error).all():
+        yield _shift_found(observed.name, mean, "on average over all corners")
+
+
+def _shifted_camera(name: str, camera: Camera, other: Camera) -> Iterator[Finding]:
+    """Where the other camera puts the rays of this one's pixels, in images of the same size."""
+    ours, theirs = camera.intrinsics, other.intrinsics
+    if (ours.width, ours.height) != (theirs.width, theirs.height):
+        return
+    pixels = ours.from_pixels(pixel_grid(ours, FINE))
+    shift = theirs.to_pixels(other.lens.project(camera.lens.unproject(pixels))) - ours.to_pixels(pixels)
+    shift = shift[np.isfinite(shift).all(axis=-1)]
+    if len(shift) and _is_shift(np.median(shift, axis=0)) and shift.std(axis=0).max() < CLOSE_TO_SHIFT:
+        yield _shift_found(name, np.median(shift, axis=0), "against the other calibration")
+
+
+def _is_shift(shift: Array) -> bool:
+    return any((np.abs(np.abs(shift) - size) < CLOSE_TO_SHIFT).all() for size in SHIFTS)
+
+
+def _shift_found(name: str, shift: Array, where: str) -> Finding:
+    sentence = f"{name}: pixels are shifted by ({shift[0]:+.2f}, {shift[1]:+.2f}) {where}."
+    return half_pixel.found(sentence, float(np.abs(shift).mean()), "px", name)
+
+
+@half_pixel.fault(
+    "half pixel",
+    "px",
+    (0.5, 1),
+    promised=0.5,
+    stage="solution",
+    lab=LabFault(1, "cx and cy are counted from {0:.2f} px elsewhere"),
+)
+def counted_from_elsewhere(solution: Adjustment, strength: float) -> Adjustment:
+    """cx and cy are counted from elsewhere."""
+    ((name, camera),) = solution.cameras.items()
+    grid = camera.intrinsics
+    shifted = replace(camera, intrinsics=replace(grid, cx=grid.cx + strength, cy=grid.cy + strength))
+    return replace(solution, cameras={name: shifted})
+
+
+@half_pixel.fault("half pixel between two", "px", (0.5, 1), promised=0.5)
+def half_pixel_against(rng: Rng, strength: float) -> Evidence:
+    """The same without corners, beside the calibration as it was."""
+    calibration = healthy(rng)
+    grid = calibration.cameras["camera"].intrinsics
+    shifted = changed(calibration, cx=grid.cx + strength, cy=grid.cy + strength)
+    return Evidence(alone(shifted), alone(calibration))
