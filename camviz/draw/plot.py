@@ -17,10 +17,19 @@ def plot_panel(
     return Panel(name, x, y, width, height, xlim[0], xlim[1], ylim[1], ylim[0])
 
 
-def axes(panel: Panel, xlabel: str, ylabel: str, xticks: Ticks | None = None, yticks: Ticks | None = None) -> str:
+def axes(
+    panel: Panel,
+    xlabel: str,
+    ylabel: str,
+    xticks: Ticks | None = None,
+    yticks: Ticks | None = None,
+    *,
+    aside: float = 40,
+) -> str:
     """Tick labels and axis names around a plot panel, to stand beside `panel.show(grid(panel) + …)`.
 
-    Ticks are found where none are given as (place, words), as for a logarithmic axis.
+    Ticks are found where none are given as (place, words), as for a logarithmic axis. The name of the y axis stands
+    `aside` units to the left of it.
     """
     xs = _found(panel.left, panel.right, panel.width) if xticks is None else xticks
     ys = _found(panel.bottom, panel.top, panel.height) if yticks is None else yticks
@@ -33,7 +42,7 @@ def axes(panel: Panel, xlabel: str, ylabel: str, xticks: Ticks | None = None, yt
         for py, (_, words) in zip(panel.place(_pairs(panel.left, _places(ys)))[:, 1], ys, strict=True)
     ]
     parts.append(svg.text((panel.x + panel.width / 2, panel.y + panel.height + 34), xlabel, "note middle"))
-    x, y = panel.x - 40, panel.y + panel.height / 2
+    x, y = panel.x - aside, panel.y + panel.height / 2
     parts.append(svg.text((x, y), ylabel, "note middle", transform=f"rotate(-90 {x:g} {y:g})"))
     return "".join(parts)
 
@@ -42,10 +51,19 @@ def grid(panel: Panel, xticks: Ticks | None = None, yticks: Ticks | None = None)
     """Grid lines at the ticks, and the axes x = 0 and y = 0 where they are inside."""
     xs = _places(_found(panel.left, panel.right, panel.width) if xticks is None else xticks)
     ys = _places(_found(panel.bottom, panel.top, panel.height) if yticks is None else yticks)
-    lines = [_pairs(x, (panel.bottom, panel.top)) for x in xs] + [_pairs((panel.left, panel.right), y) for y in ys]
     zeros = [_pairs(0, (panel.bottom, panel.top))] if panel.left <= 0 <= panel.right else []
     zeros += [_pairs((panel.left, panel.right), 0)] if panel.bottom <= 0 <= panel.top else []
-    return svg.path(map(panel.place, lines), "grid") + svg.path(map(panel.place, zeros), "axis")
+    return _lines(panel, xs, ys) + svg.path(map(panel.place, zeros), "axis")
+
+
+def logarithmic_grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:
+    """Grid lines at the ticks of axes that hold logarithms, on which 0 is no place of its own."""
+    return _lines(panel, _places(xticks), _places(yticks))
+
+
+def _lines(panel: Panel, xs: Sequence[float], ys: Sequence[float]) -> str:
+    lines = [_pairs(x, (panel.bottom, panel.top)) for x in xs] + [_pairs((panel.left, panel.right), y) for y in ys]
+    return svg.path(map(panel.place, lines), "grid")
 
 
 def curve(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
@@ -77,6 +95,12 @@ def logarithmic(low: float, high: float) -> list[tuple[float, str]]:
     values = np.sort(np.outer(powers, factors).ravel())
     values = values[(np.log10(values) >= low - 1e-9) & (np.log10(values) <= high + 1e-9)]
     return [(float(np.log10(value)), f"{value:g}") for value in values]
+
+
+def logs(pair: tuple[float, float]) -> tuple[float, float]:
+    """The base-10 logarithms of two numbers: a place on logarithmic axes, or the limits of one."""
+    low, high = np.log10(pair)
+    return float(low), float(high)
 
 
 def band(panel: Panel, x0: float, x1: float, class_: str) -> str:

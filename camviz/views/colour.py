@@ -19,9 +19,9 @@ from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel
-from camviz.draw.panel import photograph as photograph_panel
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, readout
 from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views import swatches
@@ -226,8 +226,7 @@ class ColourView(View):
         return {"its metamer": f"eye ΔE {apart:.1f}, sensor 0" if apart > 1e-6 else "none: it is an eye"}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         words = f"{self.camera} in {self._light_in_words()}, white balance {self.method}, matrix {self.matrix}"
         return f"{words}, gamma {self.gamma}: {figures}."
 
@@ -240,7 +239,7 @@ class ColourView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         image, height = self.image(draft=draft), LAYOUTS[self.panels]
         photographs = {"photograph": jpeg(image)}
-        body = [svg.rectangle(0, 0, 960, height, "paper")]
+        body = []
         if "spectra" in self.panels:
             body += [self._light_panel(), self._surface_panel(), self._sensor_panel()]
         body += [
@@ -260,7 +259,7 @@ class ColourView(View):
             photographs |= attached
         if "steps" in self.panels:
             body.append(self._steps())
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The photograph as developed, uint8 sRGB."""
@@ -310,13 +309,11 @@ class ColourView(View):
     def _photograph_panel(self, image: np.ndarray, name: str = "photograph", top: float | None = None) -> str:
         height, width = image.shape[:2]
         panel = image_panel(name, _PHOTOGRAPH, self._top if top is None else top, 330, width, height, tallest=262)
-        return panel.show(photograph_panel(panel, name, width, height), title="Developed in the same way")
+        return panel.show(placed_image(panel, name, width, height), title="Developed in the same way")
 
     def _numbers_column(self) -> str:
         rows, top = [svg.text((_COLUMN, self._top - 8), "In numbers", "title")], self._top
-        for i, (name, figure) in enumerate(self._told().items()):
-            rows.append(svg.text((_COLUMN, top + 14 + 42 * i), name, "note"))
-            rows.append(svg.text((_COLUMN, top + 30 + 42 * i), figure, "label", style="font-size:12px"))
+        rows.append(readout(self._told(), (_COLUMN, top + 14), (0, 42), (0, 16), style="font-size:12px"))
         return "".join(rows)
 
     def _steps(self) -> str:

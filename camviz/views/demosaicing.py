@@ -19,10 +19,10 @@ from camviz import mosaics
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.heat import heat_key, heat_map, heat_panel
-from camviz.draw.panel import Panel, image_panel
-from camviz.draw.panel import photograph as drawn
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
+from camviz.draw.readout import listed
+from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
 from camviz.mosaics.measures import Measures
@@ -55,6 +55,7 @@ class DemosaicingView(View):
     """
 
     title: ClassVar[str] = "Demosaicing"
+    layouts = LAYOUTS
 
     picture: str = choice("zone plate", "astronaut", "garden", help="grey rings, a photograph, or the virtual garden")
     highest: float = slider(
@@ -80,8 +81,6 @@ class DemosaicingView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in LAYOUTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, LAYOUTS))}, got {self.panels!r}")
         own = self.photograph
         if own is not None and not (own.dtype == np.uint8 and own.shape[2:] == (3,) and min(own.shape[:2]) >= LOUPE):
             takes = f"uint8 (height, width, 3), at least {LOUPE} pixels each way"
@@ -183,8 +182,7 @@ class DemosaicingView(View):
         return {"loupe at": f"({fu:.2f}, {fv:.2f}) cycles/px".replace("-", "−"), "carrier": f"{_place(near)}: {beat}"}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         blur = f"four spots {self.spots_px:g} px apart" if self.spots_px else "no blur before sampling"
         name = "a photograph" if self.photograph is not None else f"the {self.picture}"
         rings = f" up to {self.highest:g} cycles/px" if self.frequency is not None else ""
@@ -195,7 +193,7 @@ class DemosaicingView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
         height = 480 if "yours" in self.panels else 552
-        body = [svg.rectangle(0, 0, 960, height, "paper"), self._large_panel(photographs, draft)]
+        body = [self._large_panel(photographs, draft)]
         if "yours" in self.panels:
             body.append(self._your_panel(photographs, draft))
         else:
@@ -203,7 +201,7 @@ class DemosaicingView(View):
         if "spectrum" in self.panels:
             body.append(self._spectrum_panel(photographs))
         body.append(self._words())
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     @cached_property
     def _panel(self) -> Panel:
@@ -226,7 +224,7 @@ class DemosaicingView(View):
         pixels = to_display(mosaics.in_colour(self.measured, self.filters)) if self.show == "mosaic" else self.rebuilt
         title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
         photographs["picture"] = jpeg(pixels, 90)
-        return self._panel.show(drawn(self._panel, "picture", width, height) + marks, title=title, **heading)
+        return self._panel.show(placed_image(self._panel, "picture", width, height) + marks, title=title, **heading)
 
     def _map_of_errors(
         self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: str, **heading: Any
@@ -248,7 +246,7 @@ class DemosaicingView(View):
             title = "What colour is false in yours"
             return self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
         photographs["yours"] = jpeg(pixels, 90)
-        return panel.show(drawn(panel, "yours", width, height) + self._predicted(), title="With your green")
+        return panel.show(placed_image(panel, "yours", width, height) + self._predicted(), title="With your green")
 
     def _rebuilt_by(self) -> str:
         return self.used if self.used == self.algorithm else f"{self.used} ({self.algorithm} is for Bayer's patterns)"

@@ -19,15 +19,16 @@ from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
+from camviz.draw.readout import listed, readout
+from camviz.draw.space import Item, Line, OrbitCamera, axes_triad, space_panel
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import on_plane, unit
 from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene
 from camviz.views import garden
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import OrbitView, choice, slider, switch
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
@@ -42,7 +43,7 @@ _COLUMN = 822  # where the numbers stand
 
 
 @dataclass(frozen=True)
-class DistortionView(View):
+class DistortionView(OrbitView):
     """What a lens does to straight lines, and where its model stops being one.
 
     The coefficients are those of Brown and Conrady in OpenCV's order; with `lens` set, that lens is shown instead.
@@ -72,7 +73,7 @@ class DistortionView(View):
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 90))
     lens: Lens | None = None
     photograph: np.ndarray | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(target=(0.0, 0.0, 0.45), distance=2.5, yaw_deg=-35, pitch_deg=25)
+    eye: OrbitCamera = OrbitCamera(target=(0.0, 0.0, 0.45), distance=2.5, yaw_deg=-35, pitch_deg=25)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -89,7 +90,9 @@ class DistortionView(View):
             coefficients = {name: getattr(lens, name) for name in names}
             return cls(intrinsics=camera.intrinsics, photograph=photograph, **coefficients)
         aside = lens.unproject(camera.intrinsics.from_pixels(camera.intrinsics.border(4)))[:, 2]
-        eye = cls.eye if np.min(aside) > 0.25 else Eye(distance=3.7, yaw_deg=-35, pitch_deg=25)  # NaN stands back too
+        eye = (
+            cls.eye if np.min(aside) > 0.25 else OrbitCamera(distance=3.7, yaw_deg=-35, pitch_deg=25)
+        )  # NaN stands back too
         return cls(intrinsics=camera.intrinsics, lens=lens, photograph=photograph, eye=eye)
 
     @cached_property
@@ -157,8 +160,7 @@ class DistortionView(View):
         return "g(r) = r" + (f" ({above})" if above != "1" else "") + (f" / ({below})" if below != "1" else "")
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         return f"{self._name()}: {figures}. Picture shown {self.show}."
 
     def figure(self, *, draft: bool = False) -> Picture:
@@ -171,13 +173,13 @@ class DistortionView(View):
             "rays": self._frustum_panel,
         }
         height = _HEIGHTS[len(names)]
-        body, photographs = [svg.rectangle(0, 0, 960, height, "paper")], dict[str, bytes]()
+        body, photographs = [], dict[str, bytes]()
         for name, slot in zip(names, _SLOTS[len(names)], strict=True):
             content, attached = draw[name](*slot, draft=draft)
             body.append(content)
             photographs |= attached
         body.append(self._numbers_column(names))
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     def _name(self) -> str:
         if self.lens:
@@ -236,7 +238,7 @@ class DistortionView(View):
         return image_panel(name, x, y, width, self.intrinsics.width, self.intrinsics.height, tallest=tallest)
 
     def _photograph(self, panel: Panel, attached: str) -> str:
-        return photograph(panel, attached, self.intrinsics.width, self.intrinsics.height)
+        return placed_image(panel, attached, self.intrinsics.width, self.intrinsics.height)
 
     # The reader's own function ---------------------------------------------------------------------------------------
 
@@ -373,10 +375,8 @@ class DistortionView(View):
         self, x: float, y: float, width: float, tallest: float, *, draft: bool
     ) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("frustum", x, y, width, tallest)
-        content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
-        shown = panel.show(content, title="Its rays in space", hint="drag to turn", drag="orbit", label=label)
-        return shown, photographs
+        return self.in_space(panel, self._bent_frustum(), draft, "Its rays in space", label, drag="orbit")
 
     def _bent_frustum(self) -> list[Item]:
         """The rays of a grid of pixels, a metre long, beside those of a pinhole with the same intrinsics."""
@@ -392,12 +392,6 @@ class DistortionView(View):
             *axes_triad(RigidTransform.identity(), 0.4),
         ]
 
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> DistortionView:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> DistortionView:
-        return self.but(eye=self.eye.key(key))
-
     # The numbers -----------------------------------------------------------------------------------------------------
 
     def _numbers_column(self, panels: list[str]) -> str:
@@ -410,9 +404,7 @@ class DistortionView(View):
             class_ = "number" if value else "number faint"
             rows.append(svg.text((_COLUMN, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
         top = 80 + 18 * len(coefficients)
-        for i, (name, figure) in enumerate(self._told().items()):
-            rows.append(svg.text((_COLUMN, top + 40 * i), name, "note"))
-            rows.append(svg.text((_COLUMN, top + 17 + 40 * i), figure, "label"))
+        rows.append(readout(self._told(), (_COLUMN, top), (0, 40), (0, 17)))
         return "".join(rows)
 
 

@@ -15,14 +15,15 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import image_panel, photograph
+from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, readout
 from camviz.optics import exposure_value, relative_illumination, unvignetted_share
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
 from camviz.sensors.frozen import Draw, exposed
 from camviz.views import garden
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, choice, positive, slider
 
 FULL_WELL_E = 30_000.0
 READ_NOISE_E = 3.0
@@ -60,8 +61,7 @@ class ExposureView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.f_number > 0:
-            raise ValueError(f"f_number must be positive, got {self.f_number}")
+        positive(self, "f_number")
 
     # What is true -----------------------------------------------------------------------------------------------------
 
@@ -150,8 +150,7 @@ class ExposureView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         who = "metered by the average" if self.metering == "average" else "set by hand"
         return f"The {self.subject} at EV {self.light_ev:.3g}, {who}, vignetting {self.vignetting}: {figures}."
 
@@ -163,7 +162,6 @@ class ExposureView(View):
         corners, problem = self._corner_panel()
         body = "".join(
             [
-                svg.rectangle(0, 0, 960, height, "paper"),
                 self._picture_panel(),
                 self._histogram_panel(recorded),
                 self._stops_panel(),
@@ -172,11 +170,11 @@ class ExposureView(View):
                 self._numbers_column(),
             ]
         )
-        return Picture(body, 960, height, self.title, self.description(), {"camera": jpeg(to_display(recorded))})
+        return self.composed(height, body, attached={"camera": jpeg(to_display(recorded))})
 
     def _picture_panel(self) -> str:
         panel = image_panel("picture", 20, 34, 420, _WIDTH, _HEIGHT)
-        shown = photograph(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
+        shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
         note = f"f/{self.f_number:.3g}, {seconds(2.0**self.shutter_stops)}, ISO {100 * 2**self.iso:.0f}"
         return panel.show(shown, title="The picture", note=note)
 
@@ -240,11 +238,7 @@ class ExposureView(View):
         return shown + plot.axes(panel, "height on the sensor (mm)", "light, 1 on the axis"), problem
 
     def _numbers_column(self) -> str:
-        rows = [svg.text((790, 26), "This exposure", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((790, 54 + 44 * i), name, "note"))
-            rows.append(svg.text((790, 71 + 44 * i), value, "label"))
-        return "".join(rows)
+        return svg.text((790, 26), "This exposure", "title") + readout(self.numbers(), (790, 54), (0, 44), (0, 17))
 
 
 _CORNER_MM = float(np.hypot(*SENSOR_MM)) / 2

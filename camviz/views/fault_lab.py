@@ -18,6 +18,7 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.marks import arrows
@@ -45,6 +46,7 @@ class FaultLabView(View):
     """
 
     title: ClassVar[str] = "Fault lab"
+    layouts = _HEIGHTS
 
     fault: str = choice(next(iter(ILLNESSES)), *list(ILLNESSES)[1:], help="what is wrong")
     strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
@@ -56,11 +58,6 @@ class FaultLabView(View):
     panels: str = _EVERYTHING
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     verdict: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.panels not in _HEIGHTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
 
     @cached_property
     def experiment(self) -> Experiment:
@@ -86,12 +83,11 @@ class FaultLabView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         cause = f"{self.fault}, strength {self.strength:g}: {self.experiment.words}; " if self.told else ""
         if self.panels != _EVERYTHING:
             return f"{cause}error of the fit {self.numbers()['error of the fit']}."
         told = self._diagnosis() if self.told else "Findings hidden."
-        numbers = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        numbers = listed(self.numbers())
         estimates = "; ".join(
             f"{k} {'+' if e > 0 else '−'}{figures(abs(e))} ± {figures(s)} px"
             for k, (e, s) in self.experiment.estimates.items()
@@ -106,11 +102,11 @@ class FaultLabView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         height = _HEIGHTS[self.panels]
-        body = svg.rectangle(0, 0, 960, height, "paper") + self._headline() + self._bars_panel() + self._image_panel()
+        body = self._headline() + self._bars_panel() + self._image_panel()
         if self.panels == _EVERYTHING:
             body += self._estimates_panel() + self._findings(draft)
         words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
-        return Picture(body, 960, height, self.title, words)
+        return self.composed(height, body, described=words)
 
     def _headline(self) -> str:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",

@@ -18,14 +18,15 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.items import Dots, Item, Line, axes_triad
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, draw_space, space_panel
+from camviz.draw.readout import listed, readout
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses import Equidistant, Equisolid, Lens, Orthographic, Perspective, Stereographic
 from camviz.lenses.base import Array
 from camviz.panoramas.reprojection import reproject, window
 from camviz.views import garden
-from camviz.views.base import View, choice, slider
+from camviz.views.base import OrbitView, choice, slider
 from camviz.views.marks import on_photograph
 
 SIDE = 480  # pixels of the picture, which is square
@@ -78,7 +79,7 @@ _TOLD = {  # the figures that few panels speak of
 
 
 @dataclass(frozen=True)
-class FisheyeView(View):
+class FisheyeView(OrbitView):
     """What a fisheye does to the angle of a ray, and that a straight picture can be cut out of its round one.
 
     `panels` names what is drawn: "picture curves", "picture window", or both and "rays" or "yours". `yours` is a
@@ -86,6 +87,7 @@ class FisheyeView(View):
     """
 
     title: ClassVar[str] = "Fisheye"
+    layouts = _SLOTS
 
     projection: str = choice(*LENSES, help="how the angle θ of a ray becomes a distance r from the picture's middle")
     f: float = slider(
@@ -96,12 +98,7 @@ class FisheyeView(View):
     hfov_deg: float = slider(80.0, 20.0, 120.0, 1.0, label="window's field", unit="°", help="of the perspective window")
     panels: str = "picture window curves rays"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(target=(0.0, 0.0, 0.2), distance=4.4, yaw_deg=-40, pitch_deg=22)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.panels not in _SLOTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
+    eye: OrbitCamera = OrbitCamera(target=(0.0, 0.0, 0.2), distance=4.4, yaw_deg=-40, pitch_deg=22)
 
     # Cameras ---------------------------------------------------------------------------------------------------------
 
@@ -151,8 +148,7 @@ class FisheyeView(View):
         return {name: figures[name] for name in _TOLD.get(self.panels, figures)}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         window = (
             f" The window looks {self.yaw_deg:.0f}° to the right and {self.pitch_deg:.0f}° up "
             f"and is {self.hfov_deg:.0f}° wide."
@@ -169,7 +165,7 @@ class FisheyeView(View):
         slots, height = _SLOTS[self.panels]
         image, taken = _photographed(self.camera, garden.DRAFT if draft else garden.FINE)
         photographs = {"fisheye": taken}
-        body = [svg.rectangle(0, 0, 960, height, "paper"), self._picture_panel()]
+        body = [self._picture_panel()]
         if self._has("window"):
             photographs["window"] = jpeg(self._cut(image, draft))
             body.append(self._window_panel())
@@ -184,7 +180,7 @@ class FisheyeView(View):
             photographs |= attached
             body.append(yours)
         body.append(self._numbers_column())
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     def _cut(self, image: np.ndarray, draft: bool) -> np.ndarray:
         """The window's picture, cut out of the fisheye's `image`, which is as small as a draft is."""
@@ -202,7 +198,7 @@ class FisheyeView(View):
 
     def _picture_panel(self) -> str:
         panel = self._panel
-        content = photograph(panel, "fisheye", SIDE, SIDE) + self._grid_lines(panel)
+        content = placed_image(panel, "fisheye", SIDE, SIDE) + self._grid_lines(panel)
         title = f"The {self.projection} lens"
         if not self._has("window"):
             return panel.show(content, title=title)
@@ -218,7 +214,7 @@ class FisheyeView(View):
         x, y, width, _ = _SLOTS[self.panels][0]["window"]
         panel = image_panel("cut", x, y, width, 320, 240)
         note = f"perspective, {self.hfov_deg:.0f}° wide"
-        return panel.show(photograph(panel, "window", 320, 240), title="The window cut out of it", note=note)
+        return panel.show(placed_image(panel, "window", 320, 240), title="The window cut out of it", note=note)
 
     def _curves_panel(self, x: float, y: float, width: float, height: float) -> str:
         panel = plot.plot_panel("curves", x, y, width, height, (0, 180), (-1.8 if self.yours else 0, _TOP))
@@ -290,7 +286,7 @@ class FisheyeView(View):
             return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
         places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (image.shape[1] / SIDE) - 0.5
         cut = cv2.remap(image, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=_GREY)
-        return panel.show(photograph(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
+        return panel.show(placed_image(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
     def _weight(self, name: str) -> str:
         return "thick" if name == self.projection else "half"
@@ -313,9 +309,8 @@ class FisheyeView(View):
         self, x: float, y: float, width: float, height: float, *, draft: bool
     ) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("dome", x, y, width, height)
-        content, photographs = draw_space(panel, self._rays(), self.eye, draft=draft, renderer="wire")
         label = "The rays in space; drag or press the arrow keys to walk around"
-        return panel.show(content, title="Its rays", hint="drag to turn", drag="eye", label=label), photographs
+        return self.in_space(panel, self._rays(), draft, "Its rays", label)
 
     def _rays(self) -> list[Item]:
         """Where circles equally far apart in the picture come from, on a sphere around the camera; and the window."""
@@ -340,9 +335,7 @@ class FisheyeView(View):
         x = 775
         rows = [svg.text((x, 26), "This lens", "title"), svg.text((x, 50), EQUATIONS[self.projection], "label")]
         rows.append(svg.text((x, 70), f"f = {self.f:g} px", "label"))
-        for i, (name, value) in enumerate(self._told().items()):
-            rows.append(svg.text((x, 104 + 42 * i), name, "note"))
-            rows.append(svg.text((x, 121 + 42 * i), value, "label"))
+        rows.append(readout(self._told(), (x, 104), (0, 42), (0, 17)))
         if self.panels in _TOLD:
             return "".join(rows)
         rows.append(svg.text((x, 394), "r / f at 30°, 60°, 90°", "title"))
@@ -365,17 +358,14 @@ class FisheyeView(View):
     # Touch -----------------------------------------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.orbited(dx, dy))
-        return self._looking_at(
-            self.camera.project(_direction(self.yaw_deg, self.pitch_deg)) + (dx, dy) / self._panel.scale
-        )
+        if handle != "window":
+            return super().dragged(handle, x, y, dx, dy)
+        here = self.camera.project(_direction(self.yaw_deg, self.pitch_deg))
+        return self._looking_at(here + (dx, dy) / self._panel.scale)
 
     def pressed(self, handle: str, key: str) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.key(key))
         zooms = {"+": -5.0, "=": -5.0, "-": 5.0, "_": 5.0}
-        if key in zooms:
+        if handle == "window" and key in zooms:
             return self.but(hfov_deg=min(120.0, max(20.0, self.hfov_deg + zooms[key])))
         return super().pressed(handle, key)
 

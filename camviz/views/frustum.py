@@ -16,14 +16,14 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture
 from camviz.draw.space import (
     Dots,
-    Eye,
     Item,
     Label,
     Line,
+    OrbitCamera,
     axes_triad,
     camera_body,
     chosen_renderer,
@@ -36,7 +36,7 @@ from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import OrbitView, choice, slider, switch
 from camviz.views.marks import border_arrow, clipped
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
@@ -51,7 +51,7 @@ def _degrees(default: float, reach: float, label: str, help: str) -> Any:
 
 
 @dataclass(frozen=True)
-class FrustumView(View):
+class FrustumView(OrbitView):
     """Where a camera stands, which way it looks, and what of the world it therefore sees.
 
     x, y, z are what `mode` says: the camera's centre C ("edit C"), the t of its extrinsics [R | t] ("edit t"), or where
@@ -79,7 +79,7 @@ class FrustumView(View):
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 60))
     lens: Lens = field(default_factory=Perspective)
-    eye: Eye = Eye(target=(0.0, 0.3, 2.2), distance=8.0, yaw_deg=-38, pitch_deg=24)
+    eye: OrbitCamera = OrbitCamera(target=(0.0, 0.3, 2.2), distance=8.0, yaw_deg=-38, pitch_deg=24)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -152,7 +152,6 @@ class FrustumView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         seen = int(self.camera.sees(board_corners()).sum())
         return (
@@ -166,8 +165,8 @@ class FrustumView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         image, taken = garden.drafted(self.camera) if draft else garden.taken(self.camera, garden.FINE)
         world, photographs = self._world_panel(image, draft)
-        body = svg.rectangle(0, 0, 960, 580, "paper") + world + self._picture_panel() + self._numbers_panel()
-        return Picture(body, 960, 580, self.title, self.description(), photographs | {"camera": taken})
+        body = world + self._picture_panel() + self._numbers_panel()
+        return self.composed(580, body, attached=photographs | {"camera": taken})
 
     def _world_panel(self, image: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
         panel = space_panel("world", 20, 34, 540, 400)
@@ -208,7 +207,7 @@ class FrustumView(View):
     def _picture_panel(self) -> str:
         k = self.camera.intrinsics
         panel = image_panel("picture", 580, 34, 360, k.width, k.height, tallest=270)
-        content = photograph(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
+        content = placed_image(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
         label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
         return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)
 
@@ -271,14 +270,14 @@ class FrustumView(View):
     # Touch -----------------------------------------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.orbited(dx, dy))
+        if handle != "picture":
+            return super().dragged(handle, x, y, dx, dy)
         turn = self.hfov_deg / 360
         return self._turned(-turn * dx, turn * dy)
 
     def pressed(self, handle: str, key: str) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.key(key))
+        if handle != "picture":
+            return super().pressed(handle, key)
         turns = {"ArrowLeft": (-2, 0), "ArrowRight": (2, 0), "ArrowUp": (0, 2), "ArrowDown": (0, -2)}
         zooms = {"+": -2.0, "=": -2.0, "-": 2.0}
         if key in turns:

@@ -17,15 +17,16 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, bars, between, curve, grid, legend, logarithmic, plot_panel
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
 from camviz.scenes import render, textured_scene
 from camviz.sensors import DigitalCamera, Sensor, decibel
 from camviz.sensors.digital_camera import Shot
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, choice, positive, slider
 
 SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
 SCENE_LUX = 1000.0
@@ -71,8 +72,7 @@ class ImageSensorView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.exposure_ms > 0:
-            raise ValueError(f"exposure_ms must be positive, got {self.exposure_ms}")
+        positive(self, "exposure_ms")
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -138,8 +138,7 @@ class ImageSensorView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         full = " and ".join(name for (name, _), e in zip(CHANNELS, self.white_e, strict=False) if e > self.full_well)
         return (
             f"{_MODELS[self.model].name} under {self.light}, {self.exposure_ms:g} ms, fill factor "
@@ -152,9 +151,9 @@ class ImageSensorView(View):
         width = SMALL if draft else LARGE
         picture = self.shot(width).picture
         panel = image_panel("picture", 590, 34, 350, width, width * 3 // 4)
-        shown = panel.show(photograph(panel, "picture", width, width * 3 // 4), title="What becomes of it")
-        body = svg.rectangle(0, 0, 960, 590, "paper") + self._spectra() + self._electrons() + shown + self._numbers()
-        return Picture(body, 960, 590, self.title, self.description(), {"picture": jpeg(picture, 92)})
+        shown = panel.show(placed_image(panel, "picture", width, width * 3 // 4), title="What becomes of it")
+        body = self._spectra() + self._electrons() + shown + self._numbers()
+        return self.composed(590, body, attached={"picture": jpeg(picture, 92)})
 
     def _spectra(self) -> str:
         panel = plot_panel("efficiency", 70, 34, 480, 210, (380, 780), (0, 100))
@@ -228,9 +227,7 @@ class ImageSensorView(View):
 
     def _numbers(self) -> str:
         rows = [svg.text((590, 336), "This sensor", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((590, 362 + 24 * i), name, "note"))
-            rows.append(svg.text((756, 362 + 24 * i), value, "label"))
+        rows.append(readout(self.numbers(), (590, 362), (0, 24), (166, 0)))
         rows.append(svg.paragraph((590, 548), _MODELS[self.model].source, 350))
         return "".join(rows)
 

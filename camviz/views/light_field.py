@@ -15,9 +15,10 @@ import numpy as np
 
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.heat import heat_key, heat_map, heat_panel
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
+from camviz.draw.readout import listed
+from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.lightfields import LightField, aperture, refocus, to_microlens_image
 from camviz.scenes import to_display
@@ -65,6 +66,7 @@ class LightFieldView(View):
     """
 
     title: ClassVar[str] = "Light field"
+    layouts = _SLOTS
 
     slope: float = slider(0.0, _LOW, _HIGH, 0.02, unit="px", help="how far a sharp point moves from view to view")
     aperture: str = choice("full", "half", "ring", "pinhole", help="which views are summed")
@@ -84,8 +86,6 @@ class LightFieldView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in _SLOTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
         for name, size in zip(("v", "u", "row", "column"), self.views.shape, strict=False):
             value = getattr(self, name)
             if int(value) != value or not 0 <= value < size:
@@ -177,8 +177,7 @@ class LightFieldView(View):
         return _SLOTS[self.panels][0][name]
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         shown = (
             "the slope of every pixel" if self.show == "slopes" else f"the picture for slope {_signed(self.slope)} px"
         )
@@ -192,7 +191,7 @@ class LightFieldView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         attached: dict[str, bytes] = {}
         height = _SLOTS[self.panels][1]
-        body = [svg.rectangle(0, 0, 960, height, "paper"), self._picture_panel(attached)]
+        body = [self._picture_panel(attached)]
         if self._has("slice"):
             attached["slice"] = png(_bytes(self.light_field.views[self.v, :, self._slice_row]))
             body.append(self._slice_panel())
@@ -211,7 +210,7 @@ class LightFieldView(View):
         if self._has("yours"):
             body.append(self._your_panel(attached))
         body.append(self._numbers_block())
-        return Picture("".join(body), 960, height, self.title, self.description(), attached)
+        return self.composed(height, *body, attached=attached)
 
     # The picture and its slice ---------------------------------------------------------------------------------------
 
@@ -238,7 +237,7 @@ class LightFieldView(View):
             return heat_panel(panel, width, height, low, high, "px", marks, title=title, **heading)
         attached["picture"] = jpeg(self.image(), quality=90)
         title = "One view" if self.aperture == "pinhole" else f"Refocused: shear by {_signed(self.slope)} px, sum"
-        return panel.show(photograph(panel, "picture", width, height) + marks, title=title, **heading)
+        return panel.show(placed_image(panel, "picture", width, height) + marks, title=title, **heading)
 
     def _row_handle(self, left_end: Array) -> str:
         grip = svg.rectangle(left_end[0], left_end[1] - 9, 16, 18, "paper half") + svg.polygon(
@@ -423,7 +422,7 @@ class LightFieldView(View):
             return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Focused by your slope")
         attached["yours"] = jpeg(to_display(refocus(self.light_field, slope, self.mask)), quality=90)
         note = f"sheared by {_signed(slope)} px"
-        return panel.show(photograph(panel, "yours", width, height), title="Focused by your slope", note=note)
+        return panel.show(placed_image(panel, "yours", width, height), title="Focused by your slope", note=note)
 
     # Under the pointer -----------------------------------------------------------------------------------------------
 

@@ -9,9 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from camviz.draw import panel as panels
 from camviz.draw import plot, svg
+from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed
 from camviz.optics import SlantedEdge
 from camviz.scenes import to_display
 from camviz.views.base import View
@@ -44,12 +45,11 @@ class MeasuredEdgeView(View):
     name: str = "this edge"
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, 330, "paper") + self._photograph() + self._profile() + self._curve()
+        body = self._photograph() + self._profile() + self._curve()
         light = self.edge.image / max(float(np.percentile(self.edge.image, 99)), 1e-12)
-        return Picture(body, 960, 330, self.title, self.description(), {"edge": jpeg(to_display(light))})
+        return self.composed(330, body, attached={"edge": jpeg(to_display(light))})
 
     def description(self) -> str:
-        """The figures in words and numbers."""
         edge = self.edge
         figures = {
             "mtf50_cycles_per_pixel": edge.mtf50,
@@ -57,14 +57,14 @@ class MeasuredEdgeView(View):
             "rise_10_90_pixels": edge.rise,
             "angle_deg": abs(edge.angle_deg),
         }
-        return f"{self.name}: " + "; ".join(f"{words} {value}" for words, value in written(figures).items()) + "."
+        return f"{self.name}: " + listed(written(figures)) + "."
 
     def _photograph(self) -> str:
         height, width = self.edge.image.shape
-        panel = panels.image_panel("photograph", 20, 40, 240, width, height, tallest=236)
+        panel = image_panel("photograph", 20, 40, 240, width, height, tallest=236)
         v = np.array([-0.5, height - 0.5])
         slope, intercept = self.edge.line
-        content = panels.photograph(panel, "edge", width, height)
+        content = placed_image(panel, "edge", width, height)
         content += svg.line(panel.place(np.stack([slope * v + intercept, v], axis=-1)), "orange")
         return panel.show(content, title="The edge", note=f"{abs(self.edge.angle_deg):.1f}°")
 

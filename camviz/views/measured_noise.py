@@ -11,6 +11,7 @@ import numpy as np
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed
 from camviz.sensors.measurement import LINEAR, Measurement
 from camviz.sensors.trust import Figure
 from camviz.views.base import View
@@ -30,12 +31,11 @@ class MeasuredNoiseView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         panels = [self.transfer_panel(80, 40), self.response_panel(550, 40), self.snr_panel(80, 340)]
-        body = svg.rectangle(0, 0, 960, 612, "paper") + "".join([*panels, self.dark_panel(550, 340)])
-        return Picture(body, 960, 612, self.title, self.description())
+        body = "".join([*panels, self.dark_panel(550, 340)])
+        return self.composed(612, body)
 
     def description(self) -> str:
-        """The figures in words and numbers."""
-        known = "; ".join(f"{words} {value}" for words, value in self.numbers().items())
+        known = listed(self.numbers())
         return f"{self.name}, {len(self.measurement.levels)} levels of exposure: {known}."
 
     def numbers(self) -> dict[str, str]:

@@ -16,8 +16,9 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, readout
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
 from camviz.sensors.frozen import Draw, exposed
@@ -48,6 +49,7 @@ class PhotonTransferView(View):
     """
 
     title: ClassVar[str] = "Photon transfer"
+    layouts = _HEIGHTS
 
     exposure: float = slider(-3.0, -10.0, 3.0, 0.25, unit="stops", help="0 is one second; −1 half of it")
     gain: float = slider(1.0, 1.0, 16.0, 0.5, unit="×", help="more numbers for each electron, as ISO does")
@@ -67,8 +69,6 @@ class PhotonTransferView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in _HEIGHTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
         for name in ("gain", "frames", "bits"):
             if not getattr(self, name) >= 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -189,8 +189,7 @@ class PhotonTransferView(View):
         return min(2**self.bits - 1.0, well)
 
     def description(self, pixels: int = 3000) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told(pixels).items())
+        figures = listed(self._told(pixels))
         how = "the difference of two frames" if self.difference else "one frame"
         return f"Noise of {how}, {self.bits} bits, {self.temperature_c:g} °C, {self.frames} averaged: {figures}."
 
@@ -208,12 +207,14 @@ class PhotonTransferView(View):
         pixels = 1500 if draft else 3000
         dn = self.image(draft=draft)
         height = _HEIGHTS[self.panels]
-        body = svg.rectangle(0, 0, 960, height, "paper") + self._picture_panel() + self._transfer_panel(pixels)
+        body = self._picture_panel() + self._transfer_panel(pixels)
         if self.panels == _EVERYTHING:
             body += self._histogram_panel(dn) + self._numbers_column(pixels, 490, 448) + self._legend(764, 454)
         else:
             body += self._numbers_column(pixels, 20, 352) + self._legend(250, 366)
-        return Picture(body, 960, height, self.title, self.description(pixels), {"camera": jpeg(self._developed(dn))})
+        return self.composed(
+            height, body, attached={"camera": jpeg(self._developed(dn))}, described=self.description(pixels)
+        )
 
     def image(self, *, draft: bool) -> np.ndarray:
         """What the camera records of the garden with the card in it, DN (height, width)."""
@@ -231,7 +232,7 @@ class PhotonTransferView(View):
         panel = image_panel("picture", 20, 34, 380, _WIDTH, _HEIGHT)
         left, top, right, bottom = (s * n for s, n in zip(_CARD, (_WIDTH, _HEIGHT) * 2, strict=True))
         outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
-        shown = photograph(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
+        shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
         shown += svg.line(panel.place(outline), "yellow")
         note = "brightened" if self.brighten else "as recorded"
         return panel.show(shown, title=f"The garden in {_seconds(self.exposure_s)}", note=note)
@@ -321,11 +322,7 @@ class PhotonTransferView(View):
         return plot.upright(panel, at, "yellow dashed") + here + svg.dots(points, "blue", 6)
 
     def _numbers_column(self, pixels: int, x: float, y: float) -> str:
-        rows = [svg.text((x, y), "On the card", "title")]
-        for i, (name, value) in enumerate(self._told(pixels).items()):
-            rows.append(svg.text((x, y + 24 + 20 * i), name, "note"))
-            rows.append(svg.text((x + 110, y + 24 + 20 * i), value, "label"))
-        return "".join(rows)
+        return svg.text((x, y), "On the card", "title") + readout(self._told(pixels), (x, y + 24), (0, 20), (110, 0))
 
     # The exposure is dragged along the curve --------------------------------------------------------------------------
 

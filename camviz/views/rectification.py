@@ -17,9 +17,10 @@ from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.heat import heat_key, heat_map, heat_panel
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed
+from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.views import stereo_pair
@@ -221,13 +222,12 @@ class RectificationView(View):
         return f"±{self.plus_minus:g} px: {metres(near)} … {metres(far)}"
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return self._described(self.numbers())
 
     def _described(self, numbers: dict[str, str]) -> str:
         way = "rectified" if self.rectify == 1 else f"{100 * self.rectify:.0f} % of the way to rectified"
         way = way if self.rectify else "as taken"
-        figures = "; ".join(f"{name} {value}" for name, value in numbers.items())
+        figures = listed(numbers)
         matched = f"{self.method}, blocks of {self.block_size:g} px, {self.disparities:g} disparities"
         said = f"The pair {way}. {figures}. Matched by {matched}."
         if "wedge" not in self._shown:
@@ -267,9 +267,9 @@ class RectificationView(View):
         if self.yours is None:
             more |= dict(zip(("disparity", "second"), _maps(*self._matching(draft), self.show), strict=True))
         wedge = self._wedge_panel() if "wedge" in self._shown else ""
-        body = "".join([svg.rectangle(0, 0, 960, 590, "paper"), *panels, maps, wedge, _column(numbers)])
+        body = "".join([*panels, maps, wedge, _column(numbers)])
         attached |= {name: data for name, data in more.items() if f"attached:{name}" in maps}
-        return Picture(body, 960, 590, self.title, self._described(numbers), attached)
+        return self.composed(590, body, attached=attached, described=self._described(numbers))
 
     # The two pictures ------------------------------------------------------------------------------------------------
 
@@ -287,7 +287,7 @@ class RectificationView(View):
         now = self.stage.left if panel.name == "left" else self.stage.right
         size = now.intrinsics
         content = "".join([
-            photograph(panel, panel.name, size.width, size.height),
+            placed_image(panel, panel.name, size.width, size.height),
             self._pencil(panel, now),
             self._same_row(panel),
             on_photograph(self._epipolar(panel, now, np.array([self.row])), "green"),

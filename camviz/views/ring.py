@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed
 from camviz.lenses import Equirectangular
 from camviz.lenses.base import Array
 from camviz.panoramas.ring import Ring, all_round
@@ -94,8 +95,7 @@ class RingView(View):
         return f"far away: b (1/Z − 1/S) = {self.ring.baseline:.3f} m × (1/Z − 1/{self.stitched_m:g} m) radians"
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         joined = f"faded over {self.overlap:.0%} of each part" if self.overlap else "cut at the seams"
         return (
             f"{self.cameras} cameras on a ring of {self.ring.radius:g} m, stitched for {self.stitched_m:g} m, "
@@ -116,14 +116,13 @@ class RingView(View):
         panorama = self.panorama(draft=draft)
         photographs = {"panorama": jpeg(panorama, 90), "loupe": jpeg(self.loupe(draft=draft), 90)}
         body = [
-            svg.rectangle(0, 0, 960, 544, "paper"),
             self._panorama_panel(),
             self._plan_panel(),
             self._loupe_panel(),
             self._plot_panel(),
             svg.text((20, 536), self.equation(), "note"),
         ]
-        return Picture("".join(body), 960, 544, self.title, self.description(), photographs)
+        return self.composed(544, *body, attached=photographs)
 
     def _panorama_panel(self) -> str:
         pixels = all_round(_FINE, _UP_DEG)
@@ -135,7 +134,7 @@ class RingView(View):
         half = _LOUPE_DEG / 360 * panel.width * np.array([0.5, 0.5 * 220 / 300])
         middle = ahead + (0, panel.height * (0.5 + 0.5 * _LOUPE_DOWN_DEG / _UP_DEG))
         corners = middle + half * [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]
-        seen = photograph(panel, "panorama", pixels.width, pixels.height)
+        seen = placed_image(panel, "panorama", pixels.width, pixels.height)
         return panel.show(
             seen + lines + svg.line(corners, "yellow"),
             title="The stitched panorama",

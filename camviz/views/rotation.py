@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.picture import Picture
-from camviz.draw.space import Dots, Eye, Item, Label, Line, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.space import Dots, Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
-from camviz.views.base import View, slider
+from camviz.views.base import OrbitView, slider
 
 _RINGS = (  # name and colour of the turn, radius of its ring, and the axis at right angles to the ring's plane
     ("yaw", "green", 1.0, 2),
@@ -27,7 +27,7 @@ _BODY = Intrinsics.from_fov(640, 480, 60)
 
 
 @dataclass(frozen=True)
-class RotationView(View):
+class RotationView(OrbitView):
     """A camera held by three rings, each turning inside the one before: yaw about y, pitch about x, roll about z.
 
     The outer ring turns about the world's vertical and carries the axis of pitch, the middle one carries the axis of
@@ -39,7 +39,7 @@ class RotationView(View):
     yaw_deg: float = slider(30.0, -180, 180, 1.0, label="yaw", unit="°", help="of the outer ring, to the right")
     pitch_deg: float = slider(20.0, -90, 90, 1.0, label="pitch", unit="°", help="of the middle ring, up")
     roll_deg: float = slider(10.0, -180, 180, 1.0, label="roll", unit="°", help="of the inner ring, clockwise")
-    eye: Eye = Eye(distance=4.3, yaw_deg=-35, pitch_deg=22)
+    eye: OrbitCamera = OrbitCamera(distance=4.3, yaw_deg=-35, pitch_deg=22)
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
@@ -80,7 +80,6 @@ class RotationView(View):
         return bool(self.numbers()["lock_deg"] < 0.5)
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         state = "They lie in one line: gimbal lock." if self.locked else "The three turns are independent."
         return (
@@ -94,11 +93,10 @@ class RotationView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         panel = space_panel("rings", 20, 34, 520, 420)
-        content, attached = draw_space(panel, self._items(), self.eye, draft=draft, renderer="wire")
         label = "The rings in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        space = panel.show(content, title="Three rings hold a camera", hint="drag to turn", drag="eye", label=label)
-        body = svg.rectangle(0, 0, 960, 470, "paper") + space + self._numbers_panel()
-        return Picture(body, 960, 470, self.title, self.description(), attached)
+        space, attached = self.in_space(panel, self._items(), draft, "Three rings hold a camera", label)
+        body = space + self._numbers_panel()
+        return self.composed(470, body, attached=attached)
 
     def _items(self) -> list[Item]:
         camera = Camera(_BODY, world_from_cam=RigidTransform.from_rotation(self.rotation))
@@ -132,14 +130,6 @@ class RotationView(View):
             words += svg.text((570, y), value, "number red" if "lock" in value else "number")
             y += 34 if name and value is not rows[-3][1] else 20
         return svg.text((570, 26), "The same, written in every way", "title") + words
-
-    # Touch -----------------------------------------------------------------------------------------------------------
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
 
 
 def _ring(world_from_ring: Rotation, radius: float, across: int) -> Array:

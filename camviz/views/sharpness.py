@@ -15,8 +15,9 @@ import numpy as np
 
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, png
+from camviz.draw.readout import listed, readout
 from camviz.optics import (
     airy_radius_um,
     cutoff_per_mm,
@@ -26,7 +27,7 @@ from camviz.optics import (
     pixel_transfer,
 )
 from camviz.scenes import to_display
-from camviz.views.base import View, slider, switch
+from camviz.views.base import View, positive, slider, switch
 
 FIELD_UM = (320, 240)  # of the sensor that the picture shows
 TOP_PER_MM = 260.0  # the curves' right end
@@ -65,9 +66,7 @@ class SharpnessView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("f_number", "pitch_um", "wavelength_nm"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        positive(self, "f_number", "pitch_um", "wavelength_nm")
         if self.pitch_um < 0.5:
             raise ValueError(f"pitch_um must be at least 0.5, got {self.pitch_um}")
 
@@ -122,8 +121,7 @@ class SharpnessView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         light = (
             f"white light, axial colour {self.axial_um:g} µm, lateral colour {self.lateral_um:g} µm"
             if self.coloured
@@ -163,7 +161,6 @@ class SharpnessView(View):
         curves, problem = self._curves_panel()
         body = "".join(
             [
-                svg.rectangle(0, 0, 960, height, "paper"),
                 self._picture_panel(),
                 curves,
                 self._legend(),
@@ -172,11 +169,11 @@ class SharpnessView(View):
             ]
         )
         pixels = png(to_display(self.image(draft=draft)))
-        return Picture(body, 960, height, self.title, self.description(), {"sensor": pixels})
+        return self.composed(height, body, attached={"sensor": pixels})
 
     def _picture_panel(self) -> str:
         panel = image_panel("sensor", 20, 34, 400, *FIELD_UM)
-        shown = photograph(panel, "sensor", *FIELD_UM, style="image-rendering:pixelated")
+        shown = placed_image(panel, "sensor", *FIELD_UM, style="image-rendering:pixelated")
         note = f"{FIELD_UM[0] / 1000:g} × {FIELD_UM[1] / 1000:g} mm of the sensor"
         return panel.show(shown, title="What the pixels record", note=note)
 
@@ -237,9 +234,7 @@ class SharpnessView(View):
 
     def _numbers_column(self) -> str:
         x, rows = 814, [svg.text((814, 26), "This camera", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((x, 54 + 40 * i), name, "note"))
-            rows.append(svg.text((x, 71 + 40 * i), value, "label"))
+        rows.append(readout(self.numbers(), (x, 54), (0, 40), (0, 17)))
         return "".join(rows)
 
 

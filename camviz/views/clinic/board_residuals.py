@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.board_warp import WarpTest, warp_test
 from camviz.draw import svg
-from camviz.draw.items import Item, Label, Line, Sheet
+from camviz.draw.items import Item, Label, Line, TexturedMesh
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar
-from camviz.draw.space import Eye, draw_space, space_panel
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
-from camviz.views.base import View, slider
+from camviz.views.base import OrbitView, slider
 from camviz.views.clinic.observations import Observations
 from camviz.views.clinic.residuals import nice
 from camviz.views.clinic.uncertainty import adjusted
@@ -25,7 +25,7 @@ from camviz.views.marks import arrows
 
 
 @dataclass(frozen=True)
-class BoardResidualsView(View):
+class BoardResidualsView(OrbitView):
     """The mean over all views of every corner's residual, in the board's own frame, and how far the board is bent.
 
     The bend is the solution's where it has one; else what the residuals ask for, corner by corner: a corner off the
@@ -40,7 +40,7 @@ class BoardResidualsView(View):
     scale: float = slider(
         100.0, 1, 1000, 1, label="arrows", unit="×", help="how much longer the arrows are than the mean"
     )
-    eye: Eye = Eye(yaw_deg=-35, pitch_deg=35)
+    eye: OrbitCamera = OrbitCamera(yaw_deg=-35, pitch_deg=35)
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "", **options: Any) -> BoardResidualsView:
@@ -137,7 +137,6 @@ class BoardResidualsView(View):
         )
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return (
             f"{len(self.observations)} views: the mean residual of the worst corner is "
             f"{self.numbers()['longest_mm']:.3f} mm on the "
@@ -148,13 +147,8 @@ class BoardResidualsView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         panel, attached = self._means_panel()
         space, sheets = self._bent(draft)
-        body = (
-            svg.rectangle(0, 0, 960, 440, "paper")
-            + panel
-            + space
-            + svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
-        )
-        return Picture(body, 960, 440, self.title, self.description(), attached | sheets)
+        body = panel + space + svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
+        return self.composed(440, body, attached=attached | sheets)
 
     def _means_panel(self) -> tuple[str, dict[str, bytes]]:
         seen, board = self.observations, self.observations.board
@@ -190,25 +184,18 @@ class BoardResidualsView(View):
         items: list[Item] = [Line(line, "muted", 1.0) for line in [*grid, *grid.swapaxes(0, 1)]]
         items += [Line(rim, "muted dashed", 1.2), Label(flat[0, 0], "first corner", "note")]
         if min(board.rows, board.columns) > 1 and np.isfinite(grid).all():
-            items.append(Sheet.over(grid, np.repeat(np.repeat(colours, 8, 0), 8, 1), 0.9))
+            items.append(TexturedMesh.over(grid, np.repeat(np.repeat(colours, 8, 0), 8, 1), 0.9))
         middle = board.corners.mean(axis=0)
         size = float(np.linalg.norm(board.corners[-1]))
         eye = replace(
-            self.eye, target=tuple(middle.tolist()), distance=1.75 * size * self.eye.distance / Eye().distance
+            self.eye, target=tuple(middle.tolist()), distance=1.75 * size * self.eye.distance / OrbitCamera().distance
         )
-        content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
         legend, bar_picture = bar(872, 64, 270, "bend-bar", shades, "mm")
         label = "The bent board in space; drag or press the arrow keys to walk around it"
-        shown = panel.show(
-            content, title=f"The board’s bend, × {self.exaggeration:g}", hint="drag to turn", drag="eye", label=label
+        shown, attached = self.in_space(
+            panel, items, draft, f"The board’s bend, × {self.exaggeration:g}", label, eye=eye
         )
         return shown + legend, attached | bar_picture
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
 
 
 def tested(adjustment: Adjustment) -> WarpTest | None:

@@ -74,7 +74,6 @@ class CorrelationView(View):
         return [(self.names[i[k]], self.names[j[k]], float(self.correlations[i[k], j[k]])) for k in order]
 
     def description(self) -> str:
-        """The state in words and numbers."""
         told = "; ".join(f"{a} with {b} {_signed(r)}" for a, b, r in self.strongest()[:6])
         deviations = "; ".join(
             f"{name} ±{d:.3g}" for name, d in zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True)
@@ -107,20 +106,8 @@ class CorrelationView(View):
                 if np.isfinite(r)
             )
         legend, bar_picture = bar(panel.x + side + 14, 64, side - 60, "matrix-bar", shades, "r")
-        body = (
-            svg.rectangle(0, 0, 960, 590, "paper")
-            + panel.show(content, title="Correlations")
-            + legend
-            + self._names(panel, cell)
-        )
-        return Picture(
-            body + self._words(680),
-            960,
-            590,
-            self.title,
-            self.description(),
-            {"matrix": png(shades.rgba(shown)), **bar_picture},
-        )
+        body = panel.show(content, title="Correlations") + legend + self._names(panel, cell)
+        return self.composed(590, body + self._words(680), attached={"matrix": png(shades.rgba(shown)), **bar_picture})
 
     def _names(self, panel: Panel, cell: float) -> str:
         size = f"font-size:{min(12.0, max(5.0, 0.8 * cell)):.1f}px"

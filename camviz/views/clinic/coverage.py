@@ -76,7 +76,6 @@ class CoverageView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n, seen = self.numbers(), self.observations
         return (
             f"{seen.used.sum()} corners in {len(seen)} views of {seen.name} touch {100 * n['share']:.0f} % of the "
@@ -88,13 +87,13 @@ class CoverageView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         heat, attached = self._map()
-        body = svg.rectangle(0, 0, 960, 412, "paper") + heat + self._radius() + self._tilt()
+        body = heat + self._radius() + self._tilt()
         n = self.numbers()
         words = (
             f"{100 * n['share']:.0f} % of the cells have a corner; the farthest corner lies "
             f"{100 * n['reach']:.0f} % of the way out."
         )
-        return Picture(body + svg.text((20, 398), words, "label"), 960, 412, self.title, self.description(), attached)
+        return self.composed(412, body + svg.text((20, 398), words, "label"), attached=attached)
 
     def _map(self) -> tuple[str, dict[str, bytes]]:
         seen, k, counts = self.observations, self.observations.camera.intrinsics, self.counts

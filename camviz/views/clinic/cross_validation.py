@@ -97,7 +97,6 @@ class CrossValidationView(View):
         ]
 
     def description(self) -> str:
-        """The state in words and numbers."""
         worst = int(np.nanargmax(self.held.per_view)) if np.isfinite(self.held.per_view).any() else 0
         return (
             f"{self.camera}: {' '.join(self.sentences())} Worst view held out: {self._name(worst)}, "
@@ -106,9 +105,9 @@ class CrossValidationView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map()
-        body = svg.rectangle(0, 0, 960, 440, "paper") + shown + self._views()
+        body = shown + self._views()
         body += svg.paragraph((20, 386), "\n".join(self.sentences()), 920, "label", line=20)
-        return Picture(body, 960, 440, self.title, self.description(), attached)
+        return self.composed(440, body, attached=attached)
 
     @cached_property
     def _values(self) -> Any:

@@ -66,7 +66,6 @@ class DepthErrorView(View):
         return DepthUncertainty(depths, *parts)
 
     def description(self) -> str:
-        """The state in words and numbers."""
         depths = np.array([1.0, self.farthest / 2, self.farthest])
         found = self.uncertainty(depths)
         told = "; ".join(
@@ -98,12 +97,8 @@ class DepthErrorView(View):
             "the same "
             "for all points of a picture, so averaging does not lessen it. Model error is left out."
         )
-        body = (
-            svg.rectangle(0, 0, 960, 376, "paper")
-            + panel.show(content, title=f"{' and '.join(self.names)}, middle of the picture")
-            + axes
-        )
-        return Picture(body + svg.paragraph((690, 50), words, 255), 960, 376, self.title, self.description())
+        body = panel.show(content, title=f"{' and '.join(self.names)}, middle of the picture") + axes
+        return self.composed(376, body + svg.paragraph((690, 50), words, 255))
 
 
 def _metres(value: float) -> str:

@@ -103,7 +103,6 @@ class DifferenceView(View):
         )
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         moved = f" and moved by {1000 * n['shift_m']:.2g} mm" if self.distance != "infinity" else ""
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
@@ -124,11 +123,9 @@ class DifferenceView(View):
         content = colours + self._arrows(panel) + contours(panel, length, shades, " px", strong=1.0)
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
-        body = svg.rectangle(0, 0, 960, 470, "paper") + panel.show(
-            content, title=f"Points {where}", note=f"arrows × {self.scale:g}"
-        )
+        body = panel.show(content, title=f"Points {where}", note=f"arrows × {self.scale:g}")
         body += legend + self._words(panel.x + panel.width + 100)
-        return Picture(body, 960, 470, self.title, self.description(), attached | bar_picture)
+        return self.composed(470, body, attached=attached | bar_picture)
 
     def _arrows(self, panel: Panel) -> str:
         found = self.compared(15, 10)

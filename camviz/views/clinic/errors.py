@@ -35,7 +35,6 @@ class ErrorsView(View):
         return cls(errors, name)
 
     def description(self) -> str:
-        """The state in words and numbers."""
         worst = int(np.nanargmax(self.errors))
         return (
             f"{len(self.errors)} views of {self.name}: view {worst + 1} has the largest error, "
@@ -55,7 +54,5 @@ class ErrorsView(View):
             content += "".join(svg.text(panel.place(p) + (0, -4), f"{p[1]:.2f}", "tick middle halo") for p in places)
         ticks = [(t, f"{t:g}") for t in (x.tolist() if len(x) <= _NAMED else plot.ticks(1, len(x), 16).tolist())]
         shown = panel.show(content, title=f"Error of every view, {self.name}", note=f"dashed: median, {median:.3g} px")
-        body = svg.rectangle(0, 0, 960, 250, "paper") + shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
-        return Picture(
-            body + svg.paragraph((20, 220), self.description(), 920), 960, 250, self.title, self.description()
-        )
+        body = shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
+        return self.composed(250, body + svg.paragraph((20, 220), self.description(), 920))

@@ -75,18 +75,17 @@ class FoldView(View):
         return told
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return f"{self.name}: " + " ".join(self.sentences())
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map((24, 18) if draft else (80, 60))
-        body = svg.rectangle(0, 0, 960, 520, "paper") + shown
+        body = shown
         body += DistortionView.of(self.camera).curve_panel(570, 34, 370, 170, equation=False) + self._denominator()
         y = 434.0
         for sentence in self.sentences():
             body += svg.paragraph((20, y), sentence, 920, "label")
             y += 20
-        return Picture(body, 960, 520, self.title, self.description(), attached)
+        return self.composed(520, body, attached=attached)
 
     def resolution(self, columns: int, rows: int) -> tuple[Array, Array]:
         """Pixels (rows, columns, 2) from edge to edge, and how many pixels a degree has there (rows, columns).

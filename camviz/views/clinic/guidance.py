@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,12 @@ from camviz.calibration.guidance import Candidate, next_board_poses
 from camviz.cameras import transform
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Line
-from camviz.draw.panel import image_panel, photograph
+from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.space import OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import View, slider
+from camviz.views.base import OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline
 from camviz.views.clinic.observations import Missing
@@ -30,7 +30,7 @@ _SIDE = 16  # points along the edge of a square, so that it bends with the lens
 
 
 @dataclass(frozen=True)
-class GuidanceView(View):
+class GuidanceView(OrbitView):
     """The boards of a calibration in space with a ghost among them, and the picture that the ghost would give.
 
     Candidate 1 lessens the mean uncertainty of projection most; the next ones are the best that look different.
@@ -43,7 +43,7 @@ class GuidanceView(View):
     camera: str = "camera"
     choice: int = slider(1, 1, _OFFERED, 1, label="candidate", help="1 lessens the uncertainty most")
     backdrop: NDArray[np.uint8] | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(yaw_deg=-50, pitch_deg=20)
+    eye: OrbitCamera = OrbitCamera(yaw_deg=-50, pitch_deg=20)
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "") -> GuidanceView:
@@ -84,7 +84,6 @@ class GuidanceView(View):
         ]
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return f"{self.camera}, candidate {round(self.choice)} of {len(self.candidates)}. {' '.join(self.sentences())}"
 
     @cached_property
@@ -95,10 +94,10 @@ class GuidanceView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         space, attached = self._space(draft)
         shown, pictures = self._imitate()
-        body = svg.rectangle(0, 0, 960, 432, "paper") + space + shown
+        body = space + shown
         for i, sentence in enumerate(self.sentences()):
             body += svg.text((20, 402 + 20 * i), sentence, "label")
-        return Picture(body, 960, 432, self.title, self.description(), attached | pictures)
+        return self.composed(432, body, attached=attached | pictures)
 
     @cached_property
     def _cam_from_board(self) -> RigidTransform:
@@ -126,13 +125,10 @@ class GuidanceView(View):
         farthest = max(
             float(np.linalg.norm(middle)), float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
         )
-        eye = replace(self.eye, target=target, distance=1.6 * farthest * self.eye.distance / Eye().distance)
+        eye = replace(self.eye, target=target, distance=1.6 * farthest * self.eye.distance / OrbitCamera().distance)
         panel = space_panel("guidance", 20, 34, 450, 340)
-        content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
         label = "The boards in space; drag or press the arrow keys to walk around them"
-        return panel.show(
-            content, title="Imitate the orange board", hint="drag to turn", drag="eye", label=label
-        ), attached
+        return self.in_space(panel, items, draft, "Imitate the orange board", label, eye=eye)
 
     def _imitate(self) -> tuple[str, dict[str, bytes]]:
         """The picture that the ghost would give, its squares bent as the lens bends them."""
@@ -142,7 +138,7 @@ class GuidanceView(View):
         content, attached = "", {}
         if self.backdrop is not None:
             content, attached = (
-                photograph(panel, "backdrop", k.width, k.height, class_="faint"),
+                placed_image(panel, "backdrop", k.width, k.height, class_="faint"),
                 {"backdrop": jpeg(self.backdrop)},
             )
         along = np.linspace(0, 1, _SIDE, endpoint=False)[:, None]
@@ -164,12 +160,6 @@ class GuidanceView(View):
         content += svg.path([d for d in dark if np.isfinite(d).all()], "fill-orange", closed=True)
         content += svg.line(np.vstack([whole, whole[:1]]), "orange thick")
         return panel.show(content, title="The picture it would give"), attached
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
 
 
 def unlike(ranked: tuple[Candidate, ...], adjustment: Adjustment, name: str) -> tuple[Candidate, ...]:

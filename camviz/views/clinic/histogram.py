@@ -11,6 +11,7 @@ from scipy.special import erf, ndtri
 
 from camviz.draw import plot, svg
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Observations
@@ -65,13 +66,12 @@ class HistogramView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         which = {"u": "across the picture", "v": "down the picture"}.get(self.component, "in both directions")
-        return f"Residuals {which}: " + "; ".join(f"{name} {value}" for name, value in self.numbers().items()) + "."
+        return f"Residuals {which}: " + listed(self.numbers()) + "."
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, 330, "paper") + self._histogram() + self._quantiles() + self._words()
-        return Picture(body, 960, 330, self.title, self.description())
+        body = self._histogram() + self._quantiles() + self._words()
+        return self.composed(330, body)
 
     @property
     def _reach(self) -> float:

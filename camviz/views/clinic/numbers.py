@@ -12,6 +12,7 @@ from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed
 from camviz.views.base import View
 from camviz.views.marks import cross
 
@@ -70,8 +71,7 @@ class NumbersView(View):
         return ", ".join(told)
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        return f"{self.name}: " + "; ".join(f"{name} {value}" for name, value in self.rows()) + "."
+        return f"{self.name}: " + listed(self.rows()) + "."
 
     def figure(self, *, draft: bool = False) -> Picture:
         k = self.camera.intrinsics
@@ -91,4 +91,4 @@ class NumbersView(View):
             body += svg.text((380, y), name, "note") + svg.paragraph((550, y), value.replace("-", "−"), 400, "label")
             y += 24
         height = max(290.0, y + 40)
-        return Picture(svg.rectangle(0, 0, 960, height, "paper") + body, 960, height, self.title, self.description())
+        return self.composed(height, body)

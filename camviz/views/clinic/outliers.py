@@ -40,7 +40,6 @@ class OutliersView(View):
         return [divmod(int(i), lengths.shape[1]) for i in order if lengths.flat[i] > 0]
 
     def description(self) -> str:
-        """The state in words and numbers."""
         seen = self.observations
         told = [
             f"{seen.picture(view)} row {corner // seen.board.columns + 1} column {corner % seen.board.columns + 1}: "
@@ -54,7 +53,7 @@ class OutliersView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = svg.rectangle(0, 0, 960, 440, "paper"), dict[str, bytes]()
+        body, attached = "", dict[str, bytes]()
         images: dict[int, Any] = {}
         for i, (view, corner) in enumerate(self.worst):
             if view not in images:
@@ -69,7 +68,7 @@ class OutliersView(View):
         )
         if not attached:
             words += " The pictures are not at hand, so the places are bare."
-        return Picture(body + svg.text((20, 424), words, "note"), 960, 440, self.title, self.description(), attached)
+        return self.composed(440, body + svg.text((20, 424), words, "note"), attached=attached)
 
     def _detail(self, i: int, view: int, corner: int, image: Any, x: float, y: float) -> tuple[str, dict[str, bytes]]:
         seen = self.observations

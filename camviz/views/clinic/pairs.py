@@ -11,7 +11,7 @@ import numpy as np
 from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
@@ -159,7 +159,6 @@ class EpipolarPairsView(View):
         return min(max(round(self.view), 1), len(self.shared)) - 1
 
     def description(self) -> str:
-        """The state in words and numbers."""
         shared, i = self.shared, self.index
         told = f"{shared.rms[i]:.3g} px" if np.isfinite(shared.rms[i]) else "not seen by both"
         return (
@@ -169,7 +168,7 @@ class EpipolarPairsView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = svg.rectangle(0, 0, 960, 600, "paper") + self._bars_panel(), dict[str, bytes]()
+        body, attached = self._bars_panel(), dict[str, bytes]()
         for side, camera in enumerate((self.shared.left, self.shared.right)):
             shown, pictures = self._side(side, camera)
             body, attached = body + shown, attached | pictures
@@ -177,7 +176,7 @@ class EpipolarPairsView(View):
             "Green: the line on which the other picture puts a corner. Blue arrow: the first row, from the first "
             "corner on."
         )
-        return Picture(body + svg.text((20, 588), words, "note"), 960, 600, self.title, self.description(), attached)
+        return self.composed(600, body + svg.text((20, 588), words, "note"), attached=attached)
 
     @property
     def _bars(self) -> Panel:
@@ -214,7 +213,7 @@ class EpipolarPairsView(View):
         content, attached = "", {}
         if image is not None:
             name = f"pair{side}"
-            content, attached = photograph(panel, name, k.width, k.height), {name: jpeg(image)}
+            content, attached = placed_image(panel, name, k.width, k.height), {name: jpeg(image)}
         content += self._lines(panel, side)
         corners, offsets = shared.detections[side][i], shared.offsets[side][i]
         starts = panel.place(corners)

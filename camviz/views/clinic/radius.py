@@ -100,7 +100,6 @@ class RadiusView(View):
         return figures
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         return (
             f"{self.observations.used.sum()} corners of {self.observations.name}. The ring that stands out most "
@@ -112,14 +111,14 @@ class RadiusView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, 400, "paper") + self._picture()
+        body = self._picture()
         for i, (name, title) in enumerate((("outward", "Outward"), ("around", "Around the principal point"))):
             body += self._plot(name, title, 1 + i, 34 + 172 * i, 128)
         advice = (
             "Noise scatters around zero. A ring's mean off zero by more than its pale bars says that the model "
             "is too simple there, or the board not flat."
         )
-        return Picture(body + svg.paragraph((20, 356), advice, 440), 960, 400, self.title, self.description())
+        return self.composed(400, body + svg.paragraph((20, 356), advice, 440))
 
     def _plot(self, name: str, title: str, part: int, y: float, height: float) -> str:
         radius, values = self.polar[0], self.polar[part]

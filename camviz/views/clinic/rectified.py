@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
@@ -122,7 +122,6 @@ class RectifiedView(View):
         return float(np.mean(missing))
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return " ".join(self.sentences())
 
     def figure(self, *, draft: bool = False) -> Picture:
@@ -135,16 +134,14 @@ class RectifiedView(View):
                 f"rectified{side}",
                 f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}",
             )
-            content = photograph(panel, name, k.width, k.height) + self._marks(panel, side, turned, camera)
+            content = placed_image(panel, name, k.width, k.height) + self._marks(panel, side, turned, camera)
             body += panel.show(content, title=title)
             attached[name] = jpeg(self._rectified(side, turned, camera, 240 if draft else _SIDE))
             bottom = max(bottom, panel.y + panel.height)
         height = bottom + 24 + 20 * len(self.sentences())
         for i, sentence in enumerate(self.sentences()):
             body += svg.paragraph((20, bottom + 24 + 20 * i), sentence, 920, "label")
-        return Picture(
-            svg.rectangle(0, 0, 960, height, "paper") + body, 960, height, self.title, self.description(), attached
-        )
+        return self.composed(height, body, attached=attached)
 
     def _rectified(self, side: int, turned: Camera, camera: Camera, size: int) -> NDArray[np.uint8]:
         source = replace(camera, intrinsics=camera.intrinsics.within(size))

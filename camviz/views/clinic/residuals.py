@@ -12,11 +12,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, space_panel
+from camviz.draw.readout import listed, readout
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
-from camviz.views.base import Control, View, slider
+from camviz.views.base import Control, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.observations import Observations, short_names
 from camviz.views.marks import arrows, cross
@@ -26,7 +27,7 @@ ARROW = 26.0  # picture units that a view's 90th percentile residual is drawn lo
 
 
 @dataclass(frozen=True)
-class ResidualsView(View):
+class ResidualsView(OrbitView):
     """Every view's error, and where the chosen view has it: in its picture, in space, and in the board's frame.
 
     An arrow leads from a corner as detected towards where the calibration projects it, `scale` times as long as in the
@@ -40,7 +41,7 @@ class ResidualsView(View):
     scale: float = slider(
         50.0, 1, 300, 1, label="arrows", unit="×", help="how much longer the arrows are than the error"
     )
-    eye: Eye = Eye(yaw_deg=-50, pitch_deg=20)
+    eye: OrbitCamera = OrbitCamera(yaw_deg=-50, pitch_deg=20)
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "", **options: Any) -> ResidualsView:
@@ -77,9 +78,8 @@ class ResidualsView(View):
         return figures
 
     def description(self) -> str:
-        """The state in words and numbers."""
         seen, i = self.observations, self.index
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         return (
             f"{len(seen)} views of {seen.name}, together {_pixels(seen.total_rms)} RMS; the largest is "
             f"{seen.picture(seen.worst)} with {_pixels(seen.rms_seen[seen.worst])}. "
@@ -93,7 +93,6 @@ class ResidualsView(View):
         space, sheets = self._poses.space(space_panel("boards", 490, 236, 450, 338), draft)
         body = "".join(
             [
-                svg.rectangle(0, 0, 960, 800, "paper"),
                 self.bars_panel(self._bars, handle=True),
                 image,
                 space,
@@ -101,7 +100,7 @@ class ResidualsView(View):
                 self._numbers_block(),
             ]
         )
-        return Picture(body, 960, 800, self.title, self.description(), attached | sheets)
+        return self.composed(800, body, attached=attached | sheets)
 
     @property
     def _bars(self) -> Panel:
@@ -165,7 +164,7 @@ class ResidualsView(View):
         content, attached, note = self._grid(panel), {}, "the picture is not at hand"
         if image is not None:
             content, attached, note = (
-                photograph(panel, "photograph", k.width, k.height),
+                placed_image(panel, "photograph", k.width, k.height),
                 {"photograph": jpeg(image)},
                 "",
             )
@@ -226,7 +225,7 @@ class ResidualsView(View):
     def _poses(self) -> BoardPosesView:
         seen = self.observations
         eye = replace(
-            self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / Eye().distance
+            self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / OrbitCamera().distance
         )
         hidden = frozenset(np.flatnonzero(~seen.shown).tolist())
         names = short_names(seen.pictures, len(seen))
@@ -235,11 +234,9 @@ class ResidualsView(View):
         )
 
     def _numbers_block(self) -> str:
-        rows = [svg.text((490, 602), f"{self.observations.picture(self.index)}", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((490, 628 + 22 * i), name, "note"))
-            rows.append(svg.text((590, 628 + 22 * i), value, "label"))
-        return "".join(rows)
+        return svg.text((490, 602), f"{self.observations.picture(self.index)}", "title") + readout(
+            self.numbers(), (490, 628), (0, 22), (100, 0)
+        )
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
@@ -248,13 +245,13 @@ class ResidualsView(View):
             return self.but(
                 view=int(np.clip(round(self._bars.data((x - self._bars.x, 0))[0]), 1, len(self.observations)))
             )
-        return self.but(eye=self.eye.orbited(dx, dy))
+        return super().dragged(handle, x, y, dx, dy)
 
     def pressed(self, handle: str, key: str) -> Self:
         if handle == "bars":
             step = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
             return self.but(view=min(max(self.index + 1 + step, 1), len(self.observations)))
-        return self.but(eye=self.eye.key(key))
+        return super().pressed(handle, key)
 
 
 def bars_panel(seen: Observations, x: float = 70, y: float = 34, width: float = 870, height: float = 140) -> Panel:

@@ -87,7 +87,6 @@ class UncertaintyView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         return (
@@ -106,8 +105,8 @@ class UncertaintyView(View):
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         shown = panel.show(content, title=f"{self.name}: one standard deviation, points {where}")
-        body = svg.rectangle(0, 0, 960, 470, "paper") + shown + legend + self._words(panel.x + panel.width + 100)
-        return Picture(body, 960, 470, self.title, self.description(), attached | bar_picture)
+        body = shown + legend + self._words(panel.x + panel.width + 100)
+        return self.composed(470, body, attached=attached | bar_picture)
 
     def _ellipses(self, panel: Any) -> str:
         """Ellipses of one standard deviation at a few pixels, all enlarged so that the smallest can be seen."""
@@ -188,7 +187,6 @@ class UncertaintyRangeView(View):
         return _along(self.adjustment, self.name, distances, tuple(tuple(uv.tolist()) for uv in self.pixels.values()))
 
     def description(self) -> str:
-        """The state in words and numbers."""
         distances, values = self.curves()
         found = np.nan_to_num(values, nan=np.inf)
         best = "; ".join(
@@ -224,10 +222,8 @@ class UncertaintyRangeView(View):
             "The solution knows the camera best where the boards were held. Nearer than that, the place of the "
             f"camera’s centre is what is uncertain.\n \n{LEFT_OUT}"
         )
-        body = (
-            svg.rectangle(0, 0, 960, 380, "paper") + panel.show(content, title=f"{self.name}: at three pixels") + axes
-        )
-        return Picture(body + svg.paragraph((705, 50), words, 240), 960, 380, self.title, self.description())
+        body = panel.show(content, title=f"{self.name}: at three pixels") + axes
+        return self.composed(380, body + svg.paragraph((705, 50), words, 240))
 
 
 @lru_cache(maxsize=24)
