@@ -114,6 +114,11 @@ def upright(panel: Panel, x: float, class_: str) -> str:
     return svg.line(panel.place(_pairs(x, (panel.bottom, panel.top))), class_)
 
 
+def level(panel: Panel, y: float, class_: str) -> str:
+    """A horizontal line at y."""
+    return svg.line(panel.place([(panel.left, y), (panel.right, y)]), class_)
+
+
 def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top left") -> str:
     """Names of the lines in one corner of the panel: (class, words) pairs, each with a sample of its line."""
     x = 10 if "left" in corner else panel.width - 20 - 7 * max(len(words) for _, words in entries) - 20

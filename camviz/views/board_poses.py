@@ -14,6 +14,7 @@ from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import readout, vector
 from camviz.draw.space import Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
@@ -102,8 +103,8 @@ class BoardPosesView(OrbitView):
         n, chosen = self.numbers(), self.chosen
         return (
             f"{len(self.cam_from_board)} pictures of one board; the {self.still} stands still. "
-            f"Picture {self.index + 1}: t = {_row(chosen.translation)} m, the camera stood at "
-            f"C = {_row(self.centres[self.index])} m in the board's frame, {n['distance']:.2f} m from its middle, "
+            f"Picture {self.index + 1}: t = {vector(chosen.translation, 3)} m, the camera stood at "
+            f"C = {vector(self.centres[self.index], 3)} m in the board's frame, {n['distance']:.2f} m from its middle, "
             f"its axis {n['tilt_deg']:.0f}° from the board's normal."
         )
 
@@ -197,20 +198,12 @@ class BoardPosesView(OrbitView):
     def _equation(self) -> str:
         n, chosen = self.numbers(), self.chosen
         rows = [
-            ("rotation vector, axis times angle [rad]", _row(chosen.rotation.as_rotvec())),
-            ("t, the board's first corner before the camera [m]", _row(chosen.translation)),
-            ("C = −Rᵀt, the camera before the board [m]", _row(self.centres[self.index])),
+            ("rotation vector, axis times angle [rad]", vector(chosen.rotation.as_rotvec(), 3)),
+            ("t, the board's first corner before the camera [m]", vector(chosen.translation, 3)),
+            ("C = −Rᵀt, the camera before the board [m]", vector(self.centres[self.index], 3)),
             (
                 "from the board's middle; axis against the board's normal",
                 f"{n['distance']:.3f} m; {n['tilt_deg']:.1f}°",
             ),
         ]
-        return "".join(
-            svg.text((580, 338 + 41 * i), name, "note") + svg.text((580, 356 + 41 * i), value, "number")
-            for i, (name, value) in enumerate(rows)
-        )
-
-
-def _row(values: Array) -> str:
-    words = ", ".join(f"{round(float(value), 3) + 0.0:.3f}" for value in values)
-    return f"({words})".replace("-", "−")
+        return readout(rows, (580, 338), (0, 41), (0, 18), "number")

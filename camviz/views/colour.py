@@ -25,7 +25,7 @@ from camviz.draw.readout import listed, readout
 from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views import swatches
-from camviz.views.base import Control, View, choice, slider, switch
+from camviz.views.base import Control, View, answered, choice, slider, switch, without
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
 LAYOUTS = {"chart photograph": 326, "spectra chart photograph steps": 640, "chart photograph yours": 626}
@@ -166,7 +166,7 @@ class ColourView(View):
     def your_way(self, raw: np.ndarray) -> tuple[np.ndarray, str]:
         """Linear sRGB (..., 3) of raw colours (..., 3) with the reader's part in it; NaN and a sentence without."""
         if self.yours is None:
-            return np.full(raw.shape, np.nan), "No function of yours has been given."
+            return answered(None, (), raw)
         gains, matrix = self.gains, self.correction
         if self.part == "develop":
             encoded, problem = tried(self.yours, (raw, gains, matrix), raw)
@@ -183,14 +183,13 @@ class ColourView(View):
         rgb, problem = self.your_chart
         panel = replace(self._chart_panel, name="your chart", y=348)
         if problem:
-            words = svg.paragraph((16, 30), problem, panel.width - 32)
-            return panel.show(words, title="With your function"), {}
+            return without(panel, problem, "With your function", (16, 30)), {}
         shown = swatches.chart(panel, rgb, self.shot.true_chart, self._off(rgb), self.patch)
         surfaces = self._surfaces(_DRAFT if draft else _FINE)
         image = to_display(self.your_way(surfaces @ self.shot.raw_from_srgb.T)[0])
         body = panel.show(shown, title="With your function") + self._photograph_panel(image, "your photograph", 348)
-        body += svg.text((_COLUMN, 366), "mean ΔE2000, yours", "note")
-        body += svg.text((_COLUMN, 384), f"{self._off(rgb).mean():.2f}", "orange")
+        figure = {"mean ΔE2000, yours": f"{self._off(rgb).mean():.2f}"}
+        body += readout(figure, (_COLUMN, 366), (0, 0), (0, 18))
         return body, {"your photograph": jpeg(image)}
 
     def _off(self, rgb: np.ndarray) -> np.ndarray:
@@ -312,9 +311,8 @@ class ColourView(View):
         return panel.show(placed_image(panel, name, width, height), title="Developed in the same way")
 
     def _numbers_column(self) -> str:
-        rows, top = [svg.text((_COLUMN, self._top - 8), "In numbers", "title")], self._top
-        rows.append(readout(self._told(), (_COLUMN, top + 14), (0, 42), (0, 16), style="font-size:12px"))
-        return "".join(rows)
+        figures = readout(self._told(), (_COLUMN, self._top + 14), (0, 42), (0, 16), style="font-size:12px")
+        return svg.text((_COLUMN, self._top - 8), "In numbers", "title") + figures
 
     def _steps(self) -> str:
         """The chosen patch on its way through: a colour and its numbers for each step."""

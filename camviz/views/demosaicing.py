@@ -21,14 +21,14 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
-from camviz.draw.readout import listed
+from camviz.draw.readout import listed, readout
 from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
 from camviz.mosaics.measures import Measures
 from camviz.scenes import render, textured_scene, to_display, to_linear
 from camviz.scenes.photographs import photograph
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, choice, slider, without
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side
@@ -240,7 +240,7 @@ class DemosaicingView(View):
         panel, (pixels, problem) = replace(self._panel, name="yours", x=_RIGHT), self.your_picture
         height, width = self.truth.shape[:2]
         if pixels is None:
-            return panel.show(svg.paragraph((16, 30), problem, panel.width - 32), title="With your green")
+            return without(panel, problem, "With your green", (16, 30))
         if self.show == "false colour":
             error = mosaics.colour_error(pixels, self.truth)
             title = "What colour is false in yours"
@@ -302,12 +302,9 @@ class DemosaicingView(View):
     def _words(self) -> str:
         if "yours" in self.panels:
             return self._two_lines_of_figures()
-        spectrum, rows = "spectrum" in self.panels, []
-        for i, (name, value) in enumerate(self._told().items()):
-            x, y = (560, 454 + 21 * i) if spectrum else (758, 270 + 44 * i)
-            rows.append(svg.text((x, y), name, "note"))
-            rows.append(svg.text((x + 94, y) if spectrum else (x, y + 19), value, "label"))
-        return "".join(rows)
+        if self._has("spectrum"):
+            return readout(self._told(), (560, 454), (0, 21), (94, 0))
+        return readout(self._told(), (758, 270), (0, 44), (0, 19))
 
     def _two_lines_of_figures(self) -> str:
         """What the algorithm's picture and the reader's are worth, each below its picture."""

@@ -17,7 +17,6 @@ from contourpy import contour_generator
 
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -28,7 +27,7 @@ from camviz.lenses.base import on_plane, unit
 from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene
 from camviz.views import garden
-from camviz.views.base import OrbitView, choice, slider, switch
+from camviz.views.base import OrbitView, answered, choice, slider, switch, without
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
@@ -244,9 +243,7 @@ class DistortionView(OrbitView):
 
     def _your_bend(self, xy: np.ndarray) -> tuple[np.ndarray, str]:
         """Where the reader's function puts ideal points (..., 2), and what is wrong with it."""
-        if self.yours is None:
-            return np.full(xy.shape, np.nan), "No function of yours has been given."
-        return tried(self.yours, (xy, self.k1, self.k2, self.k3), xy)
+        return answered(self.yours, (xy, self.k1, self.k2, self.k3), xy)
 
     def _your_panel(
         self, x: float, y: float, width: float, tallest: float, *, draft: bool
@@ -255,7 +252,7 @@ class DistortionView(OrbitView):
         panel = self._image_panel("yours", x, y, width, tallest)
         lines, problem = self._your_bend(_grid_lines(self.intrinsics, 33 if draft else 65))
         if problem:
-            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="With your function"), {}
+            return without(panel, problem, "With your function"), {}
         straight = self.show == "undistorted"
         right = _grid_lines(self.intrinsics, 33 if draft else 65)
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(right if straight else lines)), "orange thin")

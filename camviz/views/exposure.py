@@ -17,7 +17,7 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, seconds, signed
 from camviz.optics import exposure_value, relative_illumination, unvignetted_share
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
@@ -146,7 +146,7 @@ class ExposureView(View):
             "its signal / noise": f"{grey / (grey + READ_NOISE_E**2) ** 0.5:.0f}" if grey < FULL_WELL_E else "full",
             "mean of the picture": f"{100 * float(recorded.mean()):.0f} % of white",
             "cut off at white": f"{100 * float((recorded.max(axis=-1) >= 0.999).mean()):.0f} %",
-            "corner": f"{corner:+.1f} stops".replace("-", "−") if corner < -0.05 else "as bright",
+            "corner": f"{signed(corner, 1)} stops" if corner < -0.05 else "as bright",
         }
 
     def description(self) -> str:
@@ -212,7 +212,7 @@ class ExposureView(View):
         names = [(4.5 - i - 0.05, name) for i, (name, _, _) in enumerate(rows)]
         values = [
             svg.text(
-                (panel.x + panel.width - 6, panel.y + panel.place((0, 4.5 - i))[1] + 4), _signed(v), "note end halo"
+                (panel.x + panel.width - 6, panel.y + panel.place((0, 4.5 - i))[1] + 4), signed(v, 1), "note end halo"
             )
             for i, (_, v, _) in enumerate(rows)
         ]
@@ -265,12 +265,3 @@ def _heights_mm(side: int) -> np.ndarray:
 @lru_cache(maxsize=2)
 def _draw(shape: tuple[int, ...]) -> Draw:
     return Draw.of(shape, shape, 27)
-
-
-def _signed(stops: float) -> str:
-    return f"{stops:+.1f}".replace("-", "−")
-
-
-def seconds(time: float) -> str:
-    """An exposure time as photographers write it."""
-    return f"{time:.3g} s" if time >= 0.3 else f"1/{1 / time:.0f} s"

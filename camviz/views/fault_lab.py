@@ -19,9 +19,9 @@ from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed
-from camviz.lenses.base import Array
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import choice, slider, switch
 from camviz.views.marks import arrows
+from camviz.views.view_bars import LABEL, ViewChooser
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
 _MOST = 4  # findings that have room
@@ -33,7 +33,7 @@ _VERDICTS = ("0, nothing is off", "1, a corner is off", "2, a row or a column is
 
 
 @dataclass(frozen=True)
-class FaultLabView(View):
+class FaultLabView(ViewChooser):
     """What a fault does to a calibration, and what it does not: the fit, the estimates against the truth, the findings.
 
     Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
@@ -65,9 +65,8 @@ class FaultLabView(View):
         return experiment(self.fault, float(self.strength), float(self.noise), round(self.seed))
 
     @property
-    def index(self) -> int:
-        """The place of the chosen view in the list, from 0."""
-        return min(max(round(self.view), 1), VIEWS) - 1
+    def count(self) -> int:
+        return VIEWS
 
     def worst(self) -> Self:
         """The same, with the view of the largest error chosen."""
@@ -156,9 +155,8 @@ class FaultLabView(View):
             content += plot.bars(panel, x - 0.38, x + right, np.where(mask, errors, np.nan), class_)
         content += self._your_bars(panel, x)
         median = float(np.nanmedian(errors))
-        content += svg.line(panel.place([(panel.left, median), (panel.right, median)]), "ink dashed")
-        label = "One bar per view; click, drag or press the arrow keys to choose a view"
-        shown = panel.show(content, title="Error of every view", hint="click a bar", drag="bars", label=label)
+        content += plot.level(panel, median, "ink dashed")
+        shown = panel.show(content, title="Error of every view", hint="click a bar", drag="bars", label=LABEL)
         names = [(float(i), f"{i}") for i in x.tolist()]
         return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
 
@@ -245,18 +243,6 @@ class FaultLabView(View):
         if len(listed) > _MOST:
             body += svg.text((x, y), f"and {len(listed) - _MOST} more", "note")
         return head + body
-
-    # Touch -----------------------------------------------------------------------------------------------------------
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle != "bars" or not np.isfinite(x):
-            return self
-        place: Array = self._bars.data((x - self._bars.x, 0))
-        return self.but(view=int(np.clip(round(float(place[0])), 1, VIEWS)))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        step = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
-        return self.but(view=min(max(self.index + 1 + step, 1), VIEWS))
 
 
 def grouped(findings: tuple[Finding, ...]) -> list[tuple[Finding, int]]:

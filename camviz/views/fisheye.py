@@ -11,11 +11,9 @@ from functools import cached_property, lru_cache
 from math import asin, atan2, cos, degrees, pi, radians, sin
 from typing import Any, ClassVar, Self
 
-import cv2
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.items import Dots, Item, Line, axes_triad
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -26,7 +24,7 @@ from camviz.lenses import Equidistant, Equisolid, Lens, Orthographic, Perspectiv
 from camviz.lenses.base import Array
 from camviz.panoramas.reprojection import reproject, window
 from camviz.views import garden
-from camviz.views.base import OrbitView, choice, slider
+from camviz.views.base import OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 
 SIDE = 480  # pixels of the picture, which is square
@@ -57,7 +55,6 @@ _TOP = 3.4  # focal lengths shown by the curves
 _INFINITE = 1e6  # focal lengths: tan 90° as rounded numbers have it
 _TABLED = np.radians([30.0, 60.0, 90.0])
 _FAR = 5 * SIDE  # pixels: what a reader's function puts farther out is not drawn
-_GREY = (69, 69, 69)  # of what a picture does not show
 _SLOTS = {  # where panels stand, (x, y, width, height), by which there are; then the figure's height
     "picture curves": ({"picture": (20, 34, 330, 330), "curves": (425, 34, 320, 290)}, 390),
     "picture window": ({"picture": (20, 34, 330, 330), "window": (375, 34, 375, 281)}, 390),
@@ -156,9 +153,6 @@ class FisheyeView(OrbitView):
         words = f"{self.projection}, {EQUATIONS[self.projection]}, f = {self.f:g} px: {figures}."
         return (words + window * self._has("window")).replace("-", "−")
 
-    def _has(self, panel: str) -> bool:
-        return panel in self.panels.split()
-
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
@@ -241,10 +235,8 @@ class FisheyeView(OrbitView):
 
     def _your_pixels(self, points: Array) -> tuple[Array, str]:
         """Where the reader's function puts camera-frame points (..., 3), and what is wrong with it."""
-        if self.yours is None:
-            return np.full((*points.shape[:-1], 2), np.nan), "No function of yours has been given."
         k = self.camera.intrinsics
-        uv, problem = tried(self.yours, (points, k.fx, k.cx, k.cy), points[..., :2])
+        uv, problem = answered(self.yours, (points, k.fx, k.cx, k.cy), points[..., :2])
         return np.where(np.abs(uv) < _FAR, uv, np.nan), problem
 
     def _grid_lines(self, panel: Panel) -> str:
@@ -283,9 +275,8 @@ class FisheyeView(OrbitView):
         seen = self._seen(draft)
         uv, problem = self._your_pixels(seen.rays())
         if problem:
-            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
-        places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (image.shape[1] / SIDE) - 0.5
-        cut = cv2.remap(image, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=_GREY)
+            return without(panel, problem, "Cut by your function"), {}
+        cut = garden.looked_up(image, uv, SIDE)
         return panel.show(placed_image(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
     def _weight(self, name: str) -> str:

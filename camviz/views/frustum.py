@@ -16,8 +16,10 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.course.yours import tried
 from camviz.draw import svg
+from camviz.draw.matrix import matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture
+from camviz.draw.readout import decimal, readout, vector
 from camviz.draw.space import (
     Dots,
     Item,
@@ -155,8 +157,8 @@ class FrustumView(OrbitView):
         n = self.numbers()
         seen = int(self.camera.sees(board_corners()).sum())
         return (
-            f"The camera stands at C = {_row(n['C'])} m, turned {_signed(self.yaw_deg, 0)}° right, "
-            f"{_signed(self.pitch_deg, 0)}° up, {_signed(self.roll_deg, 0)}° clockwise; t = {_row(n['t'])} m; "
+            f"The camera stands at C = {vector(n['C'], 2)} m, turned {decimal(self.yaw_deg, 0)}° right, "
+            f"{decimal(self.pitch_deg, 0)}° up, {decimal(self.roll_deg, 0)}° clockwise; t = {vector(n['t'], 2)} m; "
             f"field of view {self.hfov_deg:.0f}°; it sees {seen} of the board's 54 corners. Mode: {self.mode}."
         )
 
@@ -231,12 +233,12 @@ class FrustumView(OrbitView):
         n, from_sliders, shown = self.numbers(), " ← x, y, z", self.panels.split()
         centre = "C = −Rᵀt [m]" if "chain" in shown else "C [m]"
         parts = [
-            _matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
-            _matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
-            _matrix((450, 486), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
+            matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
+            matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
+            matrix((450, 486), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
         ]
         if "K" in shown:
-            parts.append(_matrix((580, 360), "K, intrinsics [px]", n["K"], 1))
+            parts.append(matrix((580, 360), "K, intrinsics [px]", n["K"], 1))
         if "chain" in shown:
             parts.append(self._chain())
         return "".join([*parts, self._your_numbers()])
@@ -249,23 +251,20 @@ class FrustumView(OrbitView):
         if problem:
             return svg.paragraph((x, y), problem, 360)
         away = float(np.linalg.norm(centre - self.camera.centre))
-        where = svg.text((x, y), f"your C: {_row(centre)} m", "label orange")
+        where = svg.text((x, y), f"your C: {vector(centre, 2)} m", "label orange")
         return where + svg.text((x, y + 18), f"{away:.2f} m from the camera", "label orange")
 
     def _chain(self) -> str:
         """One point, step by step."""
         point = board_corners()[0]
         seen_at = self.camera.project(point)
-        pixel = f"{_row(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
+        pixel = f"{vector(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
         rows = [
-            ("X, first corner of the board [m]", _row(point)),
-            ("R X + t, in the camera's frame [m]", _row(transform(self.camera.cam_from_world, point))),
+            ("X, first corner of the board [m]", vector(point, 2)),
+            ("R X + t, in the camera's frame [m]", vector(transform(self.camera.cam_from_world, point), 2)),
             ("through lens and K", pixel),
         ]
-        return "".join(
-            svg.text((640, 484 + 33 * i), name, "note") + svg.text((640, 500 + 33 * i), value, "number")
-            for i, (name, value) in enumerate(rows)
-        )
+        return readout(rows, (640, 484), (0, 33), (0, 16), "number")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
@@ -295,25 +294,3 @@ def _up(camera: Camera) -> Array:
 
 def _hfov_deg(intrinsics: Intrinsics) -> float:
     return degrees(2 * atan(intrinsics.width / (2 * intrinsics.fx)))
-
-
-def _matrix(corner: tuple[float, float], name: str, values: Array, decimals: int) -> str:
-    """A matrix (m, n) in brackets, its name above."""
-    x, y = corner
-    rows = [[_signed(value, decimals) for value in row] for row in values]
-    wide = max(len(word) for row in rows for word in row)
-    lines = ["  ".join(word.rjust(wide) for word in row) for row in rows]
-    width, height = 7.6 * len(lines[0]) + 16, 20 * len(lines)
-    brackets = [[(x + 5, y + 8), (x, y + 8), (x, y + 8 + height), (x + 5, y + 8 + height)]]
-    brackets.append([(2 * x + width - px, py) for px, py in brackets[0]])
-    words = [svg.text((x + 8, y + 23 + 20 * i), line, "number") for i, line in enumerate(lines)]
-    return svg.text((x, y - 2), name, "note") + svg.path(brackets, "muted") + "".join(words)
-
-
-def _row(values: Array, decimals: int = 2) -> str:
-    return f"({', '.join(_signed(value, decimals) for value in values)})"
-
-
-def _signed(value: float, decimals: int) -> str:
-    """A number with a true minus sign, and no minus before zero."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−")

@@ -15,7 +15,6 @@ from scipy import constants
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -26,7 +25,7 @@ from camviz.scenes import render, textured_scene
 from camviz.sensors import DigitalCamera, Sensor, decibel
 from camviz.sensors.digital_camera import Shot
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
-from camviz.views.base import View, choice, positive, slider
+from camviz.views.base import View, answered, choice, positive, slider
 
 SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
 SCENE_LUX = 1000.0
@@ -117,10 +116,8 @@ class ImageSensorView(View):
     @cached_property
     def your_e(self) -> tuple[float, str]:
         """The same by the reader's function, NaN without an answer, and what is wrong with it."""
-        if self.yours is None:
-            return np.nan, "No function of yours has been given."
         pitch_um, exposure_s = _MODELS[self.model].pitch_um, self.exposure_ms / 1000
-        answer, problem = tried(self.yours, (SCENE_LUX, F_NUMBER, pitch_um, exposure_s, self._efficiency), 0.0)
+        answer, problem = answered(self.yours, (SCENE_LUX, F_NUMBER, pitch_um, exposure_s, self._efficiency), 0.0)
         return float(answer), problem
 
     def numbers(self) -> dict[str, str]:
@@ -226,10 +223,9 @@ class ImageSensorView(View):
         )
 
     def _numbers(self) -> str:
-        rows = [svg.text((590, 336), "This sensor", "title")]
-        rows.append(readout(self.numbers(), (590, 362), (0, 24), (166, 0)))
-        rows.append(svg.paragraph((590, 548), _MODELS[self.model].source, 350))
-        return "".join(rows)
+        figures = readout(self.numbers(), (590, 362), (0, 24), (166, 0))
+        source = svg.paragraph((590, 548), _MODELS[self.model].source, 350)
+        return svg.text((590, 336), "This sensor", "title") + figures + source
 
 
 @lru_cache(maxsize=2)

@@ -15,7 +15,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.matrix import matrix
+from camviz.draw.matrix import intrinsic_matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout
@@ -346,12 +346,12 @@ class IntrinsicsView(OrbitView):
 
     def _matrices(self, x: float, y: float) -> str:
         before, after = self.taken.K, self.intrinsics.K
-        left = matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before)
+        left = intrinsic_matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before)
         if self.operation == "as taken":
-            right = matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
+            right = intrinsic_matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
         else:
             changed = ~np.isclose(before, after, rtol=0, atol=1e-9)
-            right = matrix(x + 248, y, f"K, {self.operation}", after, changed)
+            right = intrinsic_matrix(x + 248, y, f"K, {self.operation}", after, changed)
         K = self.intrinsics
         u = f"u = {K.fx:.2f} x {_signed(K.skew)} y {_signed(K.cx)}"
         v = f"v = {K.fy:.2f} y {_signed(K.cy)}"

@@ -12,7 +12,7 @@ from camviz import optics
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
-from camviz.draw.readout import listed
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice, slider
 
@@ -131,11 +131,11 @@ class LensElementsView(View):
         return outlines
 
     def _numbers(self) -> str:
-        rows = ""
-        for i, (name, value) in enumerate(self.numbers().items()):
-            x, y = 20 + 470 * (i // 3), _TALL + 66 + 26 * (i % 3)
-            rows += svg.text((x, y), name, "note") + svg.text((x + 170, y), value, "label")
-        return rows
+        figures, top = list(self.numbers().items()), _TALL + 66
+        left, right = (
+            readout(part, (x, top), (0, 26), (170, 0)) for part, x in ((figures[:3], 20), (figures[3:], 490))
+        )
+        return left + right
 
 
 def _behind(z_mm: float) -> str:

@@ -18,7 +18,7 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, seconds
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
 from camviz.sensors.frozen import Draw, exposed
@@ -160,7 +160,7 @@ class PhotonTransferView(View):
         whole = float(np.sqrt(sum(part[0] ** 2 for part in parts.values()))) / K
         full = self._saturated_share
         return {
-            "exposure": _seconds(self.exposure_s),
+            "exposure": seconds(self.exposure_s),
             "gain K": f"{K:.4g} DN/e⁻",
             **self._fitted(pixels),
             "on the card": f"{_electrons(self.card_e)} e⁻ ± {_electrons(whole)}",
@@ -235,7 +235,7 @@ class PhotonTransferView(View):
         shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
         shown += svg.line(panel.place(outline), "yellow")
         note = "brightened" if self.brighten else "as recorded"
-        return panel.show(shown, title=f"The garden in {_seconds(self.exposure_s)}", note=note)
+        return panel.show(shown, title=f"The garden in {seconds(self.exposure_s)}", note=note)
 
     def _histogram_panel(self, dn: np.ndarray) -> str:
         """How many pixels have which number: the whole picture, and the card alone."""
@@ -385,7 +385,3 @@ def _card_slices(height: int, width: int) -> tuple[slice, slice]:
 
 def _electrons(count: float) -> str:
     return f"{count:,.0f}" if count >= 1000 else f"{count:.3g}"
-
-
-def _seconds(seconds: float) -> str:
-    return f"{seconds:.3g} s" if seconds >= 0.3 else f"1/{1 / seconds:.0f} s"

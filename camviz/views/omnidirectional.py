@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -30,14 +29,13 @@ from camviz.panoramas.reprojection import equirectangular_camera, reproject, win
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import textured_scene, to_display
 from camviz.views import garden
-from camviz.views.base import OrbitView, choice, slider
+from camviz.views.base import OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
 UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))
 _DRAFT, _FINE = 160, 480  # pixels across the doughnut
-_GREY = (69, 69, 69)  # of what a picture does not show
 _COUNTED = 400  # pixels across the picture whose focal length is told
 _OF_THE_WINDOW = {"yaw_deg", "pitch_deg", "hfov_deg", "unroll", "model", "eye"}  # the mirror stands still
 _OF_THE_MIRROR = {"rig", "central", "lens", "rim_angle_deg", "missed_mm", "_doughnuts"}
@@ -178,9 +176,6 @@ class OmnidirectionalView(OrbitView):
         f = self.camera(_COUNTED).intrinsics.fx
         return f"u = {f:.1f} X / (Z + {self._xi:g} D), of {_COUNTED} pixels across the doughnut"
 
-    def _has(self, panel: str) -> bool:
-        return panel in self.panels.split()
-
     def _told(self) -> dict[str, str]:
         """The figures that the panels speak of."""
         figures = self.numbers()
@@ -215,7 +210,7 @@ class OmnidirectionalView(OrbitView):
         rim, blind = (side / 2 * self._share(angle) for angle in (self.rim_angle_deg, BLIND_DEG))
         y, x = np.ogrid[:side, :side]
         r2 = (x - (side - 1) / 2) ** 2 + (y - (side - 1) / 2) ** 2
-        picture[(r2 > rim**2) | (r2 < blind**2)] = _GREY
+        picture[(r2 > rim**2) | (r2 < blind**2)] = garden.NOTHING
         picture.flags.writeable = False
         return picture
 
@@ -350,10 +345,8 @@ class OmnidirectionalView(OrbitView):
 
     def _your_pixels(self, garden_points: Array) -> tuple[Array, str]:
         """Where the reader's function puts points (..., 3) of the garden in the doughnut, and what is wrong with it."""
-        if self.yours is None:
-            return np.full((*garden_points.shape[:-1], 2), np.nan), "No function of yours has been given."
         points = garden_points @ np.asarray(UP.inv().as_matrix()[:3, :3]).T
-        xy, problem = tried(self.yours, (points, self._xi), points[..., :2])
+        xy, problem = answered(self.yours, (points, self._xi), points[..., :2])
         uv = self.camera(_FINE).intrinsics.to_pixels(xy)
         return np.where(np.abs(uv) < 5 * _FINE, uv, np.nan), problem
 
@@ -376,9 +369,8 @@ class OmnidirectionalView(OrbitView):
         panel = self._box("yours", 320, 240)
         uv, problem = self._your_pixels(_AWAY * self._seen(draft).rays())
         if problem:
-            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
-        places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (picture.shape[1] / _FINE) - 0.5
-        cut = cv2.remap(picture, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=_GREY)
+            return without(panel, problem, "Cut by your function"), {}
+        cut = garden.looked_up(picture, uv, _FINE)
         return panel.show(placed_image(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
     # The hands -------------------------------------------------------------------------------------------------------

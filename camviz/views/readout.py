@@ -15,16 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, grid, plot_panel, upright
-from camviz.draw.readout import listed
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors.readout import bucket_brigade, row_times
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, answered, choice, slider
 
 ROWS = 480  # of the sensor: what the row time counts
 LARGE = (320, 240)  # pixels of a fine picture
@@ -119,9 +118,7 @@ class ReadoutView(View):
     @cached_property
     def your_row_s(self) -> tuple[float, str]:
         """The seconds from row to row by the reader's function, NaN without an answer, and what is wrong with it."""
-        if self.yours is None:
-            return np.nan, "No function of yours has been given."
-        answer, problem = tried(self.yours, (self.stripes, ROWS, MAINS_HZ), 0.0)
+        answer, problem = answered(self.yours, (self.stripes, ROWS, MAINS_HZ), 0.0)
         return float(answer), problem
 
     @cached_property
@@ -282,13 +279,10 @@ class ReadoutView(View):
         return marks + svg.text((panel.width - 8, 54), "dots: read, by your row time", "orange halo end")
 
     def _numbers(self) -> str:
-        rows = [svg.text((690, 26), "This read-out", "title")]
-        for i, (name, value) in enumerate(self._told().items()):
-            rows.append(svg.text((690, 50 + 44 * i), name, "note"))
-            rows.append(svg.text((690, 69 + 44 * i), value, "orange" if "yours" in name else "label"))
-        if "time" in self.panels:
-            rows.append(svg.paragraph((690, 340), _WORDS[self.readout], 250, "label", 19))
-        return "".join(rows)
+        words = svg.paragraph((690, 340), _WORDS[self.readout], 250, "label", 19) if "time" in self.panels else ""
+        return (
+            svg.text((690, 26), "This read-out", "title") + readout(self._told(), (690, 50), (0, 44), (0, 19)) + words
+        )
 
 
 def fan(u: ArrayLike, v: ArrayLike, turns: ArrayLike) -> Array:

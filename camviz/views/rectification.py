@@ -19,7 +19,7 @@ from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed
+from camviz.draw.readout import listed, readout
 from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
@@ -267,7 +267,7 @@ class RectificationView(View):
         if self.yours is None:
             more |= dict(zip(("disparity", "second"), _maps(*self._matching(draft), self.show), strict=True))
         wedge = self._wedge_panel() if "wedge" in self._shown else ""
-        body = "".join([*panels, maps, wedge, _column(numbers)])
+        body = "".join([*panels, maps, wedge, readout(numbers, (820, 42), (0, 37), (0, 16))])
         attached |= {name: data for name, data in more.items() if f"attached:{name}" in maps}
         return self.composed(590, body, attached=attached, described=self._described(numbers))
 
@@ -388,14 +388,6 @@ class RectificationView(View):
         notes = (self.equation(), self.interval())
         place = (672, 374, 270, 177)
         return wedge_panel(place, self.stage.pair, self.disparity, self.plus_minus, farthest, notes, worth=self.worth)
-
-
-def _column(numbers: dict[str, str]) -> str:
-    rows = []
-    for i, (name, value) in enumerate(numbers.items()):
-        rows.append(svg.text((820, 42 + 37 * i), name, "note"))
-        rows.append(svg.text((820, 58 + 37 * i), value, "label"))
-    return "".join(rows)
 
 
 # What is kept once made ----------------------------------------------------------------------------------------------

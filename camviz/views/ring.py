@@ -12,7 +12,7 @@ import numpy as np
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed
+from camviz.draw.readout import listed, signed
 from camviz.lenses import Equirectangular
 from camviz.lenses.base import Array
 from camviz.panoramas.ring import Ring, all_round
@@ -84,10 +84,10 @@ class RingView(View):
         known = seen if np.isfinite(seen) else 1e6
         return {
             "neighbours apart": f"{100 * self.ring.baseline:.1f} cm",
-            "parallax at 1 m": _signed(self.parallax_px(1.0)),
-            "parallax at 3 m": _signed(self.parallax_px(3.0)),
-            "parallax at 10 m": _signed(self.parallax_px(10.0)),
-            there: _signed(self.parallax_px(known)),
+            "parallax at 1 m": _pixels(self.parallax_px(1.0)),
+            "parallax at 3 m": _pixels(self.parallax_px(3.0)),
+            "parallax at 10 m": _pixels(self.parallax_px(10.0)),
+            there: _pixels(self.parallax_px(known)),
         }
 
     def equation(self) -> str:
@@ -207,8 +207,8 @@ class RingView(View):
         return self.dragged(handle, 0, 0, {"ArrowLeft": -5, "ArrowRight": 5}.get(key, 0), 0)
 
 
-def _signed(px: Array | float) -> str:
-    return f"{float(px):+.1f} px".replace("-", "−")
+def _pixels(px: Array | float) -> str:
+    return f"{signed(float(px), 1)} px"
 
 
 @lru_cache(maxsize=2)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.picture import Picture
+from camviz.draw.readout import decimal, vector
 from camviz.draw.space import Dots, Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
@@ -83,10 +84,9 @@ class RotationView(OrbitView):
         n = self.numbers()
         state = "They lie in one line: gimbal lock." if self.locked else "The three turns are independent."
         return (
-            f"Yaw {_signed(self.yaw_deg, 0)}°, pitch {_signed(self.pitch_deg, 0)}°, roll {_signed(self.roll_deg, 0)}°; "
-            f"rotation vector {_row(n['rotation_vector'])}, an angle of {n['angle_deg']:.1f}°; "
-            f"quaternion (x, y, z, w) {_row(n['quaternion'])}. "
-            f"The axes of yaw and roll are {n['lock_deg']:.0f}° apart. {state}"
+            f"Yaw {decimal(self.yaw_deg, 0)}°, pitch {decimal(self.pitch_deg, 0)}°, roll {decimal(self.roll_deg, 0)}°; "
+            f"rotation vector {_row(n['rotation_vector'])}, an angle of {n['angle_deg']:.1f}°; quaternion (x, y, z, w) "
+            f"{_row(n['quaternion'])}. The axes of yaw and roll are {n['lock_deg']:.0f}° apart. {state}"
         )
 
     # The picture -----------------------------------------------------------------------------------------------------
@@ -140,9 +140,4 @@ def _ring(world_from_ring: Rotation, radius: float, across: int) -> Array:
 
 
 def _row(values: ArrayLike, decimals: int = 3) -> str:
-    return "(" + ", ".join(f"{_signed(value, decimals):>{decimals + 3}}" for value in np.asarray(values)) + ")"
-
-
-def _signed(value: float, decimals: int) -> str:
-    """A number with a true minus sign, and no minus before zero."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−")
+    return vector(values, decimals, width=decimals + 3)

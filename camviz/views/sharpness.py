@@ -233,9 +233,7 @@ class SharpnessView(View):
         return "".join(parts)
 
     def _numbers_column(self) -> str:
-        x, rows = 814, [svg.text((814, 26), "This camera", "title")]
-        rows.append(readout(self.numbers(), (x, 54), (0, 40), (0, 17)))
-        return "".join(rows)
+        return svg.text((814, 26), "This camera", "title") + readout(self.numbers(), (814, 54), (0, 40), (0, 17))
 
 
 @lru_cache(maxsize=2)

@@ -139,9 +139,8 @@ class BoardResidualsView(OrbitView):
     def description(self) -> str:
         return (
             f"{len(self.observations)} views: the mean residual of the worst corner is "
-            f"{self.numbers()['longest_mm']:.3f} mm on the "
-            f"board. {self._solved()} Arrows {self.scale:g} times, bend {self.exaggeration:g} times as large as "
-            "they are."
+            f"{self.numbers()['longest_mm']:.3f} mm on the board. {self._solved()} Arrows {self.scale:g} times, bend "
+            f"{self.exaggeration:g} times as large as they are."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:

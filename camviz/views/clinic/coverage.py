@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,15 @@ from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, png
 from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
-from camviz.views.base import View, choice
-from camviz.views.clinic.observations import Observations, short_names
+from camviz.views.base import choice
+from camviz.views.clinic.observations import Observations, ObservedView, short_names
 
 _RINGS = 8
 _MOST_DOTS = 4000
 
 
 @dataclass(frozen=True)
-class CoverageView(View):
+class CoverageView(ObservedView):
     """How many corners fell on every part of the picture: the calibration knows nothing where there were none."""
 
     title: ClassVar[str] = "Coverage"
@@ -30,11 +30,6 @@ class CoverageView(View):
     observations: Observations = field(compare=False, repr=False)
     cells: str = choice("16 × 12", "8 × 6", "32 × 24", label="cells", help="how finely the picture is divided")
     count: str = choice("corners", "views", label="count", help="corners, or views that have a corner there")
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> CoverageView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls(Observations.of(calibration, camera, **options))
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
@@ -79,9 +74,8 @@ class CoverageView(View):
         n, seen = self.numbers(), self.observations
         return (
             f"{seen.used.sum()} corners in {len(seen)} views of {seen.name} touch {100 * n['share']:.0f} % of the "
-            "picture's "
-            f"{self.cells} cells and reach {100 * n['reach']:.0f} % of the way to the corner. The board was tilted by "
-            f"{n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {np.nanmin(seen.distances):.2g} m to "
+            f"picture's {self.cells} cells and reach {100 * n['reach']:.0f} % of the way to the corner. The board was "
+            f"tilted by {n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {np.nanmin(seen.distances):.2g} m to "
             f"{np.nanmax(seen.distances):.2g} m away."
         )
 

@@ -18,6 +18,7 @@ from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Missing, short_names
 from camviz.views.clinic.uncertainty import adjusted, determined
+from camviz.views.view_bars import names_below
 
 _GRID = (30, 20)
 _PARTS = ("earlier and later", "every other")
@@ -144,14 +145,12 @@ class CrossValidationView(View):
         gap = 0.1 if n <= 60 else 0.0
         content = plot.grid(panel, xticks=[]) + plot.bars(panel, x - 0.5 + gap, x + 0.0, fitted, "fill-blue")
         content += plot.bars(panel, x + 0.0, x + 0.5 - gap, held, "fill-orange")
-        level = [(panel.left, self.held.expected_rms), (panel.right, self.held.expected_rms)]
-        content += svg.line(panel.place(level), "ink dashed")
+        content += plot.level(panel, self.held.expected_rms, "ink dashed")
         content += plot.legend(
             panel,
             [("blue thick", "fitted"), ("orange thick", "held out"), ("ink dashed", "held out, expected from noise")],
         )
-        names = short_names(self.pictures, n)
-        ticks = [(t, names[round(t) - 1]) for t in (x.tolist() if n <= 20 else plot.ticks(1, n, 10).tolist())]
+        ticks = names_below(short_names(self.pictures, n), most=20, about=10)
         return panel.show(content, title="Corners of every view") + plot.axes(panel, "view", "RMS [px]", xticks=ticks)
 
     def _name(self, view: int) -> str:

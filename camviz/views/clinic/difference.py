@@ -13,6 +13,7 @@ from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import readout
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import View, choice, slider
 from camviz.views.clinic.observations import Missing
@@ -142,10 +143,7 @@ class DifferenceView(View):
         ]
         if self.distance != "infinity":
             rows.append(("and moved by", f"{1000 * n['shift_m']:.3g} mm"))
-        words = "".join(
-            svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label")
-            for i, (a, b) in enumerate(rows)
-        )
+        words = readout(rows, (x, 60), (0, 40), (0, 18))
         told = "Turn and move are what the two sets of intrinsics imply; they are taken out, for a pose takes them up."
         words += svg.paragraph((x, 236), f"{self.names[0]} against {self.names[1]}.", 950 - x) + svg.paragraph(
             (x, 290), told, 950 - x

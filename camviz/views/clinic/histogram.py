@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import erf, ndtri
 
 from camviz.draw import plot, svg
 from camviz.draw.picture import Picture
-from camviz.draw.readout import listed
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
-from camviz.views.base import View, choice
-from camviz.views.clinic.observations import Observations
+from camviz.views.base import choice
+from camviz.views.clinic.observations import Observations, ObservedView
 
 _BINS = 61
 
 
 @dataclass(frozen=True)
-class HistogramView(View):
+class HistogramView(ObservedView):
     """How the residuals of all used corners are spread, against a Gaussian; and quantile against quantile.
 
     The Gaussian's width comes from the middle half of the residuals, so that a few gross errors cannot hide in it.
@@ -30,11 +30,6 @@ class HistogramView(View):
 
     observations: Observations = field(compare=False, repr=False)
     component: str = choice("both", "u", "v", label="residuals", help="across the picture, down it, or both together")
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> HistogramView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls(Observations.of(calibration, camera, **options))
 
     @cached_property
     def values(self) -> Array:
@@ -128,11 +123,9 @@ class HistogramView(View):
         )
 
     def _words(self) -> str:
-        rows = []
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((765, 48 + 38 * i), name, "note") + svg.text((765, 65 + 38 * i), value, "label"))
+        figures = readout(self.numbers(), (765, 48), (0, 38), (0, 17))
         advice = (
             "Pure noise follows the orange curve. Tails that stand off it are outliers; a flat or two-peaked "
             "shape is a model that does not fit."
         )
-        return "".join(rows) + svg.paragraph((765, 248), advice, 190)
+        return figures + svg.paragraph((765, 248), advice, 190)

@@ -11,26 +11,21 @@ import numpy as np
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, jpeg
-from camviz.views.base import View, slider
-from camviz.views.clinic.observations import Observations
+from camviz.views.base import slider
+from camviz.views.clinic.observations import Observations, ObservedView
 from camviz.views.marks import arrows, crop, cross
 
 _COUNT, _COLUMNS = 12, 6
 
 
 @dataclass(frozen=True)
-class OutliersView(View):
+class OutliersView(ObservedView):
     """The twelve corners that are farthest from their projection, used or set aside, enlarged out of their pictures."""
 
     title: ClassVar[str] = "The worst corners"
 
     observations: Observations = field(compare=False, repr=False)
     patch: float = slider(24.0, 8, 96, 4, label="window", unit="px", help="how much of the picture each detail shows")
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> OutliersView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls(Observations.of(calibration, camera, **options))
 
     @cached_property
     def worst(self) -> list[tuple[int, int]]:

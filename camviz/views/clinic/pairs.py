@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -15,10 +15,11 @@ from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
-from camviz.views.base import Control, View, slider
+from camviz.views.base import slider
 from camviz.views.clinic.observations import Missing, Photographs, no_photographs, short_names
 from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows, clipped, on_photograph
+from camviz.views.view_bars import LABEL, ViewChooser, bars_of, figures_on, names_below
 
 if TYPE_CHECKING:
     from camviz.files import Calibration
@@ -119,7 +120,7 @@ class SharedViews:
 
 
 @dataclass(frozen=True)
-class EpipolarPairsView(View):
+class EpipolarPairsView(ViewChooser):
     """Every shared view's distance from its epipolar lines, and the chosen view's two pictures with some of the lines.
 
     Arrows lead from each corner towards its line, `scale` times as long. The arrow along the first row tells in which
@@ -149,14 +150,9 @@ class EpipolarPairsView(View):
             shared, worst + 1, float(np.clip(nice(26 / (typical * per_pixel)), 1, 300)) if typical > 1e-9 else 1.0
         )
 
-    def offered(self) -> dict[str, Control]:
-        controls = self.controls()
-        return {**controls, "view": replace(controls["view"], high=len(self.shared))}
-
     @property
-    def index(self) -> int:
-        """The place of the chosen view in the list, from 0."""
-        return min(max(round(self.view), 1), len(self.shared)) - 1
+    def count(self) -> int:
+        return len(self.shared)
 
     def description(self) -> str:
         shared, i = self.shared, self.index
@@ -184,26 +180,12 @@ class EpipolarPairsView(View):
         return plot.plot_panel("pairs", 70, 34, 870, 110, (0.5, len(self.shared) + 0.5), (0, max(top, 1e-9)))
 
     def _bars_panel(self) -> str:
-        shared, panel, n = self.shared, self._bars, len(self.shared)
-        x, gap = np.arange(1, n + 1), 0.12 if n <= 60 else 0.0
-        chosen = x == self.index + 1
-        content = plot.grid(panel, xticks=[])
-        for mask, class_ in ((~chosen, "fill-blue"), (chosen, "fill-orange")):
-            content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, np.where(mask, shared.rms, np.nan), class_)
-        content += svg.line(
-            panel.place([(panel.left, shared.total_rms), (panel.right, shared.total_rms)]), "ink dashed"
-        )
-        if n <= 16:
-            content += "".join(
-                svg.text(panel.place((i, r)) + (0, -4), f"{r:.2f}", "tick middle halo")
-                for i, r in zip(x, shared.rms, strict=True)
-            )
-        names = short_names(shared.pictures, n)
-        ticks = [(t, names[round(t) - 1]) for t in (x.tolist() if n <= 16 else plot.ticks(1, n, 16).tolist())]
-        label = "One bar per shared view; click, drag or press the arrow keys to choose a view"
-        shown = panel.show(
-            content, title="Distance from the epipolar lines", drag="bars", hint="click a bar", label=label
-        )
+        shared, panel = self.shared, self._bars
+        content = plot.grid(panel, xticks=[]) + bars_of(panel, shared.rms, self.index)
+        content += plot.level(panel, shared.total_rms, "ink dashed") + figures_on(panel, shared.rms)
+        ticks = names_below(short_names(shared.pictures, len(shared)))
+        label, title = LABEL.replace("per view", "per shared view"), "Distance from the epipolar lines"
+        shown = panel.show(content, title=title, drag="bars", hint="click a bar", label=label)
         return shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
 
     def _side(self, side: int, camera: Camera) -> tuple[str, dict[str, bytes]]:
@@ -239,15 +221,6 @@ class EpipolarPairsView(View):
             return ""
         curves = twoview.epipolar_curve(cameras[1 - side], cameras[side], other, _DISTANCES)
         return on_photograph(clipped(panel, panel.place(curves)), "green thin")
-
-    # Touch -----------------------------------------------------------------------------------------------------------
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(view=int(np.clip(round(self._bars.data((x - self._bars.x, 0))[0]), 1, len(self.shared))))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        step = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
-        return self.but(view=min(max(self.index + 1 + step, 1), len(self.shared)))
 
 
 def _to_line(lines: Array, uv: Array) -> Array:

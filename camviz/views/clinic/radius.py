@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
-from camviz.views.base import View, slider
-from camviz.views.clinic.observations import Observations
+from camviz.views.base import slider
+from camviz.views.clinic.observations import Observations, ObservedView
 from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows
 
@@ -23,7 +23,7 @@ _MOST_DOTS = 1500
 
 
 @dataclass(frozen=True)
-class RadiusView(View):
+class RadiusView(ObservedView):
     """Whether the residuals point outward or around the principal point somewhere, as they do under too simple a lens.
 
     Outward and around: each used corner's residual along the line from the principal point and across it, with the mean
@@ -38,12 +38,7 @@ class RadiusView(View):
     )
 
     @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> RadiusView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls.about(Observations.of(calibration, camera, **options))
-
-    @classmethod
-    def about(cls, observations: Observations) -> RadiusView:
+    def about(cls, observations: Observations) -> Self:
         """The view with arrows of a length that can be seen."""
         means = np.linalg.norm(cls(observations).cells[1], axis=-1)
         largest = float(np.nanmax(means)) if np.isfinite(means).any() else 0.0
@@ -102,12 +97,10 @@ class RadiusView(View):
     def description(self) -> str:
         n = self.numbers()
         return (
-            f"{self.observations.used.sum()} corners of {self.observations.name}. The ring that stands out most "
-            "is off by "
-            f"{n['outward_px']:+.3f} px outward ({n['outward_errors']:.1f} standard errors) and by "
-            f"{n['around_px']:+.3f} px "
-            f"around ({n['around_errors']:.1f}). Arrows {self.scale:g} times as long as the mean residual of "
-            "their cell."
+            f"{self.observations.used.sum()} corners of {self.observations.name}. The ring that stands out most is off "
+            f"by {n['outward_px']:+.3f} px outward ({n['outward_errors']:.1f} standard errors) and by "
+            f"{n['around_px']:+.3f} px around ({n['around_errors']:.1f}). Arrows {self.scale:g} times as long as the "
+            "mean residual of their cell."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:

@@ -18,17 +18,18 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views import garden
-from camviz.views.base import Control, View, slider
+from camviz.views.base import Control, slider
 from camviz.views.clinic.observations import Missing
 from camviz.views.clinic.pairs import SharedViews
 from camviz.views.marks import on_photograph
+from camviz.views.view_bars import ViewChooser
 
 _SIDE = 480
 _STAND = RigidTransform.from_translation([-0.4, 0.0, 0.0])  # of the left camera in the garden
 
 
 @dataclass(frozen=True)
-class RectifiedView(View):
+class RectifiedView(ViewChooser):
     """A pair's two pictures after rectification, with rows across both, and how far apart the rows of corners are.
 
     Without photographs the pair stands in the virtual garden. `shared` holds the corners, where there are any.
@@ -57,15 +58,11 @@ class RectifiedView(View):
         return cls(cameras[0], cameras[1], shared)
 
     def offered(self) -> dict[str, Control]:
-        controls = self.controls()
-        if self.shared is None or len(self.shared) < 2:
-            return {"rows": controls["rows"]}
-        return {**controls, "view": replace(controls["view"], high=len(self.shared))}
+        return super().offered() if self.count > 1 else {"rows": self.controls()["rows"]}
 
     @property
-    def index(self) -> int:
-        """The place of the chosen view in the list, from 0."""
-        return min(max(round(self.view), 1), len(self.shared) if self.shared else 1) - 1
+    def count(self) -> int:
+        return len(self.shared) if self.shared else 1
 
     @cached_property
     def pair(self) -> twoview.RectifiedPair | str:
@@ -130,10 +127,8 @@ class RectifiedView(View):
             turned = camera if isinstance(self.pair, str) else (self.pair.left, self.pair.right)[side]
             k = turned.intrinsics
             panel = image_panel(f"rectified {side}", 20 + 470 * side, 34, 450, k.width, k.height, tallest=380)
-            name, title = (
-                f"rectified{side}",
-                f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}",
-            )
+            name = f"rectified{side}"
+            title = f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}"
             content = placed_image(panel, name, k.width, k.height) + self._marks(panel, side, turned, camera)
             body += panel.show(content, title=title)
             attached[name] = jpeg(self._rectified(side, turned, camera, 240 if draft else _SIDE))

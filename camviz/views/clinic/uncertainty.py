@@ -15,6 +15,7 @@ from camviz.cameras import Camera
 from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import readout
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
@@ -130,10 +131,7 @@ class UncertaintyView(View):
         rows = [("in the middle", f"±{n['middle']:.3g} px"), ("at worst", f"±{n['worst']:.3g} px"),
                 ("below 1 px over", f"{100 * n['below_1']:.0f} % of the picture"),
                 ("noise of a corner", f"{n['sigma']:.3g} px")]  # fmt: skip
-        words = "".join(
-            svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label")
-            for i, (a, b) in enumerate(rows)
-        )
+        words = readout(rows, (x, 60), (0, 40), (0, 18))
         words += svg.paragraph((x, 236), "Ellipses: in which direction (not to scale).", 960 - x - 10)
         return words + svg.paragraph((x, 280), LEFT_OUT, 960 - x - 10)
 
