@@ -135,11 +135,11 @@ def camera_body(
     reach = _reach(camera, camera.intrinsics.border(SIDE))
     rim = camera.centre + depth * reach
     corners = rim[::SIDE]
-    items: list[Item] = [Line(_closed(rim), colour, 2.2), Dots(camera.centre, colour, 8)]
+    items: list[Item] = [Line(closed(rim), colour, 2.2), Dots(camera.centre, colour, 8)]
     items += [Line(np.array([camera.centre, corner]), colour, 1.5) for corner in corners]
-    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(_closed(rim))]
+    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(closed(rim))]
     if near > 0:
-        items.append(Line(_closed(camera.centre + near * reach), colour, 1.2))
+        items.append(Line(closed(camera.centre + near * reach), colour, 1.2))
     if image is not None:
         mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 10, 13)
         items.append(TexturedMesh.over(camera.centre + depth * _reach(camera, mesh), image))
@@ -178,7 +178,8 @@ def _up_marker(camera: Camera, top: Array, depth: float, colour: str) -> Item:
     return Face(top - [0.2 * down + right, 0.2 * down - right, 1.5 * down], colour, 0.9)
 
 
-def _closed(outline: Array) -> Array:
+def closed(outline: Array) -> Array:
+    """The outline (n, d) with its first point again at last, (n + 1, d)."""
     return np.vstack([outline, outline[:1]])
 
 

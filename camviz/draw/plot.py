@@ -6,6 +6,7 @@ import numpy as np
 
 from camviz.draw import svg
 from camviz.draw.panel import Panel
+from camviz.draw.readout import true_minus
 
 Ticks = Sequence[tuple[float, str]]
 
@@ -54,6 +55,20 @@ def grid(panel: Panel, xticks: Ticks | None = None, yticks: Ticks | None = None)
     zeros = [_pairs(0, (panel.bottom, panel.top))] if panel.left <= 0 <= panel.right else []
     zeros += [_pairs((panel.left, panel.right), 0)] if panel.bottom <= 0 <= panel.top else []
     return _lines(panel, xs, ys) + svg.path(map(panel.place, zeros), "axis")
+
+
+def plotted(
+    panel: Panel,
+    content: str,
+    xlabel: str,
+    ylabel: str,
+    xticks: Ticks | None = None,
+    yticks: Ticks | None = None,
+    **heading: str,
+) -> str:
+    """A plot with its grid and axes around what it shows; `heading` is what `Panel.show` takes."""
+    shown = panel.show(grid(panel, xticks, yticks) + content, **heading)
+    return shown + axes(panel, xlabel, ylabel, xticks, yticks)
 
 
 def logarithmic_grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:
@@ -154,7 +169,7 @@ def written(values: np.ndarray) -> list[str]:
     """Evenly spaced values as text, with as many decimals as tell them apart."""
     step = float(np.min(np.diff(values))) if len(values) > 1 else 1.0
     decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
-    return [f"{value:.{decimals}f}".replace("-", "−") if abs(value) > step / 1e6 else "0" for value in values]
+    return [true_minus(f"{value:.{decimals}f}") if abs(value) > step / 1e6 else "0" for value in values]
 
 
 def _pairs(x: object, y: object) -> np.ndarray:

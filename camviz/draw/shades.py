@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, placed_image
 from camviz.draw.picture import png
+from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
 
 _SPECK = 24  # picture units, below which a closed contour is a speck between two values
@@ -127,7 +128,7 @@ def bar(x: float, y: float, height: float, name: str, shades: Shades, title: str
     levels = shades.levels()
     at = y + height * (1 - shades.fraction(levels))
     ticks = "".join(
-        svg.text((x + 20, place + 4), f"{level:g}".replace("-", "−"), "tick")
+        svg.text((x + 20, place + 4), true_minus(f"{level:g}"), "tick")
         for place, level in zip(at, np.round(levels, 9) + 0.0, strict=True)
     )
     marks = svg.segments(

@@ -109,6 +109,10 @@ class View:
         words = self.description() if described is None else described
         return Picture(body, WIDTH, height, self.title, words, dict(attached or {}))
 
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of: names and values."""
+        return {}
+
     @property
     def _panels(self) -> str:
         return str(getattr(self, "panels", ""))
@@ -147,6 +151,11 @@ class OrbitView(View):
 
     def pressed(self, handle: str, key: str) -> Self:
         return self.but(eye=self.eye.key(key)) if handle in ORBIT_HANDLES else super().pressed(handle, key)
+
+    def from_afar(self, target: np.ndarray, distance: float) -> OrbitCamera:
+        """The onlooker of a `target` (3,) from `distance` metres, or as much nearer or farther as one has walked."""
+        away = distance * self.eye.distance / OrbitCamera().distance
+        return replace(self.eye, target=tuple(target.tolist()), distance=away)
 
     def in_space(
         self,

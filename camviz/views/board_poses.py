@@ -18,7 +18,7 @@ from camviz.draw.readout import readout, vector
 from camviz.draw.space import Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import Control, OrbitView, choice, slider
+from camviz.views.base import Control, Drawn, OrbitView, choice, slider
 from camviz.views.chessboard import outline, rim, squares
 
 _NINE_BY_SIX = Board(9, 6, 0.025)
@@ -121,7 +121,7 @@ class BoardPosesView(OrbitView):
             attached = attached | {"photograph": jpeg(self.photographs[self.index])}
         return Picture(body, 960, 500, "Camera and board", self.description(), attached)
 
-    def space(self, panel: Panel, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def space(self, panel: Panel, draft: bool) -> Drawn:
         """The panel with the poses in space, a handle called "eye", and the photographs it needs."""
         before_board = self.still == "board"
         target = (self._middle + self.centres.mean(0)) / 2 if before_board else transform(self.chosen, self._middle) / 2

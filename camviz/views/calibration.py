@@ -21,7 +21,7 @@ from camviz.draw.space import Item, Label, OrbitCamera, camera_body, space_panel
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import OrbitView
+from camviz.views.base import Drawn, OrbitView
 from camviz.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
 from camviz.views.chessboard import outline, rim, squares
 from camviz.views.one_board import FromEach, from_each, panel_of_each
@@ -187,7 +187,7 @@ class CalibrationView(OrbitView, BoardPictures):
 
     # The boards in space ---------------------------------------------------------------------------------------------
 
-    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space(self, draft: bool) -> Drawn:
         panel = space_panel("space", 490, 34, 450, 338)
         far = float(self._poses_shown.translation[:, 2].max())
         eye = replace(self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.6)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.types import Board
-from camviz.draw.items import Line, TexturedMesh
+from camviz.draw.items import Line, TexturedMesh, closed
 from camviz.lenses.base import Array
 
 
@@ -18,7 +18,7 @@ def outline(board: Board) -> Array:
 
 def rim(corners: Array, class_: str, width: float) -> Line:
     """A board's edge, through the corners (4, 3) of its squares."""
-    return Line(np.vstack([corners, corners[:1]]), class_, width)
+    return Line(closed(corners), class_, width)
 
 
 def squares(corners: Array, board: Board) -> TexturedMesh:

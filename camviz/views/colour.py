@@ -21,11 +21,11 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views import swatches
-from camviz.views.base import Control, View, answered, choice, slider, switch, without
+from camviz.views.base import Control, Drawn, View, answered, choice, slider, switch, without
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
 LAYOUTS = {"chart photograph": 326, "spectra chart photograph steps": 640, "chart photograph yours": 626}
@@ -178,7 +178,7 @@ class ColourView(View):
             matrix, problem = tried(self.yours, (balanced, target), matrix)
         return developed(raw, gains, matrix, encoded=self.gamma != "at the end"), problem
 
-    def _your_row(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _your_row(self, draft: bool) -> Drawn:
         """The chart and the photograph by the reader's function, below those above."""
         rgb, problem = self.your_chart
         panel = replace(self._chart_panel, name="your chart", y=348)
@@ -201,7 +201,7 @@ class ColourView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         kelvin, duv = temperature(chromaticity(tristimulus(self.power)))
-        unlike = f"{kelvin:.0f} K, Duv {duv:+.4f}".replace("-", "−") if np.isfinite(kelvin) else "no temperature"
+        unlike = true_minus(f"{kelvin:.0f} K, Duv {duv:+.4f}") if np.isfinite(kelvin) else "no temperature"
         return {
             "light": unlike,
             "gains": " ".join(f"{name} {gain:.2f}" for name, gain in zip("RGB", self.gains, strict=True)),
@@ -211,7 +211,6 @@ class ColourView(View):
         } | self._metamer_in_words()
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         if "steps" in self.panels:
             return figures
@@ -231,7 +230,7 @@ class ColourView(View):
 
     def _light_in_words(self) -> str:
         kind = f"{self.light} light" if self.light == "Planckian" else self.light
-        return f"{kind} with tint {self.tint:+.2f}".replace("-", "−") if self.tint else kind
+        return true_minus(f"{kind} with tint {self.tint:+.2f}") if self.tint else kind
 
     # The picture ------------------------------------------------------------------------------------------------------
 
@@ -322,12 +321,7 @@ class ColourView(View):
             balanced = raw * self.gains
         else:
             balanced = developed(raw, self.gains, np.eye(3), encoded=True)
-        steps = {
-            "counted (raw)": raw,
-            "× gains": balanced,
-            "× matrix": self.develop(raw),
-            "what the eye sees": seen,
-        }
+        steps = {"counted (raw)": raw, "× gains": balanced, "× matrix": self.develop(raw), "what the eye sees": seen}
         return swatches.steps(20, 556, steps)
 
     # The hand ---------------------------------------------------------------------------------------------------------

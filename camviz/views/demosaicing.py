@@ -21,7 +21,7 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
@@ -29,6 +29,7 @@ from camviz.mosaics.measures import Measures
 from camviz.scenes import render, textured_scene, to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views.base import View, choice, slider, without
+from camviz.views.marks import circle
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side
@@ -163,7 +164,6 @@ class DemosaicingView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures, loupe = self.numbers(), self._under_the_loupe()
         if "yours" in self.panels:
             return {name: value for name, value in figures.items() if name not in loupe}
@@ -179,7 +179,7 @@ class DemosaicingView(View):
         near, (du, dv) = nearest_carrier(self.filters, fu, fv)
         away = float(np.hypot(du, dv))
         beat = f"beats once in {1 / away:.0f} px" if away > 0.005 else "no beat"
-        return {"loupe at": f"({fu:.2f}, {fv:.2f}) cycles/px".replace("-", "−"), "carrier": f"{_place(near)}: {beat}"}
+        return {"loupe at": true_minus(f"({fu:.2f}, {fv:.2f}) cycles/px"), "carrier": f"{_place(near)}: {beat}"}
 
     def description(self) -> str:
         figures = listed(self._told())
@@ -214,10 +214,8 @@ class DemosaicingView(View):
         if "yours" in self.panels:
             marks, heading = self._predicted(), dict[str, Any]()
         else:
-            marks, label = (
-                self._predicted() + self._frame(),
-                "The picture; drag or press the arrow keys to move the loupe",
-            )
+            marks = self._predicted() + self._frame()
+            label = "The picture; drag or press the arrow keys to move the loupe"
             heading = {"hint": "drag the loupe", "drag": "loupe", "label": label}
         if self.show == "false colour":
             return self._map_of_errors(self._panel, self.measures.colour_error, photographs, draft, marks, **heading)
@@ -262,11 +260,8 @@ class DemosaicingView(View):
     def _frame(self) -> str:
         """The loupe's outline on the picture."""
         u, v = self.at
-        corners = np.array([(0, 0), (LOUPE, 0), (LOUPE, LOUPE), (0, LOUPE)]) + (
-            u - LOUPE / 2 - 0.5,
-            v - LOUPE / 2 - 0.5,
-        )
-        outline = self._panel.place(corners)
+        left, top = u - LOUPE / 2 - 0.5, v - LOUPE / 2 - 0.5
+        outline = self._panel.place(np.array([(0, 0), (LOUPE, 0), (LOUPE, LOUPE), (0, LOUPE)]) + (left, top))
         return svg.polygon(outline, "paper-line") + svg.polygon(outline, "blue thick")
 
     def _loupe_panels(self, photographs: dict[str, bytes]) -> str:
@@ -332,10 +327,8 @@ class DemosaicingView(View):
 
     def pressed(self, handle: str, key: str) -> DemosaicingView:
         """An arrow moves the loupe by one pixel, so that its phase can be followed."""
-        across, down = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}.get(
-            key, (0, 0)
-        )
-        u, v = self.at
+        steps = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
+        (u, v), (across, down) = self.at, steps.get(key, (0, 0))
         return self.but(u=float(u + across), v=float(v + down)) if handle == "loupe" else self
 
 
@@ -364,9 +357,7 @@ def _everywhere(pattern: Pattern, highest: float) -> Array:
 
 
 def _rings(centres: Array, radius: float) -> str:
-    turn = np.linspace(0, 2 * np.pi, 25)
-    circle = radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    lines = [centre + circle for centre in centres]
+    lines = [centre + radius * circle(25) for centre in centres]
     return svg.path(lines, "paper-line") + svg.path(lines, "ink")
 
 

@@ -167,7 +167,6 @@ class DepthOfFieldView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         left_out = set()
         if self.panels != "rays photograph blur":
             left_out |= {"field of view", "globe on the sensor"}

@@ -18,16 +18,17 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
+from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.space import Item, Line, OrbitCamera, axes_triad, space_panel
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import on_plane, unit
 from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene
 from camviz.views import garden
-from camviz.views.base import OrbitView, answered, choice, slider, switch, without
+from camviz.views.base import Drawn, OrbitView, answered, choice, slider, switch, without
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
@@ -139,9 +140,8 @@ class DistortionView(OrbitView):
         return tan(self._fold_angle) if self._fold_angle < pi / 2 else inf
 
     def _fold_in_words(self) -> str:
-        return (
-            f"r = {_with_angle(self._fold)}" if isfinite(self._fold) else f"{degrees(self._fold_angle):.1f}° off axis"
-        )
+        off_axis = f"{degrees(self._fold_angle):.1f}° off axis"
+        return f"r = {_with_angle(self._fold)}" if isfinite(self._fold) else off_axis
 
     def _fold_rim(self, samples: int) -> np.ndarray:
         """Where the lens puts the rays of its fold, all around: image points (samples, 2) in focal lengths."""
@@ -183,9 +183,8 @@ class DistortionView(OrbitView):
     def _name(self) -> str:
         if self.lens:
             return type(self.lens).__name__
-        return (
-            ", ".join(f"{name} = {value:g}" for name, value in self._coefficients().items() if value) or "no distortion"
-        )
+        told = [f"{name} = {value:g}" for name, value in self._coefficients().items() if value]
+        return ", ".join(told) or "no distortion"
 
     def _coefficients(self) -> dict[str, float]:
         if self.lens:
@@ -222,9 +221,7 @@ class DistortionView(OrbitView):
             return self.camera.lens.project(on_plane(xy))
         return self.camera.lens.distort(xy)
 
-    def _picture_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _picture_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         panel = self._image_panel("picture", x, y, width, tallest)
         straight = _grid_lines(self.intrinsics, 33 if draft else 65)
         lines = self._bend(straight) if self.show == "distorted" else straight
@@ -245,9 +242,7 @@ class DistortionView(OrbitView):
         """Where the reader's function puts ideal points (..., 2), and what is wrong with it."""
         return answered(self.yours, (xy, self.k1, self.k2, self.k3), xy)
 
-    def _your_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _your_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         """The same picture by the reader's function: its grid over the photograph, or the photograph straightened."""
         panel = self._image_panel("yours", x, y, width, tallest)
         lines, problem = self._your_bend(_grid_lines(self.intrinsics, 33 if draft else 65))
@@ -270,7 +265,7 @@ class DistortionView(OrbitView):
         if not isfinite(self._fold_angle if bent else self._fold):
             return ""
         rim = self._fold_rim(90) if bent else self._fold * _circle(90)
-        return svg.line(panel.place(self.intrinsics.to_pixels(np.vstack([rim, rim[:1]]))), "red dashed")
+        return svg.line(panel.place(self.intrinsics.to_pixels(closed(rim))), "red dashed")
 
     # The displacement ------------------------------------------------------------------------------------------------
 
@@ -281,9 +276,7 @@ class DistortionView(OrbitView):
     def _distorted(self, uv: np.ndarray) -> np.ndarray:
         return self.intrinsics.to_pixels(self._bend(self.intrinsics.from_pixels(uv)))
 
-    def _field_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _field_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         panel = self._image_panel("field", x, y, width, tallest)
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
@@ -316,9 +309,7 @@ class DistortionView(OrbitView):
 
     # The radial curve ------------------------------------------------------------------------------------------------
 
-    def _curve_with_axes(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _curve_with_axes(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         return self.curve_panel(x + 50, y, width - 50, min(tallest, 240)), {}
 
     def curve_panel(self, x: float, y: float, width: float, height: float, *, equation: bool = True) -> str:
@@ -368,9 +359,7 @@ class DistortionView(OrbitView):
 
     # The frustum -----------------------------------------------------------------------------------------------------
 
-    def _frustum_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _frustum_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         panel = space_panel("frustum", x, y, width, tallest)
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
         return self.in_space(panel, self._bent_frustum(), draft, "Its rays in space", label, drag="orbit")
@@ -383,7 +372,7 @@ class DistortionView(OrbitView):
         mesh = [*reach[::3], *np.swapaxes(reach[:, ::4], 0, 1)]
         spokes = [np.stack([np.zeros(3), corner]) for corner in reach[[0, 0, -1, -1], [0, -1, -1, 0]]]
         return [
-            Line(np.vstack([rim, rim[:1]]), "muted dashed", 1.3),
+            Line(closed(rim), "muted dashed", 1.3),
             *(Line(line, "blue", 1.3) for line in mesh),
             *(Line(spoke, "blue", 1.6) for spoke in spokes),
             *axes_triad(RigidTransform.identity(), 0.4),
@@ -399,7 +388,7 @@ class DistortionView(OrbitView):
         rows = [svg.text((_COLUMN, 26), "This lens", "title")]
         for i, (name, value) in enumerate(coefficients.items()):  # the lens's own, where one is given
             class_ = "number" if value else "number faint"
-            rows.append(svg.text((_COLUMN, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
+            rows.append(svg.text((_COLUMN, 50 + 18 * i), true_minus(f"{name} {value:+.4f}"), class_))
         top = 80 + 18 * len(coefficients)
         rows.append(readout(self._told(), (_COLUMN, top), (0, 40), (0, 17)))
         return "".join(rows)

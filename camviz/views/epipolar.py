@@ -20,21 +20,11 @@ from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
-from camviz.draw.space import (
-    Dots,
-    Face,
-    Item,
-    Label,
-    Line,
-    OrbitCamera,
-    camera_body,
-    scene_items,
-    space_panel,
-)
+from camviz.draw.space import Dots, Face, Item, Label, Line, OrbitCamera, camera_body, scene_items, space_panel
 from camviz.lenses.base import Array, unit
 from camviz.scenes import textured_scene
 from camviz.views import garden
-from camviz.views.base import OrbitView, step_of
+from camviz.views.base import Drawn, OrbitView, step_of
 from camviz.views.marks import border_arrow, camera_outline, clipped, crop, on_photograph, ring
 from camviz.views.two_cameras import TwoCameras
 
@@ -99,9 +89,7 @@ class EpipolarView(OrbitView, TwoCameras):
         if self.F is None:
             return "a lens that bends: no F, a curve"
         a, b, c = self.line
-        return (
-            f"{a:+.3f} u {b:+.3f} v {c:+.1f} = 0".replace("-", "−") if np.isfinite(a) else "the left epipole: no line"
-        )
+        return true_minus(f"{a:+.3f} u {b:+.3f} v {c:+.1f} = 0") if np.isfinite(a) else "the left epipole: no line"
 
     def description(self) -> str:
         where = f"The point at ({self.u:.0f}, {self.v:.0f}) in the left picture lies {self.depth:.2f} m along its ray"
@@ -300,7 +288,7 @@ class EpipolarView(OrbitView, TwoCameras):
 
     # The space -------------------------------------------------------------------------------------------------------
 
-    def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> Drawn:
         panel = space_panel("space", 20, 409, 500, 200)
         scenery = () if self.photographs else scene_items(textured_scene(), "wire")
         scenery += self._bodies(images, draft)
@@ -358,7 +346,7 @@ class EpipolarView(OrbitView, TwoCameras):
             rows.append(readout(yours, (x, below), (0, 0), (112, 0), "label orange"))
         return "".join(rows)
 
-    def _details(self, images: dict[str, np.ndarray]) -> tuple[str, dict[str, bytes]]:
+    def _details(self, images: dict[str, np.ndarray]) -> Drawn:
         """What the pictures show around the point, side by side: alike where the depth is that of the surface."""
         drawn, crops = "", {}
         for i, (name, camera, uv) in enumerate(

@@ -160,17 +160,9 @@ class ExposureView(View):
         height = 560 if self.yours else 540
         recorded = self.recorded(draft=draft)
         corners, problem = self._corner_panel()
-        body = "".join(
-            [
-                self._picture_panel(),
-                self._histogram_panel(recorded),
-                self._stops_panel(),
-                corners,
-                svg.text((20, 552), problem, "note"),
-                self._numbers_column(),
-            ]
-        )
-        return self.composed(height, body, attached={"camera": jpeg(to_display(recorded))})
+        above = self._picture_panel(), self._histogram_panel(recorded), self._stops_panel()
+        words = svg.text((20, 552), problem, "note"), self._numbers_column()
+        return self.composed(height, *above, corners, *words, attached={"camera": jpeg(to_display(recorded))})
 
     def _picture_panel(self) -> str:
         panel = image_panel("picture", 20, 34, 420, _WIDTH, _HEIGHT)
@@ -233,9 +225,9 @@ class ExposureView(View):
             points = svg.line(places, "orange") + svg.dots(places, "orange", 6)
         entries = [("ink thick", "now"), ("blue dashed", "cos⁴"), ("purple dashed", "rim")]
         entries += [("orange thick", "yours")] if self.yours else []
-        content = plot.grid(panel) + curves + points + plot.legend(panel, entries, "bottom left")
-        shown = panel.show(content, title="Light towards the corner")
-        return shown + plot.axes(panel, "height on the sensor (mm)", "light, 1 on the axis"), problem
+        content = curves + points + plot.legend(panel, entries, "bottom left")
+        names = "height on the sensor (mm)", "light, 1 on the axis"
+        return plot.plotted(panel, content, *names, title="Light towards the corner"), problem
 
     def _numbers_column(self) -> str:
         return svg.text((790, 26), "This exposure", "title") + readout(self.numbers(), (790, 54), (0, 44), (0, 17))

@@ -18,7 +18,7 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
-from camviz.draw.readout import listed
+from camviz.draw.readout import listed, true_minus
 from camviz.views.base import choice, slider, switch
 from camviz.views.marks import arrows
 from camviz.views.view_bars import LABEL, ViewChooser
@@ -210,7 +210,7 @@ class FaultLabView(ViewChooser):
             words = f"{_signed(error, sigma)} px"
             beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
         shown = panel.show(content, title="Estimate ± 1σ, less the truth")
-        ticks = [(float(t), f"{t:g}".replace("-", "−")) for t in plot.ticks(-reach, reach, 5)]
+        ticks = [(float(t), true_minus(f"{t:g}")) for t in plot.ticks(-reach, reach, 5)]
         below = "".join(
             svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
             for px, (_, words) in zip(panel.place([(t, 0) for t, _ in ticks])[:, 0], ticks, strict=True)

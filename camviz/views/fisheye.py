@@ -15,16 +15,16 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
-from camviz.draw.items import Dots, Item, Line, axes_triad
+from camviz.draw.items import Dots, Item, Line, axes_triad, closed
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses import Equidistant, Equisolid, Lens, Orthographic, Perspective, Stereographic
 from camviz.lenses.base import Array
 from camviz.panoramas.reprojection import reproject, window
 from camviz.views import garden
-from camviz.views.base import OrbitView, answered, choice, slider, without
+from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 
 SIDE = 480  # pixels of the picture, which is square
@@ -140,7 +140,6 @@ class FisheyeView(OrbitView):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         return {name: figures[name] for name in _TOLD.get(self.panels, figures)}
 
@@ -151,7 +150,7 @@ class FisheyeView(OrbitView):
             f"and is {self.hfov_deg:.0f}° wide."
         )
         words = f"{self.projection}, {EQUATIONS[self.projection]}, f = {self.f:g} px: {figures}."
-        return (words + window * self._has("window")).replace("-", "−")
+        return true_minus(words + window * self._has("window"))
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -197,7 +196,7 @@ class FisheyeView(OrbitView):
         if not self._has("window"):
             return panel.show(content, title=title)
         outline = self.camera.project(self.window.unproject(self.window.intrinsics.border(16)))
-        edges = np.vstack([outline, outline[:1]])
+        edges = closed(outline)
         far = np.linalg.norm(np.diff(edges, axis=0, append=edges[:1]), axis=-1) > SIDE / 2  # once round the back
         edges[far] = np.nan
         content += on_photograph([panel.place(edges)], "yellow thick")
@@ -218,15 +217,11 @@ class FisheyeView(OrbitView):
         names = sorted(LENSES, key=lambda name: name == self.projection) if not self.yours else [self.projection]
         for name in names:
             theta = np.linspace(0, _LAST[name], 181)
-            drawn += plot.curve(
-                panel, theta, self.radius(np.radians(theta), name), f"{_COLOURS[name]} {self._weight(name)}"
-            )
+            radius = self.radius(np.radians(theta), name)
+            drawn += plot.curve(panel, theta, radius, f"{_COLOURS[name]} {self._weight(name)}")
         drawn += self._your_curve(panel) if self.yours else "".join(self._name(panel, name) for name in names)
-        drawn += (
-            svg.text(panel.place((2, edge)) + (0, -6), "edge of the picture", "green halo")
-            if edge < 0.92 * _TOP and not self.yours
-            else ""
-        )
+        if edge < 0.92 * _TOP and not self.yours:
+            drawn += svg.text(panel.place((2, edge)) + (0, -6), "edge of the picture", "green halo")
         return plot.axes(panel, "θ, angle from the axis [°]", "r / f") + panel.show(
             drawn, title="How far from the middle", note=EQUATIONS[self.projection]
         )
@@ -251,9 +246,8 @@ class FisheyeView(OrbitView):
             + [_meridian(reach, around) for around in np.linspace(0.01, 2 * pi + 0.01, 13)[:-1]]
         )
         yours, _ = self._your_pixels(lines)
-        return svg.path(panel.place(self.camera.project(lines)), "yellow thin") + svg.path(
-            panel.place(yours), "orange dashed"
-        )
+        right = svg.path(panel.place(self.camera.project(lines)), "yellow thin")
+        return right + svg.path(panel.place(yours), "orange dashed")
 
     def _your_curve(self, panel: Panel) -> str:
         """r/f by the reader's function, of rays to the right, and what the lines are."""
@@ -267,9 +261,7 @@ class FisheyeView(OrbitView):
         uv, _ = self._your_pixels(_meridian(theta, 0.0))
         return (uv[..., 0] - self.camera.intrinsics.cx) / self.f
 
-    def _your_panel(
-        self, x: float, y: float, width: float, height: float, image: np.ndarray, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _your_panel(self, x: float, y: float, width: float, height: float, image: np.ndarray, *, draft: bool) -> Drawn:
         """The window once more, every pixel of it looked up where the reader's function says."""
         panel = image_panel("yours", x, y, width, 320, 240)
         seen = self._seen(draft)
@@ -296,9 +288,7 @@ class FisheyeView(OrbitView):
 
     # The dome --------------------------------------------------------------------------------------------------------
 
-    def _dome_panel(
-        self, x: float, y: float, width: float, height: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _dome_panel(self, x: float, y: float, width: float, height: float, *, draft: bool) -> Drawn:
         panel = space_panel("dome", x, y, width, height)
         label = "The rays in space; drag or press the arrow keys to walk around"
         return self.in_space(panel, self._rays(), draft, "Its rays", label)
@@ -316,7 +306,7 @@ class FisheyeView(OrbitView):
             theta = np.radians(np.linspace(0, reach, 17))
             items.append(Line(_meridian(theta, around), "muted", 0.8))
         rim = self.window.unproject(self.window.intrinsics.border(6))
-        items.append(Line(np.vstack([rim, rim[:1]]), "yellow", 2.6))
+        items.append(Line(closed(rim), "yellow", 2.6))
         items += [Line(np.stack([np.zeros(3), corner]), "yellow", 1.4) for corner in rim[::6]]
         return [*items, Dots(np.zeros(3), "ink", 7), *axes_triad(self.camera.world_from_cam, 0.5)]
 
@@ -331,15 +321,13 @@ class FisheyeView(OrbitView):
             return "".join(rows)
         rows.append(svg.text((x, 394), "r / f at 30°, 60°, 90°", "title"))
         radii = {name: self.radius(_TABLED, name) for name in ([self.projection] if self.yours else LENSES)}
-        for i, (name, values) in enumerate(
-            (radii | ({"yours": self._your_radius(_TABLED)} if self.yours else {})).items()
-        ):
+        radii |= {"yours": self._your_radius(_TABLED)} if self.yours else {}
+        for i, (name, values) in enumerate(radii.items()):
             strong = "" if name in (self.projection, "yours") else " half"
             colour = _COLOURS.get(name, "orange")
             rows.append(svg.text((x, 420 + 36 * i), name, f"{colour}{strong}"))
-            rows.append(
-                svg.text((x, 436 + 36 * i), self._tabled(name, values), f"number {colour * (name == 'yours')}{strong}")
-            )
+            class_ = f"number {colour * (name == 'yours')}{strong}"
+            rows.append(svg.text((x, 436 + 36 * i), self._tabled(name, values), class_))
         return "".join(rows)
 
     def _tabled(self, name: str, values: Array) -> str:

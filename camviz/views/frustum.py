@@ -38,7 +38,7 @@ from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
-from camviz.views.base import OrbitView, choice, slider, switch
+from camviz.views.base import Drawn, OrbitView, choice, slider, switch
 from camviz.views.marks import border_arrow, clipped
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
@@ -146,12 +146,7 @@ class FrustumView(OrbitView):
     def numbers(self) -> dict[str, Array]:
         """R (3, 3) and t (3,) of the extrinsics, the centre C (3,), and K (3, 3)."""
         R, t = self.camera.extrinsics
-        return {
-            "R": R,
-            "t": t,
-            "C": self.camera.centre,
-            "K": self.camera.intrinsics.K,
-        }
+        return {"R": R, "t": t, "C": self.camera.centre, "K": self.camera.intrinsics.K}
 
     def description(self) -> str:
         n = self.numbers()
@@ -170,7 +165,7 @@ class FrustumView(OrbitView):
         body = world + self._picture_panel() + self._numbers_panel()
         return self.composed(580, body, attached=photographs | {"camera": taken})
 
-    def _world_panel(self, image: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _world_panel(self, image: np.ndarray, draft: bool) -> Drawn:
         panel = space_panel("world", 20, 34, 540, 400)
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else None

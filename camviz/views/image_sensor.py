@@ -159,17 +159,14 @@ class ImageSensorView(View):
         passed = per_photon / per_photon.max(axis=0)
         spectrum = illuminant(self.light)
         known = "thick" if self.model == "KAF-0400: a curve" else "thick dashed"
+        lines = [(f"ink {known}", "without filter"), *((c, f"{name} filter") for name, c in CHANNELS)]
         content = (
             between(panel, WAVELENGTHS_NM, np.zeros(len(spectrum)), 96 * spectrum / spectrum.max(), "fill-muted")
             + grid(panel)
             + curve(panel, WAVELENGTHS_NM, unfiltered, f"ink {known}")
             + "".join(curve(panel, WAVELENGTHS_NM, unfiltered * passed[:, i], c) for i, (_, c) in enumerate(CHANNELS))
             + svg.dots([panel.place((self.sensor.measured_at_nm, 100 * float(self.sensor.efficiency())))], "ink", 8)
-            + legend(
-                panel,
-                [("ink " + known, "without filter"), *((c, f"{name} filter") for name, c in CHANNELS)],
-                "bottom right",
-            )
+            + legend(panel, lines, "bottom right")
         )
         return axes(panel, "wavelength [nm]; grey: the light's spectrum", "electrons per 100 photons") + panel.show(
             content, title="Quantum efficiency", note=_MODELS[self.model].camera
@@ -193,9 +190,7 @@ class ImageSensorView(View):
             if np.isnan(electrons):
                 continue
             content += bars(panel, left, right, top[:1], f"{class_} dotted")
-            content += bars(panel, left, right, top[1:], f"wash fill-{class_}") + bars(
-                panel, left, right, top[1:], class_
-            )
+            content += "".join(bars(panel, left, right, top[1:], c) for c in (f"wash fill-{class_}", class_))
         content += self._in_words(panel, len(names))
         floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
         content += self._level(panel, self.full_well, f"full well {self.full_well:,.0f} e⁻", "orange", -6)
@@ -218,9 +213,8 @@ class ImageSensorView(View):
 
     def _level(self, panel: Panel, electrons: float, words: str, class_: str, above: float) -> str:
         y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
-        return svg.line([(0, y), (panel.width, y)], f"{class_} dashed") + svg.text(
-            (panel.width - 6, y + above), words, f"{class_} halo end"
-        )
+        line = svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
+        return line + svg.text((panel.width - 6, y + above), words, f"{class_} halo end")
 
     def _numbers(self) -> str:
         figures = readout(self.numbers(), (590, 362), (0, 24), (166, 0))

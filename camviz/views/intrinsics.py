@@ -15,6 +15,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import svg
+from camviz.draw.items import closed
 from camviz.draw.matrix import intrinsic_matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -24,7 +25,7 @@ from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform
 from camviz.scenes import render, to_display
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, balloon_rim, balloon_scene, towards_balloon
-from camviz.views.base import Control, OrbitView, choice, slider, switch
+from camviz.views.base import Control, Drawn, OrbitView, choice, slider, switch
 
 GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the camera stands before it on the z axis
 BINS = 4
@@ -292,7 +293,7 @@ class IntrinsicsView(OrbitView):
 
     # The rays --------------------------------------------------------------------------------------------------------
 
-    def _space_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space_panel(self, draft: bool) -> Drawn:
         panel = space_panel("space", 480, 34, 460, 330)
         items = [*self._frustum(), *self._line_of_sight()]
         span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
@@ -325,12 +326,12 @@ class IntrinsicsView(OrbitView):
         name = svg.text((14, 322), "orange: your rays of the corners and the border", "orange halo")
         length = _YOURS_M / right[:, 2:]
         rim = self.camera.centre + length * right
-        frame: list[Item] = [Line(np.vstack([rim, rim[:1]]), "blue", 3.4)]
+        frame: list[Item] = [Line(closed(rim), "blue", 3.4)]
         if problem:
             return frame, svg.paragraph((14, 24), problem, 430)
         ends = self.camera.centre + length * rays
         spokes = [Line(np.array([self.camera.centre, ends[i]]), "orange", 1.8) for i in range(0, len(uv), len(uv) // 4)]
-        return [*frame, *spokes, Line(np.vstack([ends, ends[:1]]), "orange", 1.8)], name
+        return [*frame, *spokes, Line(closed(ends), "orange", 1.8)], name
 
     def _line_of_sight(self) -> list[Item]:
         """To the balloon: broken where something stands in the way."""

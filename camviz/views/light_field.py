@@ -165,7 +165,6 @@ class LightFieldView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         return {name: figures[name] for name in _TOLD.get(self.panels, figures) if name in figures}
 

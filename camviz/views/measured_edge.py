@@ -73,22 +73,18 @@ class MeasuredEdgeView(View):
         panel = plot.plot_panel("profile", 330, 40, 250, 236, (-reach, reach), (-0.15, 1.15))
         places, values = self.edge.edge_spread
         near = np.abs(places) <= reach
-        content = plot.grid(panel) + plot.curve(panel, places[near], values[near], "blue")
-        shown = panel.show(content, title="Across the edge", note=f"10–90 %: {self.edge.rise:.2f} px")
-        return shown + plot.axes(panel, "distance (px)", "light")
+        curve, note = plot.curve(panel, places[near], values[near], "blue"), f"10–90 %: {self.edge.rise:.2f} px"
+        return plot.plotted(panel, curve, "distance (px)", "light", title="Across the edge", note=note)
 
     def _curve(self) -> str:
         edge = self.edge
         panel = plot.plot_panel("curve", 650, 40, 290, 236, (0, 1), (0, 1.1))
         frequency, values = edge.curve
-        content = (
-            plot.grid(panel) + plot.upright(panel, 0.5, "muted dotted") + plot.curve(panel, frequency, values, "blue")
-        )
+        content = plot.upright(panel, 0.5, "muted dotted") + plot.curve(panel, frequency, values, "blue")
         if isfinite(edge.mtf50):
             at = panel.place([(0, 0.5), (edge.mtf50, 0.5), (edge.mtf50, 0)])
             content += svg.line(at, "orange dashed") + svg.dots(at[1:2], "orange", 6)
         nyquist = panel.place((0.5, 1.1))
         content += svg.text((nyquist[0] + 5, 14), "Nyquist", "note halo")
         note = f"MTF50: {edge.mtf50:.3f} ± {edge.mtf50_error:.3f}" if isfinite(edge.mtf50) else ""
-        shown = panel.show(content, title="Contrast that is left", note=note)
-        return shown + plot.axes(panel, "cycles per pixel", "MTF")
+        return plot.plotted(panel, content, "cycles per pixel", "MTF", title="Contrast that is left", note=note)

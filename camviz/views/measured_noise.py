@@ -73,8 +73,7 @@ class MeasuredNoiseView(View):
         error = found.judged["linearity_error"].value
         note = f"off the line by {100 * error:.2g} % on average" if isfinite(error) else ""
         xlabel = "photons per pixel" if lit else "exposure (ms)"
-        heading = panel.show(plot.grid(panel) + marks, title="Response", note=note)
-        return heading + plot.axes(panel, xlabel, "signal (DN)")
+        return plot.plotted(panel, marks, xlabel, "signal (DN)", title="Response", note=note)
 
     def snr_panel(self, x: float, y: float) -> str:
         """Signal to noise over electrons: measured, the model, and what no sensor exceeds."""
@@ -103,8 +102,7 @@ class MeasuredNoiseView(View):
             slope = found.dark_current_e_per_s * found.gain_dn_per_e / 1000
             ends = np.array([0, panel.right])
             marks += plot.curve(panel, ends, dark.mean() + slope * (ends - exposure.mean()), "orange")
-        heading = panel.show(plot.grid(panel) + marks, title="Darkness")
-        return heading + plot.axes(panel, "exposure (ms)", "mean of dark frames (DN)")
+        return plot.plotted(panel, marks, "exposure (ms)", "mean of dark frames (DN)", title="Darkness")
 
 
 FIGURES: dict[str, tuple[str, float, str]] = {
@@ -167,7 +165,7 @@ def _dots(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
 
 def _shown(panel: Panel, marks: str, title: str, xlabel: str, ylabel: str) -> str:
     ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-    return panel.show(plot.grid(panel, *ticks) + marks, title=title) + plot.axes(panel, xlabel, ylabel, *ticks)
+    return plot.plotted(panel, marks, xlabel, ylabel, *ticks, title=title)
 
 
 def _top(values: np.ndarray) -> float:

@@ -24,7 +24,7 @@ from camviz.sensors import Sensor
 from camviz.sensors.frozen import Draw, exposed
 from camviz.sensors.statistics import slope_through_origin
 from camviz.views import garden
-from camviz.views.base import View, slider, switch
+from camviz.views.base import View, slider, step_of, switch
 
 FULL_WELL_E = 15_000.0
 WHITE_E_PER_S = 10_000.0  # electrons that a white surface frees in a second
@@ -249,9 +249,8 @@ class PhotonTransferView(View):
             shares.append(plot.bars(panel, edges[:-1], edges[1:], np.sqrt(counts / counts.max()), class_))
         legend = [("muted thick", "picture"), ("blue thick", "card")]
         yticks = [(0.0, "0"), (1.0, "most")]
-        content = plot.grid(panel, None, yticks) + "".join(shares) + plot.legend(panel, legend, "top right")
-        labels = plot.axes(panel, "digital number (DN)", "√ pixels", None, yticks)
-        return panel.show(content, title="Histogram") + labels
+        content = "".join(shares) + plot.legend(panel, legend, "top right")
+        return plot.plotted(panel, content, "digital number (DN)", "√ pixels", None, yticks, title="Histogram")
 
     @cached_property
     def _plot(self) -> Panel:
@@ -263,13 +262,12 @@ class PhotonTransferView(View):
     def _transfer_panel(self, pixels: int) -> str:
         panel = self._plot
         ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-        content = plot.grid(panel, *ticks) + self._curves(panel) + self._points(panel, pixels)
+        content = self._curves(panel) + self._points(panel, pixels)
         how = "the difference of two" if self.difference else "one frame"
         label = "Noise over signal; drag or press the arrow keys to change the exposure"
-        shown = panel.show(
-            content, title=f"Noise of {how}", hint="drag to change the exposure", drag="exposure", label=label
-        )
-        return shown + plot.axes(panel, "signal above the dark (DN)", "noise, σ (DN)", *ticks)
+        heading = {"hint": "drag to change the exposure", "drag": "exposure", "label": label}
+        names = "signal above the dark (DN)", "noise, σ (DN)"
+        return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading)
 
     def _curves(self, panel: Panel) -> str:
         """Every kind of noise as a line of its own slope, and all together."""
@@ -333,8 +331,7 @@ class PhotonTransferView(View):
         return self.but(exposure=float(np.clip(stops, *_limits("exposure"))))
 
     def pressed(self, handle: str, key: str) -> PhotonTransferView:
-        steps = {"ArrowLeft": -0.5, "ArrowDown": -0.5, "-": -0.5, "ArrowRight": 0.5, "ArrowUp": 0.5, "+": 0.5}
-        return self.but(exposure=float(np.clip(self.exposure + steps.get(key, 0), *_limits("exposure"))))
+        return self.but(exposure=float(np.clip(self.exposure + 0.5 * step_of(key), *_limits("exposure"))))
 
 
 _STYLES = {

@@ -16,9 +16,10 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
+from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses import Lens, UnifiedSphere
 from camviz.lenses.base import Array
@@ -29,7 +30,7 @@ from camviz.panoramas.reprojection import equirectangular_camera, reproject, win
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import textured_scene, to_display
 from camviz.views import garden
-from camviz.views.base import OrbitView, answered, choice, slider, without
+from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
 
@@ -157,7 +158,7 @@ class OmnidirectionalView(OrbitView):
             "rim": f"{self.rim_angle_deg:.0f}° from the axis",
             **model,
             **({"viewpoint": "single"} if self.central else missed),
-            "window looks": f"{self.yaw_deg:g}° right, {self.pitch_deg:g}° up".replace("-", "−"),
+            "window looks": true_minus(f"{self.yaw_deg:g}° right, {self.pitch_deg:g}° up"),
             "window is": f"{self.hfov_deg:g}° wide",
         }
 
@@ -177,7 +178,6 @@ class OmnidirectionalView(OrbitView):
         return f"u = {f:.1f} X / (Z + {self._xi:g} D), of {_COUNTED} pixels across the doughnut"
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         if not self._has("section"):
             return {name: figures[name] for name in ("window looks", "window is")}
@@ -265,7 +265,7 @@ class OmnidirectionalView(OrbitView):
 
     # The panels ------------------------------------------------------------------------------------------------------
 
-    def _space_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space_panel(self, picture: np.ndarray, draft: bool) -> Drawn:
         x, y, width, height = self._slot("space")
         panel = space_panel("space", x, y, width, height)
         small = cv2.resize(picture, (128, 128), interpolation=cv2.INTER_AREA)
@@ -281,7 +281,7 @@ class OmnidirectionalView(OrbitView):
         panel, camera = self._doughnut_box, self.camera(_FINE)
         frame, colour = self.window(), "yellow thick" if self.yours else "orange"
         outline = frame.unproject(frame.intrinsics.border(12))
-        uv = camera.project(np.vstack([outline, outline[:1]]))
+        uv = camera.project(closed(outline))
         turn = np.linspace(-np.pi, np.pi, 73)
         horizon = camera.project(np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=-1))
         seen = placed_image(panel, "doughnut", _FINE, _FINE)
@@ -328,7 +328,7 @@ class OmnidirectionalView(OrbitView):
         panel = image_panel("unrolled", x, y, across, width, height, tallest=tallest)
         frame = self.window()
         outline = frame.unproject(frame.intrinsics.border(24))
-        uv = panel.place(camera.project(np.vstack([outline, outline[:1]])))
+        uv = panel.place(camera.project(closed(outline)))
         jump = np.linalg.norm(np.diff(uv, axis=0), axis=-1) > 40
         uv[1:][jump] = np.nan  # from one edge of the picture to another
         seen = placed_image(panel, "unrolled", width, height)
@@ -364,7 +364,7 @@ class OmnidirectionalView(OrbitView):
         right = self.camera(_FINE).project(np.array(lines))
         return svg.path(panel.place(right), "yellow thin") + svg.path(panel.place(yours), "orange dashed")
 
-    def _your_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _your_panel(self, picture: np.ndarray, draft: bool) -> Drawn:
         """The window once more, every pixel of it looked up where the reader's function says."""
         panel = self._box("yours", 320, 240)
         uv, problem = self._your_pixels(_AWAY * self._seen(draft).rays())

@@ -16,6 +16,7 @@ import numpy as np
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
+from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, logarithmic_grid, logs, plot_panel
@@ -23,7 +24,7 @@ from camviz.draw.readout import listed, readout, seconds
 from camviz.draw.space import Dots, Face, Item, Label, Line, OrbitCamera, TexturedMesh, space_panel
 from camviz.poses import RigidTransform
 from camviz.scenes import render, snapshot, textured_scene, to_display
-from camviz.views.base import OrbitView, answered, positive, slider, step_of, switch
+from camviz.views.base import Drawn, OrbitView, answered, positive, slider, step_of, switch
 
 WALL_MM = np.array([36.0, 27.0])
 PIXELS = 480  # across the wall: 75 µm each
@@ -230,7 +231,7 @@ class PinholeView(OrbitView):
 
     # The box ---------------------------------------------------------------------------------------------------------
 
-    def _box_panel(self, upright: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _box_panel(self, upright: np.ndarray, draft: bool) -> Drawn:
         panel = space_panel("box", 20, 34, 520, 285)
         behind = ENLARGED * self.depth_mm / 1000
         extent = self.object_m + behind
@@ -251,9 +252,9 @@ class PinholeView(OrbitView):
         items: list[Item] = [
             TexturedMesh.over(scene[_GRID], _stage()),
             TexturedMesh.over(back[_GRID], upright),
-            Line(_closed(scene), "muted", 1.2),
+            Line(closed(scene), "muted", 1.2),
             Face(front, "shade", 0.25),
-            *(Line(_closed(rim), "ink", 1.6) for rim in (front, back)),
+            *(Line(closed(rim), "ink", 1.6) for rim in (front, back)),
             *(Line(np.array([a, b]), "ink", 1.4) for a, b in zip(front, back, strict=True)),
             Line(np.array([(0, 0, -behind), (0, 0, self.object_m)]), "muted dashed", 1.0),
             Dots(np.zeros(3), "ink", 7),
@@ -364,10 +365,6 @@ def _reach(start: np.ndarray, half: np.ndarray, behind: float) -> float:
     """How far a ray goes on behind the hole, as a share of the way before it: to the wall, or to the box's side."""
     sides = np.divide(half, np.abs(start[:2]), out=np.full(2, np.inf), where=start[:2] != 0)
     return float(min(behind / start[2], *sides))
-
-
-def _closed(outline: np.ndarray) -> np.ndarray:
-    return np.vstack([outline, outline[:1]])
 
 
 _HOLE_TICKS = [(float(np.log10(d)), f"{d:g}") for d in (0.05, 0.1, 0.2, 0.5, 1, 2)]

@@ -154,7 +154,6 @@ class ReadoutView(View):
         return {"row time, yours": f"{1e6 * row_s:.4g} µs"}
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         return figures if "time" in self.panels else {name: figures[name] for name in ("frame", "read so far")}
 

@@ -19,12 +19,12 @@ from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, readout
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.views import stereo_pair
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import Drawn, View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
@@ -186,7 +186,7 @@ class RectificationView(View):
         now, found, score = self.stage, self.disparity_map(draft=draft), self.score(draft=draft)
         f = now.left.intrinsics.fx
         shifted = abs(now.doffs) > 0.05
-        second = f"{now.doffs:.1f} px".replace("-", "−") if shifted else f"{now.pair.baseline:.3f} m"
+        second = true_minus(f"{now.doffs:.1f} px") if shifted else f"{now.pair.baseline:.3f} m"
         figures = {"f, doffs" if shifted else "f, B": f"{f:.0f} px, {second}"}
         figures["rows differ by"] = f"{self.rows_apart():.1f} px"
         if "wedge" in self._shown:
@@ -209,7 +209,7 @@ class RectificationView(View):
 
     @staticmethod
     def _in_words(disparity: float, depth: float) -> str:
-        return f"{disparity:.1f} px: {metres(depth)}".replace("-", "−")
+        return true_minus(f"{disparity:.1f} px: {metres(depth)}")
 
     def equation(self) -> str:
         """Z = f B / d with this state's numbers."""
@@ -241,11 +241,9 @@ class RectificationView(View):
         if panel is None:
             return self
         pair = self.stage.pair
-        here, now, rectified = (
-            (self.uv_left, self.stage.left, pair.left)
-            if handle == "left"
-            else (self.uv_right, self.stage.right, pair.right)
-        )
+        here, now, rectified = self.uv_right, self.stage.right, pair.right
+        if handle == "left":
+            here, now, rectified = self.uv_left, self.stage.left, pair.left
         at = panel.place(here) + (panel.x + dx, panel.y + dy) if np.isnan(x) else np.array([x, y])
         uv = seen_from_there(rectified, now, panel.data(at - (panel.x, panel.y)))
         if not np.isfinite(uv).all():
@@ -336,7 +334,7 @@ class RectificationView(View):
         )
         return left, right
 
-    def _maps_block(self) -> tuple[str, dict[str, bytes]]:
+    def _maps_block(self) -> Drawn:
         size = self.stage.left.intrinsics
         left, right = self._map_panels()
         _, title, low, high, unit = self._second
@@ -361,7 +359,7 @@ class RectificationView(View):
         given = (found.astype(float), now.left.intrinsics.fx, now.pair.baseline, now.doffs)
         return tried(self.yours, given, found.astype(float))
 
-    def _your_maps_block(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _your_maps_block(self, draft: bool) -> Drawn:
         """The right depths, and beside them those of the reader's function."""
         size, (left, right), limits = self.stage.left.intrinsics, self._map_panels(), self._limits
         depth, problem = self.your_depth(draft=draft)
@@ -401,14 +399,7 @@ def _photographs(source: Source, baseline: float, rectify: float, side: int) -> 
 
 @lru_cache(maxsize=4)
 def _maps(
-    source: Source,
-    baseline: float,
-    rectify: float,
-    side: int,
-    method: str,
-    block: int,
-    count: int,
-    show: str,
+    source: Source, baseline: float, rectify: float, side: int, method: str, block: int, count: int, show: str
 ) -> tuple[bytes, bytes]:
     """The disparities and the second map, as PNG."""
     found = stereo_pair.disparities(source, baseline, rectify, side, method, block, count)

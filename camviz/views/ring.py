@@ -115,14 +115,9 @@ class RingView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         panorama = self.panorama(draft=draft)
         photographs = {"panorama": jpeg(panorama, 90), "loupe": jpeg(self.loupe(draft=draft), 90)}
-        body = [
-            self._panorama_panel(),
-            self._plan_panel(),
-            self._loupe_panel(),
-            self._plot_panel(),
-            svg.text((20, 536), self.equation(), "note"),
-        ]
-        return self.composed(544, *body, attached=photographs)
+        below = self._plan_panel(), self._loupe_panel(), self._plot_panel()
+        words = svg.text((20, 536), self.equation(), "note")
+        return self.composed(544, self._panorama_panel(), *below, words, attached=photographs)
 
     def _panorama_panel(self) -> str:
         pixels = all_round(_FINE, _UP_DEG)
@@ -153,9 +148,7 @@ class RingView(View):
 
     def _loupe_panel(self) -> str:
         panel = Panel("loupe", 300, 292, 300, 220, 0, 300, 0, 220)
-        seam = svg.segments([(150, 0)], [(150, 14)], "orange thick") + svg.segments(
-            [(150, 206)], [(150, 220)], "orange thick"
-        )
+        seam = "".join(svg.segments([(150, y)], [(150, y + 14)], "orange thick") for y in (0, 206))
         there, shift = list(self.numbers().items())[-1]
         words = f"{there.removeprefix('at the seam ahead, ')}: {shift}"
         return panel.show(svg.image("loupe", 0, 0, 300, 220) + seam, title="At the seam ahead", note=words)

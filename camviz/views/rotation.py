@@ -17,6 +17,7 @@ from camviz.draw.space import Dots, Item, Label, Line, OrbitCamera, axes_triad, 
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.views.base import OrbitView, slider
+from camviz.views.marks import circle
 
 _RINGS = (  # name and colour of the turn, radius of its ring, and the axis at right angles to the ring's plane
     ("yaw", "green", 1.0, 2),
@@ -134,9 +135,7 @@ class RotationView(OrbitView):
 
 def _ring(world_from_ring: Rotation, radius: float, across: int) -> Array:
     """A circle (65, 3) in the plane at right angles to the ring's axis number `across`."""
-    turn = np.linspace(0, 2 * np.pi, 65)
-    points = np.insert(radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1), across, 0, axis=-1)
-    return world_from_ring.apply(points)
+    return world_from_ring.apply(np.insert(radius * circle(65), across, 0, axis=-1))
 
 
 def _row(values: ArrayLike, decimals: int = 3) -> str:

@@ -122,11 +122,9 @@ class SharpnessView(View):
 
     def description(self) -> str:
         figures = listed(self.numbers())
-        light = (
-            f"white light, axial colour {self.axial_um:g} µm, lateral colour {self.lateral_um:g} µm"
-            if self.coloured
-            else f"{self.wavelength_nm:g} nm"
-        )
+        light = f"{self.wavelength_nm:g} nm"
+        if self.coloured:
+            light = f"white light, axial colour {self.axial_um:g} µm, lateral colour {self.lateral_um:g} µm"
         return f"A lens at f/{self.f_number:g}, {self.defocus_um:g} µm out of focus, {light}: {figures}."
 
     # What the sensor records ------------------------------------------------------------------------------------------
@@ -159,17 +157,9 @@ class SharpnessView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         height = 412 if self.yours else 392
         curves, problem = self._curves_panel()
-        body = "".join(
-            [
-                self._picture_panel(),
-                curves,
-                self._legend(),
-                svg.text((20, 402), problem, "note"),
-                self._numbers_column(),
-            ]
-        )
+        words = self._legend(), svg.text((20, 402), problem, "note"), self._numbers_column()
         pixels = png(to_display(self.image(draft=draft)))
-        return self.composed(height, body, attached={"sensor": pixels})
+        return self.composed(height, self._picture_panel(), curves, *words, attached={"sensor": pixels})
 
     def _picture_panel(self) -> str:
         panel = image_panel("sensor", 20, 34, 400, *FIELD_UM)
@@ -184,10 +174,9 @@ class SharpnessView(View):
         curves = self._colours(panel, f) if self.coloured else self._causes(panel, f)
         yours, problem = self._your_points(panel)
         nyquist = plot.upright(panel, self.nyquist_per_mm, "muted dotted")
-        shown = panel.show(
-            plot.grid(panel) + nyquist + curves + self._half(panel) + yours, title="Contrast that is left"
-        )
-        return shown + plot.axes(panel, "frequency (cycles per mm)", "MTF"), problem
+        content = nyquist + curves + self._half(panel) + yours
+        names = "frequency (cycles per mm)", "MTF"
+        return plot.plotted(panel, content, *names, title="Contrast that is left"), problem
 
     def _causes(self, panel: Panel, f: np.ndarray) -> str:
         """What each cause alone leaves, and all of them."""

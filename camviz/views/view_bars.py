@@ -55,7 +55,7 @@ class ViewChooser(View):
 
 def places(count: int) -> tuple[Array, Array]:
     """The left and the right ends (count,) of the bars of views 1 … count; with gaps where there is room for them."""
-    x, gap = np.arange(1, count + 1), 0.12 if count <= 60 else 0.0
+    x, gap = np.arange(1, count + 1, dtype=np.float64), 0.12 if count <= 60 else 0.0
     return x - 0.5 + gap, x + 0.5 - gap
 
 

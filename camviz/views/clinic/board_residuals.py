@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -17,7 +17,7 @@ from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar
 from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
-from camviz.views.base import OrbitView, slider
+from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.clinic.observations import Observations
 from camviz.views.clinic.residuals import nice
 from camviz.views.clinic.uncertainty import adjusted
@@ -106,12 +106,11 @@ class BoardResidualsView(OrbitView):
         return {
             "longest_mm": 1000 * float(np.nanmax(np.linalg.norm(self.means, axis=-1), initial=0)),
             "depth_mm": 1000 * float(np.nanmax(self.heights) - np.nanmin(self.heights)) if known else np.nan,
-            **(
-                {}
-                if warp is None
-                else {"along_rows_mm": 1000 * float(warp[0]), "along_columns_mm": 1000 * float(warp[1])}
-            ),
-        }
+        } | (
+            {}
+            if warp is None
+            else dict(zip(("along_rows_mm", "along_columns_mm"), (1000 * warp).tolist(), strict=True))
+        )
 
     def _solved(self) -> str:
         n = self.numbers()
@@ -144,12 +143,11 @@ class BoardResidualsView(OrbitView):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        panel, attached = self._means_panel()
         space, sheets = self._bent(draft)
-        body = panel + space + svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
-        return self.composed(440, body, attached=attached | sheets)
+        words = svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
+        return self.composed(440, self._means_panel(), space, words, attached=sheets)
 
-    def _means_panel(self) -> tuple[str, dict[str, bytes]]:
+    def _means_panel(self) -> str:
         seen, board = self.observations, self.observations.board
         wide, high = (board.columns + 1) * board.square_size, (board.rows + 1) * board.square_size
         scale = min(455 / wide, 320 / high)
@@ -160,13 +158,10 @@ class BoardResidualsView(OrbitView):
         grid = starts.reshape(board.rows, board.columns, 2)
         content = svg.path([*grid, *grid.swapaxes(0, 1)], "grid")
         content += arrows(starts, ends, "orange") + svg.dots(starts, "green", 4)
-        return panel.show(
-            content,
-            title=f"Mean residual on the board, × {self.scale:g}",
-            note=f"longest {self.numbers()['longest_mm']:.2g} mm",
-        ), {}
+        title, note = f"Mean residual on the board, × {self.scale:g}", f"longest {self.numbers()['longest_mm']:.2g} mm"
+        return panel.show(content, title=title, note=note)
 
-    def _bent(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _bent(self, draft: bool) -> Drawn:
         board, heights = self.observations.board, self.heights
         panel = space_panel("bent", 495, 34, 360, 320)
         if not np.isfinite(heights).any():
@@ -186,9 +181,7 @@ class BoardResidualsView(OrbitView):
             items.append(TexturedMesh.over(grid, np.repeat(np.repeat(colours, 8, 0), 8, 1), 0.9))
         middle = board.corners.mean(axis=0)
         size = float(np.linalg.norm(board.corners[-1]))
-        eye = replace(
-            self.eye, target=tuple(middle.tolist()), distance=1.75 * size * self.eye.distance / OrbitCamera().distance
-        )
+        eye = self.from_afar(middle, 1.75 * size)
         legend, bar_picture = bar(872, 64, 270, "bend-bar", shades, "mm")
         label = "The bent board in space; drag or press the arrow keys to walk around it"
         shown, attached = self.in_space(

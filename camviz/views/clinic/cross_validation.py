@@ -15,7 +15,7 @@ from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
-from camviz.views.base import View, choice
+from camviz.views.base import Drawn, View, choice
 from camviz.views.clinic.observations import Missing, short_names
 from camviz.views.clinic.uncertainty import adjusted, determined
 from camviz.views.view_bars import names_below
@@ -115,7 +115,7 @@ class CrossValidationView(View):
         apart, expected = self.halves.difference.length, self.halves.expected
         return {"difference": apart, "expected from noise": expected, "ratio": apart / expected}[self.show]
 
-    def _map(self) -> tuple[str, dict[str, bytes]]:
+    def _map(self) -> Drawn:
         k = self.halves.first.cameras[self.camera].intrinsics
         panel = image_panel("halves", 20, 34, 400, k.width, k.height, tallest=330)
         values = np.maximum(self._values, 1e-9)

@@ -65,12 +65,8 @@ class DifferenceView(View):
             raise Missing(f"The two calibrations cannot be compared: {error}.") from error
         typical = float(np.nanquantile(shift, 0.8)) if np.isfinite(shift).any() else 0.0
         per_pixel = 500 / first.intrinsics.width
-        return cls(
-            first,
-            second,
-            names,
-            scale=float(np.clip(nice(26 / (typical * per_pixel)), 1, 500)) if typical > 1e-9 else 1.0,
-        )
+        scale = float(np.clip(nice(26 / (typical * per_pixel)), 1, 500)) if typical > 1e-9 else 1.0
+        return cls(first, second, names, scale=scale)
 
     def compared(self, columns: int = 45, rows: int = 30) -> Difference:
         """The difference on a grid of pixels."""
@@ -145,9 +141,8 @@ class DifferenceView(View):
             rows.append(("and moved by", f"{1000 * n['shift_m']:.3g} mm"))
         words = readout(rows, (x, 60), (0, 40), (0, 18))
         told = "Turn and move are what the two sets of intrinsics imply; they are taken out, for a pose takes them up."
-        words += svg.paragraph((x, 236), f"{self.names[0]} against {self.names[1]}.", 950 - x) + svg.paragraph(
-            (x, 290), told, 950 - x
-        )
+        words += svg.paragraph((x, 236), f"{self.names[0]} against {self.names[1]}.", 950 - x)
+        words += svg.paragraph((x, 290), told, 950 - x)
         return words + svg.paragraph((x, 380), self.warning, 950 - x, "label red")
 
 

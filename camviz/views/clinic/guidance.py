@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -13,13 +13,13 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.guidance import Candidate, next_board_poses
 from camviz.cameras import transform
 from camviz.draw import svg
-from camviz.draw.items import Face, Item, Line
+from camviz.draw.items import Face, Item, Line, closed
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.space import OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import OrbitView, slider
+from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline
 from camviz.views.clinic.observations import Missing
@@ -104,7 +104,7 @@ class GuidanceView(OrbitView):
         a = self.adjustment
         return a.cameras[self.camera].cam_from_world * a.first_from_board[a.posed]
 
-    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space(self, draft: bool) -> Drawn:
         a, standing = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
         boards = BoardPosesView(standing, self._cam_from_board, a.board, "camera")
         size = a.board.square_size
@@ -115,32 +115,28 @@ class GuidanceView(OrbitView):
         for pose in self._cam_from_board[: 60 if len(self._cam_from_board) > 60 else None]:
             items += boards.board_items(pose, False)
         ghost = transform(self.chosen.cam_from_board, outline(a.board))
-        items += [Face(ghost, "orange", 0.25), Line(np.vstack([ghost, ghost[:1]]), "orange dashed", 2.2)]
+        items += [Face(ghost, "orange", 0.25), Line(closed(ghost), "orange dashed", 2.2)]
         items += [
             Line(transform(self.chosen.cam_from_board, line), "orange", 1.0)
             for line in _squares(a.board.columns, a.board.rows, size)
         ]
         middle = ghost.mean(axis=0)
-        target = tuple((middle / 2).tolist())
-        farthest = max(
-            float(np.linalg.norm(middle)), float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
-        )
-        eye = replace(self.eye, target=target, distance=1.6 * farthest * self.eye.distance / OrbitCamera().distance)
+        typical = float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
+        farthest = max(float(np.linalg.norm(middle)), typical)
+        eye = self.from_afar(middle / 2, 1.6 * farthest)
         panel = space_panel("guidance", 20, 34, 450, 340)
         label = "The boards in space; drag or press the arrow keys to walk around them"
         return self.in_space(panel, items, draft, "Imitate the orange board", label, eye=eye)
 
-    def _imitate(self) -> tuple[str, dict[str, bytes]]:
+    def _imitate(self) -> Drawn:
         """The picture that the ghost would give, its squares bent as the lens bends them."""
         a, camera = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
         k, board = camera.intrinsics, a.board
         panel = image_panel("imitate", 490, 34, 450, k.width, k.height, tallest=340)
         content, attached = "", {}
         if self.backdrop is not None:
-            content, attached = (
-                placed_image(panel, "backdrop", k.width, k.height, class_="faint"),
-                {"backdrop": jpeg(self.backdrop)},
-            )
+            content = placed_image(panel, "backdrop", k.width, k.height, class_="faint")
+            attached = {"backdrop": jpeg(self.backdrop)}
         along = np.linspace(0, 1, _SIDE, endpoint=False)[:, None]
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
         ring = np.concatenate([p + along * (q - p) for p, q in zip(corners, np.roll(corners, -1, 0), strict=True)])
@@ -158,7 +154,7 @@ class GuidanceView(OrbitView):
             if (i + j) % 2 == 0
         ]
         content += svg.path([d for d in dark if np.isfinite(d).all()], "fill-orange", closed=True)
-        content += svg.line(np.vstack([whole, whole[:1]]), "orange thick")
+        content += svg.line(closed(whole), "orange thick")
         return panel.show(content, title="The picture it would give"), attached
 
 

@@ -85,17 +85,13 @@ class HistogramView(ObservedView):
         width = edges[1] - edges[0]
         bell = np.zeros(_BINS)
         if self.sigma > 0:
-            bell = (
-                len(x)
-                * width
-                * np.exp(-0.5 * ((middle - np.median(x)) / self.sigma) ** 2)
-                / (self.sigma * np.sqrt(2 * np.pi))
-            )
+            falling = np.exp(-0.5 * ((middle - np.median(x)) / self.sigma) ** 2)
+            bell = len(x) * width * falling / (self.sigma * np.sqrt(2 * np.pi))
         panel = plot.plot_panel("histogram", 70, 34, 400, 240, (-reach, reach), (0, 1.15 * max(1.0, *count, *bell)))
-        content = plot.grid(panel) + plot.bars(panel, edges[:-1], edges[1:], count.astype(float), "fill-blue half")
+        content = plot.bars(panel, edges[:-1], edges[1:], count.astype(float), "fill-blue half")
         content += plot.curve(panel, middle, bell, "orange thick") if self.sigma > 0 else ""
         content += plot.legend(panel, [("blue thick", "residuals"), ("orange thick", "Gaussian")])
-        return panel.show(content, title="How they are spread") + plot.axes(panel, "residual [px]", "corners")
+        return plot.plotted(panel, content, "residual [px]", "corners", title="How they are spread")
 
     def _quantiles(self) -> str:
         """Sorted residuals over what a Gaussian of the same number would have: noise lies on the line."""
@@ -103,24 +99,13 @@ class HistogramView(ObservedView):
         reach = max(self._reach, 1e-9)
         sigma = self.sigma if self.sigma > 0 else 1.0
         panel = plot.plot_panel("quantiles", 545, 34, 190, 240, (-3.6, 3.6), (-reach, reach))
-        content = plot.grid(panel) + plot.curve(
-            panel, np.array([-3.6, 3.6]), 3.6 * np.array([-sigma, sigma]), "orange thick"
-        )
+        content = plot.curve(panel, np.array([-3.6, 3.6]), 3.6 * np.array([-sigma, sigma]), "orange thick")
         if len(x):
             normal = ndtri((np.arange(len(x)) + 0.5) / len(x))
-            shown = np.unique(
-                np.concatenate(
-                    [
-                        np.arange(min(40, len(x))),
-                        np.linspace(0, len(x) - 1, 160).astype(int),
-                        np.arange(max(0, len(x) - 40), len(x)),
-                    ]
-                )
-            )
+            ends = np.arange(min(40, len(x))), np.arange(max(0, len(x) - 40), len(x))
+            shown = np.unique(np.concatenate([*ends, np.linspace(0, len(x) - 1, 160).astype(int)]))
             content += svg.dots(panel.place(np.stack([normal[shown], x[shown]], -1)), "blue", 4)
-        return panel.show(content, title="Quantile by quantile") + plot.axes(
-            panel, "of a Gaussian [σ]", "residual [px]"
-        )
+        return plot.plotted(panel, content, "of a Gaussian [σ]", "residual [px]", title="Quantile by quantile")
 
     def _words(self) -> str:
         figures = readout(self.numbers(), (765, 48), (0, 38), (0, 17))

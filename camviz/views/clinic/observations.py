@@ -79,17 +79,11 @@ class Observations:
             raise Missing(f"The file does not hold where the board was in the views of {name}.")
         if not np.isfinite(calibration.detections[name]).any():
             raise Missing(f"{name} saw no corner of the board in any view.")
-        return cls(
-            calibration.cameras[name].at(RigidTransform.identity()),
-            calibration.board,
-            np.asarray(calibration.detections[name], dtype=float),
-            calibration.cam_from_board[name],
-            calibration.set_aside.get(name),
-            calibration.pictures.get(name, ()),
-            calibration.board_warp,
-            name,
-            photographs,
-        )
+        camera = calibration.cameras[name].at(RigidTransform.identity())
+        corners, poses = np.asarray(calibration.detections[name], dtype=float), calibration.cam_from_board[name]
+        aside, pictures = calibration.set_aside.get(name), calibration.pictures.get(name, ())
+        warp = calibration.board_warp
+        return cls(camera, calibration.board, corners, poses, aside, pictures, warp, name, photographs)
 
     def __len__(self) -> int:
         return len(self.detections)

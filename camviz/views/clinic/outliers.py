@@ -11,7 +11,7 @@ import numpy as np
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, jpeg
-from camviz.views.base import slider
+from camviz.views.base import Drawn, slider
 from camviz.views.clinic.observations import Observations, ObservedView
 from camviz.views.marks import arrows, crop, cross
 
@@ -65,7 +65,7 @@ class OutliersView(ObservedView):
             words += " The pictures are not at hand, so the places are bare."
         return self.composed(440, body + svg.text((20, 424), words, "note"), attached=attached)
 
-    def _detail(self, i: int, view: int, corner: int, image: Any, x: float, y: float) -> tuple[str, dict[str, bytes]]:
+    def _detail(self, i: int, view: int, corner: int, image: Any, x: float, y: float) -> Drawn:
         seen = self.observations
         middle = np.round(seen.detections[view, corner])
         half = self.patch / 2

@@ -15,7 +15,7 @@ from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
-from camviz.views.base import slider
+from camviz.views.base import Drawn, slider
 from camviz.views.clinic.observations import Missing, Photographs, no_photographs, short_names
 from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows, clipped, on_photograph
@@ -45,11 +45,7 @@ class SharedViews:
     ) -> SharedViews:
         """The first two cameras of a calibration. Raises Missing where it has no pair, or no views that both saw."""
         names = tuple(calibration.cameras)[:2]
-        if len(names) < 2:
-            raise Missing("The file holds one camera; this needs a pair.")
-        left, right = (calibration.cameras[name] for name in names)
-        if not np.linalg.norm(right.centre - left.centre) > 0:
-            raise Missing("The file does not say how one camera stands to the other.")
+        left, right = pair_of(calibration)
         if calibration.board is None or any(name not in calibration.detections for name in names):
             raise Missing(f"The file does not hold the corners that {names[0]} and {names[1]} saw.")
         seen = [np.array(calibration.detections[name], dtype=float) for name in names]
@@ -60,15 +56,9 @@ class SharedViews:
             raise Missing(
                 f"The two cameras have {len(seen[0])} and {len(seen[1])} views: which belong together is not known."
             )
-        found = cls(
-            left,
-            right,
-            (seen[0], seen[1]),
-            calibration.board.columns,
-            (names[0], names[1]),
-            calibration.pictures.get(names[0], ()),
-            photographs,
-        )
+        pictures = calibration.pictures.get(names[0], ())
+        corners, columns = (seen[0], seen[1]), calibration.board.columns
+        found = cls(left, right, corners, columns, (names[0], names[1]), pictures, photographs)
         if not np.isfinite(found.distances[0]).any():
             raise Missing(f"No corner was seen by {names[0]} and {names[1]} in one view.")
         return found
@@ -188,7 +178,7 @@ class EpipolarPairsView(ViewChooser):
         shown = panel.show(content, title=title, drag="bars", hint="click a bar", label=label)
         return shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
 
-    def _side(self, side: int, camera: Camera) -> tuple[str, dict[str, bytes]]:
+    def _side(self, side: int, camera: Camera) -> Drawn:
         shared, i, k = self.shared, self.index, camera.intrinsics
         panel = image_panel(shared.names[side], 20 + 470 * side, 206, 450, k.width, k.height, tallest=350)
         image = shared.photographs[side](i)
@@ -221,6 +211,16 @@ class EpipolarPairsView(ViewChooser):
             return ""
         curves = twoview.epipolar_curve(cameras[1 - side], cameras[side], other, _DISTANCES)
         return on_photograph(clipped(panel, panel.place(curves)), "green thin")
+
+
+def pair_of(calibration: Calibration) -> tuple[Camera, Camera]:
+    """The first two cameras of a calibration. Raises Missing where there are none, or not in two places."""
+    cameras = list(calibration.cameras.values())[:2]
+    if len(cameras) < 2:
+        raise Missing("The file holds one camera; this needs a pair.")
+    if not np.linalg.norm(cameras[1].centre - cameras[0].centre) > 0:
+        raise Missing("The file does not say how one camera stands to the other.")
+    return cameras[0], cameras[1]
 
 
 def _to_line(lines: Array, uv: Array) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
 from camviz.views.base import slider
 from camviz.views.clinic.observations import Observations, ObservedView
@@ -127,8 +128,8 @@ class RadiusView(ObservedView):
         dots = np.stack([radius, np.where(np.abs(values) <= 1.1 * reach, values, np.nan)], axis=-1)
         dots = dots[:: max(1, len(dots) // _MOST_DOTS)]
         ticks = plot.ticks(panel.bottom, panel.top, 4) + 0.0
-        yticks = [(y, f"{y:.3g}".replace("-", "−")) for y in ticks.tolist()]
-        content = plot.grid(panel, yticks=yticks) + svg.dots(panel.place(dots), "muted faint", 3)
+        yticks = [(y, true_minus(f"{y:.3g}")) for y in ticks.tolist()]
+        content = svg.dots(panel.place(dots), "muted faint", 3)
         low, high = (panel.place(np.stack([middle, mean + sign * 2 * error], -1)) for sign in (-1, 1))
         content += svg.segments(low, high, "orange half", style="stroke-width:7px;stroke-linecap:butt")
         known = np.isfinite(mean)
@@ -136,9 +137,8 @@ class RadiusView(ObservedView):
             panel.place(np.stack([middle, mean], -1)), "orange", 7
         )
         label = "from the principal point [px]" if part == 2 else ""
-        return panel.show(
-            content, title=title, note="mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive"
-        ) + plot.axes(panel, label, "[px]", yticks=yticks)
+        note = "mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive"
+        return plot.plotted(panel, content, label, "[px]", None, yticks, title=title, note=note)
 
     def _picture(self) -> str:
         k = self.observations.camera.intrinsics

@@ -20,7 +20,7 @@ from camviz.poses import RigidTransform
 from camviz.views import garden
 from camviz.views.base import Control, slider
 from camviz.views.clinic.observations import Missing
-from camviz.views.clinic.pairs import SharedViews
+from camviz.views.clinic.pairs import SharedViews, pair_of
 from camviz.views.marks import on_photograph
 from camviz.views.view_bars import ViewChooser
 
@@ -46,16 +46,12 @@ class RectifiedView(ViewChooser):
     @classmethod
     def of(cls, calibration: Any, **options: Any) -> RectifiedView:
         """The view of a calibrated pair. Raises Missing where there is none."""
-        cameras = list(calibration.cameras.values())[:2]
-        if len(cameras) < 2:
-            raise Missing("The file holds one camera; this needs a pair.")
-        if not np.linalg.norm(cameras[1].centre - cameras[0].centre) > 0:
-            raise Missing("The file does not say how one camera stands to the other.")
+        left, right = pair_of(calibration)
         try:
             shared: SharedViews | None = SharedViews.of(calibration, **options)
         except Missing:
             shared = None
-        return cls(cameras[0], cameras[1], shared)
+        return cls(left, right, shared)
 
     def offered(self) -> dict[str, Control]:
         return super().offered() if self.count > 1 else {"rows": self.controls()["rows"]}

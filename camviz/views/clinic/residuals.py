@@ -17,7 +17,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout
 from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
-from camviz.views.base import OrbitView, slider
+from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.observations import Observations, short_names
 from camviz.views.marks import arrows, cross
@@ -139,7 +139,7 @@ class ResidualsView(ViewChooser, OrbitView):
         few = self.count <= NAMED
         return names_below([Path(self.observations.picture(i)).stem[-9:] if few else f"{i + 1}" for i in numbers])
 
-    def picture_panel(self, panel: Panel) -> tuple[str, dict[str, bytes]]:
+    def picture_panel(self, panel: Panel) -> Drawn:
         """The chosen view's picture with its corners and arrows, and the photographs it needs."""
         seen, i, k = self.observations, self.index, self.observations.camera.intrinsics
         image = seen.photographs(i)
@@ -201,9 +201,7 @@ class ResidualsView(ViewChooser, OrbitView):
     @cached_property
     def _poses(self) -> BoardPosesView:
         seen = self.observations
-        eye = replace(
-            self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / OrbitCamera().distance
-        )
+        eye = self.from_afar(np.array(self.eye.target), 1.75 * float(np.nanmedian(seen.distances)))
         hidden = frozenset(np.flatnonzero(~seen.shown).tolist())
         names = short_names(seen.pictures, len(seen))
         return BoardPosesView(

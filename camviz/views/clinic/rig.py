@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -121,11 +121,7 @@ class RigView(OrbitView):
         places = self._places
         middle = (places.min(axis=0) + places.max(axis=0)) / 2
         reach = max(float(np.linalg.norm(np.ptp(places, axis=0))), 1e-6)
-        return replace(
-            self.eye,
-            target=tuple(middle.tolist()),
-            distance=1.25 * (reach + self._size) * self.eye.distance / OrbitCamera().distance,
-        )
+        return self.from_afar(middle, 1.25 * (reach + self._size))
 
     def _items(self) -> list[Item]:
         items: list[Item] = []

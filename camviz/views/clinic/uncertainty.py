@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import inf
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Missing
+from camviz.views.marks import circle
 
 DISTANCES = {"infinity": inf, "30 m": 30.0, "10 m": 10.0, "3 m": 3.0, "1 m": 1.0, "0.5 m": 0.5, "0.3 m": 0.3}
 LEFT_OUT = (
@@ -29,24 +30,18 @@ LEFT_OUT = (
 
 
 @dataclass(frozen=True)
-class UncertaintyView(View):
-    """The uncertainty of projection at every pixel, in the worst direction, for points at one distance.
-
-    With `ellipses`, how it spreads: ellipses of one standard deviation, enlarged.
-    """
-
-    title: ClassVar[str] = "Uncertainty of projection"
+class SolvedView(View):
+    """A view of a solution whose corners determine it. Raises Missing where they do not."""
 
     adjustment: Adjustment = field(compare=False, repr=False)
     camera: str = ""
-    distance: str = choice(*DISTANCES, help="how far away the points are that a pixel stands for")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         determined(self.adjustment)
 
     @classmethod
-    def of(cls, calibration: Any, camera: str = "") -> UncertaintyView:
+    def of(cls, calibration: Any, camera: str = "") -> Self:
         """The view of a calibration. Raises Missing where it does not hold what its solution was made from."""
         return cls(adjusted(calibration, camera), camera)
 
@@ -54,6 +49,18 @@ class UncertaintyView(View):
     def name(self) -> str:
         """Which camera it is of."""
         return self.camera or next(iter(self.adjustment.cameras))
+
+
+@dataclass(frozen=True)
+class UncertaintyView(SolvedView):
+    """The uncertainty of projection at every pixel, in the worst direction, for points at one distance.
+
+    With `ellipses`, how it spreads: ellipses of one standard deviation, enlarged.
+    """
+
+    title: ClassVar[str] = "Uncertainty of projection"
+
+    distance: str = choice(*DISTANCES, help="how far away the points are that a pixel stands for")
 
     @property
     def seen_by(self) -> Camera:
@@ -118,12 +125,10 @@ class UncertaintyView(View):
         known = np.isfinite(covariance).all(axis=(1, 2)) & (long > 0)
         if not known.any():
             return ""
-        turn = np.linspace(0, 2 * np.pi, 25)
-        circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         # Lengths by the logarithm, for they differ a hundredfold; the ratio of the axes is kept.
         reach = (7 + 9 * np.clip(np.log10(long / np.median(long[known])) + 0.5, 0, 1)) / np.where(long > 0, long, 1)
         axes = directions * np.sqrt(np.maximum(values, 0))[:, None, :] * reach[:, None, None]
-        lines = panel.place(uv)[:, None] + circle @ np.swapaxes(axes, 1, 2)
+        lines = panel.place(uv)[:, None] + circle(25) @ np.swapaxes(axes, 1, 2)
         return svg.path(lines[known], "paper-line", style="stroke-width:3px") + svg.path(lines[known], "ink thin")
 
     def _words(self, x: float) -> str:
@@ -137,7 +142,7 @@ class UncertaintyView(View):
 
 
 @dataclass(frozen=True)
-class UncertaintyRangeView(View):
+class UncertaintyRangeView(SolvedView):
     """The uncertainty of projection against the distance of the points, at three pixels from the middle outwards.
 
     It is least where the boards were held.
@@ -145,23 +150,7 @@ class UncertaintyRangeView(View):
 
     title: ClassVar[str] = "Uncertainty against range"
 
-    adjustment: Adjustment = field(compare=False, repr=False)
-    camera: str = ""
     scale: str = choice("logarithmic", "linear", label="axis", help="of the uncertainty")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        determined(self.adjustment)
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "") -> UncertaintyRangeView:
-        """The view of a calibration. Raises Missing where it does not hold what its solution was made from."""
-        return cls(adjusted(calibration, camera), camera)
-
-    @property
-    def name(self) -> str:
-        """Which camera it is of."""
-        return self.camera or next(iter(self.adjustment.cameras))
 
     @cached_property
     def boards(self) -> Array:
@@ -199,28 +188,25 @@ class UncertaintyRangeView(View):
         finite = values[np.isfinite(values) & (values > 0)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.1, 1.0)
         x = np.log10(distances)
-        ylim = (
-            (float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.3 * float(np.log10(high / low)) + 0.1)
-            if log
-            else (0.0, 1.25 * high)
-        )
+        ylim = (0.0, 1.25 * high)
+        if log:
+            ylim = float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.3 * float(np.log10(high / low)) + 0.1
         panel = plot.plot_panel("range", 70, 34, 610, 290, (float(x[0]), float(x[-1])), ylim)
         xticks = plot.logarithmic(panel.left, panel.right)
         yticks = plot.logarithmic(*ylim) if log else None
-        content = plot.grid(panel, xticks, yticks)
         boards = np.log10([self.boards.min(), self.boards.max()])
-        content += plot.band(panel, boards[0] - 0.005, boards[1] + 0.005, "fill-green")
+        content = plot.band(panel, boards[0] - 0.005, boards[1] + 0.005, "fill-green")
         content += svg.text((panel.place((boards.mean(), 0))[0], 16), "the boards", "green halo middle")
         classes = ("blue thick", "orange thick", "purple thick")
         for class_, curve in zip(classes, values, strict=True):
             content += plot.curve(panel, x, np.log10(curve) if log else curve, class_)
         content += plot.legend(panel, list(zip(classes, self.pixels, strict=True)), "top right")
-        axes = plot.axes(panel, "distance of the point [m]", "standard deviation [px]", xticks, yticks)
+        names = "distance of the point [m]", "standard deviation [px]"
         words = (
             "The solution knows the camera best where the boards were held. Nearer than that, the place of the "
             f"camera’s centre is what is uncertain.\n \n{LEFT_OUT}"
         )
-        body = panel.show(content, title=f"{self.name}: at three pixels") + axes
+        body = plot.plotted(panel, content, *names, xticks, yticks, title=f"{self.name}: at three pixels")
         return self.composed(380, body + svg.paragraph((705, 50), words, 240))
 
 

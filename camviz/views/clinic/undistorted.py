@@ -94,11 +94,7 @@ class UndistortedView(View):
         return cv2.resize(self.image, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA)
 
     def _straight(self, panel: Panel) -> str:
-        return (
-            on_photograph([panel.place(line) for line in _grid(self.camera.intrinsics)], "sky thin")
-            if self.lines
-            else ""
-        )
+        return on_photograph(panel.place(_grid(self.camera.intrinsics)), "sky thin") if self.lines else ""
 
     def _bent(self, panel: Panel, found: tuple[Intrinsics, tuple[int, int, int, int]] | str) -> str:
         """The grid of the undistorted picture where it lies in the photograph."""
@@ -106,9 +102,7 @@ class UndistortedView(View):
             return ""
         rays = on_plane(found[0].from_pixels(_grid(self.camera.intrinsics)))
         bent = self.camera.intrinsics.to_pixels(self.camera.lens.project(rays))
-        return svg.path([panel.place(line) for line in bent], "paper-line") + svg.path(
-            [panel.place(line) for line in bent], "sky thin"
-        )
+        return on_photograph(panel.place(bent), "sky thin")
 
 
 def _grid(k: Intrinsics) -> NDArray[np.float64]:
