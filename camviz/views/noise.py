@@ -193,7 +193,7 @@ class PhotonTransferView(View):
         how = "the difference of two frames" if self.difference else "one frame"
         return f"Noise of {how}, {self.bits} bits, {self.temperature_c:g} °C, {self.frames} averaged: {figures}."
 
-    def _told(self, pixels: int) -> dict[str, str]:
+    def _told(self, pixels: int = 3000) -> dict[str, str]:
         """The figures that stand beside the panels."""
         figures = self.numbers(pixels)
         if self.panels == _EVERYTHING:
@@ -265,7 +265,7 @@ class PhotonTransferView(View):
         content = self._curves(panel) + self._points(panel, pixels)
         how = "the difference of two" if self.difference else "one frame"
         label = "Noise over signal; drag or press the arrow keys to change the exposure"
-        heading = {"hint": "drag to change the exposure", "drag": "exposure", "label": label}
+        heading: dict[str, Any] = {"hint": "drag to change the exposure", "drag": "exposure", "label": label}
         names = "signal above the dark (DN)", "noise, σ (DN)"
         return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading)
 
