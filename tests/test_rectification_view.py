@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
-from camviz.draw.heat import heat_map
+from camviz.draw.shades import heat_map
 from camviz.lenses import BrownConrady, Equidistant, Perspective
 from camviz.scenes import snapshot, textured_scene
 from camviz.views import stereo_pair

@@ -330,7 +330,7 @@ def test_outlines_are_where_the_tracer_meets_the_surface():
 def test_a_meshs_vertices_lie_on_the_surface_it_stands_for(surface):
     """Rays to the vertices that face the camera, drawn in by a thousandth, end on them."""
     vertices = surface.mesh().vertices
-    middle = np.mean([centre for centre, _, _ in surface.balls()], axis=0)
+    middle = np.mean([centre for centre, _, _ in surface.bounding_spheres()], axis=0)
     inner = middle + 0.999 * (vertices - middle)
     distance = np.linalg.norm(inner, axis=-1)
     _, depth = Scene([surface]).trace(np.zeros(3), unit(inner))
@@ -396,7 +396,10 @@ def test_pixels_without_a_ray_are_not_traced():
     directions[:, TILE:] = (0, 0, 1)
     rays = Rays.gather(np.zeros(3), directions)
     ball = (np.array([0.0, 0, 5]), 1.0, np.zeros(3))
-    assert rays.may_meet(Bounds.around([[ball], Ground(1.0, RED).balls()])).tolist() == [[False, True], [False, True]]
+    assert rays.may_intersect(Bounds.around([[ball], Ground(1.0, RED).bounding_spheres()])).tolist() == [
+        [False, True],
+        [False, True],
+    ]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -409,14 +412,18 @@ def test_tiles_are_ruled_out_for_surfaces_that_none_of_their_rays_meets_and_for_
     garden = textured_scene()
     rays = Rays.gather(camera.centre, camera.rays())
     corners = {i: wall.corners for i, wall in enumerate(garden.surfaces) if isinstance(wall, Rectangle)}
-    may_meet = rays.may_meet(Bounds.around([surface.balls() for surface in garden.surfaces], corners))
+    may_intersect = rays.may_intersect(
+        Bounds.around([surface.bounding_spheres() for surface in garden.surfaces], corners)
+    )
     tiles = rays.directions.shape[1]
     with np.errstate(all="ignore"):
-        depths = [one.meet(rays.origins.reshape(3, 1), rays.directions.reshape(3, -1)).depth for one in garden.surfaces]
+        depths = [
+            one.intersect(rays.origins.reshape(3, 1), rays.directions.reshape(3, -1)).depth for one in garden.surfaces
+        ]
     meets = (np.array(depths) < np.inf).reshape(-1, tiles, TILE).any(axis=2)
-    assert not (meets & ~may_meet).any()
+    assert not (meets & ~may_intersect).any()
     flat = np.array(list(corners))
-    assert may_meet[flat].sum() <= 1.6 * meets[flat].sum() + tiles
+    assert may_intersect[flat].sum() <= 1.6 * meets[flat].sum() + tiles
 
 
 def test_every_ray_begins_where_it_is_said_to():

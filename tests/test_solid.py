@@ -12,12 +12,12 @@ import pytest
 
 from camviz.draw import opengl, solid
 from camviz.draw.backdrop import Backdrops
-from camviz.draw.items import Dots, Face, Line, Sheet
+from camviz.draw.items import Dots, Face, Line, TexturedMesh
 from camviz.draw.opengl import opengl_works, why_not_solid
-from camviz.draw.space import Eye, chosen_renderer, draw_space, space_panel
-from camviz.draw.wire import Sight
+from camviz.draw.space import OrbitCamera, chosen_renderer, draw_space, space_panel
+from camviz.draw.wire import Viewport
 
-EYE = Eye(target=(0, 0.2, 3), distance=6)
+EYE = OrbitCamera(target=(0, 0.2, 3), distance=6)
 PANEL = space_panel("space", 0, 0, 480, 360)
 SQUARE = np.array([(-1, -1, 3), (1, -1, 3), (1, 1, 3), (-1, 1, 3)], float)
 
@@ -27,13 +27,13 @@ needs_opengl = pytest.mark.skipif(not works, reason=reason)
 
 def shot_of(items, eye=EYE, scale=1.0):
     """A solid picture, taken where all are taken."""
-    sight = Sight(eye.camera(480, 360), eye.distance)
-    return solid._stage().submit(solid._shoot, sight, items, scale).result()
+    viewport = Viewport(eye.camera(480, 360), eye.distance)
+    return solid._stage().submit(solid._shoot, viewport, items, scale).result()
 
 
 @needs_opengl
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
-@pytest.mark.parametrize("eye", [EYE, Eye((0, 0, 3), 4, 50, -30, 60)])
+@pytest.mark.parametrize("eye", [EYE, OrbitCamera((0, 0, 3), 4, 50, -30, 60)])
 def test_both_renderers_put_a_point_at_the_same_pixel(eye, scale):
     """The centroid of a disc parallel to the picture is where the camera projects its middle."""
     middle = np.array([0.6, -0.4, 2.6])
@@ -63,7 +63,9 @@ def pyvista_alpha(faces, eye, width, height):
 
 
 @needs_opengl
-@pytest.mark.parametrize("eye", [EYE, Eye((0, 0, 3), 5, 50, -30, 60), Eye((0.5, 0, 3), 5, -120, 60, 50)])
+@pytest.mark.parametrize(
+    "eye", [EYE, OrbitCamera((0, 0, 3), 5, 50, -30, 60), OrbitCamera((0.5, 0, 3), 5, -120, 60, 50)]
+)
 def test_pyvista_covers_the_same_pixels(eye, monkeypatch):
     """Intersection over union of both silhouettes above 0.999: five faces without symmetry, from three sides."""
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", reason)
@@ -77,7 +79,7 @@ def test_pyvista_covers_the_same_pixels(eye, monkeypatch):
 
 @needs_opengl
 def test_the_depth_of_a_surface_is_its_distance_along_the_cameras_axis():
-    eye = Eye((0, 0, 3), 6, 0, 0)
+    eye = OrbitCamera((0, 0, 3), 6, 0, 0)
     shot = shot_of([Face(SQUARE), Face(SQUARE * (5, 5, 3), "red")], eye)
     assert shot.depth(np.array([(240, 180), (400, 180)])) == pytest.approx([6, 12], rel=1e-3)
     nowhere = np.array([(5, 5), (-1, 180), (240, 360), (np.nan, np.nan)])
@@ -87,17 +89,19 @@ def test_the_depth_of_a_surface_is_its_distance_along_the_cameras_axis():
 @needs_opengl
 def test_scenery_that_stays_is_drawn_once_and_looks_as_if_it_were_drawn_anew(monkeypatch):
     """A see-through face that moves before, behind and through a sheet, seen from two places in turns."""
-    scenery = (Sheet(SQUARE, np.array([[0, 1, 2, 3]]), SQUARE[:, :2] / 2 + 0.5, np.full((1, 1, 3), 200, np.uint8)),)
-    eyes = [Eye((0, 0, 3), 5, 30, 20, 60), Eye((0, 0, 3), 6, -40, 10, 60)]
+    scenery = (
+        TexturedMesh(SQUARE, np.array([[0, 1, 2, 3]]), SQUARE[:, :2] / 2 + 0.5, np.full((1, 1, 3), 200, np.uint8)),
+    )
+    eyes = [OrbitCamera((0, 0, 3), 5, 30, 20, 60), OrbitCamera((0, 0, 3), 6, -40, 10, 60)]
     moved = [Face(0.5 * SQUARE + (x, 0.1, 1.5), "blue", 0.5) for x in (-0.4, 0.0, 0.5, 0.9)]
     kept = []
     monkeypatch.setattr(Backdrops, "keep", lambda self, key, keep=Backdrops.keep: (kept.append(key), keep(self, key)))
-    sights = [Sight(eye.camera(480, 360), eye.distance) for eye in eyes]
+    viewports = [Viewport(eye.camera(480, 360), eye.distance) for eye in eyes]
     ours, anew = (
         [
-            solid._stage().submit(solid._shoot, sight, items(face), 1, stays).result()
+            solid._stage().submit(solid._shoot, viewport, items(face), 1, stays).result()
             for face in moved
-            for sight in sights
+            for viewport in viewports
         ]
         for items, stays in ((lambda face: [face], scenery), (lambda face: [face, *scenery], ()))
     )
@@ -111,8 +115,10 @@ def test_scenery_that_stays_is_drawn_once_and_looks_as_if_it_were_drawn_anew(mon
 
 @needs_opengl
 def test_scenery_that_is_no_opaque_sheet_is_drawn_too():
-    eye, line = Eye((0, 0, 3), 6, 0, 0), Line([(-0.5, 0.1, 2), (0.5, 0.1, 2)], "line")
-    glass = Sheet(SQUARE, np.array([[0, 1, 2, 3]]), SQUARE[:, :2], np.full((1, 1, 3), 200, np.uint8), opacity=0.5)
+    eye, line = OrbitCamera((0, 0, 3), 6, 0, 0), Line([(-0.5, 0.1, 2), (0.5, 0.1, 2)], "line")
+    glass = TexturedMesh(
+        SQUARE, np.array([[0, 1, 2, 3]]), SQUARE[:, :2], np.full((1, 1, 3), 200, np.uint8), opacity=0.5
+    )
     as_scenery = draw_space(PANEL, [], eye, renderer="solid", scenery=(line, glass, Face(SQUARE + (0, 0, 1))))
     assert as_scenery == draw_space(PANEL, [line, glass, Face(SQUARE + (0, 0, 1))], eye, renderer="solid")
     assert 'class="line"' in as_scenery[0]
@@ -120,7 +126,7 @@ def test_scenery_that_is_no_opaque_sheet_is_drawn_too():
 
 @needs_opengl
 def test_lines_behind_a_surface_are_faint_and_lines_before_it_are_not():
-    eye = Eye((0, 0, 3), 6, 0, 0)
+    eye = OrbitCamera((0, 0, 3), 6, 0, 0)
     lines = [Line([(-0.5, 0.1, z), (0.5, 0.1, z)], f"line{z}") for z in (2, 5)]
     fragment, _ = draw_space(PANEL, [Face(SQUARE), *lines], eye, renderer="solid")
     opacity = {z: float(re.search(rf'class="line{z}" style="[^"]*opacity:([\d.]+)', fragment)[1]) for z in (2, 5)}
@@ -138,10 +144,10 @@ def test_the_outline_of_a_surface_is_not_hidden_by_it():
 
 @needs_opengl
 def test_only_what_is_solid_covers_the_background():
-    shot = shot_of([Face(SQUARE, "#ff8040"), Face(SQUARE + (3, 0, 0), "#ff8040", 0.5)], Eye((0, 0, 3), 6, 0, 0))
+    shot = shot_of([Face(SQUARE, "#ff8040"), Face(SQUARE + (3, 0, 0), "#ff8040", 0.5)], OrbitCamera((0, 0, 3), 6, 0, 0))
     assert shot.alpha[180, 240] == 255
     assert shot.alpha[5, 5] == 0
-    u, v = Eye((0, 0, 3), 6, 0, 0).camera(480, 360).project((2.3, 0, 3)).astype(int)
+    u, v = OrbitCamera((0, 0, 3), 6, 0, 0).camera(480, 360).project((2.3, 0, 3)).astype(int)
     assert shot.alpha[v, u] == pytest.approx(128, abs=2)
     np.testing.assert_allclose(shot.rgb[v, u], shot.rgb[180, 240], atol=6)
 
@@ -150,8 +156,8 @@ def test_only_what_is_solid_covers_the_background():
 def test_a_picture_keeps_its_colours_and_stands_upright():
     colours = np.array([[(200, 30, 30), (30, 200, 30)], [(30, 30, 200), (200, 200, 30)]], np.uint8)
     picture = np.repeat(np.repeat(colours, 64, 0), 64, 1)
-    eye = Eye((0, 0, 3), 6, 0, 0)
-    rgb = shot_of([Sheet.over(SQUARE[[0, 1, 3, 2]].reshape(2, 2, 3), picture)], eye).rgb
+    eye = OrbitCamera((0, 0, 3), 6, 0, 0)
+    rgb = shot_of([TexturedMesh.over(SQUARE[[0, 1, 3, 2]].reshape(2, 2, 3), picture)], eye).rgb
     for i, y in enumerate((-0.5, 0.5)):
         for j, x in enumerate((-0.5, 0.5)):
             u, v = eye.camera(480, 360).project((x, y, 3)).round().astype(int)
@@ -160,9 +166,9 @@ def test_a_picture_keeps_its_colours_and_stands_upright():
 
 @needs_opengl
 def test_a_new_picture_replaces_the_old_one():
-    eye = Eye((0, 0, 3), 6, 0, 0)
+    eye = OrbitCamera((0, 0, 3), 6, 0, 0)
     for grey in (40, 200, 90):
-        sheet = Sheet.over(SQUARE[[0, 1, 3, 2]].reshape(2, 2, 3), np.full((8, 8, 3), grey, np.uint8))
+        sheet = TexturedMesh.over(SQUARE[[0, 1, 3, 2]].reshape(2, 2, 3), np.full((8, 8, 3), grey, np.uint8))
         np.testing.assert_allclose(shot_of([sheet], eye).rgb[180, 240], grey, atol=2)
     assert shot_of([], eye).alpha.max() == 0
 
@@ -199,7 +205,7 @@ def test_a_draft_is_coarser_than_the_finished_picture():
 def test_a_process_that_drew_solid_pictures_ends_well():
     code = (
         "import numpy as np; from camviz.draw.space import *; from camviz.draw.space import space_panel;"
-        "print(list(draw_space(space_panel('a', 0, 0, 48, 36), [Face(np.eye(3))], Eye(), renderer='solid')[1]))"
+        "print(list(draw_space(space_panel('a', 0, 0, 48, 36), [Face(np.eye(3))], OrbitCamera(), renderer='solid')[1]))"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "['a-solid', 'a-mask']", "")

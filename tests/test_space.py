@@ -11,13 +11,13 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics, look_at
-from camviz.draw.items import Dots, Face, Label, Line, Sheet, axes_triad, camera_body, grid_lines
-from camviz.draw.space import Eye, chosen_renderer, draw_space, scene_items, space_panel
+from camviz.draw.items import Dots, Face, Label, Line, TexturedMesh, axes_triad, camera_body, grid_lines
+from camviz.draw.space import OrbitCamera, chosen_renderer, draw_space, scene_items, space_panel
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.scenes import textured_scene
 
 PANEL = space_panel("space", 10, 30, 480, 360)
-EYE = Eye(target=(0, 0.2, 3), distance=6)
+EYE = OrbitCamera(target=(0, 0.2, 3), distance=6)
 
 
 def wire(items, eye=EYE, panel=PANEL):
@@ -40,45 +40,45 @@ def path_points(fragment, class_):
 
 def test_the_eye_looks_at_its_target_from_its_distance():
     for yaw, pitch in product((-170, -30, 0, 90), (-85, 0, 40)):
-        eye = Eye((1, 2, 3), 5, yaw, pitch)
+        eye = OrbitCamera((1, 2, 3), 5, yaw, pitch)
         camera = eye.camera(480, 360)
         assert np.linalg.norm(camera.centre - (1, 2, 3)) == pytest.approx(5)
         np.testing.assert_allclose(camera.project((1, 2, 3)), (239.5, 179.5), atol=1e-9)
 
 
 def test_at_yaw_and_pitch_0_the_eye_looks_as_an_identity_camera_does():
-    pose = Eye((0, 0, 5), 5, 0, 0).camera(480, 360).world_from_cam
+    pose = OrbitCamera((0, 0, 5), 5, 0, 0).camera(480, 360).world_from_cam
     np.testing.assert_allclose(pose.as_matrix(), np.eye(4), atol=1e-12)
 
 
 def test_pitch_raises_the_eye_above_its_target():
-    assert Eye(pitch_deg=30).camera(480, 360).centre[1] < 0  # y points down
+    assert OrbitCamera(pitch_deg=30).camera(480, 360).centre[1] < 0  # y points down
 
 
 def test_the_vertical_field_of_view_spans_the_picture():
-    eye = Eye((0, 0, 0), 2, 0, 0, vfov_deg=90)
+    eye = OrbitCamera((0, 0, 0), 2, 0, 0, vfov_deg=90)
     np.testing.assert_allclose(pixels(eye, [(0, -2, 0), (0, 2, 0)])[:, 1], [0, 360], atol=1e-9)
 
 
 def test_what_is_near_follows_the_pointer():
     near = np.array([(0, 0.2, 1.0)])  # in front of the target
-    eye = Eye((0, 0.2, 3), 6, 0, 10)
+    eye = OrbitCamera((0, 0.2, 3), 6, 0, 10)
     before = pixels(eye, near)[0]
     assert pixels(eye.orbited(20, 0), near)[0][0] > before[0]
     assert pixels(eye.orbited(0, 20), near)[0][1] > before[1]
 
 
 def test_the_eye_never_tips_over():
-    eye = Eye().orbited(0, 1e5)
+    eye = OrbitCamera().orbited(0, 1e5)
     assert eye.pitch_deg == 85
-    assert -180 <= Eye().orbited(1e5, 0).yaw_deg < 180
+    assert -180 <= OrbitCamera().orbited(1e5, 0).yaw_deg < 180
 
 
 def test_keys_turn_and_approach():
-    assert Eye().key("ArrowRight") == Eye().orbited(12.5, 0)
-    assert Eye().key("+").distance < Eye().distance < Eye().key("-").distance
-    assert Eye().key("q") == Eye()
-    assert Eye().zoomed(3).zoomed(-3).distance == pytest.approx(Eye().distance)
+    assert OrbitCamera().key("ArrowRight") == OrbitCamera().orbited(12.5, 0)
+    assert OrbitCamera().key("+").distance < OrbitCamera().distance < OrbitCamera().key("-").distance
+    assert OrbitCamera().key("q") == OrbitCamera()
+    assert OrbitCamera().zoomed(3).zoomed(-3).distance == pytest.approx(OrbitCamera().distance)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_keys_turn_and_approach():
 )
 def test_an_eye_that_cannot_see_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=field):
-        Eye(**{field: value})
+        OrbitCamera(**{field: value})
 
 
 def test_lines_end_where_opencv_projects_their_ends():
@@ -119,7 +119,7 @@ def test_nan_interrupts_a_line():
 
 
 def test_nearer_lines_are_stronger():
-    fragment, _ = wire([Line([(-1, 0, z), (1, 0, z)], f"line{z}") for z in (0, 9)], Eye((0, 0.2, 3), 6, 0, 10))
+    fragment, _ = wire([Line([(-1, 0, z), (1, 0, z)], f"line{z}") for z in (0, 9)], OrbitCamera((0, 0.2, 3), 6, 0, 10))
     width = {z: float(re.search(rf'class="line{z}" style="stroke-width:([\d.]+)', fragment)[1]) for z in (0, 9)}
     assert width[0] > width[9]
 
@@ -149,7 +149,7 @@ def test_a_picture_in_space_is_seen_in_exact_perspective():
     colours = np.array([[(255, 0, 0), (0, 255, 0)], [(0, 0, 255), (255, 255, 0)]], np.uint8)
     picture = np.repeat(np.repeat(colours, 60, 0), 80, 1)
     corners = np.array([[(-1, -0.5, 2), (1, -0.5, 4)], [(-1, 1, 2), (1, 1, 4)]], float)
-    fragment, photographs = wire([Sheet.over(corners, picture)])
+    fragment, photographs = wire([TexturedMesh.over(corners, picture)])
     box = re.search(r' x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)"', fragment)
     x, y, width, height = map(float, box.groups())
     seen = cv2.imdecode(np.frombuffer(photographs["space-0"], np.uint8), cv2.IMREAD_UNCHANGED)
@@ -213,8 +213,8 @@ def test_ground_lines_lie_in_their_plane_and_are_evenly_spaced():
     [
         (lambda: Line(np.zeros((2, 2))), "points"),
         (lambda: Face(np.zeros((3, 3)), opacity=2), "opacity"),
-        (lambda: Sheet.over(np.zeros((1, 2, 3)), np.zeros((4, 4, 3), np.uint8)), "points"),
-        (lambda: Sheet.over(np.zeros((2, 2, 3)), np.zeros((4, 4, 3))), "picture"),
+        (lambda: TexturedMesh.over(np.zeros((1, 2, 3)), np.zeros((4, 4, 3), np.uint8)), "points"),
+        (lambda: TexturedMesh.over(np.zeros((2, 2, 3)), np.zeros((4, 4, 3))), "picture"),
     ],
 )
 def test_things_that_cannot_be_drawn_are_refused_by_name(make, words):
@@ -239,7 +239,7 @@ def test_the_standard_scene_as_wireframe_is_small():
 def test_a_wireframe_needs_neither_vtk_nor_pyvista():
     code = (
         "import sys; from camviz.draw.space import *; from camviz.draw.space import space_panel;"
-        "draw_space(space_panel('a', 0, 0, 48, 36), [], Eye(), renderer='wire');"
+        "draw_space(space_panel('a', 0, 0, 48, 36), [], OrbitCamera(), renderer='wire');"
         "print([m for m in sys.modules if m.startswith(('vtk', 'pyvista', 'matplotlib', 'ipywidgets'))])"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

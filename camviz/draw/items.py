@@ -44,7 +44,7 @@ class Face:
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class TexturedMesh:
     """A picture (height, width, 3), uint8 RGB, stretched over quadrilaterals.
 
     `quads` (m, 4) are indices of vertices (n, 3) in metres; uv (n, 2) places these on the picture, u to the right and
@@ -66,7 +66,7 @@ class Sheet:
             raise ValueError(f"picture must be uint8 (height, width, 3), got {self.picture.dtype} {self.picture.shape}")
 
     @classmethod
-    def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: float = 1.0) -> Sheet:
+    def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: float = 1.0) -> TexturedMesh:
         """The picture over a grid of points (m, n, 3), at least 2 × 2, whose rows follow the picture's."""
         points = as_points(points, 3, "points")
         if points.ndim != 3 or min(points.shape[:2]) < 2:
@@ -104,7 +104,7 @@ class Label:
 
 SIDE = 16  # points along each side of a camera's rim
 
-Item = Line | Face | Sheet | Dots | Label
+Item = Line | Face | TexturedMesh | Dots | Label
 
 
 def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") -> list[Item]:
@@ -135,14 +135,14 @@ def camera_body(
     reach = _reach(camera, camera.intrinsics.border(SIDE))
     rim = camera.centre + depth * reach
     corners = rim[::SIDE]
-    items: list[Item] = [Line(_closed(rim), colour, 2.2), Dots(camera.centre, colour, 8)]
+    items: list[Item] = [Line(closed(rim), colour, 2.2), Dots(camera.centre, colour, 8)]
     items += [Line(np.array([camera.centre, corner]), colour, 1.5) for corner in corners]
-    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(_closed(rim))]
+    items += [Face(np.vstack([camera.centre, side]), colour, 0.10) for side in _sides(closed(rim))]
     if near > 0:
-        items.append(Line(_closed(camera.centre + near * reach), colour, 1.2))
+        items.append(Line(closed(camera.centre + near * reach), colour, 1.2))
     if image is not None:
         mesh = _mesh(camera, 2, 2) if isinstance(camera.lens, Perspective) else _mesh(camera, 10, 13)
-        items.append(Sheet.over(camera.centre + depth * _reach(camera, mesh), image))
+        items.append(TexturedMesh.over(camera.centre + depth * _reach(camera, mesh), image))
     items.append(_up_marker(camera, rim[SIDE // 2], depth, colour))
     return [*items, Label(camera.centre, name, f"label {colour}")] if name else items
 
@@ -178,7 +178,8 @@ def _up_marker(camera: Camera, top: Array, depth: float, colour: str) -> Item:
     return Face(top - [0.2 * down + right, 0.2 * down - right, 1.5 * down], colour, 0.9)
 
 
-def _closed(outline: Array) -> Array:
+def closed(outline: Array) -> Array:
+    """The outline (n, d) with its first point again at last, (n + 1, d)."""
     return np.vstack([outline, outline[:1]])
 
 

@@ -80,7 +80,7 @@ def image_panel(
     return Panel(name, x, y, width, width / aspect, left, right, top, bottom)
 
 
-def photograph(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: Any) -> str:
+def placed_image(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: Any) -> str:
     """The attached photograph where its pixels belong in an image panel."""
     (x0, y0), (x1, y1) = panel.place([(-0.5, -0.5), (image_width - 0.5, image_height - 0.5)])
     return svg.image(attached, x0, y0, x1 - x0, y1 - y0, **attributes)

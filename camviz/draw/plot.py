@@ -6,6 +6,7 @@ import numpy as np
 
 from camviz.draw import svg
 from camviz.draw.panel import Panel
+from camviz.draw.readout import true_minus
 
 Ticks = Sequence[tuple[float, str]]
 
@@ -17,10 +18,19 @@ def plot_panel(
     return Panel(name, x, y, width, height, xlim[0], xlim[1], ylim[1], ylim[0])
 
 
-def axes(panel: Panel, xlabel: str, ylabel: str, xticks: Ticks | None = None, yticks: Ticks | None = None) -> str:
+def axes(
+    panel: Panel,
+    xlabel: str,
+    ylabel: str,
+    xticks: Ticks | None = None,
+    yticks: Ticks | None = None,
+    *,
+    aside: float = 40,
+) -> str:
     """Tick labels and axis names around a plot panel, to stand beside `panel.show(grid(panel) + …)`.
 
-    Ticks are found where none are given as (place, words), as for a logarithmic axis.
+    Ticks are found where none are given as (place, words), as for a logarithmic axis. The name of the y axis stands
+    `aside` units to the left of it.
     """
     xs = _found(panel.left, panel.right, panel.width) if xticks is None else xticks
     ys = _found(panel.bottom, panel.top, panel.height) if yticks is None else yticks
@@ -33,7 +43,7 @@ def axes(panel: Panel, xlabel: str, ylabel: str, xticks: Ticks | None = None, yt
         for py, (_, words) in zip(panel.place(_pairs(panel.left, _places(ys)))[:, 1], ys, strict=True)
     ]
     parts.append(svg.text((panel.x + panel.width / 2, panel.y + panel.height + 34), xlabel, "note middle"))
-    x, y = panel.x - 40, panel.y + panel.height / 2
+    x, y = panel.x - aside, panel.y + panel.height / 2
     parts.append(svg.text((x, y), ylabel, "note middle", transform=f"rotate(-90 {x:g} {y:g})"))
     return "".join(parts)
 
@@ -42,10 +52,33 @@ def grid(panel: Panel, xticks: Ticks | None = None, yticks: Ticks | None = None)
     """Grid lines at the ticks, and the axes x = 0 and y = 0 where they are inside."""
     xs = _places(_found(panel.left, panel.right, panel.width) if xticks is None else xticks)
     ys = _places(_found(panel.bottom, panel.top, panel.height) if yticks is None else yticks)
-    lines = [_pairs(x, (panel.bottom, panel.top)) for x in xs] + [_pairs((panel.left, panel.right), y) for y in ys]
     zeros = [_pairs(0, (panel.bottom, panel.top))] if panel.left <= 0 <= panel.right else []
     zeros += [_pairs((panel.left, panel.right), 0)] if panel.bottom <= 0 <= panel.top else []
-    return svg.path(map(panel.place, lines), "grid") + svg.path(map(panel.place, zeros), "axis")
+    return _lines(panel, xs, ys) + svg.path(map(panel.place, zeros), "axis")
+
+
+def plotted(
+    panel: Panel,
+    content: str,
+    xlabel: str,
+    ylabel: str,
+    xticks: Ticks | None = None,
+    yticks: Ticks | None = None,
+    **heading: str,
+) -> str:
+    """A plot with its grid and axes around what it shows; `heading` is what `Panel.show` takes."""
+    shown = panel.show(grid(panel, xticks, yticks) + content, **heading)
+    return shown + axes(panel, xlabel, ylabel, xticks, yticks)
+
+
+def logarithmic_grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:
+    """Grid lines at the ticks of axes that hold logarithms, on which 0 is no place of its own."""
+    return _lines(panel, _places(xticks), _places(yticks))
+
+
+def _lines(panel: Panel, xs: Sequence[float], ys: Sequence[float]) -> str:
+    lines = [_pairs(x, (panel.bottom, panel.top)) for x in xs] + [_pairs((panel.left, panel.right), y) for y in ys]
+    return svg.path(map(panel.place, lines), "grid")
 
 
 def curve(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
@@ -79,6 +112,12 @@ def logarithmic(low: float, high: float) -> list[tuple[float, str]]:
     return [(float(np.log10(value)), f"{value:g}") for value in values]
 
 
+def logs(pair: tuple[float, float]) -> tuple[float, float]:
+    """The base-10 logarithms of two numbers: a place on logarithmic axes, or the limits of one."""
+    low, high = np.log10(pair)
+    return float(low), float(high)
+
+
 def band(panel: Panel, x0: float, x1: float, class_: str) -> str:
     """The vertical band x0 … x1, shaded."""
     (left, _), (right, _) = panel.place([(max(x0, panel.left), 0), (min(x1, panel.right), 0)])
@@ -88,6 +127,11 @@ def band(panel: Panel, x0: float, x1: float, class_: str) -> str:
 def upright(panel: Panel, x: float, class_: str) -> str:
     """A vertical line at x."""
     return svg.line(panel.place(_pairs(x, (panel.bottom, panel.top))), class_)
+
+
+def level(panel: Panel, y: float, class_: str) -> str:
+    """A horizontal line at y."""
+    return svg.line(panel.place([(panel.left, y), (panel.right, y)]), class_)
 
 
 def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top left") -> str:
@@ -125,7 +169,7 @@ def written(values: np.ndarray) -> list[str]:
     """Evenly spaced values as text, with as many decimals as tell them apart."""
     step = float(np.min(np.diff(values))) if len(values) > 1 else 1.0
     decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
-    return [f"{value:.{decimals}f}".replace("-", "−") if abs(value) > step / 1e6 else "0" for value in values]
+    return [true_minus(f"{value:.{decimals}f}") if abs(value) > step / 1e6 else "0" for value in values]
 
 
 def _pairs(x: object, y: object) -> np.ndarray:

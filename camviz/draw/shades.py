@@ -1,4 +1,6 @@
-"""Heat maps: a number at every place of an image as a colour, with contours that say which, and a colour bar.
+"""Heat maps: a number at every place of an image as a colour, with its key or a colour bar beside it.
+
+`heat` shades smoothly between few numbers, with `contours` that say which; `heat_map` has a number for every pixel.
 
 The colours are the same in either theme, perceptually even and safe for the colour-blind: viridis (van der Walt &
 Smith 2015) for amounts, blue through grey to orange for what has a sign.
@@ -16,11 +18,14 @@ from contourpy import contour_generator
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel
+from camviz.draw.panel import Panel, placed_image
 from camviz.draw.picture import png
+from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
 
 _SPECK = 24  # picture units, below which a closed contour is a speck between two values
+_COLOURS = {"depth": cv2.COLORMAP_VIRIDIS, "disparity": cv2.COLORMAP_TURBO, "error": cv2.COLORMAP_INFERNO}
+_GAP, _BAR = 7, 10  # between a map and its key, and the key's width, in picture units
 _BLUE, _GREY, _ORANGE = (33, 92, 168), (238, 238, 236), (179, 88, 6)
 
 
@@ -58,7 +63,7 @@ class Shades:
         """The colours (..., 4) of values (...); NaN is transparent."""
         fraction = self.fraction(values)
         known = np.isfinite(fraction)
-        table = _diverging() if self.diverging else _viridis()
+        table = _diverging() if self.diverging else _coloured("depth")[:, :3]
         rgb = table[np.rint(255 * np.where(known, fraction, 0)).astype(int)]
         return np.concatenate([rgb, np.where(known, 255, 0).astype(np.uint8)[..., None]], axis=-1)
 
@@ -123,7 +128,7 @@ def bar(x: float, y: float, height: float, name: str, shades: Shades, title: str
     levels = shades.levels()
     at = y + height * (1 - shades.fraction(levels))
     ticks = "".join(
-        svg.text((x + 20, place + 4), f"{level:g}".replace("-", "−"), "tick")
+        svg.text((x + 20, place + 4), true_minus(f"{level:g}"), "tick")
         for place, level in zip(at, np.round(levels, 9) + 0.0, strict=True)
     )
     marks = svg.segments(
@@ -131,6 +136,49 @@ def bar(x: float, y: float, height: float, name: str, shades: Shades, title: str
     )
     picture = svg.image(name, x, y, 14, height) + svg.rectangle(x, y, 14, height, "frame")
     return picture + marks + ticks + svg.text((x - 2, y - 8), title, "note"), {name: png(shades.rgba(values[:, None]))}
+
+
+def heat_map(values: np.ndarray, low: float, high: float, colours: str) -> bytes:
+    """Numbers (height, width) as PNG: `low` … `high` over the colours named "depth", "disparity" or "error".
+
+    What lies beyond takes the colour of the end, NaN none at all.
+    """
+    shade = (np.clip(np.nan_to_num(values, nan=low), low, high) - low) * (255 / (high - low))
+    pixels = _coloured(colours).view(np.uint32).take(shade.astype(np.uint8))
+    pixels[np.isnan(values)] = 0
+    return png(pixels.view(np.uint8).reshape(*values.shape, 4))
+
+
+@cache
+def heat_key(colours: str) -> bytes:
+    """The colours from low, at the bottom, to high, as PNG."""
+    return png(np.ascontiguousarray(_coloured(colours)[::-4, None]))
+
+
+def heat_panel(
+    panel: Panel, width: int, height: int, low: float, high: float, unit: str, marks: str = "", **heading: str
+) -> str:
+    """The map attached under the panel's name, of so many pixels, hatched where it has none, and its key at the right.
+
+    The key is attached as "NAME key". `marks` are drawn over the map, `heading` is what `Panel.show` takes.
+    """
+    content = _hatching(panel) + placed_image(panel, panel.name, width, height, style="image-rendering:pixelated")
+    x = panel.x + panel.width + _GAP
+    key = svg.image(f"{panel.name} key", x, panel.y, _BAR, panel.height)
+    key += svg.rectangle(x, panel.y, _BAR, panel.height, "frame")
+    values = plot.ticks(low, high, panel.height / 35)
+    places = panel.y + panel.height * (high - values) / (high - low)
+    words = plot.written(values)
+    if words:
+        words[-1] += f" {unit}"
+    labels = [svg.text((x + _BAR + 4, y + 4), one, "tick") for y, one in zip(places, words, strict=True)]
+    return panel.show(content + marks, **heading) + key + "".join(labels)
+
+
+def _hatching(panel: Panel) -> str:
+    along = np.arange(-panel.height, panel.width, 9.0)
+    starts = np.stack([along, np.full_like(along, panel.height)], axis=-1)
+    return svg.segments(starts, starts + (panel.height, -panel.height), "grid")
 
 
 def _named(panel: Panel, lines: list[Array], words: str, turn: int) -> str:
@@ -158,8 +206,10 @@ def _rounded(value: float, *, down: bool) -> float:
 
 
 @cache
-def _viridis() -> NDArray[np.uint8]:
-    return cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1]
+def _coloured(name: str) -> NDArray[np.uint8]:
+    """The 256 colours (256, 4), RGBA, of the map called "depth", "disparity" or "error"."""
+    ramp = np.arange(256, dtype=np.uint8)[None]
+    return np.asarray(cv2.cvtColor(cv2.applyColorMap(ramp, _COLOURS[name]), cv2.COLOR_BGR2RGBA)[0])
 
 
 @cache

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Intrinsics
-from camviz.draw.items import Sheet
+from camviz.draw.items import TexturedMesh
 from camviz.lenses.base import Array
 
 Window = tuple[tuple[float, float, float, float], np.ndarray]
 
 
-def warp(px: Array, sheet: Sheet, view: Intrinsics, scale: float) -> Window | None:
+def warp(px: Array, sheet: TexturedMesh, view: Intrinsics, scale: float) -> Window | None:
     """The sheet as seen, its vertices at picture units `px` (n, 2): a rectangle (x, y, width, height) and RGBA pixels.
 
     `scale` is pixels per picture unit. None where nothing of it is in view.
@@ -34,7 +34,7 @@ def warp(px: Array, sheet: Sheet, view: Intrinsics, scale: float) -> Window | No
     return (float(low[0]), float(low[1]), width / scale, height / scale), picture
 
 
-def _cells(px: Array, sheet: Sheet) -> Iterator[tuple[Array, Array]]:
+def _cells(px: Array, sheet: TexturedMesh) -> Iterator[tuple[Array, Array]]:
     """Corners in view and in the sheet's picture, both (4, 2), of every quad that exists."""
     height, width = sheet.picture.shape[:2]
     source = (sheet.uv * (1, -1) + (0, 1)) * (width, height)

@@ -23,10 +23,11 @@ import numpy as np
 
 from camviz.draw import svg
 from camviz.draw.backdrop import Backdrops
-from camviz.draw.items import Face, Item, Sheet
+from camviz.draw.items import Face, Item, TexturedMesh
 from camviz.draw.opengl import opengl_works
+from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.picture import jpeg, png
-from camviz.draw.wire import NEAR, Sight, draw_lines, draw_marks
+from camviz.draw.wire import NEAR, Viewport, draw_lines, draw_marks
 from camviz.lenses.base import Array
 
 # Colours between those of the light and of the dark theme, good on both.
@@ -40,23 +41,23 @@ _BACKGROUND = 128
 
 
 def draw_solid(
-    sight: Sight, items: Sequence[Item], name: str, draft: bool, scenery: tuple[Item, ...] = ()
+    viewport: Viewport, items: Sequence[Item], name: str, draft: bool, scenery: tuple[Item, ...] = ()
 ) -> tuple[str, dict[str, bytes]]:
-    """The content of a picture as wide and high as the sight's camera, and its photographs `name`-solid, `name`-mask.
+    """The content of a picture as wide and high as the viewport's camera, and photographs `name`-solid, `name`-mask.
 
     The photograph has FINE pixels per picture unit, or DRAFT. `scenery` stays while other things move: as long as its
     opaque sheets are seen from one place, they are drawn once.
     """
-    staying = tuple(item for item in scenery if isinstance(item, Sheet) and item.opacity == 1)
+    staying = tuple(item for item in scenery if isinstance(item, TexturedMesh) and item.opacity == 1)
     items = [*(item for item in scenery if item not in staying), *items]
-    shot = _stage().submit(_shoot, sight, items, DRAFT if draft else FINE, staying).result()
-    fragment, photographs = _cut_out(shot, sight, name)
-    fragment += draw_lines(sight, items, shot.hides) + draw_marks(sight, items, shot.hides)
+    shot = _stage().submit(_shoot, viewport, items, DRAFT if draft else FINE, staying).result()
+    fragment, photographs = _cut_out(shot, viewport, name)
+    fragment += draw_lines(viewport, items, shot.hides) + draw_marks(viewport, items, shot.hides)
     return fragment, photographs
 
 
 @dataclass(frozen=True)
-class Shot:
+class SolidPicture:
     """A solid picture: uint8 rgb (h, w, 3) and alpha (h, w), its pixels per picture unit, and OpenGL's depth buffer.
 
     The buffer (h, w) holds d = (1/near - 1/z) / (1/near - 1/far), 1 where nothing is.
@@ -82,9 +83,9 @@ class Shot:
         return depth > 1.01 * self.depth(px)
 
 
-def _cut_out(shot: Shot, sight: Sight, name: str) -> tuple[str, dict[str, bytes]]:
+def _cut_out(shot: SolidPicture, viewport: Viewport, name: str) -> tuple[str, dict[str, bytes]]:
     """The shot without its background: a JPEG and a mask take a tenth of the time of a picture with transparency."""
-    k = sight.camera.intrinsics
+    k = viewport.camera.intrinsics
     mask, colour = png(shot.alpha), jpeg(shot.rgb, 88)
     id_ = f"{name}-{crc32(mask):08x}"
     masked = svg.element("mask", svg.image(f"{name}-mask", 0, 0, k.width, k.height), id=id_, maskUnits="userSpaceOnUse",
@@ -107,9 +108,11 @@ def _studio() -> Studio:
     return Studio(window)
 
 
-def _shoot(sight: Sight, items: Sequence[Item], scale: float, staying: tuple[Sheet, ...] = ()) -> Shot:
+def _shoot(
+    viewport: Viewport, items: Sequence[Item], scale: float, staying: tuple[TexturedMesh, ...] = ()
+) -> SolidPicture:
     studio, start = _studio(), perf_counter()
-    shot = studio.shoot(sight, items, scale, staying)
+    shot = studio.shoot(viewport, items, scale, staying)
     studio.pace.append((perf_counter() - start) / scale**2)
     return shot
 
@@ -122,14 +125,15 @@ def too_slow() -> bool:
 
 def rehearse(window: str) -> None:
     """Draw a square with the named window class and exit, 0 if it is seen, twice: for a process of its own."""
-    from camviz.draw.space import Eye
 
     def square() -> bool:
-        sight = Sight(Eye().camera(64, 48), 5)
+        viewport = Viewport(OrbitCamera().camera(64, 48), 5)
         corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
-        sheet = Sheet(corners, np.array([[0, 1, 2, 3]]), corners[:, :2] / 2 + 0.5, np.full((1, 1, 3), 255, np.uint8))
+        sheet = TexturedMesh(
+            corners, np.array([[0, 1, 2, 3]]), corners[:, :2] / 2 + 0.5, np.full((1, 1, 3), 255, np.uint8)
+        )
         studio = Studio(window)
-        first, nothing, again = (studio.shoot(sight, [], 1, stays) for stays in ((sheet,), (), (sheet,)))
+        first, nothing, again = (studio.shoot(viewport, [], 1, stays) for stays in ((sheet,), (), (sheet,)))
         seen = all(shot.alpha[24, 32] == 255 and shot.alpha[0, 0] == 0 for shot in (first, again))
         return bool(seen and not nothing.alpha.any() and (first.buffer == again.buffer).all())
 
@@ -159,22 +163,24 @@ class Studio:
             self.renderer.AddLight(light)
         self.renderer.SetAutomaticLightCreation(False)
         self.opaque, self.clear = self._actor(), self._actor()
-        self.sheets: dict[Sheet, Any] = {}
+        self.sheets: dict[TexturedMesh, Any] = {}
         self.backdrops = Backdrops(self.window)
         self.size = np.zeros(2, dtype=int)
         self.pace: deque[float] = deque(maxlen=5)
 
-    def shoot(self, sight: Sight, items: Sequence[Item], scale: float, staying: tuple[Sheet, ...] = ()) -> Shot:
+    def shoot(
+        self, viewport: Viewport, items: Sequence[Item], scale: float, staying: tuple[TexturedMesh, ...] = ()
+    ) -> SolidPicture:
         """A picture of the faces and sheets, and of the opaque sheets that stay from one picture to the next."""
         faces = [item for item in items if isinstance(item, Face) and np.isfinite(item.vertices).all()]
-        faces.sort(key=lambda face: -sight.points_cam(face.vertices)[:, 2].mean())
+        faces.sort(key=lambda face: -viewport.points_cam(face.vertices)[:, 2].mean())
         _dress(self.opaque, [face for face in faces if face.opacity == 1])
         _dress(self.clear, [face for face in faces if face.opacity < 1])
-        self._hang([*staying, *(item for item in items if isinstance(item, Sheet))])
-        self._aim(sight, [*staying, *items])
-        self._open(*_pixels(sight, scale))
+        self._hang([*staying, *(item for item in items if isinstance(item, TexturedMesh))])
+        self._aim(viewport, [*staying, *items])
+        self._open(*_pixels(viewport, scale))
         self._render(staying)
-        return self._develop(sight, scale)
+        return self._develop(viewport, scale)
 
     def _actor(self) -> Any:
         from vtkmodules.vtkCommonDataModel import vtkPolyData
@@ -188,7 +194,7 @@ class Studio:
         self.renderer.AddActor(actor)
         return actor
 
-    def _hang(self, sheets: Sequence[Sheet]) -> None:
+    def _hang(self, sheets: Sequence[TexturedMesh]) -> None:
         """One textured actor per sheet; a sheet that hangs already stays as it is, one that is gone frees its actor."""
         for sheet in set(self.sheets) - set(sheets):
             self.renderer.RemoveActor(self.sheets.pop(sheet))
@@ -196,7 +202,7 @@ class Studio:
             if sheet not in self.sheets:
                 self.sheets[sheet] = self._paper(sheet)
 
-    def _paper(self, sheet: Sheet) -> Any:
+    def _paper(self, sheet: TexturedMesh) -> Any:
         """An actor of the sheet's shape and picture, unlit, for pictures bring their own light."""
         from vtkmodules.util.numpy_support import numpy_to_vtk
 
@@ -214,16 +220,16 @@ class Studio:
         actor.SetTexture(next(alike, None) or _texture(sheet.picture))
         return actor
 
-    def _aim(self, sight: Sight, items: Sequence[Item]) -> None:
-        """The camera of VTK where the sight's is, with the same field of view and all solid things in range."""
-        camera, k = self.renderer.GetActiveCamera(), sight.camera.intrinsics
-        R = sight.camera.world_from_cam.rotation.as_matrix()
-        camera.SetPosition(sight.camera.centre)
-        camera.SetFocalPoint(sight.camera.centre + R[:, 2])
+    def _aim(self, viewport: Viewport, items: Sequence[Item]) -> None:
+        """The camera of VTK where the viewport's is, with the same field of view and all solid things in range."""
+        camera, k = self.renderer.GetActiveCamera(), viewport.camera.intrinsics
+        R = viewport.camera.world_from_cam.rotation.as_matrix()
+        camera.SetPosition(viewport.camera.centre)
+        camera.SetFocalPoint(viewport.camera.centre + R[:, 2])
         camera.SetViewUp(-R[:, 1])
         camera.SetViewAngle(2 * degrees(atan(k.height / (2 * k.fy))))
-        solid = [item.vertices for item in items if isinstance(item, Face | Sheet)]
-        depth = sight.points_cam(np.concatenate(solid or [np.zeros((1, 3))]))[:, 2]
+        solid = [item.vertices for item in items if isinstance(item, Face | TexturedMesh)]
+        depth = viewport.points_cam(np.concatenate(solid or [np.zeros((1, 3))]))[:, 2]
         depth = depth[np.isfinite(depth)]
         far = _power_of_2(max(1.05 * depth.max(initial=0), 2 * NEAR))
         near = _power_of_2(max(0.95 * depth.min(initial=far), far / 1e4, NEAR)) / 2
@@ -236,7 +242,7 @@ class Studio:
             self.window.SetSize(*self.size.tolist())
         self.renderer.SetViewport(0, 0, width / self.size[0], height / self.size[1])
 
-    def _render(self, staying: Sequence[Sheet]) -> None:
+    def _render(self, staying: Sequence[TexturedMesh]) -> None:
         """Draw all, but of what stays only a kept picture where there is one from here."""
         backdrop = [self.sheets[sheet] for sheet in staying]
         if backdrop:
@@ -265,11 +271,11 @@ class Studio:
         seen = *camera.GetPosition(), *camera.GetFocalPoint(), *camera.GetViewUp(), camera.GetViewAngle()
         return *seen, *camera.GetClippingRange(), *self.renderer.GetViewport(), *self.size.tolist()
 
-    def _develop(self, sight: Sight, scale: float) -> Shot:
+    def _develop(self, viewport: Viewport, scale: float) -> SolidPicture:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkFloatArray, vtkUnsignedCharArray
 
-        width, height = _pixels(sight, scale)
+        width, height = _pixels(viewport, scale)
         pixels, depths = vtkUnsignedCharArray(), vtkFloatArray()
         self.window.GetRGBACharPixelData(0, 0, width - 1, height - 1, False, pixels)
         self.window.GetZbufferData(0, 0, width - 1, height - 1, depths)
@@ -277,12 +283,14 @@ class Studio:
         # The farthest of a point and its neighbours: a surface does not hide its own edges.
         farthest = cv2.dilate(cv2.flip(vtk_to_numpy(depths).reshape(height, width), 0), np.ones((3, 3)))
         alpha = cv2.extractChannel(rgba, 3)
-        return Shot(_unmixed(rgba, alpha), alpha, scale, farthest, *self.renderer.GetActiveCamera().GetClippingRange())
+        return SolidPicture(
+            _unmixed(rgba, alpha), alpha, scale, farthest, *self.renderer.GetActiveCamera().GetClippingRange()
+        )
 
 
-def _pixels(sight: Sight, scale: float) -> tuple[int, int]:
+def _pixels(viewport: Viewport, scale: float) -> tuple[int, int]:
     """Width and height of a picture with this many pixels a unit."""
-    return round(scale * sight.camera.intrinsics.width), round(scale * sight.camera.intrinsics.height)
+    return round(scale * viewport.camera.intrinsics.width), round(scale * viewport.camera.intrinsics.height)
 
 
 def _power_of_2(least: float) -> float:

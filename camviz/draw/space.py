@@ -1,75 +1,26 @@
-"""Drawing in space: items, an eye that looks at them, and the choice between a solid and a wireframe picture."""
+"""Drawing in space: items, a camera that looks at them, and the choice between a solid and a wireframe picture."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import cos, exp, radians, sin, tan
 
 import numpy as np
 
-from camviz.cameras import Camera, Intrinsics, look_at
-from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet, axes_triad, camera_body, grid_lines
+from camviz.draw.items import Dots, Face, Item, Label, Line, TexturedMesh, axes_triad, camera_body, grid_lines
+from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
-from camviz.draw.wire import Sight, draw_wire
+from camviz.draw.wire import Viewport, draw_wire
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.scenes import Scene, wireframe_scene
 from camviz.scenes.surfaces import Mesh
 
 __all__ = [
-    "Dots", "Eye", "Face", "Item", "Label", "Line", "Sheet", "axes_triad", "camera_body", "chosen_renderer",
-    "draw_space", "grid_lines", "scene_items", "space_panel",
+    "Dots", "Face", "Item", "Label", "Line", "OrbitCamera", "TexturedMesh", "axes_triad", "camera_body",
+    "chosen_renderer", "draw_space", "grid_lines", "scene_items", "space_panel",
 ]  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Eye:
-    """The onlooker, `distance` metres from the `target` (3,) it looks at and can walk around.
-
-    At yaw 0 and pitch 0 it looks along z, as a camera in the identity pose does; pitch raises it above the target.
-    """
-
-    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    distance: float = 5.0
-    yaw_deg: float = 30.0
-    pitch_deg: float = 20.0
-    vfov_deg: float = 35.0
-
-    def __post_init__(self) -> None:
-        if not self.distance > 0:
-            raise ValueError(f"distance must be a positive number of metres, got {self.distance}")
-        if not 0 < self.vfov_deg < 180:
-            raise ValueError(f"vfov_deg must lie between 0 and 180 degrees, got {self.vfov_deg}")
-        if not -89 <= self.pitch_deg <= 89:
-            raise ValueError(f"pitch_deg must lie between -89 and 89 degrees, got {self.pitch_deg}")
-
-    def camera(self, width: int, height: int) -> Camera:
-        """The pinhole camera through which it sees."""
-        yaw, pitch = radians(self.yaw_deg), radians(self.pitch_deg)
-        outward = np.array([-sin(yaw) * cos(pitch), -sin(pitch), -cos(yaw) * cos(pitch)])
-        f = height / (2 * tan(radians(self.vfov_deg) / 2))
-        intrinsics = Intrinsics(width, height, f, f, (width - 1) / 2, (height - 1) / 2)
-        return Camera(intrinsics, world_from_cam=look_at(self.target + self.distance * outward, self.target))
-
-    def orbited(self, dx: float, dy: float) -> Eye:
-        """After a drag by (dx, dy) picture units: what is near follows the pointer."""
-        yaw = (self.yaw_deg + 0.4 * dx + 180) % 360 - 180
-        return replace(self, yaw_deg=yaw, pitch_deg=min(85.0, max(-85.0, self.pitch_deg + 0.4 * dy)))
-
-    def zoomed(self, steps: float) -> Eye:
-        """Nearer by a tenth for every positive step."""
-        return replace(self, distance=min(1e4, max(0.05, self.distance * exp(-0.1 * steps))))
-
-    def key(self, key: str) -> Eye:
-        """After a key: arrows walk around by 5°, + and - (or page up and down) walk nearer and back."""
-        turns = {"ArrowLeft": (-12.5, 0), "ArrowRight": (12.5, 0), "ArrowUp": (0, -12.5), "ArrowDown": (0, 12.5)}
-        steps = {"+": 1, "=": 1, "PageUp": 1, "-": -1, "_": -1, "PageDown": -1}
-        if key in turns:
-            return self.orbited(*turns[key])
-        return self.zoomed(steps[key]) if key in steps else self
 
 
 def space_panel(name: str, x: float, y: float, width: float, height: float) -> Panel:
@@ -80,7 +31,7 @@ def space_panel(name: str, x: float, y: float, width: float, height: float) -> P
 def draw_space(
     panel: Panel,
     items: Sequence[Item],
-    eye: Eye,
+    eye: OrbitCamera,
     *,
     draft: bool = False,
     renderer: str | None = None,
@@ -93,19 +44,19 @@ def draw_space(
     CAMVIZ_RENDERER says "wire". Both show the same points at the same places. `frame` is world_from_frame where the eye
     stands in another frame than the world's. Raises ValueError for another renderer.
     """
-    sight = _sight(eye, round(panel.width), round(panel.height))
+    viewport = _viewport(eye, round(panel.width), round(panel.height))
     if frame is not None:
-        sight = Sight(sight.camera.at(frame * sight.camera.world_from_cam), eye.distance)
+        viewport = Viewport(viewport.camera.at(frame * viewport.camera.world_from_cam), eye.distance)
     if chosen_renderer(renderer, draft) == "solid":
         from camviz.draw.solid import draw_solid
 
-        return draw_solid(sight, items, panel.name, draft, scenery)
-    return draw_wire(sight, items, panel.name, 0.5 if draft else 2, scenery)
+        return draw_solid(viewport, items, panel.name, draft, scenery)
+    return draw_wire(viewport, items, panel.name, 0.5 if draft else 2, scenery)
 
 
 @lru_cache(maxsize=4)
-def _sight(eye: Eye, width: int, height: int) -> Sight:
-    return Sight(eye.camera(width, height), eye.distance)
+def _viewport(eye: OrbitCamera, width: int, height: int) -> Viewport:
+    return Viewport(eye.camera(width, height), eye.distance)
 
 
 @lru_cache(maxsize=4)
@@ -131,12 +82,12 @@ def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
     return (*ground, *fills, *drawn, *squares)
 
 
-def _sheet(meshes: Sequence[Mesh]) -> Sheet:
+def _sheet(meshes: Sequence[Mesh]) -> TexturedMesh:
     """Meshes with one picture as one sheet: a renderer's time goes with the sheets rather than with their faces."""
     counts = [len(mesh.vertices) for mesh in meshes]
     quads = [first + mesh.quads for first, mesh in zip(np.cumsum([0, *counts]), meshes, strict=False)]
     vertices, uv = (np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in ("vertices", "uv"))
-    return Sheet(vertices, np.concatenate(quads), uv, meshes[0].picture)
+    return TexturedMesh(vertices, np.concatenate(quads), uv, meshes[0].picture)
 
 
 def _near(name: str, points: Array) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.items import Dots, Face, Item, Label, Line, Sheet
+from camviz.draw.items import Dots, Face, Item, Label, Line, TexturedMesh
 from camviz.draw.picture import png
 from camviz.draw.sheets import warp
 from camviz.lenses.base import Array
@@ -32,7 +32,7 @@ def nothing_hides(px: Array, depth: Array) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class Viewport:
     """The onlooker's camera and how far it looks: what is `distance` metres deep is drawn at ordinary strength."""
 
     camera: Camera
@@ -67,45 +67,45 @@ Fill = tuple[float, str, dict[str, bytes]]  # depth, fragment, attached pictures
 
 
 def draw_wire(
-    sight: Sight, items: Sequence[Item], name: str, scale: float = 1, scenery: tuple[Item, ...] = ()
+    viewport: Viewport, items: Sequence[Item], name: str, scale: float = 1, scenery: tuple[Item, ...] = ()
 ) -> tuple[str, dict[str, bytes]]:
     """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …
 
     What is seen of the `scenery`, things that do not change, is kept while the onlooker stands still.
     """
-    stage, kept = _scenery(sight, scenery, scale)
-    fills = sorted([*kept, *_fills(sight, items, name, scale)], key=lambda fill: -fill[0])
+    stage, kept = _scenery(viewport, scenery, scale)
+    fills = sorted([*kept, *_fills(viewport, items, name, scale)], key=lambda fill: -fill[0])
     depths = np.array([depth for depth, _, _ in fills])
     behind, lines = _lines(scenery), _lines(items)
-    pieces = _joined(stage, len(behind), cut(sight, lines, nothing_hides, fine=False))
-    strokes = _strokes(sight, [*behind, *lines], pieces, depths)
+    pieces = _joined(stage, len(behind), cut(viewport, lines, nothing_hides, fine=False))
+    strokes = _strokes(viewport, [*behind, *lines], pieces, depths)
     layers = [strokes.get(0, "")]
     for i, (_, fragment, _) in enumerate(fills):
         layers += [fragment, strokes.get(i + 1, "")]
     photographs = {key: data for _, _, attached in fills for key, data in attached.items()}
-    return "".join(layers) + draw_marks(sight, [*scenery, *items]), photographs
+    return "".join(layers) + draw_marks(viewport, [*scenery, *items]), photographs
 
 
-def draw_lines(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
+def draw_lines(viewport: Viewport, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
     """The lines alone, faint where something solid hides them."""
     lines = _lines(items)
-    pieces = cut(sight, lines, hidden, fine=hidden is not nothing_hides)
-    return "".join(_strokes(sight, lines, pieces, np.empty(0)).values())
+    pieces = cut(viewport, lines, hidden, fine=hidden is not nothing_hides)
+    return "".join(_strokes(viewport, lines, pieces, np.empty(0)).values())
 
 
 @lru_cache(maxsize=4)
-def _scenery(sight: Sight, items: tuple[Item, ...], scale: float) -> tuple[Pieces, list[Fill]]:
-    return cut(sight, _lines(items), nothing_hides, fine=False), list(_fills(sight, items, "scenery", scale))
+def _scenery(viewport: Viewport, items: tuple[Item, ...], scale: float) -> tuple[Pieces, list[Fill]]:
+    return cut(viewport, _lines(items), nothing_hides, fine=False), list(_fills(viewport, items, "scenery", scale))
 
 
 def _lines(items: Sequence[Item]) -> list[Line]:
     return [item for item in items if isinstance(item, Line)]
 
 
-def _strokes(sight: Sight, lines: Sequence[Line], pieces: Pieces, depths: Array) -> dict[int, str]:
+def _strokes(viewport: Viewport, lines: Sequence[Line], pieces: Pieces, depths: Array) -> dict[int, str]:
     """The lines, keyed by how many of the filled things at `depths` (descending) they come after."""
     slot = np.searchsorted(-depths, -0.98 * pieces.depth, side="left")
-    level = np.where(pieces.hidden, -1, sight.strength(pieces.depth))
+    level = np.where(pieces.hidden, -1, viewport.strength(pieces.depth))
     pens = {pen: i for i, pen in enumerate(dict.fromkeys((line.class_, line.width) for line in lines))}
     pen = np.array([pens[line.class_, line.width] for line in lines], dtype=int)[pieces.line]
     key = (slot * (LEVELS + 1) + level + 1) * len(pens) + pen
@@ -116,33 +116,33 @@ def _strokes(sight: Sight, lines: Sequence[Line], pieces: Pieces, depths: Array)
         slot_, strength = divmod(rest, LEVELS + 1)
         layers[slot_] = layers.get(slot_, "") + _stroke(data, *names[which], strength - 1)
     last = max(layers, default=0)
-    layers[last] = layers.get(last, "") + "".join(_heads(sight, lines))
+    layers[last] = layers.get(last, "") + "".join(_heads(viewport, lines))
     return layers
 
 
-def draw_marks(sight: Sight, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
+def draw_marks(viewport: Viewport, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
     """Dots and labels, over everything else; dots that something hides are faint."""
     parts = []
     for item in items:
         if isinstance(item, Dots):
-            points_cam = sight.points_cam(item.points)
-            px = sight.place(points_cam)
+            points_cam = viewport.points_cam(item.points)
+            px = viewport.place(points_cam)
             behind = hidden(px, points_cam[:, 2])
             parts.append(svg.dots(px[~behind], item.class_, item.diameter))
             parts.append(svg.dots(px[behind], f"{item.class_} faint", item.diameter))
     for item in items:
         if isinstance(item, Label):
-            px = sight.place(sight.points_cam(item.point))
+            px = viewport.place(viewport.points_cam(item.point))
             parts.append(svg.text(px + (0, 4.5), item.words, f"{item.class_} halo middle"))
     return "".join(parts)
 
 
-def cut(sight: Sight, lines: Sequence[Line], hidden: Hidden, fine: bool) -> Pieces:
+def cut(viewport: Viewport, lines: Sequence[Line], hidden: Hidden, fine: bool) -> Pieces:
     """The visible parts of the lines, cut into pieces a few pixels long (`fine`) or as long as their depth allows."""
-    starts, ends, line = _segments(sight, lines)
-    starts, ends, inside = _clipped(sight, starts, ends)
+    starts, ends, line = _segments(viewport, lines)
+    starts, ends, inside = _clipped(viewport, starts, ends)
     segment, line = np.flatnonzero(inside), line[inside]
-    px0, px1, z0, z1 = sight.place(starts), sight.place(ends), starts[:, 2], ends[:, 2]
+    px0, px1, z0, z1 = viewport.place(starts), viewport.place(ends), starts[:, 2], ends[:, 2]
     length = np.linalg.norm(px1 - px0, axis=-1)
     count = np.ceil(np.maximum(length / (5 if fine else 160), np.abs(np.log(z1 / z0)) / 0.15)).clip(1, 300).astype(int)
     whole = np.repeat(np.arange(len(count)), count)
@@ -163,18 +163,18 @@ def _joined(first: Pieces, lines: int, then: Pieces) -> Pieces:
     return Pieces(**both)
 
 
-def _segments(sight: Sight, lines: Sequence[Line]) -> tuple[Array, Array, np.ndarray]:
+def _segments(viewport: Viewport, lines: Sequence[Line]) -> tuple[Array, Array, np.ndarray]:
     if not lines:
         return np.empty((0, 3)), np.empty((0, 3)), np.empty(0, int)
-    points = sight.points_cam(np.concatenate([line.points for line in lines]))
+    points = viewport.points_cam(np.concatenate([line.points for line in lines]))
     line = np.repeat(np.arange(len(lines)), [len(line.points) for line in lines])
     here = (line[1:] == line[:-1]) & np.isfinite(points[1:] + points[:-1]).all(axis=-1)
     return points[:-1][here], points[1:][here], line[1:][here]
 
 
-def _clipped(sight: Sight, starts: Array, ends: Array) -> tuple[Array, Array, np.ndarray]:
+def _clipped(viewport: Viewport, starts: Array, ends: Array) -> tuple[Array, Array, np.ndarray]:
     """The parts of segments (n, 3) inside the view, and which of the segments have one (Liang & Barsky 1984)."""
-    planes = _pyramid(sight)
+    planes = _pyramid(viewport)
     d0, d1 = starts @ planes[:, :3].T - planes[:, 3], ends @ planes[:, :3].T - planes[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
         t = d0 / (d0 - d1)
@@ -185,9 +185,9 @@ def _clipped(sight: Sight, starts: Array, ends: Array) -> tuple[Array, Array, np
     return a + enter * (b - a), a + leave * (b - a), inside
 
 
-def _pyramid(sight: Sight) -> Array:
+def _pyramid(viewport: Viewport) -> Array:
     """Planes (5, 4) with n · p ≥ d inside: the near plane, and the sides of a view a little wider than the picture."""
-    k = sight.camera.intrinsics
+    k = viewport.camera.intrinsics
     x, y = 0.55 * k.width / k.fx, 0.55 * k.height / k.fy
     return np.array([(0, 0, 1, NEAR), (1, 0, x, 0), (-1, 0, x, 0), (0, 1, y, 0), (0, -1, y, 0)])
 
@@ -222,12 +222,12 @@ def _path_data(pieces: Pieces, key: np.ndarray) -> Iterator[tuple[int, str]]:
         yield int(key[start]), "".join(words[start:end])
 
 
-def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
+def _heads(viewport: Viewport, lines: Sequence[Line]) -> Iterator[str]:
     """Arrow heads, shorter where the arrow points towards the eye or away from it."""
     arrows = [line for line in lines if line.head]
     if not arrows:
         return
-    ends = sight.place(sight.points_cam(np.array([line.points[-2:] for line in arrows])))
+    ends = viewport.place(viewport.points_cam(np.array([line.points[-2:] for line in arrows])))
     for line, (tail, tip) in zip(arrows, ends, strict=True):
         along = tip - tail
         length = float(np.hypot(*along))
@@ -240,34 +240,36 @@ def _heads(sight: Sight, lines: Sequence[Line]) -> Iterator[str]:
             )
 
 
-def _fills(sight: Sight, items: Sequence[Item], name: str, scale: float) -> Iterator[Fill]:
+def _fills(viewport: Viewport, items: Sequence[Item], name: str, scale: float) -> Iterator[Fill]:
     """Every face and sheet in view."""
-    solids = [(i, item) for i, item in enumerate(items) if isinstance(item, Face | Sheet)]
+    solids = [(i, item) for i, item in enumerate(items) if isinstance(item, Face | TexturedMesh)]
     if not solids:
         return
-    points_cam = sight.points_cam(np.concatenate([item.vertices for _, item in solids]))
-    px = sight.place(points_cam)
+    points_cam = viewport.points_cam(np.concatenate([item.vertices for _, item in solids]))
+    px = viewport.place(points_cam)
     end = 0
     for i, item in solids:
         here = slice(end, end := end + len(item.vertices))
         if isinstance(item, Face):
-            fill = _face(sight, item, points_cam[here], px[here])
+            fill = _face(viewport, item, points_cam[here], px[here])
         else:
-            fill = _sheet(sight, item, points_cam[here], px[here], f"{name}-{i}", scale)
+            fill = _sheet(viewport, item, points_cam[here], px[here], f"{name}-{i}", scale)
         if fill is not None:
             yield fill
 
 
-def _face(sight: Sight, face: Face, points_cam: Array, px: Array) -> Fill | None:
+def _face(viewport: Viewport, face: Face, points_cam: Array, px: Array) -> Fill | None:
     if points_cam[:, 2].min() < NEAR:
         points_cam = _cut_near(points_cam)
-        px = sight.place(points_cam)
+        px = viewport.place(points_cam)
     depth = float(points_cam[:, 2].mean()) if len(points_cam) > 2 else nan
     return (depth, _fill(px, face), {}) if isfinite(depth) else None
 
 
-def _sheet(sight: Sight, sheet: Sheet, points_cam: Array, px: Array, name: str, scale: float) -> Fill | None:
-    window = warp(px, sheet, sight.camera.intrinsics, scale)
+def _sheet(
+    viewport: Viewport, sheet: TexturedMesh, points_cam: Array, px: Array, name: str, scale: float
+) -> Fill | None:
+    window = warp(px, sheet, viewport.camera.intrinsics, scale)
     if window is None:
         return None
     rectangle, pixels = window

@@ -75,7 +75,7 @@ class Mirror:
         x, y, z = np.moveaxis(as_points(points, 3, "points"), -1, 0)
         return unit(np.stack([x, y, self.curvature_radius - (1 - self.eccentricity**2) * (self.top - z)], axis=-1))
 
-    def meet(self, origins: Array, directions: Array) -> Array:
+    def intersect(self, origins: Array, directions: Array) -> Array:
         """The points (..., 3) where rays from `origins` along `directions`, (..., 3) each, meet it first; else NaN."""
         shape = 1 - self.eccentricity**2
         start, step = self.top - origins[..., 2], -directions[..., 2]
@@ -144,7 +144,7 @@ class Catadioptric:
         The law of reflection, d - 2 (d·n) n, at the point where the camera's ray meets the mirror; NaN where it misses.
         """
         starts, directions = self.before(xy)
-        points = self.mirror.meet(starts, directions)
+        points = self.mirror.intersect(starts, directions)
         normals = self.mirror.normal(points)
         return points, directions - 2 * np.sum(directions * normals, axis=-1, keepdims=True) * normals
 

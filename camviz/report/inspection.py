@@ -20,7 +20,7 @@ from camviz.draw.items import Face, Item, Label, Line
 from camviz.draw.page import document, figure
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
-from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.space import OrbitCamera, axes_triad, camera_body, draw_space, space_panel
 from camviz.poses import RigidTransform
 from camviz.report.findings import findings_html
 from camviz.report.page import numbers_table
@@ -190,7 +190,7 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
     panel = space_panel("boards", 10, 34, 470, 470)
     away = float(np.nanmedian(seen.distances))
     middle = np.nanmedian(seen.corners_cam.mean(axis=1), axis=0)
-    eye = Eye(tuple((0.62 * middle).tolist()), 1.5 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
+    eye = OrbitCamera(tuple((0.62 * middle).tolist()), 1.5 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
     items: list[Item] = [*camera_body(standing, 2 * size, colour="blue"), *axes_triad(_STILL, 2 * size)]
     others = [i for i in range(len(seen)) if i not in links and seen.shown[i]][:MOST_BOARDS]
     items += [item for i in others for item in drawn.board_items(seen.cam_from_board[i], False)]

@@ -181,7 +181,7 @@ def _things(scene: Scene) -> tuple[Scene, ...]:
 
 
 def _touch(one: Surface, other: Surface) -> bool:
-    pairs = product(one.balls(), other.balls()) if one.name == other.name else ()
+    pairs = product(one.bounding_spheres(), other.bounding_spheres()) if one.name == other.name else ()
     return any(np.linalg.norm(a - b) <= r + s for (a, r, _), (b, s, _) in pairs)
 
 
@@ -193,7 +193,7 @@ def _surrounds(thing: Scene, camera: Camera) -> bool:
 @lru_cache(maxsize=256)
 def _extent(thing: Scene) -> tuple[Array, Array, Array]:
     """Centres (n, 3) and radii (n,) of balls around its surfaces, and points (m, 3) a little outside its outline."""
-    balls = [one.balls() for one in thing.surfaces]
+    balls = [one.bounding_spheres() for one in thing.surfaces]
     middles = [np.mean([centre for centre, _, _ in those], axis=0) for those in balls]
     lines = [(middle, line) for middle, one in zip(middles, thing.surfaces, strict=True) for line in one.outline()]
     outside = [middle + _ROOM * (line - middle) for middle, line in lines]

@@ -1,7 +1,7 @@
 """The tracer as one would write it first: every ray against every surface, the nearest one is seen.
 
 `camviz.scenes.render` gives the same picture several times sooner: it cuts the picture into tiles, rules whole tiles
-out, and lets alike surfaces be met together (`camviz.scenes.rays`, `camviz.scenes.together`).
+out, and lets alike surfaces be met together (`camviz.scenes.rays`, `camviz.scenes.batched`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
-from camviz.scenes.meeting import Meeting
+from camviz.scenes.intersection import Hit
 from camviz.scenes.scene import NEUTRAL, Scene
 from camviz.scenes.surfaces import on_sphere
 
@@ -34,12 +34,12 @@ def _light(scene: Scene, origin: Array, directions: Array) -> Array:
     light, distance = _sky(scene, directions), np.full(directions.shape[1], np.inf)
     for surface in scene.surfaces:
         with np.errstate(divide="ignore", invalid="ignore"):  # a ray that passes the surface by has no distance to it
-            at = surface.meet(origin, directions.astype(np.float32))
+            at = surface.intersect(origin, directions.astype(np.float32))
         nearer = at.depth < distance
         if not nearer.any():
             continue
         distance[nearer] = at.depth[nearer]
-        light[nearer] = surface.radiance(Meeting(at.depth[nearer], at.place[:, nearer]), 0.0)[:, :3]
+        light[nearer] = surface.radiance(Hit(at.depth[nearer], at.place[:, nearer]), 0.0)[:, :3]
     return light
 
 

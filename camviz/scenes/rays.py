@@ -117,7 +117,7 @@ class Rays:
         origins = self.origins.take(tiles, axis=1) if self.origins.shape[1] > 1 else self.origins
         return origins, self.directions.take(tiles, axis=1)
 
-    def may_meet(self, bounds: Bounds) -> NDArray[np.bool_]:
+    def may_intersect(self, bounds: Bounds) -> NDArray[np.bool_]:
         """False (surfaces, tiles) where no ray of the tile can meet the surface.
 
         A ray whose origin moves by the slack passes a ball by at most that much less; so the ball grows by it, and a

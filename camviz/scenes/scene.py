@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens
 from camviz.lenses.base import Array, as_points
+from camviz.scenes.batched import Indices, Traced, batched
+from camviz.scenes.intersection import Hit
 from camviz.scenes.light import to_display
-from camviz.scenes.meeting import Meeting
 from camviz.scenes.rays import SIDE, TILE, Bounds, Floats, Rays
 from camviz.scenes.surfaces import Mesh, Rectangle, Surface, on_sphere
 from camviz.scenes.texture import LIGHT, Texture
-from camviz.scenes.together import Indices, Traced, together
 from camviz.scenes.wireframe import Wireframe
 
 BLOCK = 1 << 17  # rays traced together, which take about 12 MB
@@ -66,30 +66,30 @@ class Scene:
     @cached_property
     def _bounds(self) -> Bounds:
         corners = {i: wall.corners for i, wall in enumerate(self.surfaces) if isinstance(wall, Rectangle)}
-        return Bounds.around([surface.balls() for surface in self.surfaces], corners)
+        return Bounds.around([surface.bounding_spheres() for surface in self.surfaces], corners)
 
     @cached_property
     def _traced(self) -> list[tuple[Traced, list[int]]]:
-        return together(self.surfaces)
+        return batched(self.surfaces)
 
     def follow(self, rays: Rays, spread: float) -> tuple[Floats, Floats]:
         """As `trace` does, for rays in tiles: light (height, width, 3) and distance (height, width)."""
         depth = np.full(rays.directions[0].size, np.inf, dtype=np.float32)
         light = np.empty((depth.size, LIGHT), dtype=np.float32)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            may_meet = rays.may_meet(self._bounds)
+            may_intersect = rays.may_intersect(self._bounds)
             for surfaces, members in self._traced:
-                member, tile = np.nonzero(may_meet[members])
+                member, tile = np.nonzero(may_intersect[members])
                 if tile.size:
-                    self._meet(surfaces, member, tile, rays, depth, light, spread)
+                    self._intersect(surfaces, member, tile, rays, depth, light, spread)
             self._paint_sky(rays, depth, light, spread)
         return cv2.cvtColor(rays.picture(light), cv2.COLOR_RGBA2RGB), rays.picture(depth)
 
-    def _meet(
+    def _intersect(
         self, surfaces: Traced, member: Indices, tile: Indices, rays: Rays, depth: Floats, light: Floats, spread: float
     ) -> None:
         """Let each `tile` (p,) of rays meet one surface, and where that is the nearest so far, see it."""
-        at = surfaces.meet(*rays.pick(tile), member)
+        at = surfaces.intersect(*rays.pick(tile), member)
         hit = np.flatnonzero(at.depth < depth.reshape(-1, TILE).take(tile, axis=0).ravel())
         pair = hit // TILE
         ray = hit + (TILE * (tile - np.arange(tile.size))).take(pair)
@@ -97,7 +97,7 @@ class Scene:
         np.minimum.at(depth, ray, distance)
         nearest = np.flatnonzero(distance == depth.take(ray))
         if nearest.size:
-            seen = Meeting(distance.take(nearest), at.place.take(hit.take(nearest), axis=1))
+            seen = Hit(distance.take(nearest), at.place.take(hit.take(nearest), axis=1))
             radiance = surfaces.radiance(seen, spread, member.take(pair.take(nearest)))
             _whole(light)[ray.take(nearest)] = _whole(radiance)
 

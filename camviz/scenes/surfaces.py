@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.lenses.base import Array, unit
+from camviz.scenes.intersection import FAR, HALF, Hit, intersect_circle, intersect_plane, intersect_square, texels
 from camviz.scenes.light import sunlight, to_display, to_linear
-from camviz.scenes.meeting import FAR, HALF, Meeting, meet_circle, meet_plane, meet_square, texels
 from camviz.scenes.rays import Ball, Floats, turned
 from camviz.scenes.texture import Texture
 
@@ -52,15 +52,15 @@ class Surface(Protocol):
         """What it belongs to, in drawings."""
         ...
 
-    def balls(self) -> tuple[Ball, ...]:
+    def bounding_spheres(self) -> tuple[Ball, ...]:
         """Balls that it lies in: centre (3,), radius, and its unit normal (3,) if it is flat, otherwise 0."""
         ...
 
-    def meet(self, origins: Array, directions: Floats) -> Meeting:
+    def intersect(self, origins: Array, directions: Floats) -> Hit:
         """Where rays with unit directions (3, n) from origins (3, n) or (3, 1) meet the surface first."""
         ...
 
-    def radiance(self, at: Meeting, spread: float) -> Floats:
+    def radiance(self, at: Hit, spread: float) -> Floats:
         """Linear light (n, LIGHT) that leaves the surface towards rays `spread` radians apart."""
         ...
 
@@ -117,14 +117,14 @@ class Rectangle:
         wide = self.texture.width * columns / np.linalg.norm(self.across)
         return float(max(wide, self.texture.height * rows / np.linalg.norm(self.down)))
 
-    def balls(self) -> tuple[Ball, ...]:
+    def bounding_spheres(self) -> tuple[Ball, ...]:
         centre = self.corners.mean(axis=0)
         return ((centre, float(np.linalg.norm(self.corners - centre, axis=1).max()), self.normal),)
 
-    def meet(self, origins: Array, directions: Floats) -> Meeting:
-        return meet_square(*_in_frame(self.local_from_world, self.corner, origins, directions))
+    def intersect(self, origins: Array, directions: Floats) -> Hit:
+        return intersect_square(*_in_frame(self.local_from_world, self.corner, origins, directions))
 
-    def radiance(self, at: Meeting, spread: float) -> Floats:
+    def radiance(self, at: Hit, spread: float) -> Floats:
         columns, rows = (np.float32(n) for n in self.repeats)
         s, r, cosine = at.place
         apart = texels(at.depth, cosine, spread * self.texels_per_metre) if spread > 0 else 0.0
@@ -167,14 +167,14 @@ class Ground:
     def _local_from_world(self) -> Array:
         return np.array([[1 / self.tile, 0, 0], [0, 0, -1 / self.tile], [0, -1, 0]])
 
-    def balls(self) -> tuple[Ball, ...]:
+    def bounding_spheres(self) -> tuple[Ball, ...]:
         return ((self._point, np.inf, np.array([0.0, -1.0, 0.0])),)
 
-    def meet(self, origins: Array, directions: Floats) -> Meeting:
-        at = meet_plane(*_in_frame(self._local_from_world, self._point, origins, directions))
+    def intersect(self, origins: Array, directions: Floats) -> Hit:
+        at = intersect_plane(*_in_frame(self._local_from_world, self._point, origins, directions))
         return at._replace(depth=np.where(at.depth > 0, at.depth, FAR))
 
-    def radiance(self, at: Meeting, spread: float) -> Floats:
+    def radiance(self, at: Hit, spread: float) -> Floats:
         s, r, cosine = at.place
         apart = texels(at.depth, cosine, spread * self.texture.width / self.tile) if spread > 0 else 0.0
         light = self.texture.sample(s, r, apart)
@@ -212,17 +212,17 @@ class Sphere:
         if not self.radius > 0:
             raise ValueError(f"radius must be a positive length in metres, got {self.radius}")
 
-    def balls(self) -> tuple[Ball, ...]:
+    def bounding_spheres(self) -> tuple[Ball, ...]:
         return ((self.centre, self.radius, np.zeros(3)),)
 
-    def meet(self, origins: Array, directions: Floats) -> Meeting:
+    def intersect(self, origins: Array, directions: Floats) -> Hit:
         start = ((origins - self.centre[:, None]) / self.radius).astype(np.float32)
         step = directions / np.float32(self.radius)
-        first, second = meet_circle(start, step)
+        first, second = intersect_circle(start, step)
         depth = np.where(first > 0, first, second)
-        return Meeting(np.where(depth > 0, depth, FAR), start + depth * step)
+        return Hit(np.where(depth > 0, depth, FAR), start + depth * step)
 
-    def radiance(self, at: Meeting, spread: float) -> Floats:
+    def radiance(self, at: Hit, spread: float) -> Floats:
         density = self.texture.height / (np.pi * self.radius)
         return self.texture.sample(*on_sphere(*at.place), at.depth * np.float32(spread * density))
 
@@ -262,24 +262,24 @@ class Column:
     def _top(self) -> Array:
         return self.foot - [0, self.height, 0]
 
-    def balls(self) -> tuple[Ball, ...]:
+    def bounding_spheres(self) -> tuple[Ball, ...]:
         """One above the other, at most four: a single one would be far wider than a thin column."""
         count = int(np.clip(self.height / (2 * self.radius), 1, 4))
         radius = float(np.hypot(self.height / (2 * count), self.radius))
         at = (np.arange(count) + 0.5) / count
         return tuple((self.foot + share * (self._top - self.foot), radius, np.zeros(3)) for share in at)
 
-    def meet(self, origins: Array, directions: Floats) -> Meeting:
+    def intersect(self, origins: Array, directions: Floats) -> Hit:
         scale = np.array([[self.radius], [self.height], [self.radius]])
         start = ((origins - self._top[:, None]) / scale).astype(np.float32)
         step = np.divide(directions, scale, dtype=np.float32)
-        first, second = meet_circle(start[::2], step[::2])
+        first, second = intersect_circle(start[::2], step[::2])
         outside = (first > 0) & (np.abs(start[1] + first * step[1] - HALF) <= HALF)
         depth = np.where(outside, first, second)
         place = start + depth * step
-        return Meeting(np.where((depth > 0) & (np.abs(place[1] - HALF) <= HALF), depth, FAR), place)
+        return Hit(np.where((depth > 0) & (np.abs(place[1] - HALF) <= HALF), depth, FAR), place)
 
-    def radiance(self, at: Meeting, spread: float) -> Floats:
+    def radiance(self, at: Hit, spread: float) -> Floats:
         x, r, z = at.place
         density = self.texture.height / self.height
         return self.texture.sample(around(x, -z), r, at.depth * np.float32(spread * density))

@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
 from math import isfinite
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
+from camviz.course.yours import tried
+from camviz.draw import svg
+from camviz.draw.orbit_camera import OrbitCamera
+from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
+from camviz.draw.space import Item, draw_space
+
+WIDTH = 960  # picture units, of every picture
+Function = Callable[..., Any]
+"""What a reader writes."""
+Drawn = tuple[str, dict[str, bytes]]
+"""A part of a picture, and the photographs that it needs."""
+ORBIT_HANDLES = ("eye", "orbit")
 
 
 @dataclass(frozen=True)
@@ -55,13 +70,19 @@ def switch(default: bool, *, label: str = "", help: str = "") -> Any:
 
 @dataclass(frozen=True)
 class View:
-    """Base of all views. A subclass is a frozen dataclass of state whose `figure` draws that state."""
+    """Base of all views. A subclass is a frozen dataclass of state whose `figure` draws that state.
+
+    Where it can draw several sets of panels, its field `panels` names one of its `layouts`.
+    """
 
     title: ClassVar[str] = ""
+    layouts: ClassVar[Iterable[str]] = ()
 
     def __post_init__(self) -> None:
         for name, control in self.controls().items():
             control.checked(name, getattr(self, name))
+        if self.layouts:
+            one_of("panels", self._panels, self.layouts)
 
     @classmethod
     def controls(cls) -> dict[str, Control]:
@@ -75,6 +96,30 @@ class View:
     def figure(self, *, draft: bool = False) -> Picture:
         """The picture of this state; with `draft`, a coarser one fit for dragging."""
         raise NotImplementedError(f"{type(self).__name__} draws nothing yet")
+
+    def description(self) -> str:
+        """The state in words and numbers."""
+        return ""
+
+    def composed(
+        self, height: float, *parts: str, attached: Mapping[str, bytes] | None = None, described: str | None = None
+    ) -> Picture:
+        """A picture of the parts, with the photographs attached that they need, under the state's description."""
+        body = svg.rectangle(0, 0, WIDTH, height, "paper") + "".join(parts)
+        words = self.description() if described is None else described
+        return Picture(body, WIDTH, height, self.title, words, dict(attached or {}))
+
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of: names and values."""
+        return {}
+
+    @property
+    def _panels(self) -> str:
+        return str(getattr(self, "panels", ""))
+
+    def _has(self, panel: str) -> bool:
+        """Whether the panel of that name is drawn."""
+        return panel in self._panels.split()
 
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed."""
@@ -92,6 +137,79 @@ class View:
 
     def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
         return self.figure()._repr_mimebundle_(**options)
+
+
+class OrbitView(View):
+    """A view with things in space, around which one walks by dragging or by keys: its field `eye` is the onlooker."""
+
+    eye: OrbitCamera
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        if handle in ORBIT_HANDLES:
+            return self.but(eye=self.eye.orbited(dx, dy))
+        return super().dragged(handle, x, y, dx, dy)
+
+    def pressed(self, handle: str, key: str) -> Self:
+        return self.but(eye=self.eye.key(key)) if handle in ORBIT_HANDLES else super().pressed(handle, key)
+
+    def from_afar(self, target: np.ndarray, distance: float) -> OrbitCamera:
+        """The onlooker of a `target` (3,) from `distance` metres, or as much nearer or farther as one has walked."""
+        away = distance * self.eye.distance / OrbitCamera().distance
+        return replace(self.eye, target=tuple(target.tolist()), distance=away)
+
+    def in_space(
+        self,
+        panel: Panel,
+        items: Iterable[Item],
+        draft: bool,
+        title: str,
+        label: str,
+        *,
+        eye: OrbitCamera | None = None,
+        scenery: tuple[Item, ...] = (),
+        over: str = "",
+        **heading: str,
+    ) -> Drawn:
+        """The panel with the things in it as a wireframe, and marks `over` them; `heading` is what `Panel.show` takes.
+
+        It is seen by `eye`, the field where there is no other.
+        """
+        heading = {"hint": "drag to turn", "drag": "eye"} | heading
+        content, attached = draw_space(
+            panel, list(items), eye or self.eye, draft=draft, renderer="wire", scenery=scenery
+        )
+        return panel.show(content + over, title=title, label=label, **heading), attached
+
+
+def one_of(name: str, value: object, known: Iterable[object]) -> None:
+    """Raise ValueError unless the value of the field `name` is one of those known."""
+    if value not in known:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, got {value!r}")
+
+
+def positive(view: View, *names: str) -> None:
+    """Raise ValueError unless all of these fields of the view are above zero."""
+    for name in names:
+        if not getattr(view, name) > 0:
+            raise ValueError(f"{name} must be positive, got {getattr(view, name)}")
+
+
+def step_of(key: str) -> int:
+    """1 for a key that leads onwards (right, up, plus), -1 for one that leads back, 0 for any other."""
+    return {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
+
+
+def answered(function: Function | None, arguments: tuple[Any, ...], like: Any) -> tuple[Any, str]:
+    """What a reader's function answers, in the shape of `like`, and what is wrong with it; NaN where there is none."""
+    if function is None:
+        like = np.asarray(like, dtype=float)
+        return np.full(like.shape, np.nan), "No function of yours has been given."
+    return tried(function, arguments, like)
+
+
+def without(panel: Panel, problem: str, title: str, at: tuple[float, float] = (12, 26)) -> str:
+    """The panel with the sentence that says why it is empty."""
+    return panel.show(svg.paragraph(at, problem, panel.width - 2 * at[0]), title=title)
 
 
 def _labelled(declared: Field[Any]) -> Control:

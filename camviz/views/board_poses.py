@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +12,13 @@ from numpy.typing import NDArray
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, Item, Label, Line, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.readout import readout, vector
+from camviz.draw.space import Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import Control, View, choice, slider
+from camviz.views.base import Control, Drawn, OrbitView, choice, slider
 from camviz.views.chessboard import outline, rim, squares
 
 _NINE_BY_SIX = Board(9, 6, 0.025)
@@ -26,7 +26,7 @@ _MOST_NUMBERED = 40  # boards that still leave room for each other's numbers
 
 
 @dataclass(frozen=True)
-class BoardPosesView(View):
+class BoardPosesView(OrbitView):
     """The poses of a calibration's pictures in space, one of them picked out, and the board as that picture has it.
 
     `cam_from_board` holds one pose per picture. The board's frame has its origin at the first inner corner, x along the
@@ -41,7 +41,7 @@ class BoardPosesView(View):
     still: str = choice("board", "camera", label="what stands still", help="the board, or the camera")
     picture: int = slider(1, 1, 13, 1, label="picture", help="which of the pictures is picked out, in orange")
     photographs: Sequence[NDArray[np.uint8]] = field(default=(), compare=False, repr=False)
-    eye: Eye = Eye(distance=0.9, yaw_deg=-50, pitch_deg=20)
+    eye: OrbitCamera = OrbitCamera(distance=0.9, yaw_deg=-50, pitch_deg=20)
     hidden: frozenset[int] = frozenset()
     names: tuple[str, ...] = ()
 
@@ -100,12 +100,11 @@ class BoardPosesView(View):
         return {"distance": float(distance), "tilt_deg": float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))}
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n, chosen = self.numbers(), self.chosen
         return (
             f"{len(self.cam_from_board)} pictures of one board; the {self.still} stands still. "
-            f"Picture {self.index + 1}: t = {_row(chosen.translation)} m, the camera stood at "
-            f"C = {_row(self.centres[self.index])} m in the board's frame, {n['distance']:.2f} m from its middle, "
+            f"Picture {self.index + 1}: t = {vector(chosen.translation, 3)} m, the camera stood at "
+            f"C = {vector(self.centres[self.index], 3)} m in the board's frame, {n['distance']:.2f} m from its middle, "
             f"its axis {n['tilt_deg']:.0f}° from the board's normal."
         )
 
@@ -122,16 +121,15 @@ class BoardPosesView(View):
             attached = attached | {"photograph": jpeg(self.photographs[self.index])}
         return Picture(body, 960, 500, "Camera and board", self.description(), attached)
 
-    def space(self, panel: Panel, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def space(self, panel: Panel, draft: bool) -> Drawn:
         """The panel with the poses in space, a handle called "eye", and the photographs it needs."""
         before_board = self.still == "board"
         target = (self._middle + self.centres.mean(0)) / 2 if before_board else transform(self.chosen, self._middle) / 2
         eye = replace(self.eye, target=tuple(target.tolist()))
         items = self._cameras() if before_board else self._boards()
-        content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
         title = "Where the camera stood" if before_board else "Where the board was held"
         label = "The poses in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), attached
+        return self.in_space(panel, items, draft, title, label, eye=eye)
 
     def _cameras(self) -> list[Item]:
         """The board, and every picture's camera around it."""
@@ -188,7 +186,7 @@ class BoardPosesView(View):
     def _image(self) -> str:
         k = self.camera.intrinsics
         panel = image_panel("picture", 580, 34, 360, k.width, k.height, tallest=270)
-        content = photograph(panel, "photograph", k.width, k.height) if self.photographs else self._drawn(panel)
+        content = placed_image(panel, "photograph", k.width, k.height) if self.photographs else self._drawn(panel)
         title = f"Picture {self.index + 1}, and the corners computed"
         return panel.show(content + svg.dots(panel.place(self.pixels()), "red", 5), title=title)
 
@@ -200,28 +198,12 @@ class BoardPosesView(View):
     def _equation(self) -> str:
         n, chosen = self.numbers(), self.chosen
         rows = [
-            ("rotation vector, axis times angle [rad]", _row(chosen.rotation.as_rotvec())),
-            ("t, the board's first corner before the camera [m]", _row(chosen.translation)),
-            ("C = −Rᵀt, the camera before the board [m]", _row(self.centres[self.index])),
+            ("rotation vector, axis times angle [rad]", vector(chosen.rotation.as_rotvec(), 3)),
+            ("t, the board's first corner before the camera [m]", vector(chosen.translation, 3)),
+            ("C = −Rᵀt, the camera before the board [m]", vector(self.centres[self.index], 3)),
             (
                 "from the board's middle; axis against the board's normal",
                 f"{n['distance']:.3f} m; {n['tilt_deg']:.1f}°",
             ),
         ]
-        return "".join(
-            svg.text((580, 338 + 41 * i), name, "note") + svg.text((580, 356 + 41 * i), value, "number")
-            for i, (name, value) in enumerate(rows)
-        )
-
-    # Touch -----------------------------------------------------------------------------------------------------------
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
-
-
-def _row(values: Array) -> str:
-    words = ", ".join(f"{round(float(value), 3) + 0.0:.3f}" for value in values)
-    return f"({words})".replace("-", "−")
+        return readout(rows, (580, 338), (0, 41), (0, 18), "number")

@@ -14,12 +14,14 @@ import numpy as np
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, Item, Label, camera_body, draw_space, space_panel
+from camviz.draw.readout import listed, signed, true_minus
+from camviz.draw.space import Item, Label, OrbitCamera, camera_body, space_panel
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz.views.base import Drawn, OrbitView
 from camviz.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
 from camviz.views.chessboard import outline, rim, squares
 from camviz.views.one_board import FromEach, from_each, panel_of_each
@@ -36,7 +38,7 @@ _HEIGHTS = {"picture fit": 400, "picture yours": 430, _EVERYTHING: 660}  # of th
 
 
 @dataclass(frozen=True)
-class CalibrationView(BoardPictures):
+class CalibrationView(OrbitView, BoardPictures):
     """Corners and their residuals, the boards in space, the estimate ± σ against the truth, and two kinds of error.
 
     `panels` says what is drawn: everything; "picture fit", the corners with the estimate and its RMS error alone; or
@@ -45,15 +47,11 @@ class CalibrationView(BoardPictures):
     """
 
     title: ClassVar[str] = "Calibration"
+    layouts = _HEIGHTS
 
     panels: str = _EVERYTHING
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(distance=1.2, yaw_deg=-58, pitch_deg=26)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.panels not in _HEIGHTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
+    eye: OrbitCamera = OrbitCamera(distance=1.2, yaw_deg=-58, pitch_deg=26)
 
     # Words -----------------------------------------------------------------------------------------------------------
 
@@ -66,17 +64,16 @@ class CalibrationView(BoardPictures):
         if np.isfinite(self.held_out):
             figures["on unseen boards"] = f"{self.held_out:.3g} px"
         if self.used[self.index]:
-            figures[f"correlation of fx with the distance of board {self.index + 1}"] = _signed(self.correlation)
+            figures[f"correlation of fx with the distance of board {self.index + 1}"] = signed(self.correlation, 4)
         return figures
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.count
         boards = f"{n} board{'s' if n > 1 else ''}"
         if self.seen is None:
             boards += f" tilted by {self.tilt:g}° about {self.distance:g} m away, corners found to {self.noise:g} px"
         left_out = f", without board {self.index + 1}" if self.leave_out else ""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         return f"{boards}{left_out}; solved for {self.free}. {figures}."
 
     def _told(self) -> dict[str, str]:
@@ -103,7 +100,7 @@ class CalibrationView(BoardPictures):
         view = self.but(coarse=True) if draft else self
         attached = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
         height = _HEIGHTS[self.panels]
-        body = svg.rectangle(0, 0, 960, height, "paper") + view._image()
+        body = view._image()
         if self.panels == "picture fit":
             body += view._fit()
         elif self.panels == "picture yours":
@@ -111,7 +108,7 @@ class CalibrationView(BoardPictures):
         else:
             space, photographs = view._space(draft)
             body, attached = body + space + view._estimates() + view._errors(), attached | photographs
-        return Picture(body, 960, height, self.title, view.description(), attached)
+        return self.composed(height, body, attached=attached, described=view.description())
 
     # What the camera saw ---------------------------------------------------------------------------------------------
 
@@ -124,7 +121,7 @@ class CalibrationView(BoardPictures):
         others = np.delete(self.corners, self.index, axis=0)
         marks = svg.dots(panel.place(others), "muted", 2.6) + self._vectors(panel) + self._handle(panel)
         if self.photographs:
-            content = photograph(panel, "photograph", self.width, self.height) + self._outlined(panel) + marks
+            content = placed_image(panel, "photograph", self.width, self.height) + self._outlined(panel) + marks
         else:
             content = self._coverage(panel) + self._outlined(panel) + marks
         note = f"errors drawn {self.magnified:g}×" if self.adjustment else ""
@@ -190,14 +187,13 @@ class CalibrationView(BoardPictures):
 
     # The boards in space ---------------------------------------------------------------------------------------------
 
-    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space(self, draft: bool) -> Drawn:
         panel = space_panel("space", 490, 34, 450, 338)
         far = float(self._poses_shown.translation[:, 2].max())
         eye = replace(self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.6)
-        content, attached = draw_space(panel, self._items(), eye, draft=draft, renderer="wire")
         label = "The boards in space; drag or press the arrow keys to walk around, plus and minus to go nearer"
         note = "dashed: where the estimate has them" if self.truth else ""
-        return panel.show(content, title="The boards in space", note=note, drag="eye", label=label), attached
+        return self.in_space(panel, self._items(), draft, "The boards in space", label, eye=eye, note=note, hint="")
 
     @property
     def _poses_shown(self) -> RigidTransform:
@@ -279,24 +275,18 @@ class CalibrationView(BoardPictures):
         """Every estimate's distance from the truth with ± σ and ± 2σ, in pixels on a scale that is linear near 0."""
         marks = np.array([-100, -10, -1, 0, 1, 10, 100])
         xs = _STRIP.place(np.stack([_squeezed(marks), 0 * marks], axis=-1))[:, 0]
-        content = "".join(
-            svg.line([(x, 0), (x, _STRIP.height)], "axis" if not m else "grid") for x, m in zip(xs, marks, strict=True)
-        )
-        for row, name in enumerate(INTRINSICS):
-            content += self._dot(name, row)
-        ticks = "".join(
-            svg.text(
-                (_STRIP.x + x, _STRIP.y + _STRIP.height + 15), f"{m:+d}".replace("-", "−") if m else "0", "tick middle"
-            )
+        lines = [
+            svg.line([(x, 0), (x, _STRIP.height)], "grid" if m else "axis") for x, m in zip(xs, marks, strict=True)
+        ]
+        dots = [self._dot(name, row) for row, name in enumerate(INTRINSICS)]
+        below = _STRIP.y + _STRIP.height
+        ticks = [
+            svg.text((_STRIP.x + x, below + 15), signed(m, 0) if m else "0", "tick middle")
             for x, m in zip(xs, marks, strict=True)
-        )
-        where = "from the truth" if self.truth else "σ"
-        words = f"{where}, px; k and p: at the image’s corner"
-        return (
-            _STRIP.show(content)
-            + ticks
-            + svg.text((_STRIP.x + 145, _STRIP.y + _STRIP.height + 31), words, "note middle")
-        )
+        ]
+        words = f"{'from the truth' if self.truth else 'σ'}, px; k and p: at the image’s corner"
+        name = svg.text((_STRIP.x + 145, below + 31), words, "note middle")
+        return _STRIP.show("".join(lines + dots)) + "".join(ticks) + name
 
     def _dot(self, name: str, row: int) -> str:
         value, sigma = self.estimates.get(name, (np.nan, np.nan))
@@ -377,16 +367,16 @@ class CalibrationView(BoardPictures):
 
     def _facts(self) -> str:
         lines = [svg.text((650, 622 + 17 * i), words, "number") for i, words in enumerate(self.levers())]
-        words = f"correlation of fx with Z of board {self.index + 1}: {_signed(self.correlation)}"
+        words = f"correlation of fx with Z of board {self.index + 1}: {signed(self.correlation, 4)}"
         return "".join(lines) + svg.text((650, 656), words if self.used[self.index] else "", "note")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.orbited(dx, dy))
         if handle == "tilt":
             return self.moved(self.index, turn=np.radians(0.5) * np.array([dy, -dx, 0]))
+        if handle != "board":
+            return super().dragged(handle, x, y, dx, dy)
         view = self if np.isnan(x) else self._with_board_at(x - dx, y - dy)
         centre = transform(view.cam_from_board[view.index], middle_of(self.board))
         du, dv = np.array([dx, dy]) / self._image_panel.scale
@@ -394,8 +384,6 @@ class CalibrationView(BoardPictures):
         return view.moved(view.index, shift=centre[2] * np.array([du / pixels.fx, dv / pixels.fy, 0]))
 
     def pressed(self, handle: str, key: str) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.key(key))
         steps = {"+": -1, "=": -1, "-": 1}.get(key, 0)
         if handle == "board" and steps:
             centre = transform(self.cam_from_board[self.index], middle_of(self.board))
@@ -423,17 +411,13 @@ def _share(pixels: float) -> float:
 
 
 def _number(name: str, value: float) -> str:
-    return (f"{value:.1f}" if name in _PIXELS else f"{value:.4f}").replace("-", "−")
+    return true_minus(f"{value:.1f}" if name in _PIXELS else f"{value:.4f}")
 
 
 def _spread(name: str, sigma: float) -> str:
     if name in _PIXELS:
         return f"{sigma:.2g}" if sigma < 10 else f"{sigma:.0f}" if sigma < 1e4 else "unknown"
     return f"{sigma:.4f}" if sigma < 1 else f"{sigma:.3g}" if sigma < 1e3 else "unknown"
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.4f}".replace("-", "−")
 
 
 def _digits(value: float) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.types import Board
-from camviz.draw.items import Line, Sheet
+from camviz.draw.items import Line, TexturedMesh, closed
 from camviz.lenses.base import Array
 
 
@@ -18,12 +18,12 @@ def outline(board: Board) -> Array:
 
 def rim(corners: Array, class_: str, width: float) -> Line:
     """A board's edge, through the corners (4, 3) of its squares."""
-    return Line(np.vstack([corners, corners[:1]]), class_, width)
+    return Line(closed(corners), class_, width)
 
 
-def squares(corners: Array, board: Board) -> Sheet:
+def squares(corners: Array, board: Board) -> TexturedMesh:
     """A board's squares as a picture between its corners (4, 3)."""
-    return Sheet.over(corners[[0, 1, 3, 2]].reshape(2, 2, 3), checkers(board), 0.9)
+    return TexturedMesh.over(corners[[0, 1, 3, 2]].reshape(2, 2, 3), checkers(board), 0.9)
 
 
 def checkers(board: Board) -> NDArray[np.uint8]:

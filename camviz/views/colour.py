@@ -19,13 +19,13 @@ from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel
-from camviz.draw.panel import photograph as photograph_panel
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views import swatches
-from camviz.views.base import Control, View, choice, slider, switch
+from camviz.views.base import Control, Drawn, View, answered, choice, slider, switch, without
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
 LAYOUTS = {"chart photograph": 326, "spectra chart photograph steps": 640, "chart photograph yours": 626}
@@ -166,7 +166,7 @@ class ColourView(View):
     def your_way(self, raw: np.ndarray) -> tuple[np.ndarray, str]:
         """Linear sRGB (..., 3) of raw colours (..., 3) with the reader's part in it; NaN and a sentence without."""
         if self.yours is None:
-            return np.full(raw.shape, np.nan), "No function of yours has been given."
+            return answered(None, (), raw)
         gains, matrix = self.gains, self.correction
         if self.part == "develop":
             encoded, problem = tried(self.yours, (raw, gains, matrix), raw)
@@ -178,19 +178,18 @@ class ColourView(View):
             matrix, problem = tried(self.yours, (balanced, target), matrix)
         return developed(raw, gains, matrix, encoded=self.gamma != "at the end"), problem
 
-    def _your_row(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _your_row(self, draft: bool) -> Drawn:
         """The chart and the photograph by the reader's function, below those above."""
         rgb, problem = self.your_chart
         panel = replace(self._chart_panel, name="your chart", y=348)
         if problem:
-            words = svg.paragraph((16, 30), problem, panel.width - 32)
-            return panel.show(words, title="With your function"), {}
+            return without(panel, problem, "With your function", (16, 30)), {}
         shown = swatches.chart(panel, rgb, self.shot.true_chart, self._off(rgb), self.patch)
         surfaces = self._surfaces(_DRAFT if draft else _FINE)
         image = to_display(self.your_way(surfaces @ self.shot.raw_from_srgb.T)[0])
         body = panel.show(shown, title="With your function") + self._photograph_panel(image, "your photograph", 348)
-        body += svg.text((_COLUMN, 366), "mean ΔE2000, yours", "note")
-        body += svg.text((_COLUMN, 384), f"{self._off(rgb).mean():.2f}", "orange")
+        figure = {"mean ΔE2000, yours": f"{self._off(rgb).mean():.2f}"}
+        body += readout(figure, (_COLUMN, 366), (0, 0), (0, 18))
         return body, {"your photograph": jpeg(image)}
 
     def _off(self, rgb: np.ndarray) -> np.ndarray:
@@ -202,7 +201,7 @@ class ColourView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         kelvin, duv = temperature(chromaticity(tristimulus(self.power)))
-        unlike = f"{kelvin:.0f} K, Duv {duv:+.4f}".replace("-", "−") if np.isfinite(kelvin) else "no temperature"
+        unlike = true_minus(f"{kelvin:.0f} K, Duv {duv:+.4f}") if np.isfinite(kelvin) else "no temperature"
         return {
             "light": unlike,
             "gains": " ".join(f"{name} {gain:.2f}" for name, gain in zip("RGB", self.gains, strict=True)),
@@ -212,7 +211,6 @@ class ColourView(View):
         } | self._metamer_in_words()
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         if "steps" in self.panels:
             return figures
@@ -226,21 +224,20 @@ class ColourView(View):
         return {"its metamer": f"eye ΔE {apart:.1f}, sensor 0" if apart > 1e-6 else "none: it is an eye"}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         words = f"{self.camera} in {self._light_in_words()}, white balance {self.method}, matrix {self.matrix}"
         return f"{words}, gamma {self.gamma}: {figures}."
 
     def _light_in_words(self) -> str:
         kind = f"{self.light} light" if self.light == "Planckian" else self.light
-        return f"{kind} with tint {self.tint:+.2f}".replace("-", "−") if self.tint else kind
+        return true_minus(f"{kind} with tint {self.tint:+.2f}") if self.tint else kind
 
     # The picture ------------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
         image, height = self.image(draft=draft), LAYOUTS[self.panels]
         photographs = {"photograph": jpeg(image)}
-        body = [svg.rectangle(0, 0, 960, height, "paper")]
+        body = []
         if "spectra" in self.panels:
             body += [self._light_panel(), self._surface_panel(), self._sensor_panel()]
         body += [
@@ -260,7 +257,7 @@ class ColourView(View):
             photographs |= attached
         if "steps" in self.panels:
             body.append(self._steps())
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The photograph as developed, uint8 sRGB."""
@@ -310,14 +307,11 @@ class ColourView(View):
     def _photograph_panel(self, image: np.ndarray, name: str = "photograph", top: float | None = None) -> str:
         height, width = image.shape[:2]
         panel = image_panel(name, _PHOTOGRAPH, self._top if top is None else top, 330, width, height, tallest=262)
-        return panel.show(photograph_panel(panel, name, width, height), title="Developed in the same way")
+        return panel.show(placed_image(panel, name, width, height), title="Developed in the same way")
 
     def _numbers_column(self) -> str:
-        rows, top = [svg.text((_COLUMN, self._top - 8), "In numbers", "title")], self._top
-        for i, (name, figure) in enumerate(self._told().items()):
-            rows.append(svg.text((_COLUMN, top + 14 + 42 * i), name, "note"))
-            rows.append(svg.text((_COLUMN, top + 30 + 42 * i), figure, "label", style="font-size:12px"))
-        return "".join(rows)
+        figures = readout(self._told(), (_COLUMN, self._top + 14), (0, 42), (0, 16), style="font-size:12px")
+        return svg.text((_COLUMN, self._top - 8), "In numbers", "title") + figures
 
     def _steps(self) -> str:
         """The chosen patch on its way through: a colour and its numbers for each step."""
@@ -327,12 +321,7 @@ class ColourView(View):
             balanced = raw * self.gains
         else:
             balanced = developed(raw, self.gains, np.eye(3), encoded=True)
-        steps = {
-            "counted (raw)": raw,
-            "× gains": balanced,
-            "× matrix": self.develop(raw),
-            "what the eye sees": seen,
-        }
+        steps = {"counted (raw)": raw, "× gains": balanced, "× matrix": self.develop(raw), "what the eye sees": seen}
         return swatches.steps(20, 556, steps)
 
     # The hand ---------------------------------------------------------------------------------------------------------

@@ -19,16 +19,17 @@ from camviz import mosaics
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.heat import heat_key, heat_map, heat_panel
-from camviz.draw.panel import Panel, image_panel
-from camviz.draw.panel import photograph as drawn
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
+from camviz.draw.readout import listed, readout, true_minus
+from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
 from camviz.mosaics.measures import Measures
 from camviz.scenes import render, textured_scene, to_display, to_linear
 from camviz.scenes.photographs import photograph
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, choice, slider, without
+from camviz.views.marks import circle
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side
@@ -55,6 +56,7 @@ class DemosaicingView(View):
     """
 
     title: ClassVar[str] = "Demosaicing"
+    layouts = LAYOUTS
 
     picture: str = choice("zone plate", "astronaut", "garden", help="grey rings, a photograph, or the virtual garden")
     highest: float = slider(
@@ -80,8 +82,6 @@ class DemosaicingView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in LAYOUTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, LAYOUTS))}, got {self.panels!r}")
         own = self.photograph
         if own is not None and not (own.dtype == np.uint8 and own.shape[2:] == (3,) and min(own.shape[:2]) >= LOUPE):
             takes = f"uint8 (height, width, 3), at least {LOUPE} pixels each way"
@@ -164,7 +164,6 @@ class DemosaicingView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures, loupe = self.numbers(), self._under_the_loupe()
         if "yours" in self.panels:
             return {name: value for name, value in figures.items() if name not in loupe}
@@ -180,11 +179,10 @@ class DemosaicingView(View):
         near, (du, dv) = nearest_carrier(self.filters, fu, fv)
         away = float(np.hypot(du, dv))
         beat = f"beats once in {1 / away:.0f} px" if away > 0.005 else "no beat"
-        return {"loupe at": f"({fu:.2f}, {fv:.2f}) cycles/px".replace("-", "−"), "carrier": f"{_place(near)}: {beat}"}
+        return {"loupe at": true_minus(f"({fu:.2f}, {fv:.2f}) cycles/px"), "carrier": f"{_place(near)}: {beat}"}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         blur = f"four spots {self.spots_px:g} px apart" if self.spots_px else "no blur before sampling"
         name = "a photograph" if self.photograph is not None else f"the {self.picture}"
         rings = f" up to {self.highest:g} cycles/px" if self.frequency is not None else ""
@@ -195,7 +193,7 @@ class DemosaicingView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
         height = 480 if "yours" in self.panels else 552
-        body = [svg.rectangle(0, 0, 960, height, "paper"), self._large_panel(photographs, draft)]
+        body = [self._large_panel(photographs, draft)]
         if "yours" in self.panels:
             body.append(self._your_panel(photographs, draft))
         else:
@@ -203,7 +201,7 @@ class DemosaicingView(View):
         if "spectrum" in self.panels:
             body.append(self._spectrum_panel(photographs))
         body.append(self._words())
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     @cached_property
     def _panel(self) -> Panel:
@@ -216,17 +214,15 @@ class DemosaicingView(View):
         if "yours" in self.panels:
             marks, heading = self._predicted(), dict[str, Any]()
         else:
-            marks, label = (
-                self._predicted() + self._frame(),
-                "The picture; drag or press the arrow keys to move the loupe",
-            )
+            marks = self._predicted() + self._frame()
+            label = "The picture; drag or press the arrow keys to move the loupe"
             heading = {"hint": "drag the loupe", "drag": "loupe", "label": label}
         if self.show == "false colour":
             return self._map_of_errors(self._panel, self.measures.colour_error, photographs, draft, marks, **heading)
         pixels = to_display(mosaics.in_colour(self.measured, self.filters)) if self.show == "mosaic" else self.rebuilt
         title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
         photographs["picture"] = jpeg(pixels, 90)
-        return self._panel.show(drawn(self._panel, "picture", width, height) + marks, title=title, **heading)
+        return self._panel.show(placed_image(self._panel, "picture", width, height) + marks, title=title, **heading)
 
     def _map_of_errors(
         self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: str, **heading: Any
@@ -242,13 +238,13 @@ class DemosaicingView(View):
         panel, (pixels, problem) = replace(self._panel, name="yours", x=_RIGHT), self.your_picture
         height, width = self.truth.shape[:2]
         if pixels is None:
-            return panel.show(svg.paragraph((16, 30), problem, panel.width - 32), title="With your green")
+            return without(panel, problem, "With your green", (16, 30))
         if self.show == "false colour":
             error = mosaics.colour_error(pixels, self.truth)
             title = "What colour is false in yours"
             return self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
         photographs["yours"] = jpeg(pixels, 90)
-        return panel.show(drawn(panel, "yours", width, height) + self._predicted(), title="With your green")
+        return panel.show(placed_image(panel, "yours", width, height) + self._predicted(), title="With your green")
 
     def _rebuilt_by(self) -> str:
         return self.used if self.used == self.algorithm else f"{self.used} ({self.algorithm} is for Bayer's patterns)"
@@ -264,11 +260,8 @@ class DemosaicingView(View):
     def _frame(self) -> str:
         """The loupe's outline on the picture."""
         u, v = self.at
-        corners = np.array([(0, 0), (LOUPE, 0), (LOUPE, LOUPE), (0, LOUPE)]) + (
-            u - LOUPE / 2 - 0.5,
-            v - LOUPE / 2 - 0.5,
-        )
-        outline = self._panel.place(corners)
+        left, top = u - LOUPE / 2 - 0.5, v - LOUPE / 2 - 0.5
+        outline = self._panel.place(np.array([(0, 0), (LOUPE, 0), (LOUPE, LOUPE), (0, LOUPE)]) + (left, top))
         return svg.polygon(outline, "paper-line") + svg.polygon(outline, "blue thick")
 
     def _loupe_panels(self, photographs: dict[str, bytes]) -> str:
@@ -304,12 +297,9 @@ class DemosaicingView(View):
     def _words(self) -> str:
         if "yours" in self.panels:
             return self._two_lines_of_figures()
-        spectrum, rows = "spectrum" in self.panels, []
-        for i, (name, value) in enumerate(self._told().items()):
-            x, y = (560, 454 + 21 * i) if spectrum else (758, 270 + 44 * i)
-            rows.append(svg.text((x, y), name, "note"))
-            rows.append(svg.text((x + 94, y) if spectrum else (x, y + 19), value, "label"))
-        return "".join(rows)
+        if self._has("spectrum"):
+            return readout(self._told(), (560, 454), (0, 21), (94, 0))
+        return readout(self._told(), (758, 270), (0, 44), (0, 19))
 
     def _two_lines_of_figures(self) -> str:
         """What the algorithm's picture and the reader's are worth, each below its picture."""
@@ -337,10 +327,8 @@ class DemosaicingView(View):
 
     def pressed(self, handle: str, key: str) -> DemosaicingView:
         """An arrow moves the loupe by one pixel, so that its phase can be followed."""
-        across, down = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}.get(
-            key, (0, 0)
-        )
-        u, v = self.at
+        steps = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
+        (u, v), (across, down) = self.at, steps.get(key, (0, 0))
         return self.but(u=float(u + across), v=float(v + down)) if handle == "loupe" else self
 
 
@@ -369,9 +357,7 @@ def _everywhere(pattern: Pattern, highest: float) -> Array:
 
 
 def _rings(centres: Array, radius: float) -> str:
-    turn = np.linspace(0, 2 * np.pi, 25)
-    circle = radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    lines = [centre + circle for centre in centres]
+    lines = [centre + radius * circle(25) for centre in centres]
     return svg.path(lines, "paper-line") + svg.path(lines, "ink")
 
 

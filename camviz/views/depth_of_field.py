@@ -15,14 +15,15 @@ import numpy as np
 from camviz import optics
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.plot import Ticks, axes, band, curve, legend, logarithmic, plot_panel, upright
+from camviz.draw.plot import axes, band, curve, legend, logarithmic, logarithmic_grid, logs, plot_panel, upright
+from camviz.draw.readout import listed, readout
 from camviz.poses import RigidTransform
 from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera
 from camviz.views import lens_diagram
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import View, choice, positive, slider, step_of, switch
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = 64, 256  # points of the lens
@@ -52,6 +53,7 @@ class DepthOfFieldView(View):
     """
 
     title: ClassVar[str] = "Lens and depth of field"
+    layouts = _HEIGHTS
 
     focal_mm: float = slider(50.0, 20.0, 100.0, 1.0, label="focal length f", unit="mm")
     f_number: float = slider(2.0, 1.4, 22.0, 0.1, label="f-number N", help="focal length / diameter of the aperture")
@@ -69,11 +71,7 @@ class DepthOfFieldView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in _HEIGHTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
-        for name in ("focal_mm", "f_number", "focus_m", "distance_m"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        positive(self, "focal_mm", "f_number", "focus_m", "distance_m")
         if not 1000 * min(self.focus_m, self.distance_m) > self.focal_mm:
             raise ValueError(f"focus_m and distance_m must lie beyond the focal length, got {self.focus_m} m")
 
@@ -169,7 +167,6 @@ class DepthOfFieldView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         left_out = set()
         if self.panels != "rays photograph blur":
             left_out |= {"field of view", "globe on the sensor"}
@@ -189,8 +186,7 @@ class DepthOfFieldView(View):
         return f"1/{self.focal_mm:g} = 1/{1000 * self.focus_m:.0f} + 1/{self.lens.image_mm:.2f}"
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         return (
             f"A lens of {self.focal_mm:g} mm at f/{self.f_number:.3g}, focused at {self.focus_m:.2f} m, "
             f"{self.distance_m:.2f} m from the globe, {self.sensor} sensor, aperture {self.aperture}, "
@@ -206,13 +202,13 @@ class DepthOfFieldView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         height = _HEIGHTS[self.panels]
-        body = [svg.rectangle(0, 0, 960, height, "paper"), self._photograph_panel(), self._numbers()]
+        body = [self._photograph_panel(), self._numbers()]
         if "rays" in self.panels:
             body += [self._ray_panel(), self._loupe_panel(), self._aperture_panel()]
         if "blur" in self.panels:
             body.append(self._blur_panel())
         photographs = {"lens": _photographed(self, DRAFT, True) if draft else _photographed(self, FINE, False)}
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     @cached_property
     def _rays(self) -> Panel:
@@ -234,9 +230,8 @@ class DepthOfFieldView(View):
         depths = [(1000 * self.distance_m, "blue", "globe"), (np.inf, "orange", "far away")]
         content = lens_diagram.loupe(self._loupe, self.lens, depths)
         label = "Around the sensor, enlarged; drag or press the arrow keys to move the sensor"
-        return self._loupe.show(
-            content, title="At the sensor", note="10 mm wide, 2.5 mm tall", drag="sensor", label=label
-        )
+        note = "10 mm wide, 2.5 mm tall"
+        return self._loupe.show(content, title="At the sensor", note=note, drag="sensor", label=label)
 
     def _aperture_panel(self) -> str:
         panel = Panel("aperture", 440, 268, 140, 140, -1.1, 1.1, -1.1, 1.1)
@@ -247,12 +242,12 @@ class DepthOfFieldView(View):
     def _photograph_panel(self) -> str:
         panel = image_panel("lens", 600, 34, 340, 320, 240)
         note = f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
-        return panel.show(photograph(panel, "lens", 320, 240), title="The photograph, traced", note=note)
+        return panel.show(placed_image(panel, "lens", 320, 240), title="The photograph, traced", note=note)
 
     @cached_property
     def _plot(self) -> Panel:
         top, height = (446, 140) if "rays" in self.panels else (34, 380)
-        return plot_panel("blur", 74, top, 506, height, _logs(_DEPTHS), _logs(_BLURS))
+        return plot_panel("blur", 74, top, 506, height, logs(_DEPTHS), logs(_BLURS))
 
     def _blur_panel(self) -> str:
         panel, (near, far) = self._plot, self.limits_m
@@ -262,10 +257,10 @@ class DepthOfFieldView(View):
         far_x = min(np.log10(far), panel.right)
         lines, names = self._levels(panel)
         bounds = band(panel, np.log10(near), far_x, "fill-green") if self._bounded else ""
-        here = panel.place(_logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), _BLURS[0]))))
-        xticks, yticks = logarithmic(*_logs(_DEPTHS)), _micrometres()
+        here = panel.place(logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), _BLURS[0]))))
+        xticks, yticks = logarithmic(*logs(_DEPTHS)), _micrometres()
         content = (
-            _grid(panel, xticks, yticks)
+            logarithmic_grid(panel, xticks, yticks)
             + bounds
             + lines
             + curve(panel, np.log10(depth), np.log10(blur), "blue thick")
@@ -317,15 +312,10 @@ class DepthOfFieldView(View):
         return drawn + (svg.paragraph((12, 22), words, panel.width - 24) if words else "")
 
     def _numbers(self) -> str:
-        rows = [svg.text((606, 326), "This lens", "title")]
-        for i, (name, value) in enumerate(self._told().items()):
-            rows.append(svg.text((606, 352 + 23 * i), name, "note"))
-            rows.append(svg.text((736, 352 + 23 * i), value, "label"))
+        rows = svg.text((606, 326), "This lens", "title") + readout(self._told(), (606, 352), (0, 23), (130, 0))
         if self.panels != "rays photograph blur":
-            return "".join(rows)
-        rows.append(svg.text((606, 574), "lens equation, 1/f = 1/s + 1/v, in mm:", "note"))
-        rows.append(svg.text((606, 596), self.equation(), "label"))
-        return "".join(rows)
+            return rows
+        return rows + readout({"lens equation, 1/f = 1/s + 1/v, in mm:": self.equation()}, (606, 574), (0, 0), (0, 22))
 
     # What it does when touched ---------------------------------------------------------------------------------------
 
@@ -343,7 +333,7 @@ class DepthOfFieldView(View):
         return self.but(**{name: float(np.clip(value, *self._range(name)))})
 
     def pressed(self, handle: str, key: str) -> Self:
-        step = {"ArrowLeft": -1, "ArrowDown": -1, "-": -1, "ArrowRight": 1, "ArrowUp": 1, "+": 1}.get(key, 0)
+        step = step_of(key)
         if handle == "object":  # to the right is nearer
             return self._moved("distance_m", self.distance_m * 1.05**-step)
         return self._moved("focus_m", self.focus_m * 1.05 ** (-step if handle == "sensor" else step))
@@ -366,20 +356,9 @@ def _garden() -> Scene:
     return Scene([*lights, *garden.surfaces], garden.sky)
 
 
-def _logs(pair: tuple[float, float]) -> tuple[float, float]:
-    low, high = np.log10(pair)
-    return float(low), float(high)
-
-
 def _log10(values: np.ndarray) -> np.ndarray:
     """NaN for what has no logarithm."""
     return np.log10(np.where(values > 0, values, np.nan))
-
-
-def _grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:
-    lines = [[(x, panel.bottom), (x, panel.top)] for x, _ in xticks]
-    lines += [[(panel.left, y), (panel.right, y)] for y, _ in yticks]
-    return svg.path([panel.place(line) for line in lines], "grid")
 
 
 def _micrometres() -> list[tuple[float, str]]:

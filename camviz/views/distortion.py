@@ -17,17 +17,18 @@ from contourpy import contour_generator
 
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.items import closed
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, Item, Line, axes_triad, draw_space, space_panel
+from camviz.draw.readout import listed, readout, true_minus
+from camviz.draw.space import Item, Line, OrbitCamera, axes_triad, space_panel
 from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import on_plane, unit
 from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene
 from camviz.views import garden
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import Drawn, OrbitView, answered, choice, slider, switch, without
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
@@ -42,7 +43,7 @@ _COLUMN = 822  # where the numbers stand
 
 
 @dataclass(frozen=True)
-class DistortionView(View):
+class DistortionView(OrbitView):
     """What a lens does to straight lines, and where its model stops being one.
 
     The coefficients are those of Brown and Conrady in OpenCV's order; with `lens` set, that lens is shown instead.
@@ -72,7 +73,7 @@ class DistortionView(View):
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 90))
     lens: Lens | None = None
     photograph: np.ndarray | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(target=(0.0, 0.0, 0.45), distance=2.5, yaw_deg=-35, pitch_deg=25)
+    eye: OrbitCamera = OrbitCamera(target=(0.0, 0.0, 0.45), distance=2.5, yaw_deg=-35, pitch_deg=25)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -89,7 +90,9 @@ class DistortionView(View):
             coefficients = {name: getattr(lens, name) for name in names}
             return cls(intrinsics=camera.intrinsics, photograph=photograph, **coefficients)
         aside = lens.unproject(camera.intrinsics.from_pixels(camera.intrinsics.border(4)))[:, 2]
-        eye = cls.eye if np.min(aside) > 0.25 else Eye(distance=3.7, yaw_deg=-35, pitch_deg=25)  # NaN stands back too
+        eye = (
+            cls.eye if np.min(aside) > 0.25 else OrbitCamera(distance=3.7, yaw_deg=-35, pitch_deg=25)
+        )  # NaN stands back too
         return cls(intrinsics=camera.intrinsics, lens=lens, photograph=photograph, eye=eye)
 
     @cached_property
@@ -137,9 +140,8 @@ class DistortionView(View):
         return tan(self._fold_angle) if self._fold_angle < pi / 2 else inf
 
     def _fold_in_words(self) -> str:
-        return (
-            f"r = {_with_angle(self._fold)}" if isfinite(self._fold) else f"{degrees(self._fold_angle):.1f}° off axis"
-        )
+        off_axis = f"{degrees(self._fold_angle):.1f}° off axis"
+        return f"r = {_with_angle(self._fold)}" if isfinite(self._fold) else off_axis
 
     def _fold_rim(self, samples: int) -> np.ndarray:
         """Where the lens puts the rays of its fold, all around: image points (samples, 2) in focal lengths."""
@@ -157,8 +159,7 @@ class DistortionView(View):
         return "g(r) = r" + (f" ({above})" if above != "1" else "") + (f" / ({below})" if below != "1" else "")
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         return f"{self._name()}: {figures}. Picture shown {self.show}."
 
     def figure(self, *, draft: bool = False) -> Picture:
@@ -171,20 +172,19 @@ class DistortionView(View):
             "rays": self._frustum_panel,
         }
         height = _HEIGHTS[len(names)]
-        body, photographs = [svg.rectangle(0, 0, 960, height, "paper")], dict[str, bytes]()
+        body, photographs = [], dict[str, bytes]()
         for name, slot in zip(names, _SLOTS[len(names)], strict=True):
             content, attached = draw[name](*slot, draft=draft)
             body.append(content)
             photographs |= attached
         body.append(self._numbers_column(names))
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     def _name(self) -> str:
         if self.lens:
             return type(self.lens).__name__
-        return (
-            ", ".join(f"{name} = {value:g}" for name, value in self._coefficients().items() if value) or "no distortion"
-        )
+        told = [f"{name} = {value:g}" for name, value in self._coefficients().items() if value]
+        return ", ".join(told) or "no distortion"
 
     def _coefficients(self) -> dict[str, float]:
         if self.lens:
@@ -221,9 +221,7 @@ class DistortionView(View):
             return self.camera.lens.project(on_plane(xy))
         return self.camera.lens.distort(xy)
 
-    def _picture_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _picture_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         panel = self._image_panel("picture", x, y, width, tallest)
         straight = _grid_lines(self.intrinsics, 33 if draft else 65)
         lines = self._bend(straight) if self.show == "distorted" else straight
@@ -236,24 +234,20 @@ class DistortionView(View):
         return image_panel(name, x, y, width, self.intrinsics.width, self.intrinsics.height, tallest=tallest)
 
     def _photograph(self, panel: Panel, attached: str) -> str:
-        return photograph(panel, attached, self.intrinsics.width, self.intrinsics.height)
+        return placed_image(panel, attached, self.intrinsics.width, self.intrinsics.height)
 
     # The reader's own function ---------------------------------------------------------------------------------------
 
     def _your_bend(self, xy: np.ndarray) -> tuple[np.ndarray, str]:
         """Where the reader's function puts ideal points (..., 2), and what is wrong with it."""
-        if self.yours is None:
-            return np.full(xy.shape, np.nan), "No function of yours has been given."
-        return tried(self.yours, (xy, self.k1, self.k2, self.k3), xy)
+        return answered(self.yours, (xy, self.k1, self.k2, self.k3), xy)
 
-    def _your_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _your_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         """The same picture by the reader's function: its grid over the photograph, or the photograph straightened."""
         panel = self._image_panel("yours", x, y, width, tallest)
         lines, problem = self._your_bend(_grid_lines(self.intrinsics, 33 if draft else 65))
         if problem:
-            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="With your function"), {}
+            return without(panel, problem, "With your function"), {}
         straight = self.show == "undistorted"
         right = _grid_lines(self.intrinsics, 33 if draft else 65)
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(right if straight else lines)), "orange thin")
@@ -271,7 +265,7 @@ class DistortionView(View):
         if not isfinite(self._fold_angle if bent else self._fold):
             return ""
         rim = self._fold_rim(90) if bent else self._fold * _circle(90)
-        return svg.line(panel.place(self.intrinsics.to_pixels(np.vstack([rim, rim[:1]]))), "red dashed")
+        return svg.line(panel.place(self.intrinsics.to_pixels(closed(rim))), "red dashed")
 
     # The displacement ------------------------------------------------------------------------------------------------
 
@@ -282,9 +276,7 @@ class DistortionView(View):
     def _distorted(self, uv: np.ndarray) -> np.ndarray:
         return self.intrinsics.to_pixels(self._bend(self.intrinsics.from_pixels(uv)))
 
-    def _field_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _field_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         panel = self._image_panel("field", x, y, width, tallest)
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
@@ -317,9 +309,7 @@ class DistortionView(View):
 
     # The radial curve ------------------------------------------------------------------------------------------------
 
-    def _curve_with_axes(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _curve_with_axes(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         return self.curve_panel(x + 50, y, width - 50, min(tallest, 240)), {}
 
     def curve_panel(self, x: float, y: float, width: float, height: float, *, equation: bool = True) -> str:
@@ -369,14 +359,10 @@ class DistortionView(View):
 
     # The frustum -----------------------------------------------------------------------------------------------------
 
-    def _frustum_panel(
-        self, x: float, y: float, width: float, tallest: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _frustum_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
         panel = space_panel("frustum", x, y, width, tallest)
-        content, photographs = draw_space(panel, self._bent_frustum(), self.eye, draft=draft, renderer="wire")
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
-        shown = panel.show(content, title="Its rays in space", hint="drag to turn", drag="orbit", label=label)
-        return shown, photographs
+        return self.in_space(panel, self._bent_frustum(), draft, "Its rays in space", label, drag="orbit")
 
     def _bent_frustum(self) -> list[Item]:
         """The rays of a grid of pixels, a metre long, beside those of a pinhole with the same intrinsics."""
@@ -386,17 +372,11 @@ class DistortionView(View):
         mesh = [*reach[::3], *np.swapaxes(reach[:, ::4], 0, 1)]
         spokes = [np.stack([np.zeros(3), corner]) for corner in reach[[0, 0, -1, -1], [0, -1, -1, 0]]]
         return [
-            Line(np.vstack([rim, rim[:1]]), "muted dashed", 1.3),
+            Line(closed(rim), "muted dashed", 1.3),
             *(Line(line, "blue", 1.3) for line in mesh),
             *(Line(spoke, "blue", 1.6) for spoke in spokes),
             *axes_triad(RigidTransform.identity(), 0.4),
         ]
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> DistortionView:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> DistortionView:
-        return self.but(eye=self.eye.key(key))
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
@@ -408,11 +388,9 @@ class DistortionView(View):
         rows = [svg.text((_COLUMN, 26), "This lens", "title")]
         for i, (name, value) in enumerate(coefficients.items()):  # the lens's own, where one is given
             class_ = "number" if value else "number faint"
-            rows.append(svg.text((_COLUMN, 50 + 18 * i), f"{name} {value:+.4f}".replace("-", "−"), class_))
+            rows.append(svg.text((_COLUMN, 50 + 18 * i), true_minus(f"{name} {value:+.4f}"), class_))
         top = 80 + 18 * len(coefficients)
-        for i, (name, figure) in enumerate(self._told().items()):
-            rows.append(svg.text((_COLUMN, top + 40 * i), name, "note"))
-            rows.append(svg.text((_COLUMN, top + 17 + 40 * i), figure, "label"))
+        rows.append(readout(self._told(), (_COLUMN, top), (0, 40), (0, 17)))
         return "".join(rows)
 
 

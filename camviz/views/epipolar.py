@@ -16,12 +16,14 @@ from camviz import twoview
 from camviz.cameras import Camera, transform
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
+from camviz.draw.readout import listed, readout, true_minus
+from camviz.draw.space import Dots, Face, Item, Label, Line, OrbitCamera, camera_body, scene_items, space_panel
 from camviz.lenses.base import Array, unit
 from camviz.scenes import textured_scene
 from camviz.views import garden
+from camviz.views.base import Drawn, OrbitView, step_of
 from camviz.views.marks import border_arrow, camera_outline, clipped, crop, on_photograph, ring
 from camviz.views.two_cameras import TwoCameras
 
@@ -34,7 +36,7 @@ _PANELS = {"space", "match", "epipoles", "F"}
 
 
 @dataclass(frozen=True)
-class EpipolarView(TwoCameras):
+class EpipolarView(OrbitView, TwoCameras):
     """Where a point of the left picture can appear in the right one, and what a fundamental matrix knows of it.
 
     `panels` names what is shown with the two pictures: space (the cameras from outside), match (the two details),
@@ -46,7 +48,7 @@ class EpipolarView(TwoCameras):
 
     panels: str = "space match epipoles F"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(target=(-0.1, 0.25, 1.7), distance=4.6, yaw_deg=-62, pitch_deg=22, vfov_deg=30)
+    eye: OrbitCamera = OrbitCamera(target=(-0.1, 0.25, 1.7), distance=4.6, yaw_deg=-62, pitch_deg=22, vfov_deg=30)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,14 +88,11 @@ class EpipolarView(TwoCameras):
         if self.F is None:
             return "a lens that bends: no F, a curve"
         a, b, c = self.line
-        return (
-            f"{a:+.3f} u {b:+.3f} v {c:+.1f} = 0".replace("-", "−") if np.isfinite(a) else "the left epipole: no line"
-        )
+        return true_minus(f"{a:+.3f} u {b:+.3f} v {c:+.1f} = 0") if np.isfinite(a) else "the left epipole: no line"
 
     def description(self) -> str:
-        """The state in words and numbers."""
         where = f"The point at ({self.u:.0f}, {self.v:.0f}) in the left picture lies {self.depth:.2f} m along its ray"
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         return f"{where}. {figures}. Right epipolar line: {self.equation()}."
 
     # The reader's own F ----------------------------------------------------------------------------------------------
@@ -139,16 +138,13 @@ class EpipolarView(TwoCameras):
         if handle == "left":
             return self._with_point(self._left_panel, x, y, dx, dy)
         if handle == "right":
-            return self._with_depth(self._right_panel, x, y, dx, dy)
-        return self.but(eye=self.eye.orbited(dx, dy))
+            return self._with_depth(self._right_panel, x, y)
+        return super().dragged(handle, x, y, dx, dy)
 
     def pressed(self, handle: str, key: str) -> EpipolarView:
-        if handle == "left":
-            return super().pressed(handle, key)
         if handle == "right":
-            farther = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
-            return self.but(depth=float(np.clip(self.depth * 1.05**farther, _NEAREST, _FARTHEST)))
-        return self.but(eye=self.eye.key(key))
+            return self.but(depth=float(np.clip(self.depth * 1.05 ** step_of(key), _NEAREST, _FARTHEST)))
+        return super().pressed(handle, key)
 
     def _with_point(self, panel: Panel, x: float, y: float, dx: float, dy: float) -> EpipolarView:
         """The point under the pointer, or moved by (dx, dy) where there is no pointer."""
@@ -157,7 +153,7 @@ class EpipolarView(TwoCameras):
         size = self.left.intrinsics
         return self.but(u=float(np.clip(u, 0, size.width - 1)), v=float(np.clip(v, 0, size.height - 1)))
 
-    def _with_depth(self, panel: Panel, x: float, y: float, dx: float, dy: float) -> EpipolarView:
+    def _with_depth(self, panel: Panel, x: float, y: float) -> EpipolarView:
         """The depth whose image in the right picture is nearest to the pointer."""
         depths = np.geomspace(_NEAREST, _FARTHEST, 1500)
         curve = panel.place(twoview.epipolar_curve(self.left, self.right, [self.u, self.v], depths))
@@ -170,25 +166,21 @@ class EpipolarView(TwoCameras):
         images, attached = self._pictures(draft)
         space, sheets = self._space_panel(images, draft) if "space" in self._shown else ("", {})
         details, crops = self._details(images) if "match" in self._shown else ("", {})
-        panels = [
-            self._picture_panel(self._left_panel, self.left, self.right, "drag the point", "move the point"),
-            self._picture_panel(self._right_panel, self.right, self.left, self.equation(), "move it along its ray"),
-        ]
-        body = "".join([svg.rectangle(0, 0, 960, 622, "paper"), *panels, space, self._numbers_block(), details])
-        return Picture(body, 960, 622, self.title, self.description(), attached | sheets | crops)
+        left = self._picture_panel(self._left_panel, self.left, self.right, "drag the point", "move the point")
+        along = self.equation(), "move it along its ray"
+        right = self._picture_panel(self._right_panel, self.right, self.left, *along)
+        body = left + right + space + self._numbers_block() + details
+        return self.composed(622, body, attached=attached | sheets | crops)
 
     def _pictures(self, draft: bool) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
         """What the two cameras see, as pixels and as JPEG."""
         if self.photographs is None:
-            cameras = {"left": self.left, "right": self.right}
-            taken = {
-                name: garden.taken(camera, garden.DRAFT if draft else garden.FINE) for name, camera in cameras.items()
-            }
+            side = garden.DRAFT if draft else garden.FINE
+            taken = [garden.taken(camera, side) for camera in (self.left, self.right)]
         else:
-            taken = {
-                name: (image, jpeg(image)) for name, image in zip(("left", "right"), self.photographs, strict=True)
-            }
-        return {name: image for name, (image, _) in taken.items()}, {name: data for name, (_, data) in taken.items()}
+            taken = [(image, jpeg(image)) for image in self.photographs]
+        (left, left_jpeg), (right, right_jpeg) = taken
+        return {"left": left, "right": right}, {"left": left_jpeg, "right": right_jpeg}
 
     # The two pictures ------------------------------------------------------------------------------------------------
 
@@ -203,18 +195,16 @@ class EpipolarView(TwoCameras):
         return image_panel("right", 485, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
     def _picture_panel(self, panel: Panel, camera: Camera, other: Camera, note: str, action: str) -> str:
-        content = "".join(
-            [
-                photograph(panel, panel.name, camera.intrinsics.width, camera.intrinsics.height),
-                self._pencil(panel, camera),
-                self._match_dots(panel),
-                self._own_line(panel, camera),
-                self._estimated_line(panel, camera),
-                self._your_marks(panel),
-                self._other_camera(panel, camera, other),
-                self._epipole_mark(panel, camera, other),
-                self._point_mark(panel, camera),
-            ]
+        content = (
+            placed_image(panel, panel.name, camera.intrinsics.width, camera.intrinsics.height)
+            + self._pencil(panel, camera)
+            + self._match_dots(panel)
+            + self._own_line(panel, camera)
+            + self._estimated_line(panel, camera)
+            + self._your_marks(panel)
+            + self._other_camera(panel, camera, other)
+            + self._epipole_mark(panel, camera, other)
+            + self._point_mark(panel, camera)
         )
         label = f"The {panel.name} picture; drag or press the arrow keys to {action}"
         said = {"hint": note} if note.startswith("drag") else {"note": note}
@@ -297,15 +287,13 @@ class EpipolarView(TwoCameras):
 
     # The space -------------------------------------------------------------------------------------------------------
 
-    def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> Drawn:
         panel = space_panel("space", 20, 409, 500, 200)
         scenery = () if self.photographs else scene_items(textured_scene(), "wire")
         scenery += self._bodies(images, draft)
-        items, eye = self._space_items(), self._onlooker
-        content, sheets = draw_space(panel, items, eye, draft=draft, renderer="wire", scenery=scenery)
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
-        shown = panel.show(content, title="The epipolar plane", hint="drag to turn", drag="orbit", label=label)
-        return shown, sheets
+        seen: dict[str, Any] = {"eye": self._onlooker, "scenery": scenery}
+        return self.in_space(panel, self._space_items(), draft, "The epipolar plane", label, drag="orbit", **seen)
 
     @property
     def _nearness(self) -> float:
@@ -313,7 +301,7 @@ class EpipolarView(TwoCameras):
         return min(1.0, max(0.05, self.baseline / 0.3)) if self.pair else 1.0
 
     @property
-    def _onlooker(self) -> Eye:
+    def _onlooker(self) -> OrbitCamera:
         """The eye, as near to a small rig as it is to a large one."""
         left, s = self.left.centre, self._nearness
         target = tuple((left + s * (np.array(self.eye.target) - left)).tolist())
@@ -350,15 +338,14 @@ class EpipolarView(TwoCameras):
             for i, row in enumerate(self.F if self.F is not None else ()):
                 rows.append(svg.text((x, y + 22 + 18 * i), _row(row), "number"))
             y += 92
-        figures = [(name, value, "label") for name, value in self.numbers().items()]
+        figures = self.numbers()
+        rows.append(readout(figures, (x, y), (0, 19), (112, 0)))
         if self.yours is not None and self.F is not None:
-            figures.append(("your line", self._your_figure(), "label orange"))
-        for i, (name, value, class_) in enumerate(figures):
-            rows.append(svg.text((x, y + 19 * i), name, "note"))
-            rows.append(svg.text((x + 112, y + 19 * i), value, class_))
+            yours, below = {"your line": self._your_figure()}, y + 19 * len(figures)
+            rows.append(readout(yours, (x, below), (0, 0), (112, 0), "label orange"))
         return "".join(rows)
 
-    def _details(self, images: dict[str, np.ndarray]) -> tuple[str, dict[str, bytes]]:
+    def _details(self, images: dict[str, np.ndarray]) -> Drawn:
         """What the pictures show around the point, side by side: alike where the depth is that of the surface."""
         drawn, crops = "", {}
         for i, (name, camera, uv) in enumerate(
@@ -421,4 +408,4 @@ def _row(entries: Array) -> str:
 def _pixel(uv: Array, missing: str) -> str:
     if not np.isfinite(uv).all() or np.abs(uv).max() > 1e6:
         return missing
-    return f"({uv[0]:.1f}, {uv[1]:.1f})".replace("-", "−")
+    return true_minus(f"({uv[0]:.1f}, {uv[1]:.1f})")

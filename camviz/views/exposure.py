@@ -15,14 +15,15 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import image_panel, photograph
+from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, readout, seconds, signed
 from camviz.optics import exposure_value, relative_illumination, unvignetted_share
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.views import garden
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, choice, positive, slider
 
 FULL_WELL_E = 30_000.0
 READ_NOISE_E = 3.0
@@ -60,8 +61,7 @@ class ExposureView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.f_number > 0:
-            raise ValueError(f"f_number must be positive, got {self.f_number}")
+        positive(self, "f_number")
 
     # What is true -----------------------------------------------------------------------------------------------------
 
@@ -146,12 +146,11 @@ class ExposureView(View):
             "its signal / noise": f"{grey / (grey + READ_NOISE_E**2) ** 0.5:.0f}" if grey < FULL_WELL_E else "full",
             "mean of the picture": f"{100 * float(recorded.mean()):.0f} % of white",
             "cut off at white": f"{100 * float((recorded.max(axis=-1) >= 0.999).mean()):.0f} %",
-            "corner": f"{corner:+.1f} stops".replace("-", "−") if corner < -0.05 else "as bright",
+            "corner": f"{signed(corner, 1)} stops" if corner < -0.05 else "as bright",
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         who = "metered by the average" if self.metering == "average" else "set by hand"
         return f"The {self.subject} at EV {self.light_ev:.3g}, {who}, vignetting {self.vignetting}: {figures}."
 
@@ -161,22 +160,13 @@ class ExposureView(View):
         height = 560 if self.yours else 540
         recorded = self.recorded(draft=draft)
         corners, problem = self._corner_panel()
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, height, "paper"),
-                self._picture_panel(),
-                self._histogram_panel(recorded),
-                self._stops_panel(),
-                corners,
-                svg.text((20, 552), problem, "note"),
-                self._numbers_column(),
-            ]
-        )
-        return Picture(body, 960, height, self.title, self.description(), {"camera": jpeg(to_display(recorded))})
+        above = self._picture_panel(), self._histogram_panel(recorded), self._stops_panel()
+        words = svg.text((20, 552), problem, "note"), self._numbers_column()
+        return self.composed(height, *above, corners, *words, attached={"camera": jpeg(to_display(recorded))})
 
     def _picture_panel(self) -> str:
         panel = image_panel("picture", 20, 34, 420, _WIDTH, _HEIGHT)
-        shown = photograph(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
+        shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
         note = f"f/{self.f_number:.3g}, {seconds(2.0**self.shutter_stops)}, ISO {100 * 2**self.iso:.0f}"
         return panel.show(shown, title="The picture", note=note)
 
@@ -214,7 +204,7 @@ class ExposureView(View):
         names = [(4.5 - i - 0.05, name) for i, (name, _, _) in enumerate(rows)]
         values = [
             svg.text(
-                (panel.x + panel.width - 6, panel.y + panel.place((0, 4.5 - i))[1] + 4), _signed(v), "note end halo"
+                (panel.x + panel.width - 6, panel.y + panel.place((0, 4.5 - i))[1] + 4), signed(v, 1), "note end halo"
             )
             for i, (_, v, _) in enumerate(rows)
         ]
@@ -235,16 +225,12 @@ class ExposureView(View):
             points = svg.line(places, "orange") + svg.dots(places, "orange", 6)
         entries = [("ink thick", "now"), ("blue dashed", "cos⁴"), ("purple dashed", "rim")]
         entries += [("orange thick", "yours")] if self.yours else []
-        content = plot.grid(panel) + curves + points + plot.legend(panel, entries, "bottom left")
-        shown = panel.show(content, title="Light towards the corner")
-        return shown + plot.axes(panel, "height on the sensor (mm)", "light, 1 on the axis"), problem
+        content = curves + points + plot.legend(panel, entries, "bottom left")
+        names = "height on the sensor (mm)", "light, 1 on the axis"
+        return plot.plotted(panel, content, *names, title="Light towards the corner"), problem
 
     def _numbers_column(self) -> str:
-        rows = [svg.text((790, 26), "This exposure", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((790, 54 + 44 * i), name, "note"))
-            rows.append(svg.text((790, 71 + 44 * i), value, "label"))
-        return "".join(rows)
+        return svg.text((790, 26), "This exposure", "title") + readout(self.numbers(), (790, 54), (0, 44), (0, 17))
 
 
 _CORNER_MM = float(np.hypot(*SENSOR_MM)) / 2
@@ -271,12 +257,3 @@ def _heights_mm(side: int) -> np.ndarray:
 @lru_cache(maxsize=2)
 def _draw(shape: tuple[int, ...]) -> Draw:
     return Draw.of(shape, shape, 27)
-
-
-def _signed(stops: float) -> str:
-    return f"{stops:+.1f}".replace("-", "−")
-
-
-def seconds(time: float) -> str:
-    """An exposure time as photographers write it."""
-    return f"{time:.3g} s" if time >= 0.3 else f"1/{1 / time:.0f} s"

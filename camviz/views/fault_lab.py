@@ -18,9 +18,10 @@ from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
-from camviz.lenses.base import Array
-from camviz.views.base import View, choice, slider, switch
+from camviz.draw.readout import listed, true_minus
+from camviz.views.base import choice, slider, switch
 from camviz.views.marks import arrows
+from camviz.views.view_bars import LABEL, ViewChooser
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
 _MOST = 4  # findings that have room
@@ -32,7 +33,7 @@ _VERDICTS = ("0, nothing is off", "1, a corner is off", "2, a row or a column is
 
 
 @dataclass(frozen=True)
-class FaultLabView(View):
+class FaultLabView(ViewChooser):
     """What a fault does to a calibration, and what it does not: the fit, the estimates against the truth, the findings.
 
     Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
@@ -45,6 +46,7 @@ class FaultLabView(View):
     """
 
     title: ClassVar[str] = "Fault lab"
+    layouts = _HEIGHTS
 
     fault: str = choice(*lab_faults(), help="what is wrong")
     strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
@@ -57,20 +59,14 @@ class FaultLabView(View):
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     verdict: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.panels not in _HEIGHTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
-
     @cached_property
     def experiment(self) -> Experiment:
         """The calibration shown, and its truth."""
         return experiment(self.fault, float(self.strength), float(self.noise), round(self.seed))
 
     @property
-    def index(self) -> int:
-        """The place of the chosen view in the list, from 0."""
-        return min(max(round(self.view), 1), VIEWS) - 1
+    def count(self) -> int:
+        return VIEWS
 
     def worst(self) -> Self:
         """The same, with the view of the largest error chosen."""
@@ -86,12 +82,11 @@ class FaultLabView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         cause = f"{self.fault}, strength {self.strength:g}: {self.experiment.words}; " if self.told else ""
         if self.panels != _EVERYTHING:
             return f"{cause}error of the fit {self.numbers()['error of the fit']}."
         told = self._diagnosis() if self.told else "Findings hidden."
-        numbers = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        numbers = listed(self.numbers())
         estimates = "; ".join(
             f"{k} {'+' if e > 0 else '−'}{figures(abs(e))} ± {figures(s)} px"
             for k, (e, s) in self.experiment.estimates.items()
@@ -106,11 +101,11 @@ class FaultLabView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         height = _HEIGHTS[self.panels]
-        body = svg.rectangle(0, 0, 960, height, "paper") + self._headline() + self._bars_panel() + self._image_panel()
+        body = self._headline() + self._bars_panel() + self._image_panel()
         if self.panels == _EVERYTHING:
             body += self._estimates_panel() + self._findings(draft)
         words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
-        return Picture(body, 960, height, self.title, words)
+        return self.composed(height, body, described=words)
 
     def _headline(self) -> str:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
@@ -160,9 +155,8 @@ class FaultLabView(View):
             content += plot.bars(panel, x - 0.38, x + right, np.where(mask, errors, np.nan), class_)
         content += self._your_bars(panel, x)
         median = float(np.nanmedian(errors))
-        content += svg.line(panel.place([(panel.left, median), (panel.right, median)]), "ink dashed")
-        label = "One bar per view; click, drag or press the arrow keys to choose a view"
-        shown = panel.show(content, title="Error of every view", hint="click a bar", drag="bars", label=label)
+        content += plot.level(panel, median, "ink dashed")
+        shown = panel.show(content, title="Error of every view", hint="click a bar", drag="bars", label=LABEL)
         names = [(float(i), f"{i}") for i in x.tolist()]
         return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
 
@@ -216,7 +210,7 @@ class FaultLabView(View):
             words = f"{_signed(error, sigma)} px"
             beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
         shown = panel.show(content, title="Estimate ± 1σ, less the truth")
-        ticks = [(float(t), f"{t:g}".replace("-", "−")) for t in plot.ticks(-reach, reach, 5)]
+        ticks = [(float(t), true_minus(f"{t:g}")) for t in plot.ticks(-reach, reach, 5)]
         below = "".join(
             svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
             for px, (_, words) in zip(panel.place([(t, 0) for t, _ in ticks])[:, 0], ticks, strict=True)
@@ -249,18 +243,6 @@ class FaultLabView(View):
         if len(listed) > _MOST:
             body += svg.text((x, y), f"and {len(listed) - _MOST} more", "note")
         return head + body
-
-    # Touch -----------------------------------------------------------------------------------------------------------
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle != "bars" or not np.isfinite(x):
-            return self
-        place: Array = self._bars.data((x - self._bars.x, 0))
-        return self.but(view=int(np.clip(round(float(place[0])), 1, VIEWS)))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        step = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
-        return self.but(view=min(max(self.index + 1 + step, 1), VIEWS))
 
 
 def grouped(findings: tuple[Finding, ...]) -> list[tuple[Finding, int]]:

@@ -11,21 +11,20 @@ from functools import cached_property, lru_cache
 from math import asin, atan2, cos, degrees, pi, radians, sin
 from typing import Any, ClassVar, Self
 
-import cv2
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.items import Dots, Item, Line, axes_triad
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.items import Dots, Item, Line, axes_triad, closed
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, draw_space, space_panel
+from camviz.draw.readout import listed, readout, true_minus
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses import Equidistant, Equisolid, Lens, Orthographic, Perspective, Stereographic
 from camviz.lenses.base import Array
 from camviz.panoramas.reprojection import reproject, window
 from camviz.views import garden
-from camviz.views.base import View, choice, slider
+from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 
 SIDE = 480  # pixels of the picture, which is square
@@ -56,7 +55,6 @@ _TOP = 3.4  # focal lengths shown by the curves
 _INFINITE = 1e6  # focal lengths: tan 90° as rounded numbers have it
 _TABLED = np.radians([30.0, 60.0, 90.0])
 _FAR = 5 * SIDE  # pixels: what a reader's function puts farther out is not drawn
-_GREY = (69, 69, 69)  # of what a picture does not show
 _SLOTS = {  # where panels stand, (x, y, width, height), by which there are; then the figure's height
     "picture curves": ({"picture": (20, 34, 330, 330), "curves": (425, 34, 320, 290)}, 390),
     "picture window": ({"picture": (20, 34, 330, 330), "window": (375, 34, 375, 281)}, 390),
@@ -78,7 +76,7 @@ _TOLD = {  # the figures that few panels speak of
 
 
 @dataclass(frozen=True)
-class FisheyeView(View):
+class FisheyeView(OrbitView):
     """What a fisheye does to the angle of a ray, and that a straight picture can be cut out of its round one.
 
     `panels` names what is drawn: "picture curves", "picture window", or both and "rays" or "yours". `yours` is a
@@ -86,6 +84,7 @@ class FisheyeView(View):
     """
 
     title: ClassVar[str] = "Fisheye"
+    layouts = _SLOTS
 
     projection: str = choice(*LENSES, help="how the angle θ of a ray becomes a distance r from the picture's middle")
     f: float = slider(
@@ -96,12 +95,7 @@ class FisheyeView(View):
     hfov_deg: float = slider(80.0, 20.0, 120.0, 1.0, label="window's field", unit="°", help="of the perspective window")
     panels: str = "picture window curves rays"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(target=(0.0, 0.0, 0.2), distance=4.4, yaw_deg=-40, pitch_deg=22)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.panels not in _SLOTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
+    eye: OrbitCamera = OrbitCamera(target=(0.0, 0.0, 0.2), distance=4.4, yaw_deg=-40, pitch_deg=22)
 
     # Cameras ---------------------------------------------------------------------------------------------------------
 
@@ -146,22 +140,17 @@ class FisheyeView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         return {name: figures[name] for name in _TOLD.get(self.panels, figures)}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         window = (
             f" The window looks {self.yaw_deg:.0f}° to the right and {self.pitch_deg:.0f}° up "
             f"and is {self.hfov_deg:.0f}° wide."
         )
         words = f"{self.projection}, {EQUATIONS[self.projection]}, f = {self.f:g} px: {figures}."
-        return (words + window * self._has("window")).replace("-", "−")
-
-    def _has(self, panel: str) -> bool:
-        return panel in self.panels.split()
+        return true_minus(words + window * self._has("window"))
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -169,7 +158,7 @@ class FisheyeView(View):
         slots, height = _SLOTS[self.panels]
         image, taken = _photographed(self.camera, garden.DRAFT if draft else garden.FINE)
         photographs = {"fisheye": taken}
-        body = [svg.rectangle(0, 0, 960, height, "paper"), self._picture_panel()]
+        body = [self._picture_panel()]
         if self._has("window"):
             photographs["window"] = jpeg(self._cut(image, draft))
             body.append(self._window_panel())
@@ -184,7 +173,7 @@ class FisheyeView(View):
             photographs |= attached
             body.append(yours)
         body.append(self._numbers_column())
-        return Picture("".join(body), 960, height, self.title, self.description(), photographs)
+        return self.composed(height, *body, attached=photographs)
 
     def _cut(self, image: np.ndarray, draft: bool) -> np.ndarray:
         """The window's picture, cut out of the fisheye's `image`, which is as small as a draft is."""
@@ -202,12 +191,12 @@ class FisheyeView(View):
 
     def _picture_panel(self) -> str:
         panel = self._panel
-        content = photograph(panel, "fisheye", SIDE, SIDE) + self._grid_lines(panel)
+        content = placed_image(panel, "fisheye", SIDE, SIDE) + self._grid_lines(panel)
         title = f"The {self.projection} lens"
         if not self._has("window"):
             return panel.show(content, title=title)
         outline = self.camera.project(self.window.unproject(self.window.intrinsics.border(16)))
-        edges = np.vstack([outline, outline[:1]])
+        edges = closed(outline)
         far = np.linalg.norm(np.diff(edges, axis=0, append=edges[:1]), axis=-1) > SIDE / 2  # once round the back
         edges[far] = np.nan
         content += on_photograph([panel.place(edges)], "yellow thick")
@@ -218,7 +207,7 @@ class FisheyeView(View):
         x, y, width, _ = _SLOTS[self.panels][0]["window"]
         panel = image_panel("cut", x, y, width, 320, 240)
         note = f"perspective, {self.hfov_deg:.0f}° wide"
-        return panel.show(photograph(panel, "window", 320, 240), title="The window cut out of it", note=note)
+        return panel.show(placed_image(panel, "window", 320, 240), title="The window cut out of it", note=note)
 
     def _curves_panel(self, x: float, y: float, width: float, height: float) -> str:
         panel = plot.plot_panel("curves", x, y, width, height, (0, 180), (-1.8 if self.yours else 0, _TOP))
@@ -228,15 +217,11 @@ class FisheyeView(View):
         names = sorted(LENSES, key=lambda name: name == self.projection) if not self.yours else [self.projection]
         for name in names:
             theta = np.linspace(0, _LAST[name], 181)
-            drawn += plot.curve(
-                panel, theta, self.radius(np.radians(theta), name), f"{_COLOURS[name]} {self._weight(name)}"
-            )
+            radius = self.radius(np.radians(theta), name)
+            drawn += plot.curve(panel, theta, radius, f"{_COLOURS[name]} {self._weight(name)}")
         drawn += self._your_curve(panel) if self.yours else "".join(self._name(panel, name) for name in names)
-        drawn += (
-            svg.text(panel.place((2, edge)) + (0, -6), "edge of the picture", "green halo")
-            if edge < 0.92 * _TOP and not self.yours
-            else ""
-        )
+        if edge < 0.92 * _TOP and not self.yours:
+            drawn += svg.text(panel.place((2, edge)) + (0, -6), "edge of the picture", "green halo")
         return plot.axes(panel, "θ, angle from the axis [°]", "r / f") + panel.show(
             drawn, title="How far from the middle", note=EQUATIONS[self.projection]
         )
@@ -245,10 +230,8 @@ class FisheyeView(View):
 
     def _your_pixels(self, points: Array) -> tuple[Array, str]:
         """Where the reader's function puts camera-frame points (..., 3), and what is wrong with it."""
-        if self.yours is None:
-            return np.full((*points.shape[:-1], 2), np.nan), "No function of yours has been given."
         k = self.camera.intrinsics
-        uv, problem = tried(self.yours, (points, k.fx, k.cx, k.cy), points[..., :2])
+        uv, problem = answered(self.yours, (points, k.fx, k.cx, k.cy), points[..., :2])
         return np.where(np.abs(uv) < _FAR, uv, np.nan), problem
 
     def _grid_lines(self, panel: Panel) -> str:
@@ -263,9 +246,8 @@ class FisheyeView(View):
             + [_meridian(reach, around) for around in np.linspace(0.01, 2 * pi + 0.01, 13)[:-1]]
         )
         yours, _ = self._your_pixels(lines)
-        return svg.path(panel.place(self.camera.project(lines)), "yellow thin") + svg.path(
-            panel.place(yours), "orange dashed"
-        )
+        right = svg.path(panel.place(self.camera.project(lines)), "yellow thin")
+        return right + svg.path(panel.place(yours), "orange dashed")
 
     def _your_curve(self, panel: Panel) -> str:
         """r/f by the reader's function, of rays to the right, and what the lines are."""
@@ -279,18 +261,15 @@ class FisheyeView(View):
         uv, _ = self._your_pixels(_meridian(theta, 0.0))
         return (uv[..., 0] - self.camera.intrinsics.cx) / self.f
 
-    def _your_panel(
-        self, x: float, y: float, width: float, height: float, image: np.ndarray, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _your_panel(self, x: float, y: float, width: float, height: float, image: np.ndarray, *, draft: bool) -> Drawn:
         """The window once more, every pixel of it looked up where the reader's function says."""
         panel = image_panel("yours", x, y, width, 320, 240)
         seen = self._seen(draft)
         uv, problem = self._your_pixels(seen.rays())
         if problem:
-            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
-        places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (image.shape[1] / SIDE) - 0.5
-        cut = cv2.remap(image, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=_GREY)
-        return panel.show(photograph(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
+            return without(panel, problem, "Cut by your function"), {}
+        cut = garden.looked_up(image, uv, SIDE)
+        return panel.show(placed_image(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
     def _weight(self, name: str) -> str:
         return "thick" if name == self.projection else "half"
@@ -309,13 +288,10 @@ class FisheyeView(View):
 
     # The dome --------------------------------------------------------------------------------------------------------
 
-    def _dome_panel(
-        self, x: float, y: float, width: float, height: float, *, draft: bool
-    ) -> tuple[str, dict[str, bytes]]:
+    def _dome_panel(self, x: float, y: float, width: float, height: float, *, draft: bool) -> Drawn:
         panel = space_panel("dome", x, y, width, height)
-        content, photographs = draw_space(panel, self._rays(), self.eye, draft=draft, renderer="wire")
         label = "The rays in space; drag or press the arrow keys to walk around"
-        return panel.show(content, title="Its rays", hint="drag to turn", drag="eye", label=label), photographs
+        return self.in_space(panel, self._rays(), draft, "Its rays", label)
 
     def _rays(self) -> list[Item]:
         """Where circles equally far apart in the picture come from, on a sphere around the camera; and the window."""
@@ -330,7 +306,7 @@ class FisheyeView(View):
             theta = np.radians(np.linspace(0, reach, 17))
             items.append(Line(_meridian(theta, around), "muted", 0.8))
         rim = self.window.unproject(self.window.intrinsics.border(6))
-        items.append(Line(np.vstack([rim, rim[:1]]), "yellow", 2.6))
+        items.append(Line(closed(rim), "yellow", 2.6))
         items += [Line(np.stack([np.zeros(3), corner]), "yellow", 1.4) for corner in rim[::6]]
         return [*items, Dots(np.zeros(3), "ink", 7), *axes_triad(self.camera.world_from_cam, 0.5)]
 
@@ -340,22 +316,18 @@ class FisheyeView(View):
         x = 775
         rows = [svg.text((x, 26), "This lens", "title"), svg.text((x, 50), EQUATIONS[self.projection], "label")]
         rows.append(svg.text((x, 70), f"f = {self.f:g} px", "label"))
-        for i, (name, value) in enumerate(self._told().items()):
-            rows.append(svg.text((x, 104 + 42 * i), name, "note"))
-            rows.append(svg.text((x, 121 + 42 * i), value, "label"))
+        rows.append(readout(self._told(), (x, 104), (0, 42), (0, 17)))
         if self.panels in _TOLD:
             return "".join(rows)
         rows.append(svg.text((x, 394), "r / f at 30°, 60°, 90°", "title"))
         radii = {name: self.radius(_TABLED, name) for name in ([self.projection] if self.yours else LENSES)}
-        for i, (name, values) in enumerate(
-            (radii | ({"yours": self._your_radius(_TABLED)} if self.yours else {})).items()
-        ):
+        radii |= {"yours": self._your_radius(_TABLED)} if self.yours else {}
+        for i, (name, values) in enumerate(radii.items()):
             strong = "" if name in (self.projection, "yours") else " half"
             colour = _COLOURS.get(name, "orange")
             rows.append(svg.text((x, 420 + 36 * i), name, f"{colour}{strong}"))
-            rows.append(
-                svg.text((x, 436 + 36 * i), self._tabled(name, values), f"number {colour * (name == 'yours')}{strong}")
-            )
+            class_ = f"number {colour * (name == 'yours')}{strong}"
+            rows.append(svg.text((x, 436 + 36 * i), self._tabled(name, values), class_))
         return "".join(rows)
 
     def _tabled(self, name: str, values: Array) -> str:
@@ -365,17 +337,14 @@ class FisheyeView(View):
     # Touch -----------------------------------------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.orbited(dx, dy))
-        return self._looking_at(
-            self.camera.project(_direction(self.yaw_deg, self.pitch_deg)) + (dx, dy) / self._panel.scale
-        )
+        if handle != "window":
+            return super().dragged(handle, x, y, dx, dy)
+        here = self.camera.project(_direction(self.yaw_deg, self.pitch_deg))
+        return self._looking_at(here + (dx, dy) / self._panel.scale)
 
     def pressed(self, handle: str, key: str) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.key(key))
         zooms = {"+": -5.0, "=": -5.0, "-": 5.0, "_": 5.0}
-        if key in zooms:
+        if handle == "window" and key in zooms:
             return self.but(hfov_deg=min(120.0, max(20.0, self.hfov_deg + zooms[key])))
         return super().pressed(handle, key)
 

@@ -16,14 +16,16 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.matrix import matrix
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture
+from camviz.draw.readout import decimal, readout, vector
 from camviz.draw.space import (
     Dots,
-    Eye,
     Item,
     Label,
     Line,
+    OrbitCamera,
     axes_triad,
     camera_body,
     chosen_renderer,
@@ -36,7 +38,7 @@ from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import Drawn, OrbitView, choice, slider, switch
 from camviz.views.marks import border_arrow, clipped
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
@@ -51,7 +53,7 @@ def _degrees(default: float, reach: float, label: str, help: str) -> Any:
 
 
 @dataclass(frozen=True)
-class FrustumView(View):
+class FrustumView(OrbitView):
     """Where a camera stands, which way it looks, and what of the world it therefore sees.
 
     x, y, z are what `mode` says: the camera's centre C ("edit C"), the t of its extrinsics [R | t] ("edit t"), or where
@@ -79,7 +81,7 @@ class FrustumView(View):
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 60))
     lens: Lens = field(default_factory=Perspective)
-    eye: Eye = Eye(target=(0.0, 0.3, 2.2), distance=8.0, yaw_deg=-38, pitch_deg=24)
+    eye: OrbitCamera = OrbitCamera(target=(0.0, 0.3, 2.2), distance=8.0, yaw_deg=-38, pitch_deg=24)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -144,20 +146,14 @@ class FrustumView(View):
     def numbers(self) -> dict[str, Array]:
         """R (3, 3) and t (3,) of the extrinsics, the centre C (3,), and K (3, 3)."""
         R, t = self.camera.extrinsics
-        return {
-            "R": R,
-            "t": t,
-            "C": self.camera.centre,
-            "K": self.camera.intrinsics.K,
-        }
+        return {"R": R, "t": t, "C": self.camera.centre, "K": self.camera.intrinsics.K}
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         seen = int(self.camera.sees(board_corners()).sum())
         return (
-            f"The camera stands at C = {_row(n['C'])} m, turned {_signed(self.yaw_deg, 0)}° right, "
-            f"{_signed(self.pitch_deg, 0)}° up, {_signed(self.roll_deg, 0)}° clockwise; t = {_row(n['t'])} m; "
+            f"The camera stands at C = {vector(n['C'], 2)} m, turned {decimal(self.yaw_deg, 0)}° right, "
+            f"{decimal(self.pitch_deg, 0)}° up, {decimal(self.roll_deg, 0)}° clockwise; t = {vector(n['t'], 2)} m; "
             f"field of view {self.hfov_deg:.0f}°; it sees {seen} of the board's 54 corners. Mode: {self.mode}."
         )
 
@@ -166,10 +162,10 @@ class FrustumView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         image, taken = garden.drafted(self.camera) if draft else garden.taken(self.camera, garden.FINE)
         world, photographs = self._world_panel(image, draft)
-        body = svg.rectangle(0, 0, 960, 580, "paper") + world + self._picture_panel() + self._numbers_panel()
-        return Picture(body, 960, 580, self.title, self.description(), photographs | {"camera": taken})
+        body = world + self._picture_panel() + self._numbers_panel()
+        return self.composed(580, body, attached=photographs | {"camera": taken})
 
-    def _world_panel(self, image: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _world_panel(self, image: np.ndarray, draft: bool) -> Drawn:
         panel = space_panel("world", 20, 34, 540, 400)
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else None
@@ -208,7 +204,7 @@ class FrustumView(View):
     def _picture_panel(self) -> str:
         k = self.camera.intrinsics
         panel = image_panel("picture", 580, 34, 360, k.width, k.height, tallest=270)
-        content = photograph(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
+        content = placed_image(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
         label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
         return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)
 
@@ -232,12 +228,12 @@ class FrustumView(View):
         n, from_sliders, shown = self.numbers(), " ← x, y, z", self.panels.split()
         centre = "C = −Rᵀt [m]" if "chain" in shown else "C [m]"
         parts = [
-            _matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
-            _matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
-            _matrix((450, 486), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
+            matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
+            matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
+            matrix((450, 486), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
         ]
         if "K" in shown:
-            parts.append(_matrix((580, 360), "K, intrinsics [px]", n["K"], 1))
+            parts.append(matrix((580, 360), "K, intrinsics [px]", n["K"], 1))
         if "chain" in shown:
             parts.append(self._chain())
         return "".join([*parts, self._your_numbers()])
@@ -250,35 +246,32 @@ class FrustumView(View):
         if problem:
             return svg.paragraph((x, y), problem, 360)
         away = float(np.linalg.norm(centre - self.camera.centre))
-        where = svg.text((x, y), f"your C: {_row(centre)} m", "label orange")
+        where = svg.text((x, y), f"your C: {vector(centre, 2)} m", "label orange")
         return where + svg.text((x, y + 18), f"{away:.2f} m from the camera", "label orange")
 
     def _chain(self) -> str:
         """One point, step by step."""
         point = board_corners()[0]
         seen_at = self.camera.project(point)
-        pixel = f"{_row(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
+        pixel = f"{vector(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
         rows = [
-            ("X, first corner of the board [m]", _row(point)),
-            ("R X + t, in the camera's frame [m]", _row(transform(self.camera.cam_from_world, point))),
+            ("X, first corner of the board [m]", vector(point, 2)),
+            ("R X + t, in the camera's frame [m]", vector(transform(self.camera.cam_from_world, point), 2)),
             ("through lens and K", pixel),
         ]
-        return "".join(
-            svg.text((640, 484 + 33 * i), name, "note") + svg.text((640, 500 + 33 * i), value, "number")
-            for i, (name, value) in enumerate(rows)
-        )
+        return readout(rows, (640, 484), (0, 33), (0, 16), "number")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.orbited(dx, dy))
+        if handle != "picture":
+            return super().dragged(handle, x, y, dx, dy)
         turn = self.hfov_deg / 360
         return self._turned(-turn * dx, turn * dy)
 
     def pressed(self, handle: str, key: str) -> Self:
-        if handle == "eye":
-            return self.but(eye=self.eye.key(key))
+        if handle != "picture":
+            return super().pressed(handle, key)
         turns = {"ArrowLeft": (-2, 0), "ArrowRight": (2, 0), "ArrowUp": (0, 2), "ArrowDown": (0, -2)}
         zooms = {"+": -2.0, "=": -2.0, "-": 2.0}
         if key in turns:
@@ -296,25 +289,3 @@ def _up(camera: Camera) -> Array:
 
 def _hfov_deg(intrinsics: Intrinsics) -> float:
     return degrees(2 * atan(intrinsics.width / (2 * intrinsics.fx)))
-
-
-def _matrix(corner: tuple[float, float], name: str, values: Array, decimals: int) -> str:
-    """A matrix (m, n) in brackets, its name above."""
-    x, y = corner
-    rows = [[_signed(value, decimals) for value in row] for row in values]
-    wide = max(len(word) for row in rows for word in row)
-    lines = ["  ".join(word.rjust(wide) for word in row) for row in rows]
-    width, height = 7.6 * len(lines[0]) + 16, 20 * len(lines)
-    brackets = [[(x + 5, y + 8), (x, y + 8), (x, y + 8 + height), (x + 5, y + 8 + height)]]
-    brackets.append([(2 * x + width - px, py) for px, py in brackets[0]])
-    words = [svg.text((x + 8, y + 23 + 20 * i), line, "number") for i, line in enumerate(lines)]
-    return svg.text((x, y - 2), name, "note") + svg.path(brackets, "muted") + "".join(words)
-
-
-def _row(values: Array, decimals: int = 2) -> str:
-    return f"({', '.join(_signed(value, decimals) for value in values)})"
-
-
-def _signed(value: float, decimals: int) -> str:
-    """A number with a true minus sign, and no minus before zero."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−")

@@ -19,6 +19,7 @@ from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene, to_display
 from camviz.scenes.scene import NEUTRAL
 
+NOTHING = (69, 69, 69)  # the grey of what a picture does not show
 DRAFT, FINE = 136, 400  # pixels on the longer side; the tracer takes a fine picture at 4:3 as one block of rays
 
 Pose = tuple[float, ...]
@@ -68,6 +69,12 @@ def _all_round(place: Place) -> tuple[Camera, np.ndarray, tuple[int, ...]]:
     picture = cv2.copyMakeBorder(seen, 1, 1, 1, 1, cv2.BORDER_WRAP)
     k = around.intrinsics.cropped(-1, -1, width + 2, width // 2 + 2)
     return Camera(k, around.lens), picture, tuple(to_display(np.full(3, NEUTRAL, np.float32)).tolist())
+
+
+def looked_up(picture: np.ndarray, uv: Array, side: float) -> np.ndarray:
+    """What a square picture, `side` pixels wide in full size, has at pixels (height, width, 2) of that size."""
+    places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (picture.shape[1] / side) - 0.5
+    return cv2.remap(picture, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=NOTHING)
 
 
 def landmarks(camera: Camera) -> Array:

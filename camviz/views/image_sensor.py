@@ -15,17 +15,17 @@ from scipy import constants
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
-from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, bars, between, curve, grid, legend, logarithmic, plot_panel
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
 from camviz.scenes import render, textured_scene
 from camviz.sensors import DigitalCamera, Sensor, decibel
 from camviz.sensors.digital_camera import Shot
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, answered, choice, positive, slider
 
 SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
 SCENE_LUX = 1000.0
@@ -71,8 +71,7 @@ class ImageSensorView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.exposure_ms > 0:
-            raise ValueError(f"exposure_ms must be positive, got {self.exposure_ms}")
+        positive(self, "exposure_ms")
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -117,10 +116,8 @@ class ImageSensorView(View):
     @cached_property
     def your_e(self) -> tuple[float, str]:
         """The same by the reader's function, NaN without an answer, and what is wrong with it."""
-        if self.yours is None:
-            return np.nan, "No function of yours has been given."
         pitch_um, exposure_s = _MODELS[self.model].pitch_um, self.exposure_ms / 1000
-        answer, problem = tried(self.yours, (SCENE_LUX, F_NUMBER, pitch_um, exposure_s, self._efficiency), 0.0)
+        answer, problem = answered(self.yours, (SCENE_LUX, F_NUMBER, pitch_um, exposure_s, self._efficiency), 0.0)
         return float(answer), problem
 
     def numbers(self) -> dict[str, str]:
@@ -138,8 +135,7 @@ class ImageSensorView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         full = " and ".join(name for (name, _), e in zip(CHANNELS, self.white_e, strict=False) if e > self.full_well)
         return (
             f"{_MODELS[self.model].name} under {self.light}, {self.exposure_ms:g} ms, fill factor "
@@ -152,9 +148,9 @@ class ImageSensorView(View):
         width = SMALL if draft else LARGE
         picture = self.shot(width).picture
         panel = image_panel("picture", 590, 34, 350, width, width * 3 // 4)
-        shown = panel.show(photograph(panel, "picture", width, width * 3 // 4), title="What becomes of it")
-        body = svg.rectangle(0, 0, 960, 590, "paper") + self._spectra() + self._electrons() + shown + self._numbers()
-        return Picture(body, 960, 590, self.title, self.description(), {"picture": jpeg(picture, 92)})
+        shown = panel.show(placed_image(panel, "picture", width, width * 3 // 4), title="What becomes of it")
+        body = self._spectra() + self._electrons() + shown + self._numbers()
+        return self.composed(590, body, attached={"picture": jpeg(picture, 92)})
 
     def _spectra(self) -> str:
         panel = plot_panel("efficiency", 70, 34, 480, 210, (380, 780), (0, 100))
@@ -163,17 +159,14 @@ class ImageSensorView(View):
         passed = per_photon / per_photon.max(axis=0)
         spectrum = illuminant(self.light)
         known = "thick" if self.model == "KAF-0400: a curve" else "thick dashed"
+        lines = [(f"ink {known}", "without filter"), *((c, f"{name} filter") for name, c in CHANNELS)]
         content = (
             between(panel, WAVELENGTHS_NM, np.zeros(len(spectrum)), 96 * spectrum / spectrum.max(), "fill-muted")
             + grid(panel)
             + curve(panel, WAVELENGTHS_NM, unfiltered, f"ink {known}")
             + "".join(curve(panel, WAVELENGTHS_NM, unfiltered * passed[:, i], c) for i, (_, c) in enumerate(CHANNELS))
             + svg.dots([panel.place((self.sensor.measured_at_nm, 100 * float(self.sensor.efficiency())))], "ink", 8)
-            + legend(
-                panel,
-                [("ink " + known, "without filter"), *((c, f"{name} filter") for name, c in CHANNELS)],
-                "bottom right",
-            )
+            + legend(panel, lines, "bottom right")
         )
         return axes(panel, "wavelength [nm]; grey: the light's spectrum", "electrons per 100 photons") + panel.show(
             content, title="Quantum efficiency", note=_MODELS[self.model].camera
@@ -197,9 +190,7 @@ class ImageSensorView(View):
             if np.isnan(electrons):
                 continue
             content += bars(panel, left, right, top[:1], f"{class_} dotted")
-            content += bars(panel, left, right, top[1:], f"wash fill-{class_}") + bars(
-                panel, left, right, top[1:], class_
-            )
+            content += "".join(bars(panel, left, right, top[1:], c) for c in (f"wash fill-{class_}", class_))
         content += self._in_words(panel, len(names))
         floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
         content += self._level(panel, self.full_well, f"full well {self.full_well:,.0f} e⁻", "orange", -6)
@@ -222,17 +213,13 @@ class ImageSensorView(View):
 
     def _level(self, panel: Panel, electrons: float, words: str, class_: str, above: float) -> str:
         y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
-        return svg.line([(0, y), (panel.width, y)], f"{class_} dashed") + svg.text(
-            (panel.width - 6, y + above), words, f"{class_} halo end"
-        )
+        line = svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
+        return line + svg.text((panel.width - 6, y + above), words, f"{class_} halo end")
 
     def _numbers(self) -> str:
-        rows = [svg.text((590, 336), "This sensor", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((590, 362 + 24 * i), name, "note"))
-            rows.append(svg.text((756, 362 + 24 * i), value, "label"))
-        rows.append(svg.paragraph((590, 548), _MODELS[self.model].source, 350))
-        return "".join(rows)
+        figures = readout(self.numbers(), (590, 362), (0, 24), (166, 0))
+        source = svg.paragraph((590, 548), _MODELS[self.model].source, 350)
+        return svg.text((590, 336), "This sensor", "title") + figures + source
 
 
 @lru_cache(maxsize=2)

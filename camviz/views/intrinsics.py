@@ -15,15 +15,17 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.matrix import matrix
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.items import closed
+from camviz.draw.matrix import intrinsic_matrix
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, Item, Label, Line, camera_body, draw_space, scene_items, space_panel
+from camviz.draw.readout import listed, readout
+from camviz.draw.space import Item, Label, Line, OrbitCamera, camera_body, scene_items, space_panel
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform
 from camviz.scenes import render, to_display
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, balloon_rim, balloon_scene, towards_balloon
-from camviz.views.base import Control, View, choice, slider, switch
+from camviz.views.base import Control, Drawn, OrbitView, choice, slider, switch
 
 GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the camera stands before it on the z axis
 BINS = 4
@@ -35,7 +37,7 @@ _HEIGHTS = {"picture space": 440, "picture space matrices": 604}
 
 
 @dataclass(frozen=True)
-class IntrinsicsView(View):
+class IntrinsicsView(OrbitView):
     """Nine numbers, the picture they make of the garden and the rays they choose.
 
     The camera looks along z, `distance` metres in front of the globe. `focal_px`, `focal_mm` and `aspect` are no state
@@ -47,6 +49,7 @@ class IntrinsicsView(View):
     """
 
     title: ClassVar[str] = "Intrinsics"
+    layouts = _HEIGHTS
 
     fx: float = slider(450.0, **_FOCAL, help="focal length in widths of a pixel")
     fy: float = slider(450.0, **_FOCAL, help="focal length in heights of a pixel")
@@ -63,14 +66,9 @@ class IntrinsicsView(View):
     width: int = 640
     height: int = 480
     millimetres: bool = True
-    eye: Eye = Eye(distance=20.5, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
+    eye: OrbitCamera = OrbitCamera(distance=20.5, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
     panels: str = "picture space matrices"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.panels not in _HEIGHTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
 
     @classmethod
     def of(cls, camera: Camera, **state: Any) -> Self:
@@ -189,9 +187,8 @@ class IntrinsicsView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         K = self.intrinsics
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         return (
             f"{self.operation}, {K.width} × {K.height} pixels: fx = {K.fx:.2f}, fy = {K.fy:.2f}, cx = {K.cx:.2f}, "
             f"cy = {K.cy:.2f}, skew = {K.skew:.2f}; {figures}."
@@ -213,12 +210,12 @@ class IntrinsicsView(View):
         picture = self.image(draft=draft)
         space, photographs = self._space_panel(draft)
         height = _HEIGHTS[self.panels]
-        body = svg.rectangle(0, 0, 960, height, "paper") + self._picture_panel() + space
+        body = self._picture_panel() + space
         if "matrices" in self.panels:
             body += self._matrices(20, 414) + self._lattice_panel() + self._numbers_column(724, 398)
         else:
             body += self._numbers_row(20, 398)
-        return Picture(body, 960, height, self.title, self.description(), {**photographs, "camera": jpeg(picture)})
+        return self.composed(height, body, attached={**photographs, "camera": jpeg(picture)})
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The picture (height, width, 3); a crop is shown within the whole, so it shows the picture as taken."""
@@ -235,7 +232,7 @@ class IntrinsicsView(View):
     def _picture_panel(self) -> str:
         panel, K = self._picture, self.intrinsics
         coarse = {"style": "image-rendering:pixelated"} if K.width < 200 else {}
-        content = photograph(panel, "camera", self.width, self.height, **coarse) + self._window()
+        content = placed_image(panel, "camera", self.width, self.height, **coarse) + self._window()
         content += self._behind() + self._globe()
         note = f"{K.width} × {K.height} pixels"
         return panel.show(content + self._principal_point(), title=f"The picture, {self.operation}", note=note)
@@ -296,7 +293,7 @@ class IntrinsicsView(View):
 
     # The rays --------------------------------------------------------------------------------------------------------
 
-    def _space_panel(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space_panel(self, draft: bool) -> Drawn:
         panel = space_panel("space", 480, 34, 460, 330)
         items = [*self._frustum(), *self._line_of_sight()]
         span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
@@ -304,11 +301,9 @@ class IntrinsicsView(View):
         eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
         scenery = scene_items(balloon_scene(), "wire")
         yours, words = self._your_rays() if self.yours else ([], "")
-        content, photographs = draw_space(panel, items + yours, eye, draft=draft, renderer="wire", scenery=scenery)
-        content += words
         label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
-        drawn = panel.show(content, title="The rays it picks out", hint="drag to turn", drag="orbit", label=label)
-        return drawn, photographs
+        seen: dict[str, Any] = {"eye": eye, "scenery": scenery, "over": words, "drag": "orbit"}
+        return self.in_space(panel, items + yours, draft, "The rays it picks out", label, **seen)
 
     def _frustum(self) -> list[Item]:
         items = camera_body(self.camera, 1.4, colour="blue")
@@ -331,12 +326,12 @@ class IntrinsicsView(View):
         name = svg.text((14, 322), "orange: your rays of the corners and the border", "orange halo")
         length = _YOURS_M / right[:, 2:]
         rim = self.camera.centre + length * right
-        frame: list[Item] = [Line(np.vstack([rim, rim[:1]]), "blue", 3.4)]
+        frame: list[Item] = [Line(closed(rim), "blue", 3.4)]
         if problem:
             return frame, svg.paragraph((14, 24), problem, 430)
         ends = self.camera.centre + length * rays
         spokes = [Line(np.array([self.camera.centre, ends[i]]), "orange", 1.8) for i in range(0, len(uv), len(uv) // 4)]
-        return [*frame, *spokes, Line(np.vstack([ends, ends[:1]]), "orange", 1.8)], name
+        return [*frame, *spokes, Line(closed(ends), "orange", 1.8)], name
 
     def _line_of_sight(self) -> list[Item]:
         """To the balloon: broken where something stands in the way."""
@@ -352,12 +347,12 @@ class IntrinsicsView(View):
 
     def _matrices(self, x: float, y: float) -> str:
         before, after = self.taken.K, self.intrinsics.K
-        left = matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before)
+        left = intrinsic_matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before)
         if self.operation == "as taken":
-            right = matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
+            right = intrinsic_matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
         else:
             changed = ~np.isclose(before, after, rtol=0, atol=1e-9)
-            right = matrix(x + 248, y, f"K, {self.operation}", after, changed)
+            right = intrinsic_matrix(x + 248, y, f"K, {self.operation}", after, changed)
         K = self.intrinsics
         u = f"u = {K.fx:.2f} x {_signed(K.skew)} y {_signed(K.cx)}"
         v = f"v = {K.fy:.2f} y {_signed(K.cy)}"
@@ -390,20 +385,13 @@ class IntrinsicsView(View):
         return panel.show(content, title="Its pixels", note=note)
 
     def _numbers_column(self, x: float, y: float) -> str:
-        rows = []
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((x, y + 40 * i), name, "note"))
-            rows.append(svg.text((x, y + 17 + 40 * i), value, "label"))
-        return "".join(rows)
+        return readout(self.numbers(), (x, y), (0, 40), (0, 17))
 
     def _numbers_row(self, x: float, y: float) -> str:
         """The figures that need no K, side by side under the pictures."""
         figures = self.numbers()
-        rows = []
-        for i, name in enumerate(("field of view", "camera to globe", "red balloon")):
-            rows.append(svg.text((x + 230 * i, y), name, "note"))
-            rows.append(svg.text((x + 230 * i, y + 19), figures[name], "label"))
-        return "".join(rows)
+        shown = {name: figures[name] for name in ("field of view", "camera to globe", "red balloon")}
+        return readout(shown, (x, y), (230, 0), (0, 19))
 
     # The hands -------------------------------------------------------------------------------------------------------
 
@@ -415,12 +403,12 @@ class IntrinsicsView(View):
         if handle == "window":
             column = min(max(self.x0 + du, 0), self.width - self.width // 2)
             return self.but(x0=float(column), y0=float(min(max(self.y0 + dv, 0), self.height - self.height // 2)))
-        return self.but(eye=self.eye.orbited(dx, dy))
+        return super().dragged(handle, x, y, dx, dy)
 
     def pressed(self, handle: str, key: str) -> Self:
         """An arrow moves the principal point or the crop by eight pixels."""
-        if handle == "orbit":
-            return self.but(eye=self.eye.key(key))
+        if handle not in ("principal", "window"):
+            return super().pressed(handle, key)
         steps = {"ArrowLeft": (-8, 0), "ArrowRight": (8, 0), "ArrowUp": (0, -8), "ArrowDown": (0, 8)}
         dx, dy = np.array(steps.get(key, (0, 0))) * self._picture.scale
         return self.dragged(handle, float("nan"), float("nan"), float(dx), float(dy))

@@ -15,6 +15,7 @@ from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 from camviz.scenes.aperture import Aperture, ThinLensCamera
+from camviz.views.marks import circle
 
 HORIZON_MM = 180.0  # k: where infinity is drawn, before the lens
 BEHIND_MM = 125.0  # as much as is drawn behind it
@@ -147,7 +148,6 @@ def _cone_end(panel: Panel, lens: ThinLensCamera, depth_mm: float, class_: str) 
 
 def opening(panel: Panel, aperture: Aperture, points: Array, passes: Array) -> str:
     """The lens from behind: which of its points look at the scene, and which are stopped."""
-    turn = np.linspace(0, 2 * np.pi, 49)
-    rim = panel.place(np.stack([np.cos(turn), np.sin(turn)], axis=-1))
+    rim = panel.place(circle(49))
     through, stopped = panel.place(points[passes > 0]), panel.place(points[passes <= 0])
     return svg.line(rim, "ink") + svg.dots(through, "blue", 5) + svg.dots(stopped, "muted faint", 4)

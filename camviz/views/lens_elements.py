@@ -12,6 +12,7 @@ from camviz import optics
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice, slider
 
@@ -65,16 +66,15 @@ class LensElementsView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         return (
             f"{self.prescription.name}, {len(self.prescription.surfaces)} surfaces, light through "
             f"{100 * self.opening:.0f} % of its opening to {self.image_mm:g} mm from the axis. {figures}."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, _TALL + 152, "paper") + self._section() + self._numbers()
-        return Picture(body, 960, _TALL + 152, self.title, self.description())
+        body = self._section() + self._numbers()
+        return self.composed(_TALL + 152, body)
 
     @cached_property
     def _panel(self) -> Panel:
@@ -131,11 +131,11 @@ class LensElementsView(View):
         return outlines
 
     def _numbers(self) -> str:
-        rows = ""
-        for i, (name, value) in enumerate(self.numbers().items()):
-            x, y = 20 + 470 * (i // 3), _TALL + 66 + 26 * (i % 3)
-            rows += svg.text((x, y), name, "note") + svg.text((x + 170, y), value, "label")
-        return rows
+        figures, top = list(self.numbers().items()), _TALL + 66
+        left, right = (
+            readout(part, (x, top), (0, 26), (170, 0)) for part, x in ((figures[:3], 20), (figures[3:], 490))
+        )
+        return left + right
 
 
 def _behind(z_mm: float) -> str:

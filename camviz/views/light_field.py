@@ -13,16 +13,16 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.heat import heat_key, heat_map, heat_panel
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
+from camviz.draw.readout import listed, readout, signed
+from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.lightfields import LightField, aperture, refocus, to_microlens_image
 from camviz.scenes import to_display
 from camviz.views import garden_field, microlens_diagram
-from camviz.views.base import Control, View, choice, slider, switch
+from camviz.views.base import Control, View, answered, choice, slider, step_of, switch, without
 from camviz.views.depth_wedge import metres
 from camviz.views.marks import on_photograph, ring
 
@@ -65,6 +65,7 @@ class LightFieldView(View):
     """
 
     title: ClassVar[str] = "Light field"
+    layouts = _SLOTS
 
     slope: float = slider(0.0, _LOW, _HIGH, 0.02, unit="px", help="how far a sharp point moves from view to view")
     aperture: str = choice("full", "half", "ring", "pinhole", help="which views are summed")
@@ -84,8 +85,6 @@ class LightFieldView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in _SLOTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
         for name, size in zip(("v", "u", "row", "column"), self.views.shape, strict=False):
             value = getattr(self, name)
             if int(value) != value or not 0 <= value < size:
@@ -152,11 +151,11 @@ class LightFieldView(View):
         rows, columns, height, width = self.views.shape[:4]
         known = {
             "focused at": metres(float(field.depth(self.slope))),
-            "slope at the mark": f"{_signed(self.slope_here)} px, {metres(float(field.depth(self.slope_here)))}",
+            "slope at the mark": f"{signed(self.slope_here, 2)} px, {metres(float(field.depth(self.slope_here)))}",
         }
         if self.field is None:
             truth = float(garden_field.true_slopes(self.fence)[self.row, self.column])
-            known["in truth"] = f"{_signed(truth)} px, {metres(float(field.depth(truth)))}"
+            known["in truth"] = f"{signed(truth, 2)} px, {metres(float(field.depth(truth)))}"
             known["α"] = f"{float(field.alpha(self.slope, PITCH)):.3f}"
             known["a view blurs"] = f"{self.opening * abs(self.slope_here):.2f} px at the mark"
         return known | {
@@ -166,21 +165,16 @@ class LightFieldView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         return {name: figures[name] for name in _TOLD.get(self.panels, figures) if name in figures}
-
-    def _has(self, panel: str) -> bool:
-        return panel in self.panels.split()
 
     def _slot(self, name: str) -> tuple[float, float, float, float]:
         return _SLOTS[self.panels][0][name]
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         shown = (
-            "the slope of every pixel" if self.show == "slopes" else f"the picture for slope {_signed(self.slope)} px"
+            "the slope of every pixel" if self.show == "slopes" else f"the picture for slope {signed(self.slope, 2)} px"
         )
         fence = " behind a fence" if self.fence and self.field is None else ""
         what = "A light field" if self.field else f"The garden{fence} as a light field"
@@ -192,7 +186,7 @@ class LightFieldView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         attached: dict[str, bytes] = {}
         height = _SLOTS[self.panels][1]
-        body = [svg.rectangle(0, 0, 960, height, "paper"), self._picture_panel(attached)]
+        body = [self._picture_panel(attached)]
         if self._has("slice"):
             attached["slice"] = png(_bytes(self.light_field.views[self.v, :, self._slice_row]))
             body.append(self._slice_panel())
@@ -211,7 +205,7 @@ class LightFieldView(View):
         if self._has("yours"):
             body.append(self._your_panel(attached))
         body.append(self._numbers_block())
-        return Picture("".join(body), 960, height, self.title, self.description(), attached)
+        return self.composed(height, *body, attached=attached)
 
     # The picture and its slice ---------------------------------------------------------------------------------------
 
@@ -237,8 +231,8 @@ class LightFieldView(View):
             low, high = self.limits
             return heat_panel(panel, width, height, low, high, "px", marks, title=title, **heading)
         attached["picture"] = jpeg(self.image(), quality=90)
-        title = "One view" if self.aperture == "pinhole" else f"Refocused: shear by {_signed(self.slope)} px, sum"
-        return panel.show(photograph(panel, "picture", width, height) + marks, title=title, **heading)
+        title = "One view" if self.aperture == "pinhole" else f"Refocused: shear by {signed(self.slope, 2)} px, sum"
+        return panel.show(placed_image(panel, "picture", width, height) + marks, title=title, **heading)
 
     def _row_handle(self, left_end: Array) -> str:
         grip = svg.rectangle(left_end[0], left_end[1] - 9, 16, 18, "paper half") + svg.polygon(
@@ -375,16 +369,12 @@ class LightFieldView(View):
         return "".join(parts)
 
     def _words(self, figures: dict[str, str], x: float, y: float, step: tuple[float, float]) -> str:
-        rows = [
-            svg.text((x + i * step[0], y + i * step[1]), name, "note")
-            + svg.text((x + i * step[0] + 118, y + i * step[1]), value, "label")
-            for i, (name, value) in enumerate(figures.items())
-        ]
+        rows = readout(figures, (x, y), step, (118, 0))
         if self.yours:
-            own = f"{_signed(self._your_slope)} px" if np.isfinite(self._your_slope) else "–"
-            at = (x + len(rows) * step[0], y)
-            rows += [svg.text(at, "your slope for this depth", "note"), svg.text((at[0] + 165, y), own, "orange")]
-        return "".join(rows)
+            own = f"{signed(self._your_slope, 2)} px" if np.isfinite(self._your_slope) else "–"
+            at = (x + len(figures) * step[0], y)
+            rows += readout({"your slope for this depth": own}, at, (0, 0), (165, 0), "orange")
+        return rows
 
     # The reader's own function ---------------------------------------------------------------------------------------
 
@@ -394,9 +384,7 @@ class LightFieldView(View):
         field = self.light_field
         depths = np.append(np.geomspace(1.3, 60, 80), field.depth(self.slope))
         given = (depths, field.baseline, field.focal_length, field.focus_distance)
-        if self.yours is None:
-            return depths, np.full(depths.shape, np.nan), "No function of yours has been given."
-        return (depths, *tried(self.yours, given, depths))
+        return (depths, *answered(self.yours, given, depths))
 
     @property
     def _your_slope(self) -> float:
@@ -417,13 +405,13 @@ class LightFieldView(View):
         panel = image_panel("yours", x, y, across, width, height, tallest=tallest)
         problem, slope = self._your_slopes[2], self._your_slope
         if not problem and not abs(slope) < _STEEPEST:
-            steep = f"{_signed(slope)} px a view: so steep a shear leaves the picture."
+            steep = f"{signed(slope, 2)} px a view: so steep a shear leaves the picture."
             problem = f"Your slope for this depth is {steep if np.isfinite(slope) else 'not a finite number.'}"
         if problem:
-            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Focused by your slope")
+            return without(panel, problem, "Focused by your slope")
         attached["yours"] = jpeg(to_display(refocus(self.light_field, slope, self.mask)), quality=90)
-        note = f"sheared by {_signed(slope)} px"
-        return panel.show(photograph(panel, "yours", width, height), title="Focused by your slope", note=note)
+        note = f"sheared by {signed(slope, 2)} px"
+        return panel.show(placed_image(panel, "yours", width, height), title="Focused by your slope", note=note)
 
     # Under the pointer -----------------------------------------------------------------------------------------------
 
@@ -451,14 +439,9 @@ class LightFieldView(View):
 
     def pressed(self, handle: str, key: str) -> Self:
         if handle == "slope":
-            step = {"ArrowLeft": -1, "ArrowDown": -1, "-": -1, "ArrowRight": 1, "ArrowUp": 1, "+": 1}.get(key, 0)
-            return self.dragged("slope", 0, 0, 5.5 * step, 0)
+            return self.dragged("slope", 0, 0, 5.5 * step_of(key), 0)
         return super().pressed(handle, key)
 
 
 def _bytes(views: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(views) if views.dtype == np.uint8 else to_display(views)
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.2f}".replace("-", "−")

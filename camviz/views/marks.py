@@ -79,8 +79,13 @@ def cross(at: ArrayLike, class_: str, radius: float = 5) -> str:
 
 def ring(at: Array, class_: str, radius: float) -> str:
     """A circle around a place (2,) in the panel."""
-    turn = np.linspace(0, 2 * np.pi, 33)
-    return on_photograph([at + radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)], class_)
+    return on_photograph([at + radius * circle(33)], class_)
+
+
+def circle(samples: int) -> Array:
+    """Points (samples, 2) all around the unit circle, the first of them again at last."""
+    turn = np.linspace(0, 2 * np.pi, samples)
+    return np.stack([np.cos(turn), np.sin(turn)], axis=-1)
 
 
 def crop(image: np.ndarray, intrinsics: Intrinsics, uv: ArrayLike, size: float) -> np.ndarray:

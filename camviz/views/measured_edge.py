@@ -9,9 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from camviz.draw import panel as panels
 from camviz.draw import plot, svg
+from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed
 from camviz.optics import SlantedEdge
 from camviz.scenes import to_display
 from camviz.views.base import View
@@ -44,12 +45,11 @@ class MeasuredEdgeView(View):
     name: str = "this edge"
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, 330, "paper") + self._photograph() + self._profile() + self._curve()
+        body = self._photograph() + self._profile() + self._curve()
         light = self.edge.image / max(float(np.percentile(self.edge.image, 99)), 1e-12)
-        return Picture(body, 960, 330, self.title, self.description(), {"edge": jpeg(to_display(light))})
+        return self.composed(330, body, attached={"edge": jpeg(to_display(light))})
 
     def description(self) -> str:
-        """The figures in words and numbers."""
         edge = self.edge
         figures = {
             "mtf50_cycles_per_pixel": edge.mtf50,
@@ -57,14 +57,14 @@ class MeasuredEdgeView(View):
             "rise_10_90_pixels": edge.rise,
             "angle_deg": abs(edge.angle_deg),
         }
-        return f"{self.name}: " + "; ".join(f"{words} {value}" for words, value in written(figures).items()) + "."
+        return f"{self.name}: " + listed(written(figures)) + "."
 
     def _photograph(self) -> str:
         height, width = self.edge.image.shape
-        panel = panels.image_panel("photograph", 20, 40, 240, width, height, tallest=236)
+        panel = image_panel("photograph", 20, 40, 240, width, height, tallest=236)
         v = np.array([-0.5, height - 0.5])
         slope, intercept = self.edge.line
-        content = panels.photograph(panel, "edge", width, height)
+        content = placed_image(panel, "edge", width, height)
         content += svg.line(panel.place(np.stack([slope * v + intercept, v], axis=-1)), "orange")
         return panel.show(content, title="The edge", note=f"{abs(self.edge.angle_deg):.1f}°")
 
@@ -73,22 +73,18 @@ class MeasuredEdgeView(View):
         panel = plot.plot_panel("profile", 330, 40, 250, 236, (-reach, reach), (-0.15, 1.15))
         places, values = self.edge.edge_spread
         near = np.abs(places) <= reach
-        content = plot.grid(panel) + plot.curve(panel, places[near], values[near], "blue")
-        shown = panel.show(content, title="Across the edge", note=f"10–90 %: {self.edge.rise:.2f} px")
-        return shown + plot.axes(panel, "distance (px)", "light")
+        curve, note = plot.curve(panel, places[near], values[near], "blue"), f"10–90 %: {self.edge.rise:.2f} px"
+        return plot.plotted(panel, curve, "distance (px)", "light", title="Across the edge", note=note)
 
     def _curve(self) -> str:
         edge = self.edge
         panel = plot.plot_panel("curve", 650, 40, 290, 236, (0, 1), (0, 1.1))
         frequency, values = edge.curve
-        content = (
-            plot.grid(panel) + plot.upright(panel, 0.5, "muted dotted") + plot.curve(panel, frequency, values, "blue")
-        )
+        content = plot.upright(panel, 0.5, "muted dotted") + plot.curve(panel, frequency, values, "blue")
         if isfinite(edge.mtf50):
             at = panel.place([(0, 0.5), (edge.mtf50, 0.5), (edge.mtf50, 0)])
             content += svg.line(at, "orange dashed") + svg.dots(at[1:2], "orange", 6)
         nyquist = panel.place((0.5, 1.1))
         content += svg.text((nyquist[0] + 5, 14), "Nyquist", "note halo")
         note = f"MTF50: {edge.mtf50:.3f} ± {edge.mtf50_error:.3f}" if isfinite(edge.mtf50) else ""
-        shown = panel.show(content, title="Contrast that is left", note=note)
-        return shown + plot.axes(panel, "cycles per pixel", "MTF")
+        return plot.plotted(panel, content, "cycles per pixel", "MTF", title="Contrast that is left", note=note)

@@ -11,6 +11,7 @@ import numpy as np
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import LINEAR
 from camviz.sensors.trust import Figure
@@ -31,12 +32,11 @@ class MeasuredNoiseView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         panels = [self.transfer_panel(80, 40), self.response_panel(550, 40), self.snr_panel(80, 340)]
-        body = svg.rectangle(0, 0, 960, 612, "paper") + "".join([*panels, self.dark_panel(550, 340)])
-        return Picture(body, 960, 612, self.title, self.description())
+        body = "".join([*panels, self.dark_panel(550, 340)])
+        return self.composed(612, body)
 
     def description(self) -> str:
-        """The figures in words and numbers."""
-        known = "; ".join(f"{words} {value}" for words, value in self.numbers().items())
+        known = listed(self.numbers())
         return f"{self.name}, {len(self.measurement.levels)} levels of exposure: {known}."
 
     def numbers(self) -> dict[str, str]:
@@ -74,8 +74,7 @@ class MeasuredNoiseView(View):
         error = found.judged["linearity_error"].value
         note = f"off the line by {100 * error:.2g} % on average" if isfinite(error) else ""
         xlabel = "photons per pixel" if lit else "exposure (ms)"
-        heading = panel.show(plot.grid(panel) + marks, title="Response", note=note)
-        return heading + plot.axes(panel, xlabel, "signal (DN)")
+        return plot.plotted(panel, marks, xlabel, "signal (DN)", title="Response", note=note)
 
     def snr_panel(self, x: float, y: float) -> str:
         """Signal to noise over electrons: measured, the model, and what no sensor exceeds."""
@@ -104,8 +103,7 @@ class MeasuredNoiseView(View):
             slope = found.dark_current_e_per_s * found.gain_dn_per_e / 1000
             ends = np.array([0, panel.right])
             marks += plot.curve(panel, ends, dark.mean() + slope * (ends - exposure.mean()), "orange")
-        heading = panel.show(plot.grid(panel) + marks, title="Darkness")
-        return heading + plot.axes(panel, "exposure (ms)", "mean of dark frames (DN)")
+        return plot.plotted(panel, marks, "exposure (ms)", "mean of dark frames (DN)", title="Darkness")
 
 
 FIGURES: dict[str, tuple[str, float, str]] = {
@@ -168,7 +166,7 @@ def _dots(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
 
 def _shown(panel: Panel, marks: str, title: str, xlabel: str, ylabel: str) -> str:
     ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-    return panel.show(plot.grid(panel, *ticks) + marks, title=title) + plot.axes(panel, xlabel, ylabel, *ticks)
+    return plot.plotted(panel, marks, xlabel, ylabel, *ticks, title=title)
 
 
 def _top(values: np.ndarray) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from camviz.cameras import Intrinsics
 from camviz.draw import svg
-from camviz.draw.items import Item, Label, Line, Sheet
+from camviz.draw.items import Item, Label, Line, TexturedMesh
 from camviz.draw.panel import Panel
 from camviz.draw.space import Dots
 from camviz.lenses.base import Array, unit
@@ -97,11 +97,11 @@ def _rings(camera: Catadioptric, radius: Array, turn: Array) -> Array:
     return np.stack([scaled * np.cos(turn), scaled * np.sin(turn)], axis=-1)
 
 
-def _wearing(bowl: Array, image: Array, picture: np.ndarray) -> Sheet:
+def _wearing(bowl: Array, image: Array, picture: np.ndarray) -> TexturedMesh:
     """The mirror (m, n, 3) with its picture on it."""
-    sheet = Sheet.over(bowl, picture, 0.9)
+    sheet = TexturedMesh.over(bowl, picture, 0.9)
     uv = np.stack([0.5 + 0.5 * image[..., 0], 0.5 - 0.5 * image[..., 1]], axis=-1).reshape(-1, 2)
-    return Sheet(sheet.vertices, sheet.quads, uv, picture, 0.9)
+    return TexturedMesh(sheet.vertices, sheet.quads, uv, picture, 0.9)
 
 
 def _legs(camera: Catadioptric, xy: Array) -> Array:

@@ -16,14 +16,15 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, readout, seconds
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.sensors.statistics import slope_through_origin
 from camviz.views import garden
-from camviz.views.base import View, slider, switch
+from camviz.views.base import View, slider, step_of, switch
 
 FULL_WELL_E = 15_000.0
 WHITE_E_PER_S = 10_000.0  # electrons that a white surface frees in a second
@@ -48,6 +49,7 @@ class PhotonTransferView(View):
     """
 
     title: ClassVar[str] = "Photon transfer"
+    layouts = _HEIGHTS
 
     exposure: float = slider(-3.0, -10.0, 3.0, 0.25, unit="stops", help="0 is one second; −1 half of it")
     gain: float = slider(1.0, 1.0, 16.0, 0.5, unit="×", help="more numbers for each electron, as ISO does")
@@ -67,8 +69,6 @@ class PhotonTransferView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in _HEIGHTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _HEIGHTS))}, got {self.panels!r}")
         for name in ("gain", "frames", "bits"):
             if not getattr(self, name) >= 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -160,7 +160,7 @@ class PhotonTransferView(View):
         whole = float(np.sqrt(sum(part[0] ** 2 for part in parts.values()))) / K
         full = self._saturated_share
         return {
-            "exposure": _seconds(self.exposure_s),
+            "exposure": seconds(self.exposure_s),
             "gain K": f"{K:.4g} DN/e⁻",
             **self._fitted(pixels),
             "on the card": f"{_electrons(self.card_e)} e⁻ ± {_electrons(whole)}",
@@ -189,12 +189,11 @@ class PhotonTransferView(View):
         return min(2**self.bits - 1.0, well)
 
     def description(self, pixels: int = 3000) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told(pixels).items())
+        figures = listed(self._told(pixels))
         how = "the difference of two frames" if self.difference else "one frame"
         return f"Noise of {how}, {self.bits} bits, {self.temperature_c:g} °C, {self.frames} averaged: {figures}."
 
-    def _told(self, pixels: int) -> dict[str, str]:
+    def _told(self, pixels: int = 3000) -> dict[str, str]:
         """The figures that stand beside the panels."""
         figures = self.numbers(pixels)
         if self.panels == _EVERYTHING:
@@ -208,12 +207,14 @@ class PhotonTransferView(View):
         pixels = 1500 if draft else 3000
         dn = self.image(draft=draft)
         height = _HEIGHTS[self.panels]
-        body = svg.rectangle(0, 0, 960, height, "paper") + self._picture_panel() + self._transfer_panel(pixels)
+        body = self._picture_panel() + self._transfer_panel(pixels)
         if self.panels == _EVERYTHING:
             body += self._histogram_panel(dn) + self._numbers_column(pixels, 490, 448) + self._legend(764, 454)
         else:
             body += self._numbers_column(pixels, 20, 352) + self._legend(250, 366)
-        return Picture(body, 960, height, self.title, self.description(pixels), {"camera": jpeg(self._developed(dn))})
+        return self.composed(
+            height, body, attached={"camera": jpeg(self._developed(dn))}, described=self.description(pixels)
+        )
 
     def image(self, *, draft: bool) -> np.ndarray:
         """What the camera records of the garden with the card in it, DN (height, width)."""
@@ -231,10 +232,10 @@ class PhotonTransferView(View):
         panel = image_panel("picture", 20, 34, 380, _WIDTH, _HEIGHT)
         left, top, right, bottom = (s * n for s, n in zip(_CARD, (_WIDTH, _HEIGHT) * 2, strict=True))
         outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
-        shown = photograph(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
+        shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
         shown += svg.line(panel.place(outline), "yellow")
         note = "brightened" if self.brighten else "as recorded"
-        return panel.show(shown, title=f"The garden in {_seconds(self.exposure_s)}", note=note)
+        return panel.show(shown, title=f"The garden in {seconds(self.exposure_s)}", note=note)
 
     def _histogram_panel(self, dn: np.ndarray) -> str:
         """How many pixels have which number: the whole picture, and the card alone."""
@@ -248,9 +249,8 @@ class PhotonTransferView(View):
             shares.append(plot.bars(panel, edges[:-1], edges[1:], np.sqrt(counts / counts.max()), class_))
         legend = [("muted thick", "picture"), ("blue thick", "card")]
         yticks = [(0.0, "0"), (1.0, "most")]
-        content = plot.grid(panel, None, yticks) + "".join(shares) + plot.legend(panel, legend, "top right")
-        labels = plot.axes(panel, "digital number (DN)", "√ pixels", None, yticks)
-        return panel.show(content, title="Histogram") + labels
+        content = "".join(shares) + plot.legend(panel, legend, "top right")
+        return plot.plotted(panel, content, "digital number (DN)", "√ pixels", None, yticks, title="Histogram")
 
     @cached_property
     def _plot(self) -> Panel:
@@ -262,13 +262,12 @@ class PhotonTransferView(View):
     def _transfer_panel(self, pixels: int) -> str:
         panel = self._plot
         ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-        content = plot.grid(panel, *ticks) + self._curves(panel) + self._points(panel, pixels)
+        content = self._curves(panel) + self._points(panel, pixels)
         how = "the difference of two" if self.difference else "one frame"
         label = "Noise over signal; drag or press the arrow keys to change the exposure"
-        shown = panel.show(
-            content, title=f"Noise of {how}", hint="drag to change the exposure", drag="exposure", label=label
-        )
-        return shown + plot.axes(panel, "signal above the dark (DN)", "noise, σ (DN)", *ticks)
+        heading: dict[str, Any] = {"hint": "drag to change the exposure", "drag": "exposure", "label": label}
+        names = "signal above the dark (DN)", "noise, σ (DN)"
+        return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading)
 
     def _curves(self, panel: Panel) -> str:
         """Every kind of noise as a line of its own slope, and all together."""
@@ -321,11 +320,7 @@ class PhotonTransferView(View):
         return plot.upright(panel, at, "yellow dashed") + here + svg.dots(points, "blue", 6)
 
     def _numbers_column(self, pixels: int, x: float, y: float) -> str:
-        rows = [svg.text((x, y), "On the card", "title")]
-        for i, (name, value) in enumerate(self._told(pixels).items()):
-            rows.append(svg.text((x, y + 24 + 20 * i), name, "note"))
-            rows.append(svg.text((x + 110, y + 24 + 20 * i), value, "label"))
-        return "".join(rows)
+        return svg.text((x, y), "On the card", "title") + readout(self._told(pixels), (x, y + 24), (0, 20), (110, 0))
 
     # The exposure is dragged along the curve --------------------------------------------------------------------------
 
@@ -336,8 +331,7 @@ class PhotonTransferView(View):
         return self.but(exposure=float(np.clip(stops, *_limits("exposure"))))
 
     def pressed(self, handle: str, key: str) -> PhotonTransferView:
-        steps = {"ArrowLeft": -0.5, "ArrowDown": -0.5, "-": -0.5, "ArrowRight": 0.5, "ArrowUp": 0.5, "+": 0.5}
-        return self.but(exposure=float(np.clip(self.exposure + steps.get(key, 0), *_limits("exposure"))))
+        return self.but(exposure=float(np.clip(self.exposure + 0.5 * step_of(key), *_limits("exposure"))))
 
 
 _STYLES = {
@@ -388,7 +382,3 @@ def _card_slices(height: int, width: int) -> tuple[slice, slice]:
 
 def _electrons(count: float) -> str:
     return f"{count:,.0f}" if count >= 1000 else f"{count:.3g}"
-
-
-def _seconds(seconds: float) -> str:
-    return f"{seconds:.3g} s" if seconds >= 0.3 else f"1/{1 / seconds:.0f} s"

@@ -15,11 +15,12 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.items import closed
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, draw_space, space_panel
+from camviz.draw.readout import listed, readout, true_minus
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses import Lens, UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.panoramas.cubemap import cubemap_camera
@@ -29,14 +30,13 @@ from camviz.panoramas.reprojection import equirectangular_camera, reproject, win
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import textured_scene, to_display
 from camviz.views import garden
-from camviz.views.base import View, choice, slider
+from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
 UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))
 _DRAFT, _FINE = 160, 480  # pixels across the doughnut
-_GREY = (69, 69, 69)  # of what a picture does not show
 _COUNTED = 400  # pixels across the picture whose focal length is told
 _OF_THE_WINDOW = {"yaw_deg", "pitch_deg", "hfov_deg", "unroll", "model", "eye"}  # the mirror stands still
 _OF_THE_MIRROR = {"rig", "central", "lens", "rim_angle_deg", "missed_mm", "_doughnuts"}
@@ -60,7 +60,7 @@ _AWAY = 2.5  # metres to what a window shows, for a function that takes its dist
 
 
 @dataclass(frozen=True)
-class OmnidirectionalView(View):
+class OmnidirectionalView(OrbitView):
     """A camera that looks up into a mirror in the garden, and what can be made of its picture.
 
     A hyperbolic mirror has the shape that goes with `xi`; at 0 it is flat, at 1 it is the parabolic one. The camera
@@ -71,6 +71,7 @@ class OmnidirectionalView(View):
     """
 
     title: ClassVar[str] = "Omnidirectional camera"
+    layouts = _SLOTS
 
     xi: float = slider(0.92, 0.0, 1.0, 0.01, label="ξ", help="0 is a flat mirror, a pinhole; 1 a paraboloid")
     mirror: str = choice("hyperbolic", "parabolic", "spherical", help="only the first two have a single viewpoint")
@@ -85,12 +86,7 @@ class OmnidirectionalView(View):
     model: str = choice("mirror", "sphere", label="drawn as", help="cut along the axis: the mirror, or the sphere")
     panels: str = _ALL
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(target=(0.0, 0.3, 0.0), distance=2.7, yaw_deg=75, pitch_deg=12)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.panels not in _SLOTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _SLOTS))}, got {self.panels!r}")
+    eye: OrbitCamera = OrbitCamera(target=(0.0, 0.3, 0.0), distance=2.7, yaw_deg=75, pitch_deg=12)
 
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed; what depends on the mirror alone is kept while the window turns."""
@@ -162,7 +158,7 @@ class OmnidirectionalView(View):
             "rim": f"{self.rim_angle_deg:.0f}° from the axis",
             **model,
             **({"viewpoint": "single"} if self.central else missed),
-            "window looks": f"{self.yaw_deg:g}° right, {self.pitch_deg:g}° up".replace("-", "−"),
+            "window looks": true_minus(f"{self.yaw_deg:g}° right, {self.pitch_deg:g}° up"),
             "window is": f"{self.hfov_deg:g}° wide",
         }
 
@@ -181,19 +177,14 @@ class OmnidirectionalView(View):
         f = self.camera(_COUNTED).intrinsics.fx
         return f"u = {f:.1f} X / (Z + {self._xi:g} D), of {_COUNTED} pixels across the doughnut"
 
-    def _has(self, panel: str) -> bool:
-        return panel in self.panels.split()
-
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         if not self._has("section"):
             return {name: figures[name] for name in ("window looks", "window is")}
         return {name: text for name, text in figures.items() if self._has("window") or not name.startswith("window")}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         kind = f"{self.mirror} mirror" if self._has("section") else "mirror"
         unrolled = f" The picture is unrolled as {self.unroll}." if self._has("unrolled") else ""
         return f"A camera looks up into a {kind}: {figures}.{unrolled}"
@@ -219,7 +210,7 @@ class OmnidirectionalView(View):
         rim, blind = (side / 2 * self._share(angle) for angle in (self.rim_angle_deg, BLIND_DEG))
         y, x = np.ogrid[:side, :side]
         r2 = (x - (side - 1) / 2) ** 2 + (y - (side - 1) / 2) ** 2
-        picture[(r2 > rim**2) | (r2 < blind**2)] = _GREY
+        picture[(r2 > rim**2) | (r2 < blind**2)] = garden.NOTHING
         picture.flags.writeable = False
         return picture
 
@@ -233,7 +224,7 @@ class OmnidirectionalView(View):
         side = _DRAFT if draft else _FINE
         picture, camera = self.doughnut(side, draft=draft), self.camera(side)
         photographs = {"doughnut": jpeg(picture)}
-        body = [svg.rectangle(0, 0, 960, self._height, "paper"), self._doughnut_panel()]
+        body = [self._doughnut_panel()]
         if self._has("space"):
             space, attached = self._space_panel(picture, draft)
             photographs |= attached
@@ -251,7 +242,7 @@ class OmnidirectionalView(View):
             photographs |= attached
             body.append(yours)
         body.append(self._numbers_column())
-        return Picture("".join(body), 960, self._height, self.title, self.description(), photographs)
+        return self.composed(self._height, *body, attached=photographs)
 
     @property
     def _height(self) -> int:
@@ -274,16 +265,13 @@ class OmnidirectionalView(View):
 
     # The panels ------------------------------------------------------------------------------------------------------
 
-    def _space_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space_panel(self, picture: np.ndarray, draft: bool) -> Drawn:
         x, y, width, height = self._slot("space")
         panel = space_panel("space", x, y, width, height)
         small = cv2.resize(picture, (128, 128), interpolation=cv2.INTER_AREA)
         items = in_space(self.rig, small, self.looking, draft=draft)
-        content, photographs = draw_space(panel, items, self.eye, draft=draft, renderer="wire")
         label = "Mirror and camera in space; drag or press the arrow keys to walk around"
-        return panel.show(
-            content, title="Mirror and camera", hint="drag to turn", drag="orbit", label=label
-        ), photographs
+        return self.in_space(panel, items, draft, "Mirror and camera", label, drag="orbit")
 
     @property
     def _doughnut_box(self) -> Panel:
@@ -293,10 +281,10 @@ class OmnidirectionalView(View):
         panel, camera = self._doughnut_box, self.camera(_FINE)
         frame, colour = self.window(), "yellow thick" if self.yours else "orange"
         outline = frame.unproject(frame.intrinsics.border(12))
-        uv = camera.project(np.vstack([outline, outline[:1]]))
+        uv = camera.project(closed(outline))
         turn = np.linspace(-np.pi, np.pi, 73)
         horizon = camera.project(np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=-1))
-        seen = photograph(panel, "doughnut", _FINE, _FINE)
+        seen = placed_image(panel, "doughnut", _FINE, _FINE)
         words = svg.text((panel.width / 2, panel.height / 2 + 4), "camera", "note halo middle")
         if not self._has("window"):
             horizon_line = svg.line(panel.place(horizon), "yellow dashed thin")
@@ -315,7 +303,7 @@ class OmnidirectionalView(View):
     def _window_panel(self) -> str:
         panel = self._box("window", 320, 240)
         label = "The virtual pan-tilt-zoom window; drag or press the arrow keys to look around, + and - to zoom"
-        seen = photograph(panel, "window", 320, 240)
+        seen = placed_image(panel, "window", 320, 240)
         return panel.show(seen, title="A window in it", hint="drag to look around", drag="window", label=label)
 
     def _section_panel(self) -> str:
@@ -340,29 +328,25 @@ class OmnidirectionalView(View):
         panel = image_panel("unrolled", x, y, across, width, height, tallest=tallest)
         frame = self.window()
         outline = frame.unproject(frame.intrinsics.border(24))
-        uv = panel.place(camera.project(np.vstack([outline, outline[:1]])))
+        uv = panel.place(camera.project(closed(outline)))
         jump = np.linalg.norm(np.diff(uv, axis=0), axis=-1) > 40
         uv[1:][jump] = np.nan  # from one edge of the picture to another
-        seen = photograph(panel, "unrolled", width, height)
+        seen = placed_image(panel, "unrolled", width, height)
         title = "Unrolled: longitude and latitude" if self.unroll == "equirectangular" else "Folded out: a cube map"
         return panel.show(seen + svg.line(uv, "orange"), title=title)
 
     def _numbers_column(self) -> str:
         x, y = 784, 332 if self.panels == _ALL else 26
-        rows = [svg.text((x, y), "This camera" if self._has("section") else "This window", "title")]
-        for i, (name, figure) in enumerate(self._told().items()):
-            rows.append(svg.text((x, y + 22 + 38 * i), name, "note"))
-            rows.append(svg.text((x, y + 39 + 38 * i), figure, "label"))
-        return "".join(rows)
+        return svg.text((x, y), "This camera" if self._has("section") else "This window", "title") + readout(
+            self._told(), (x, y + 22), (0, 38), (0, 17)
+        )
 
     # The reader's own function ---------------------------------------------------------------------------------------
 
     def _your_pixels(self, garden_points: Array) -> tuple[Array, str]:
         """Where the reader's function puts points (..., 3) of the garden in the doughnut, and what is wrong with it."""
-        if self.yours is None:
-            return np.full((*garden_points.shape[:-1], 2), np.nan), "No function of yours has been given."
         points = garden_points @ np.asarray(UP.inv().as_matrix()[:3, :3]).T
-        xy, problem = tried(self.yours, (points, self._xi), points[..., :2])
+        xy, problem = answered(self.yours, (points, self._xi), points[..., :2])
         uv = self.camera(_FINE).intrinsics.to_pixels(xy)
         return np.where(np.abs(uv) < 5 * _FINE, uv, np.nan), problem
 
@@ -380,21 +364,20 @@ class OmnidirectionalView(View):
         right = self.camera(_FINE).project(np.array(lines))
         return svg.path(panel.place(right), "yellow thin") + svg.path(panel.place(yours), "orange dashed")
 
-    def _your_panel(self, picture: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _your_panel(self, picture: np.ndarray, draft: bool) -> Drawn:
         """The window once more, every pixel of it looked up where the reader's function says."""
         panel = self._box("yours", 320, 240)
         uv, problem = self._your_pixels(_AWAY * self._seen(draft).rays())
         if problem:
-            return panel.show(svg.paragraph((12, 26), problem, panel.width - 24), title="Cut by your function"), {}
-        places = (np.nan_to_num(uv, nan=-9.0) + 0.5) * (picture.shape[1] / _FINE) - 0.5
-        cut = cv2.remap(picture, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=_GREY)
-        return panel.show(photograph(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
+            return without(panel, problem, "Cut by your function"), {}
+        cut = garden.looked_up(picture, uv, _FINE)
+        return panel.show(placed_image(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
     # The hands -------------------------------------------------------------------------------------------------------
 
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> OmnidirectionalView:
-        if handle == "orbit":
-            return self.but(eye=self.eye.orbited(dx, dy))
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        if handle not in ("window", "doughnut"):
+            return super().dragged(handle, x, y, dx, dy)
         if handle == "window" or np.isnan(x):
             per_unit = self.hfov_deg / (self._slot("window")[2] if self._has("window") else 330)
             return self._looking(self.yaw_deg - per_unit * dx, self.pitch_deg + per_unit * dy)
@@ -405,16 +388,16 @@ class OmnidirectionalView(View):
         yaw, pitch = np.arctan2(ahead[0], ahead[2]), np.arctan2(-ahead[1], np.hypot(ahead[0], ahead[2]))
         return self._looking(degrees(yaw), degrees(pitch))
 
-    def pressed(self, handle: str, key: str) -> OmnidirectionalView:
-        if handle == "orbit":
-            return self.but(eye=self.eye.key(key))
+    def pressed(self, handle: str, key: str) -> Self:
+        if handle not in ("window", "doughnut"):
+            return super().pressed(handle, key)
         zoom = {"+": -4, "=": -4, "-": 4, "_": 4}.get(key, 0)
         turns = {"ArrowLeft": (-4, 0), "ArrowRight": (4, 0), "ArrowUp": (0, 4), "ArrowDown": (0, -4)}
         right, up = turns.get(key, (0, 0))
         wider = float(min(120, max(20, self.hfov_deg + zoom)))
         return self.but(hfov_deg=wider)._looking(self.yaw_deg + right, self.pitch_deg + up)
 
-    def _looking(self, yaw_deg: float, pitch_deg: float) -> OmnidirectionalView:
+    def _looking(self, yaw_deg: float, pitch_deg: float) -> Self:
         yaw = (yaw_deg + 180) % 360 - 180
         return self.but(yaw_deg=round(float(yaw), 1), pitch_deg=round(float(min(30, max(-70, pitch_deg))), 1))
 

@@ -14,6 +14,7 @@ from camviz.cameras import Camera
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
+from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
 
 Function = Callable[..., Any]
@@ -106,4 +107,4 @@ def _written(each: FromEach, picked: int, yours: bool, x: float, y: float) -> st
 
 def _pair(values: Array) -> str:
     fx, fy = (f"{value:.1f}" if np.isfinite(value) else "none" for value in values)
-    return f"fx {fx}, fy {fy}".replace("-", "−")
+    return true_minus(f"fx {fx}, fy {fy}")

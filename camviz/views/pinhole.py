@@ -15,15 +15,16 @@ import numpy as np
 
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.items import closed
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.plot import curve, plot_panel
-from camviz.draw.space import Dots, Eye, Face, Item, Label, Line, Sheet, draw_space, space_panel
+from camviz.draw.plot import axes, curve, logarithmic_grid, logs, plot_panel
+from camviz.draw.readout import listed, readout, seconds
+from camviz.draw.space import Dots, Face, Item, Label, Line, OrbitCamera, TexturedMesh, space_panel
 from camviz.poses import RigidTransform
 from camviz.scenes import render, snapshot, textured_scene, to_display
-from camviz.views.base import View, slider, switch
+from camviz.views.base import Drawn, OrbitView, answered, positive, slider, step_of, switch
 
 WALL_MM = np.array([36.0, 27.0])
 PIXELS = 480  # across the wall: 75 µm each
@@ -45,7 +46,7 @@ _POINTS = {  # of the tower, from its middle, metres: what the rays start from
 
 
 @dataclass(frozen=True)
-class PinholeView(View):
+class PinholeView(OrbitView):
     """A light-tight box with a hole, `object_m` metres from a crate with a globe on it.
 
     The picture is ray-traced, blurred by what waves make of the hole in green light, dimmed by the exposure and, with
@@ -59,6 +60,7 @@ class PinholeView(View):
     """
 
     title: ClassVar[str] = "Pinhole camera"
+    layouts = _PANELS
 
     hole_mm: float = slider(0.3, 0.05, 2.0, 0.01, label="hole d", unit="mm", help="diameter of the hole")
     depth_mm: float = slider(50.0, 15.0, 120.0, 1.0, label="depth f", unit="mm", help="from the hole to the wall")
@@ -67,17 +69,15 @@ class PinholeView(View):
     match_exposure: bool = switch(False, label="match exposure", help="expose as long as the brightness needs")
     turn_picture: bool = switch(False, label="turn the picture", help="as it hangs on the wall, or upright")
     noise: bool = switch(True, label="photon noise", help="light arrives in photons: dim pictures are grainy")
-    eye: Eye = Eye(distance=0.8, yaw_deg=46, pitch_deg=18)  # its distance counts in lengths of what there is to see
+    eye: OrbitCamera = OrbitCamera(
+        distance=0.8, yaw_deg=46, pitch_deg=18
+    )  # its distance counts in lengths of what there is to see
     panels: str = "box picture blur"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.panels not in _PANELS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, _PANELS))}, got {self.panels!r}")
-        for name in ("hole_mm", "depth_mm", "object_m", "exposure_s"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        positive(self, "hole_mm", "depth_mm", "object_m", "exposure_s")
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -128,7 +128,7 @@ class PinholeView(View):
             "f-number": f"f/{float(optics.f_number(self.hole_mm, self.depth_mm)):.0f}",
             "field of view": f"{optics.field_of_view_deg(WALL_MM[0], self.depth_mm):.1f}° across",
             **(blur if "blur" in self.panels else {}),
-            "exposure": _seconds(self.exposed_s),
+            "exposure": seconds(self.exposed_s),
             "brightness": f"{_times(self.brightness)} correct",
         }
 
@@ -138,8 +138,7 @@ class PinholeView(View):
         return f"h = f H / Z = {given} = {self._tower_image_mm:.1f} mm"
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         shown = "upright" if self._upright else "upside down, as on the wall"
         return (
             f"A hole of {self.hole_mm:g} mm, {self.depth_mm:g} mm before the wall, {self.object_m:g} m from the globe: "
@@ -161,8 +160,8 @@ class PinholeView(View):
             photographs |= more
             content = box + self._picture_panel() + self._numbers()
             content += self._blur_panel() if "blur" in self.panels else ""
-        body = svg.rectangle(0, 0, 960, height, "paper") + content
-        return Picture(body, 960, height, self.title, self.description(), photographs)
+        body = content
+        return self.composed(height, body, attached=photographs)
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -183,7 +182,9 @@ class PinholeView(View):
         )
         ends = panel.place([self._pixel(_POINTS["blue"]), self._pixel(_POINTS["orange"])])
         title = "The picture, turned upright" if self._upright else "The picture on the wall, from behind"
-        content = photograph(panel, "wall", pixels.width, pixels.height) + svg.line(ends, "yellow dashed thin") + marks
+        content = (
+            placed_image(panel, "wall", pixels.width, pixels.height) + svg.line(ends, "yellow dashed thin") + marks
+        )
         return panel.show(content, title=title, note=f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm")
 
     def _pixel(self, point: tuple[float, float, float]) -> np.ndarray:
@@ -208,14 +209,12 @@ class PinholeView(View):
     def _your_pixels(self, points: np.ndarray) -> tuple[np.ndarray, str]:
         """Where the reader's function puts points (..., 3), and what is wrong with it."""
         pixels = self.camera().intrinsics
-        if self.yours is None:
-            return np.full((*points.shape[:-1], 2), np.nan), "No function of yours has been given."
-        return tried(self.yours, (points, pixels.fx, pixels.cx, pixels.cy), points[..., :2])
+        return answered(self.yours, (points, pixels.fx, pixels.cx, pixels.cy), points[..., :2])
 
     def _outlined(self, name: str, x: float, lines: np.ndarray, colour: str, title: str, words: str = "") -> str:
         pixels = self.camera().intrinsics
         panel = image_panel(name, x, 34, 440, pixels.width, pixels.height)
-        picture = "" if words else photograph(panel, "wall", pixels.width, pixels.height)
+        picture = "" if words else placed_image(panel, "wall", pixels.width, pixels.height)
         return panel.show(picture + svg.path(panel.place(lines), colour) + words, title=title)
 
     def _pixel_numbers(self) -> str:
@@ -226,26 +225,22 @@ class PinholeView(View):
             ("principal point", f"cx = {pixels.cx:g} px, cy = {pixels.cy:g} px"),
             ("picture", f"{pixels.width} × {pixels.height} pixels, {WALL_MM[0]:g} × {WALL_MM[1]:g} mm"),
         ]
-        rows = [svg.text((20, 398), "What your function is given", "title")]
-        for i, (name, value) in enumerate(given):
-            rows.append(svg.text((20, 424 + 21 * i), name, "note"))
-            rows.append(svg.text((140, 424 + 21 * i), value, "label"))
-        rows.append(svg.text((500, 424), "crate and globe on the wall, by similar triangles:", "note"))
-        rows.append(svg.text((500, 445), self.equation(), "label"))
-        return "".join(rows)
+        similar = [("crate and globe on the wall, by similar triangles:", self.equation())]
+        title = svg.text((20, 398), "What your function is given", "title")
+        return title + readout(given, (20, 424), (0, 21), (120, 0)) + readout(similar, (500, 424), (0, 0), (0, 21))
 
     # The box ---------------------------------------------------------------------------------------------------------
 
-    def _box_panel(self, upright: np.ndarray, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _box_panel(self, upright: np.ndarray, draft: bool) -> Drawn:
         panel = space_panel("box", 20, 34, 520, 285)
         behind = ENLARGED * self.depth_mm / 1000
         extent = self.object_m + behind
         aim = (0.0, 0.0, (self.object_m - behind) / 2 - 0.08 * extent)
         eye = replace(self.eye, target=aim, distance=self.eye.distance * (extent + 2))
-        content, photographs = draw_space(panel, self._box_items(upright), eye, draft=draft, renderer="wire")
         label = "The box and the garden in space; drag or press the arrow keys to walk around"
         note = f"the box is drawn {ENLARGED} times as large"
-        return panel.show(content, title="Light in a box", note=note, drag="orbit", label=label), photographs
+        heading: dict[str, Any] = {"eye": eye, "note": note, "hint": "", "drag": "orbit"}
+        return self.in_space(panel, self._box_items(upright), draft, "Light in a box", label, **heading)
 
     def _box_items(self, upright: np.ndarray) -> list[Item]:
         """The garden as a picture in its place, the rays through the hole, and the picture they make."""
@@ -255,11 +250,11 @@ class PinholeView(View):
         stage = np.array([(-0.95, -0.72), (0.95, -0.72), (0.95, 0.72), (-0.95, 0.72)])
         scene = np.insert(stage, 2, self.object_m, axis=1)
         items: list[Item] = [
-            Sheet.over(scene[_GRID], _stage()),
-            Sheet.over(back[_GRID], upright),
-            Line(_closed(scene), "muted", 1.2),
+            TexturedMesh.over(scene[_GRID], _stage()),
+            TexturedMesh.over(back[_GRID], upright),
+            Line(closed(scene), "muted", 1.2),
             Face(front, "shade", 0.25),
-            *(Line(_closed(rim), "ink", 1.6) for rim in (front, back)),
+            *(Line(closed(rim), "ink", 1.6) for rim in (front, back)),
             *(Line(np.array([a, b]), "ink", 1.4) for a, b in zip(front, back, strict=True)),
             Line(np.array([(0, 0, -behind), (0, 0, self.object_m)]), "muted dashed", 1.0),
             Dots(np.zeros(3), "ink", 7),
@@ -278,7 +273,7 @@ class PinholeView(View):
 
     @cached_property
     def _plot(self) -> Panel:
-        return plot_panel("blur", 74, 368, 466, 164, _logs(_HOLES), _logs(_BLURS))
+        return plot_panel("blur", 74, 368, 466, 164, logs(_HOLES), logs(_BLURS))
 
     def _blur_panel(self) -> str:
         panel = self._plot
@@ -287,18 +282,19 @@ class PinholeView(View):
         airy = optics.diffraction_blur_mm(hole, self.depth_mm)
         total = optics.pinhole_blur_mm(hole, self.depth_mm, 1000 * self.object_m)
         lines = [(shadow, "orange dashed"), (airy, "green dashed"), (total, "blue thick")]
-        right, left = (panel.place(_logs((hole[i], y[i]))) for i, y in ((104, shadow), (2, airy)))
+        right, left = (panel.place(logs((hole[i], y[i]))) for i, y in ((104, shadow), (2, airy)))
         content = (
-            _log_grid(panel)
+            logarithmic_grid(panel, _HOLE_TICKS, _BLUR_TICKS)
             + "".join(curve(panel, np.log10(hole), np.log10(y), class_) for y, class_ in lines)
             + svg.text((panel.width - 10, right[1] + 36), "the hole's shadow", "orange halo end")
             + svg.text(left + (0, 34), "diffraction", "green halo")
             + svg.text(right + (-14, -8), "both together", "blue halo end")
             + self._best_mark(panel)
-            + svg.dots([panel.place(_logs((self.hole_mm, self.blur_mm)))], "red", 11)
+            + svg.dots([panel.place(logs((self.hole_mm, self.blur_mm)))], "red", 11)
         )
         label = "Blur against the hole's diameter; drag or press the arrow keys to change the hole"
-        return _log_ticks(panel) + panel.show(
+        names = "hole diameter d [mm], logarithmic", "blur [µm]"
+        return axes(panel, *names, _HOLE_TICKS, _BLUR_TICKS, aside=44) + panel.show(
             content, title="Blur on the wall", hint="drag to change the hole", drag="hole", label=label
         )
 
@@ -314,27 +310,22 @@ class PinholeView(View):
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> PinholeView:
         if handle != "hole":
-            return self.but(eye=self.eye.orbited(dx, dy))
+            return super().dragged(handle, x, y, dx, dy)
         log = np.log10(self.hole_mm) + dx / self._plot.scale[0]
         return self.but(hole_mm=float(np.clip(10**log, *_HOLES)))
 
     def pressed(self, handle: str, key: str) -> PinholeView:
         if handle != "hole":
-            return self.but(eye=self.eye.key(key))
-        step = {"ArrowLeft": -8, "ArrowDown": -8, "-": -8, "ArrowRight": 8, "ArrowUp": 8, "+": 8}.get(key, 0)
-        return self.dragged(handle, 0, 0, step, 0)
+            return super().pressed(handle, key)
+        return self.dragged(handle, 0, 0, 8 * step_of(key), 0)
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
     def _numbers(self) -> str:
         left, below = (580, 546) if "blur" in self.panels else (20, 386)  # of the blur's curve, or in its place
-        rows = [svg.text((left, 360), "This box", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((left, 386 + 21 * i), name, "note"))
-            rows.append(svg.text((left + 120, 386 + 21 * i), value, "label"))
-        rows.append(svg.text((580, below), "crate and globe, by similar triangles:", "note"))
-        rows.append(svg.text((580, below + 21), self.equation(), "label"))
-        return "".join(rows)
+        figures = readout(self.numbers(), (left, 386), (0, 21), (120, 0))
+        similar = [("crate and globe, by similar triangles:", self.equation())]
+        return svg.text((left, 360), "This box", "title") + figures + readout(similar, (580, below), (0, 0), (0, 21))
 
 
 @lru_cache(maxsize=2)
@@ -376,40 +367,8 @@ def _reach(start: np.ndarray, half: np.ndarray, behind: float) -> float:
     return float(min(behind / start[2], *sides))
 
 
-def _closed(outline: np.ndarray) -> np.ndarray:
-    return np.vstack([outline, outline[:1]])
-
-
-def _logs(pair: tuple[float, float]) -> tuple[float, float]:
-    low, high = np.log10(pair)
-    return float(low), float(high)
-
-
-_HOLE_TICKS, _BLUR_TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2), (0.1, 0.2, 0.5, 1, 2, 4)
-
-
-def _log_grid(panel: Panel) -> str:
-    across = [[(panel.left, y), (panel.right, y)] for y in np.log10(_BLUR_TICKS)]
-    upright = [[(x, panel.bottom), (x, panel.top)] for x in np.log10(_HOLE_TICKS)]
-    return svg.path([panel.place(line) for line in across + upright], "grid")
-
-
-def _log_ticks(panel: Panel) -> str:
-    bottom, left = panel.y + panel.height, panel.x
-    xs = left + panel.place([(x, panel.bottom) for x in np.log10(_HOLE_TICKS)])[:, 0]
-    ys = panel.y + panel.place([(panel.left, y) for y in np.log10(_BLUR_TICKS)])[:, 1]
-    middle, centre = left + panel.width / 2, panel.y + panel.height / 2
-    holes = [svg.text((x, bottom + 16), f"{d:g}", "tick middle") for x, d in zip(xs, _HOLE_TICKS, strict=True)]
-    blurs = [svg.text((left - 6, y + 4), f"{1000 * b:g}", "tick end") for y, b in zip(ys, _BLUR_TICKS, strict=True)]
-    names = [
-        svg.text((middle, bottom + 34), "hole diameter d [mm], logarithmic", "note middle"),
-        svg.text((left - 44, centre), "blur [µm]", "note middle", transform=f"rotate(-90 {left - 44:g} {centre:g})"),
-    ]
-    return "".join(holes + blurs + names)
-
-
-def _seconds(seconds: float) -> str:
-    return f"{seconds:.3g} s" if seconds >= 0.3 else f"1/{1 / seconds:.0f} s"
+_HOLE_TICKS = [(float(np.log10(d)), f"{d:g}") for d in (0.05, 0.1, 0.2, 0.5, 1, 2)]
+_BLUR_TICKS = [(float(np.log10(b)), f"{1000 * b:g}") for b in (0.1, 0.2, 0.5, 1, 2, 4)]
 
 
 def _times(factor: float) -> str:

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, grid, plot_panel, upright
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors.readout import bucket_brigade, row_times
-from camviz.views.base import View, choice, slider
+from camviz.views.base import View, answered, choice, slider
 
 ROWS = 480  # of the sensor: what the row time counts
 LARGE = (320, 240)  # pixels of a fine picture
@@ -56,6 +56,7 @@ class ReadoutView(View):
     """
 
     title: ClassVar[str] = "Read-out"
+    layouts = LAYOUTS
 
     readout: str = choice(
         "CMOS, rolling shutter", "CMOS, global shutter", "CCD", label="sensor", help="how charge is exposed and read"
@@ -75,8 +76,6 @@ class ReadoutView(View):
             raise ValueError(f"row_us must be positive, got {self.row_us}")
         if not 0 <= self.time <= 100:
             raise ValueError(f"time must be a share of the frame, 0 to 100 %, got {self.time}")
-        if self.panels not in LAYOUTS:
-            raise ValueError(f"panels must be one of {', '.join(map(repr, LAYOUTS))}, got {self.panels!r}")
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -119,9 +118,7 @@ class ReadoutView(View):
     @cached_property
     def your_row_s(self) -> tuple[float, str]:
         """The seconds from row to row by the reader's function, NaN without an answer, and what is wrong with it."""
-        if self.yours is None:
-            return np.nan, "No function of yours has been given."
-        answer, problem = tried(self.yours, (self.stripes, ROWS, MAINS_HZ), 0.0)
+        answer, problem = answered(self.yours, (self.stripes, ROWS, MAINS_HZ), 0.0)
         return float(answer), problem
 
     @cached_property
@@ -157,13 +154,11 @@ class ReadoutView(View):
         return {"row time, yours": f"{1e6 * row_s:.4g} µs"}
 
     def _told(self) -> dict[str, str]:
-        """The figures that the panels speak of."""
         figures = self.numbers()
         return figures if "time" in self.panels else {name: figures[name] for name in ("frame", "read so far")}
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self._told().items())
+        figures = listed(self._told())
         how = {
             "CCD": "All rows were exposed at once; their charge moves row by row into a register and along it.",
             "CMOS, global shutter": "All rows were exposed at once; each is then read through its columns' amplifiers.",
@@ -180,8 +175,7 @@ class ReadoutView(View):
         partial[read:] = (_DIM * whole[read:]).astype(np.uint8)
         height = LAYOUTS[self.panels]
         body = (
-            svg.rectangle(0, 0, 960, height, "paper")
-            + self._photo("scene", 20, "The scene at this moment", size, "moves on")
+            self._photo("scene", 20, "The scene at this moment", size, "moves on")
             + self._photo("read", 350, "The picture, as far as it is read", size)
             + self._numbers()
         )
@@ -189,7 +183,7 @@ class ReadoutView(View):
             body += self._buckets(whole)
         if "time" in self.panels:
             body += self._timing()
-        return Picture(body, 960, height, self.title, self.description(), {"scene": jpeg(now), "read": jpeg(partial)})
+        return self.composed(height, body, attached={"scene": jpeg(now), "read": jpeg(partial)})
 
     def _photo(self, name: str, x: float, title: str, size: tuple[int, int], note: str = "") -> str:
         panel = image_panel(name, x, 34, 310, *size)
@@ -198,7 +192,7 @@ class ReadoutView(View):
             line = ""
         else:
             line = svg.line([(0, place), (panel.width, place)], "orange thick")
-        return panel.show(photograph(panel, name, *size) + line, title=title, note=note)
+        return panel.show(placed_image(panel, name, *size) + line, title=title, note=note)
 
     # The charge ------------------------------------------------------------------------------------------------------
 
@@ -284,13 +278,10 @@ class ReadoutView(View):
         return marks + svg.text((panel.width - 8, 54), "dots: read, by your row time", "orange halo end")
 
     def _numbers(self) -> str:
-        rows = [svg.text((690, 26), "This read-out", "title")]
-        for i, (name, value) in enumerate(self._told().items()):
-            rows.append(svg.text((690, 50 + 44 * i), name, "note"))
-            rows.append(svg.text((690, 69 + 44 * i), value, "orange" if "yours" in name else "label"))
-        if "time" in self.panels:
-            rows.append(svg.paragraph((690, 340), _WORDS[self.readout], 250, "label", 19))
-        return "".join(rows)
+        words = svg.paragraph((690, 340), _WORDS[self.readout], 250, "label", 19) if "time" in self.panels else ""
+        return (
+            svg.text((690, 26), "This read-out", "title") + readout(self._told(), (690, 50), (0, 44), (0, 19)) + words
+        )
 
 
 def fan(u: ArrayLike, v: ArrayLike, turns: ArrayLike) -> Array:

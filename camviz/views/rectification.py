@@ -17,13 +17,14 @@ from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.heat import heat_key, heat_map, heat_panel
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, readout, true_minus
+from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.views import stereo_pair
-from camviz.views.base import View, choice, slider, switch
+from camviz.views.base import Drawn, View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
@@ -185,7 +186,7 @@ class RectificationView(View):
         now, found, score = self.stage, self.disparity_map(draft=draft), self.score(draft=draft)
         f = now.left.intrinsics.fx
         shifted = abs(now.doffs) > 0.05
-        second = f"{now.doffs:.1f} px".replace("-", "−") if shifted else f"{now.pair.baseline:.3f} m"
+        second = true_minus(f"{now.doffs:.1f} px") if shifted else f"{now.pair.baseline:.3f} m"
         figures = {"f, doffs" if shifted else "f, B": f"{f:.0f} px, {second}"}
         figures["rows differ by"] = f"{self.rows_apart():.1f} px"
         if "wedge" in self._shown:
@@ -208,7 +209,7 @@ class RectificationView(View):
 
     @staticmethod
     def _in_words(disparity: float, depth: float) -> str:
-        return f"{disparity:.1f} px: {metres(depth)}".replace("-", "−")
+        return true_minus(f"{disparity:.1f} px: {metres(depth)}")
 
     def equation(self) -> str:
         """Z = f B / d with this state's numbers."""
@@ -221,13 +222,12 @@ class RectificationView(View):
         return f"±{self.plus_minus:g} px: {metres(near)} … {metres(far)}"
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return self._described(self.numbers())
 
     def _described(self, numbers: dict[str, str]) -> str:
         way = "rectified" if self.rectify == 1 else f"{100 * self.rectify:.0f} % of the way to rectified"
         way = way if self.rectify else "as taken"
-        figures = "; ".join(f"{name} {value}" for name, value in numbers.items())
+        figures = listed(numbers)
         matched = f"{self.method}, blocks of {self.block_size:g} px, {self.disparities:g} disparities"
         said = f"The pair {way}. {figures}. Matched by {matched}."
         if "wedge" not in self._shown:
@@ -241,11 +241,9 @@ class RectificationView(View):
         if panel is None:
             return self
         pair = self.stage.pair
-        here, now, rectified = (
-            (self.uv_left, self.stage.left, pair.left)
-            if handle == "left"
-            else (self.uv_right, self.stage.right, pair.right)
-        )
+        here, now, rectified = self.uv_right, self.stage.right, pair.right
+        if handle == "left":
+            here, now, rectified = self.uv_left, self.stage.left, pair.left
         at = panel.place(here) + (panel.x + dx, panel.y + dy) if np.isnan(x) else np.array([x, y])
         uv = seen_from_there(rectified, now, panel.data(at - (panel.x, panel.y)))
         if not np.isfinite(uv).all():
@@ -267,9 +265,9 @@ class RectificationView(View):
         if self.yours is None:
             more |= dict(zip(("disparity", "second"), _maps(*self._matching(draft), self.show), strict=True))
         wedge = self._wedge_panel() if "wedge" in self._shown else ""
-        body = "".join([svg.rectangle(0, 0, 960, 590, "paper"), *panels, maps, wedge, _column(numbers)])
+        body = "".join([*panels, maps, wedge, readout(numbers, (820, 42), (0, 37), (0, 16))])
         attached |= {name: data for name, data in more.items() if f"attached:{name}" in maps}
-        return Picture(body, 960, 590, self.title, self._described(numbers), attached)
+        return self.composed(590, body, attached=attached, described=self._described(numbers))
 
     # The two pictures ------------------------------------------------------------------------------------------------
 
@@ -287,7 +285,7 @@ class RectificationView(View):
         now = self.stage.left if panel.name == "left" else self.stage.right
         size = now.intrinsics
         content = "".join([
-            photograph(panel, panel.name, size.width, size.height),
+            placed_image(panel, panel.name, size.width, size.height),
             self._pencil(panel, now),
             self._same_row(panel),
             on_photograph(self._epipolar(panel, now, np.array([self.row])), "green"),
@@ -336,7 +334,7 @@ class RectificationView(View):
         )
         return left, right
 
-    def _maps_block(self) -> tuple[str, dict[str, bytes]]:
+    def _maps_block(self) -> Drawn:
         size = self.stage.left.intrinsics
         left, right = self._map_panels()
         _, title, low, high, unit = self._second
@@ -361,7 +359,7 @@ class RectificationView(View):
         given = (found.astype(float), now.left.intrinsics.fx, now.pair.baseline, now.doffs)
         return tried(self.yours, given, found.astype(float))
 
-    def _your_maps_block(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _your_maps_block(self, draft: bool) -> Drawn:
         """The right depths, and beside them those of the reader's function."""
         size, (left, right), limits = self.stage.left.intrinsics, self._map_panels(), self._limits
         depth, problem = self.your_depth(draft=draft)
@@ -390,14 +388,6 @@ class RectificationView(View):
         return wedge_panel(place, self.stage.pair, self.disparity, self.plus_minus, farthest, notes, worth=self.worth)
 
 
-def _column(numbers: dict[str, str]) -> str:
-    rows = []
-    for i, (name, value) in enumerate(numbers.items()):
-        rows.append(svg.text((820, 42 + 37 * i), name, "note"))
-        rows.append(svg.text((820, 58 + 37 * i), value, "label"))
-    return "".join(rows)
-
-
 # What is kept once made ----------------------------------------------------------------------------------------------
 
 
@@ -409,14 +399,7 @@ def _photographs(source: Source, baseline: float, rectify: float, side: int) -> 
 
 @lru_cache(maxsize=4)
 def _maps(
-    source: Source,
-    baseline: float,
-    rectify: float,
-    side: int,
-    method: str,
-    block: int,
-    count: int,
-    show: str,
+    source: Source, baseline: float, rectify: float, side: int, method: str, block: int, count: int, show: str
 ) -> tuple[bytes, bytes]:
     """The disparities and the second map, as PNG."""
     found = stereo_pair.disparities(source, baseline, rectify, side, method, block, count)

@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
+from camviz.draw.readout import listed, signed
 from camviz.lenses import Equirectangular
 from camviz.lenses.base import Array
 from camviz.panoramas.ring import Ring, all_round
@@ -83,10 +84,10 @@ class RingView(View):
         known = seen if np.isfinite(seen) else 1e6
         return {
             "neighbours apart": f"{100 * self.ring.baseline:.1f} cm",
-            "parallax at 1 m": _signed(self.parallax_px(1.0)),
-            "parallax at 3 m": _signed(self.parallax_px(3.0)),
-            "parallax at 10 m": _signed(self.parallax_px(10.0)),
-            there: _signed(self.parallax_px(known)),
+            "parallax at 1 m": _pixels(self.parallax_px(1.0)),
+            "parallax at 3 m": _pixels(self.parallax_px(3.0)),
+            "parallax at 10 m": _pixels(self.parallax_px(10.0)),
+            there: _pixels(self.parallax_px(known)),
         }
 
     def equation(self) -> str:
@@ -94,8 +95,7 @@ class RingView(View):
         return f"far away: b (1/Z − 1/S) = {self.ring.baseline:.3f} m × (1/Z − 1/{self.stitched_m:g} m) radians"
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         joined = f"faded over {self.overlap:.0%} of each part" if self.overlap else "cut at the seams"
         return (
             f"{self.cameras} cameras on a ring of {self.ring.radius:g} m, stitched for {self.stitched_m:g} m, "
@@ -115,15 +115,9 @@ class RingView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         panorama = self.panorama(draft=draft)
         photographs = {"panorama": jpeg(panorama, 90), "loupe": jpeg(self.loupe(draft=draft), 90)}
-        body = [
-            svg.rectangle(0, 0, 960, 544, "paper"),
-            self._panorama_panel(),
-            self._plan_panel(),
-            self._loupe_panel(),
-            self._plot_panel(),
-            svg.text((20, 536), self.equation(), "note"),
-        ]
-        return Picture("".join(body), 960, 544, self.title, self.description(), photographs)
+        below = self._plan_panel(), self._loupe_panel(), self._plot_panel()
+        words = svg.text((20, 536), self.equation(), "note")
+        return self.composed(544, self._panorama_panel(), *below, words, attached=photographs)
 
     def _panorama_panel(self) -> str:
         pixels = all_round(_FINE, _UP_DEG)
@@ -135,7 +129,7 @@ class RingView(View):
         half = _LOUPE_DEG / 360 * panel.width * np.array([0.5, 0.5 * 220 / 300])
         middle = ahead + (0, panel.height * (0.5 + 0.5 * _LOUPE_DOWN_DEG / _UP_DEG))
         corners = middle + half * [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]
-        seen = photograph(panel, "panorama", pixels.width, pixels.height)
+        seen = placed_image(panel, "panorama", pixels.width, pixels.height)
         return panel.show(
             seen + lines + svg.line(corners, "yellow"),
             title="The stitched panorama",
@@ -154,9 +148,7 @@ class RingView(View):
 
     def _loupe_panel(self) -> str:
         panel = Panel("loupe", 300, 292, 300, 220, 0, 300, 0, 220)
-        seam = svg.segments([(150, 0)], [(150, 14)], "orange thick") + svg.segments(
-            [(150, 206)], [(150, 220)], "orange thick"
-        )
+        seam = "".join(svg.segments([(150, y)], [(150, y + 14)], "orange thick") for y in (0, 206))
         there, shift = list(self.numbers().items())[-1]
         words = f"{there.removeprefix('at the seam ahead, ')}: {shift}"
         return panel.show(svg.image("loupe", 0, 0, 300, 220) + seam, title="At the seam ahead", note=words)
@@ -208,8 +200,8 @@ class RingView(View):
         return self.dragged(handle, 0, 0, {"ArrowLeft": -5, "ArrowRight": 5}.get(key, 0), 0)
 
 
-def _signed(px: Array | float) -> str:
-    return f"{float(px):+.1f} px".replace("-", "−")
+def _pixels(px: Array | float) -> str:
+    return f"{signed(float(px), 1)} px"
 
 
 @lru_cache(maxsize=2)

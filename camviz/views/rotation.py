@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.picture import Picture
-from camviz.draw.space import Dots, Eye, Item, Label, Line, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.readout import decimal, vector
+from camviz.draw.space import Dots, Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
-from camviz.views.base import View, slider
+from camviz.views.base import OrbitView, slider
+from camviz.views.marks import circle
 
 _RINGS = (  # name and colour of the turn, radius of its ring, and the axis at right angles to the ring's plane
     ("yaw", "green", 1.0, 2),
@@ -27,7 +29,7 @@ _BODY = Intrinsics.from_fov(640, 480, 60)
 
 
 @dataclass(frozen=True)
-class RotationView(View):
+class RotationView(OrbitView):
     """A camera held by three rings, each turning inside the one before: yaw about y, pitch about x, roll about z.
 
     The outer ring turns about the world's vertical and carries the axis of pitch, the middle one carries the axis of
@@ -39,7 +41,7 @@ class RotationView(View):
     yaw_deg: float = slider(30.0, -180, 180, 1.0, label="yaw", unit="°", help="of the outer ring, to the right")
     pitch_deg: float = slider(20.0, -90, 90, 1.0, label="pitch", unit="°", help="of the middle ring, up")
     roll_deg: float = slider(10.0, -180, 180, 1.0, label="roll", unit="°", help="of the inner ring, clockwise")
-    eye: Eye = Eye(distance=4.3, yaw_deg=-35, pitch_deg=22)
+    eye: OrbitCamera = OrbitCamera(distance=4.3, yaw_deg=-35, pitch_deg=22)
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
@@ -80,25 +82,22 @@ class RotationView(View):
         return bool(self.numbers()["lock_deg"] < 0.5)
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         state = "They lie in one line: gimbal lock." if self.locked else "The three turns are independent."
         return (
-            f"Yaw {_signed(self.yaw_deg, 0)}°, pitch {_signed(self.pitch_deg, 0)}°, roll {_signed(self.roll_deg, 0)}°; "
-            f"rotation vector {_row(n['rotation_vector'])}, an angle of {n['angle_deg']:.1f}°; "
-            f"quaternion (x, y, z, w) {_row(n['quaternion'])}. "
-            f"The axes of yaw and roll are {n['lock_deg']:.0f}° apart. {state}"
+            f"Yaw {decimal(self.yaw_deg, 0)}°, pitch {decimal(self.pitch_deg, 0)}°, roll {decimal(self.roll_deg, 0)}°; "
+            f"rotation vector {_row(n['rotation_vector'])}, an angle of {n['angle_deg']:.1f}°; quaternion (x, y, z, w) "
+            f"{_row(n['quaternion'])}. The axes of yaw and roll are {n['lock_deg']:.0f}° apart. {state}"
         )
 
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
         panel = space_panel("rings", 20, 34, 520, 420)
-        content, attached = draw_space(panel, self._items(), self.eye, draft=draft, renderer="wire")
         label = "The rings in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        space = panel.show(content, title="Three rings hold a camera", hint="drag to turn", drag="eye", label=label)
-        body = svg.rectangle(0, 0, 960, 470, "paper") + space + self._numbers_panel()
-        return Picture(body, 960, 470, self.title, self.description(), attached)
+        space, attached = self.in_space(panel, self._items(), draft, "Three rings hold a camera", label)
+        body = space + self._numbers_panel()
+        return self.composed(470, body, attached=attached)
 
     def _items(self) -> list[Item]:
         camera = Camera(_BODY, world_from_cam=RigidTransform.from_rotation(self.rotation))
@@ -133,26 +132,11 @@ class RotationView(View):
             y += 34 if name and value is not rows[-3][1] else 20
         return svg.text((570, 26), "The same, written in every way", "title") + words
 
-    # Touch -----------------------------------------------------------------------------------------------------------
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
-
 
 def _ring(world_from_ring: Rotation, radius: float, across: int) -> Array:
     """A circle (65, 3) in the plane at right angles to the ring's axis number `across`."""
-    turn = np.linspace(0, 2 * np.pi, 65)
-    points = np.insert(radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1), across, 0, axis=-1)
-    return world_from_ring.apply(points)
+    return world_from_ring.apply(np.insert(radius * circle(65), across, 0, axis=-1))
 
 
 def _row(values: ArrayLike, decimals: int = 3) -> str:
-    return "(" + ", ".join(f"{_signed(value, decimals):>{decimals + 3}}" for value in np.asarray(values)) + ")"
-
-
-def _signed(value: float, decimals: int) -> str:
-    """A number with a true minus sign, and no minus before zero."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−")
+    return vector(values, decimals, width=decimals + 3)

@@ -15,8 +15,9 @@ import numpy as np
 
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, png
+from camviz.draw.readout import listed, readout
 from camviz.optics import (
     airy_radius_um,
     cutoff_per_mm,
@@ -26,7 +27,7 @@ from camviz.optics import (
     pixel_transfer,
 )
 from camviz.scenes import to_display
-from camviz.views.base import View, slider, switch
+from camviz.views.base import View, positive, slider, switch
 
 FIELD_UM = (320, 240)  # of the sensor that the picture shows
 TOP_PER_MM = 260.0  # the curves' right end
@@ -65,9 +66,7 @@ class SharpnessView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("f_number", "pitch_um", "wavelength_nm"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        positive(self, "f_number", "pitch_um", "wavelength_nm")
         if self.pitch_um < 0.5:
             raise ValueError(f"pitch_um must be at least 0.5, got {self.pitch_um}")
 
@@ -122,13 +121,10 @@ class SharpnessView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
-        light = (
-            f"white light, axial colour {self.axial_um:g} µm, lateral colour {self.lateral_um:g} µm"
-            if self.coloured
-            else f"{self.wavelength_nm:g} nm"
-        )
+        figures = listed(self.numbers())
+        light = f"{self.wavelength_nm:g} nm"
+        if self.coloured:
+            light = f"white light, axial colour {self.axial_um:g} µm, lateral colour {self.lateral_um:g} µm"
         return f"A lens at f/{self.f_number:g}, {self.defocus_um:g} µm out of focus, {light}: {figures}."
 
     # What the sensor records ------------------------------------------------------------------------------------------
@@ -161,22 +157,13 @@ class SharpnessView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         height = 412 if self.yours else 392
         curves, problem = self._curves_panel()
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, height, "paper"),
-                self._picture_panel(),
-                curves,
-                self._legend(),
-                svg.text((20, 402), problem, "note"),
-                self._numbers_column(),
-            ]
-        )
+        words = self._legend(), svg.text((20, 402), problem, "note"), self._numbers_column()
         pixels = png(to_display(self.image(draft=draft)))
-        return Picture(body, 960, height, self.title, self.description(), {"sensor": pixels})
+        return self.composed(height, self._picture_panel(), curves, *words, attached={"sensor": pixels})
 
     def _picture_panel(self) -> str:
         panel = image_panel("sensor", 20, 34, 400, *FIELD_UM)
-        shown = photograph(panel, "sensor", *FIELD_UM, style="image-rendering:pixelated")
+        shown = placed_image(panel, "sensor", *FIELD_UM, style="image-rendering:pixelated")
         note = f"{FIELD_UM[0] / 1000:g} × {FIELD_UM[1] / 1000:g} mm of the sensor"
         return panel.show(shown, title="What the pixels record", note=note)
 
@@ -187,10 +174,9 @@ class SharpnessView(View):
         curves = self._colours(panel, f) if self.coloured else self._causes(panel, f)
         yours, problem = self._your_points(panel)
         nyquist = plot.upright(panel, self.nyquist_per_mm, "muted dotted")
-        shown = panel.show(
-            plot.grid(panel) + nyquist + curves + self._half(panel) + yours, title="Contrast that is left"
-        )
-        return shown + plot.axes(panel, "frequency (cycles per mm)", "MTF"), problem
+        content = nyquist + curves + self._half(panel) + yours
+        names = "frequency (cycles per mm)", "MTF"
+        return plot.plotted(panel, content, *names, title="Contrast that is left"), problem
 
     def _causes(self, panel: Panel, f: np.ndarray) -> str:
         """What each cause alone leaves, and all of them."""
@@ -236,11 +222,7 @@ class SharpnessView(View):
         return "".join(parts)
 
     def _numbers_column(self) -> str:
-        x, rows = 814, [svg.text((814, 26), "This camera", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((x, 54 + 40 * i), name, "note"))
-            rows.append(svg.text((x, 71 + 40 * i), value, "label"))
-        return "".join(rows)
+        return svg.text((814, 26), "This camera", "title") + readout(self.numbers(), (814, 54), (0, 40), (0, 17))
 
 
 @lru_cache(maxsize=2)

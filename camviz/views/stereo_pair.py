@@ -58,7 +58,7 @@ class Stage:
 
 
 @dataclass(frozen=True, eq=False)
-class Pictures:
+class StereoPictures:
     """What the two cameras of a stage see, and `distances` (height, width) along the left one's rays, NaN = unknown."""
 
     left: NDArray[np.uint8]
@@ -112,7 +112,7 @@ def _weakened(lens: Lens, share: float) -> Lens:
 
 
 @lru_cache(maxsize=4)
-def pictures(source: Source, baseline: float, rectify: float, side: int) -> Pictures:
+def pictures(source: Source, baseline: float, rectify: float, side: int) -> StereoPictures:
     """What the stage's cameras see, `side` pixels on the longer side: the originals' pictures, resampled."""
     now, taken = stage(source, baseline, rectify), _originals(source, baseline, side)
     if rectify == 0:
@@ -120,21 +120,21 @@ def pictures(source: Source, baseline: float, rectify: float, side: int) -> Pict
     left = _resampled(taken.left, now.left_original, now.left, cv2.INTER_LINEAR, _OUTSIDE)
     right = _resampled(taken.right, now.right_original, now.right, cv2.INTER_LINEAR, _OUTSIDE)
     distances = _resampled(taken.distances, now.left_original, now.left, cv2.INTER_NEAREST, np.nan)
-    return Pictures(left, right, distances)
+    return StereoPictures(left, right, distances)
 
 
 @lru_cache(maxsize=4)
-def _originals(source: Source, baseline: float, side: int) -> Pictures:
+def _originals(source: Source, baseline: float, side: int) -> StereoPictures:
     now = stage(source, baseline, 0.0)
     if source.photographs is None:
         views = [garden.taken(camera, side)[0] for camera in (now.left, now.right)]
-        return Pictures(views[0], views[1], garden.distances(now.left, side))
+        return StereoPictures(views[0], views[1], garden.distances(now.left, side))
     small = source.left.intrinsics.within(side)
     size = (small.width, small.height)
     left, right = (cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in source.photographs)
     if source.distances is None:
-        return Pictures(left, right, np.full(size[::-1], np.nan, np.float32))
-    return Pictures(left, right, cv2.resize(source.distances, size, interpolation=cv2.INTER_NEAREST))
+        return StereoPictures(left, right, np.full(size[::-1], np.nan, np.float32))
+    return StereoPictures(left, right, cv2.resize(source.distances, size, interpolation=cv2.INTER_NEAREST))
 
 
 def _resampled(image: np.ndarray, original: Camera, camera: Camera, how: int, outside: object) -> np.ndarray:

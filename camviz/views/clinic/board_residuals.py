@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.board_warp import WarpTest, warp_test
 from camviz.draw import svg
-from camviz.draw.items import Item, Label, Line, Sheet
+from camviz.draw.items import Item, Label, Line, TexturedMesh
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar
-from camviz.draw.space import Eye, draw_space, space_panel
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
-from camviz.views.base import View, slider
+from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.clinic.observations import Observations
 from camviz.views.clinic.residuals import nice
 from camviz.views.clinic.uncertainty import adjusted
@@ -25,7 +25,7 @@ from camviz.views.marks import arrows
 
 
 @dataclass(frozen=True)
-class BoardResidualsView(View):
+class BoardResidualsView(OrbitView):
     """The mean over all views of every corner's residual, in the board's own frame, and how far the board is bent.
 
     The bend is the solution's where it has one; else what the residuals ask for, corner by corner: a corner off the
@@ -40,7 +40,7 @@ class BoardResidualsView(View):
     scale: float = slider(
         100.0, 1, 1000, 1, label="arrows", unit="×", help="how much longer the arrows are than the mean"
     )
-    eye: Eye = Eye(yaw_deg=-35, pitch_deg=35)
+    eye: OrbitCamera = OrbitCamera(yaw_deg=-35, pitch_deg=35)
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "", **options: Any) -> BoardResidualsView:
@@ -106,12 +106,11 @@ class BoardResidualsView(View):
         return {
             "longest_mm": 1000 * float(np.nanmax(np.linalg.norm(self.means, axis=-1), initial=0)),
             "depth_mm": 1000 * float(np.nanmax(self.heights) - np.nanmin(self.heights)) if known else np.nan,
-            **(
-                {}
-                if warp is None
-                else {"along_rows_mm": 1000 * float(warp[0]), "along_columns_mm": 1000 * float(warp[1])}
-            ),
-        }
+        } | (
+            {}
+            if warp is None
+            else dict(zip(("along_rows_mm", "along_columns_mm"), (1000 * warp).tolist(), strict=True))
+        )
 
     def _solved(self) -> str:
         n = self.numbers()
@@ -137,26 +136,18 @@ class BoardResidualsView(View):
         )
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return (
             f"{len(self.observations)} views: the mean residual of the worst corner is "
-            f"{self.numbers()['longest_mm']:.3f} mm on the "
-            f"board. {self._solved()} Arrows {self.scale:g} times, bend {self.exaggeration:g} times as large as "
-            "they are."
+            f"{self.numbers()['longest_mm']:.3f} mm on the board. {self._solved()} Arrows {self.scale:g} times, bend "
+            f"{self.exaggeration:g} times as large as they are."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        panel, attached = self._means_panel()
         space, sheets = self._bent(draft)
-        body = (
-            svg.rectangle(0, 0, 960, 440, "paper")
-            + panel
-            + space
-            + svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
-        )
-        return Picture(body, 960, 440, self.title, self.description(), attached | sheets)
+        words = svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
+        return self.composed(440, self._means_panel(), space, words, attached=sheets)
 
-    def _means_panel(self) -> tuple[str, dict[str, bytes]]:
+    def _means_panel(self) -> str:
         seen, board = self.observations, self.observations.board
         wide, high = (board.columns + 1) * board.square_size, (board.rows + 1) * board.square_size
         scale = min(455 / wide, 320 / high)
@@ -167,13 +158,10 @@ class BoardResidualsView(View):
         grid = starts.reshape(board.rows, board.columns, 2)
         content = svg.path([*grid, *grid.swapaxes(0, 1)], "grid")
         content += arrows(starts, ends, "orange") + svg.dots(starts, "green", 4)
-        return panel.show(
-            content,
-            title=f"Mean residual on the board, × {self.scale:g}",
-            note=f"longest {self.numbers()['longest_mm']:.2g} mm",
-        ), {}
+        title, note = f"Mean residual on the board, × {self.scale:g}", f"longest {self.numbers()['longest_mm']:.2g} mm"
+        return panel.show(content, title=title, note=note)
 
-    def _bent(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _bent(self, draft: bool) -> Drawn:
         board, heights = self.observations.board, self.heights
         panel = space_panel("bent", 495, 34, 360, 320)
         if not np.isfinite(heights).any():
@@ -190,25 +178,16 @@ class BoardResidualsView(View):
         items: list[Item] = [Line(line, "muted", 1.0) for line in [*grid, *grid.swapaxes(0, 1)]]
         items += [Line(rim, "muted dashed", 1.2), Label(flat[0, 0], "first corner", "note")]
         if min(board.rows, board.columns) > 1 and np.isfinite(grid).all():
-            items.append(Sheet.over(grid, np.repeat(np.repeat(colours, 8, 0), 8, 1), 0.9))
+            items.append(TexturedMesh.over(grid, np.repeat(np.repeat(colours, 8, 0), 8, 1), 0.9))
         middle = board.corners.mean(axis=0)
         size = float(np.linalg.norm(board.corners[-1]))
-        eye = replace(
-            self.eye, target=tuple(middle.tolist()), distance=1.75 * size * self.eye.distance / Eye().distance
-        )
-        content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
+        eye = self.from_afar(middle, 1.75 * size)
         legend, bar_picture = bar(872, 64, 270, "bend-bar", shades, "mm")
         label = "The bent board in space; drag or press the arrow keys to walk around it"
-        shown = panel.show(
-            content, title=f"The board’s bend, × {self.exaggeration:g}", hint="drag to turn", drag="eye", label=label
+        shown, attached = self.in_space(
+            panel, items, draft, f"The board’s bend, × {self.exaggeration:g}", label, eye=eye
         )
         return shown + legend, attached | bar_picture
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
 
 
 def tested(adjustment: Adjustment) -> WarpTest | None:

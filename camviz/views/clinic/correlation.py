@@ -11,6 +11,7 @@ import numpy as np
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, png
+from camviz.draw.readout import signed
 from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
@@ -74,8 +75,7 @@ class CorrelationView(View):
         return [(self.names[i[k]], self.names[j[k]], float(self.correlations[i[k], j[k]])) for k in order]
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        told = "; ".join(f"{a} with {b} {_signed(r)}" for a, b, r in self.strongest()[:6])
+        told = "; ".join(f"{a} with {b} {signed(r, 2)}" for a, b, r in self.strongest()[:6])
         deviations = "; ".join(
             f"{name} ±{d:.3g}" for name, d in zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True)
         )
@@ -99,7 +99,7 @@ class CorrelationView(View):
             content += "".join(
                 svg.text(
                     place + (0, 0.35 * size),
-                    f"{r:.2f}" if self.show == "size only" else _signed(r),
+                    f"{r:.2f}" if self.show == "size only" else signed(r, 2),
                     "label middle",
                     style=f"font-size:{size:.1f}px;fill:{'#14181f' if light > 140 else '#ffffff'}",
                 )
@@ -107,20 +107,8 @@ class CorrelationView(View):
                 if np.isfinite(r)
             )
         legend, bar_picture = bar(panel.x + side + 14, 64, side - 60, "matrix-bar", shades, "r")
-        body = (
-            svg.rectangle(0, 0, 960, 590, "paper")
-            + panel.show(content, title="Correlations")
-            + legend
-            + self._names(panel, cell)
-        )
-        return Picture(
-            body + self._words(680),
-            960,
-            590,
-            self.title,
-            self.description(),
-            {"matrix": png(shades.rgba(shown)), **bar_picture},
-        )
+        body = panel.show(content, title="Correlations") + legend + self._names(panel, cell)
+        return self.composed(590, body + self._words(680), attached={"matrix": png(shades.rgba(shown)), **bar_picture})
 
     def _names(self, panel: Panel, cell: float) -> str:
         size = f"font-size:{min(12.0, max(5.0, 0.8 * cell)):.1f}px"
@@ -134,7 +122,7 @@ class CorrelationView(View):
     def _words(self, x: float) -> str:
         words = svg.text((x, 48), "The strongest pairs", "title")
         for i, (a, b, r) in enumerate(self.strongest()[:9]):
-            words += svg.text((x, 72 + 20 * i), f"{_signed(r)}", "number" + (" red" if abs(r) > _STRONG else ""))
+            words += svg.text((x, 72 + 20 * i), signed(r, 2), "number" + (" red" if abs(r) > _STRONG else ""))
             words += svg.text((x + 50, 72 + 20 * i), f"{a} – {b}", "label")
         words += svg.text((x, 280), "One standard deviation", "title")
         rows = list(zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True))
@@ -149,7 +137,3 @@ class CorrelationView(View):
             "and fx with fy always hang together."
         )
         return words + svg.paragraph((x, 520), advice, 270)
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.2f}".replace("-", "−")

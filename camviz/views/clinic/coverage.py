@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,15 @@ from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, png
 from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
-from camviz.views.base import View, choice
-from camviz.views.clinic.observations import Observations, short_names
+from camviz.views.base import Drawn, choice
+from camviz.views.clinic.observations import Observations, ObservedView, short_names
 
 _RINGS = 8
 _MOST_DOTS = 4000
 
 
 @dataclass(frozen=True)
-class CoverageView(View):
+class CoverageView(ObservedView):
     """How many corners fell on every part of the picture: the calibration knows nothing where there were none."""
 
     title: ClassVar[str] = "Coverage"
@@ -30,11 +30,6 @@ class CoverageView(View):
     observations: Observations = field(compare=False, repr=False)
     cells: str = choice("16 × 12", "8 × 6", "32 × 24", label="cells", help="how finely the picture is divided")
     count: str = choice("corners", "views", label="count", help="corners, or views that have a corner there")
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> CoverageView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls(Observations.of(calibration, camera, **options))
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
@@ -76,27 +71,25 @@ class CoverageView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n, seen = self.numbers(), self.observations
         return (
             f"{seen.used.sum()} corners in {len(seen)} views of {seen.name} touch {100 * n['share']:.0f} % of the "
-            "picture's "
-            f"{self.cells} cells and reach {100 * n['reach']:.0f} % of the way to the corner. The board was tilted by "
-            f"{n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {np.nanmin(seen.distances):.2g} m to "
+            f"picture's {self.cells} cells and reach {100 * n['reach']:.0f} % of the way to the corner. The board was "
+            f"tilted by {n['tilt_low']:.0f}° to {n['tilt_high']:.0f}° and held {np.nanmin(seen.distances):.2g} m to "
             f"{np.nanmax(seen.distances):.2g} m away."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
         heat, attached = self._map()
-        body = svg.rectangle(0, 0, 960, 412, "paper") + heat + self._radius() + self._tilt()
+        body = heat + self._radius() + self._tilt()
         n = self.numbers()
         words = (
             f"{100 * n['share']:.0f} % of the cells have a corner; the farthest corner lies "
             f"{100 * n['reach']:.0f} % of the way out."
         )
-        return Picture(body + svg.text((20, 398), words, "label"), 960, 412, self.title, self.description(), attached)
+        return self.composed(412, body + svg.text((20, 398), words, "label"), attached=attached)
 
-    def _map(self) -> tuple[str, dict[str, bytes]]:
+    def _map(self) -> Drawn:
         seen, k, counts = self.observations, self.observations.camera.intrinsics, self.counts
         panel = image_panel("coverage", 20, 34, 440, k.width, k.height, tallest=340)
         shades = Shades(0, float(max(1, counts.max())))
@@ -106,52 +99,43 @@ class CoverageView(View):
         content += svg.dots(panel.place(corners[:: max(1, len(corners) // _MOST_DOTS)]), "paper-dot", 2.5)
         content += self._figures(panel)
         legend, bar_picture = bar(panel.x + panel.width + 10, 60, panel.height - 40, "counts-bar", shades, self.count)
-        return panel.show(content, title=f"{self.count.capitalize()} in every cell", note="bare: none") + legend, {
-            "counts": png(rgba),
-            **bar_picture,
-        }
+        shown = panel.show(content, title=f"{self.count.capitalize()} in every cell", note="bare: none")
+        return shown + legend, {"counts": png(rgba), **bar_picture}
 
     def _figures(self, panel: Panel) -> str:
         """The counts as numbers, where the cells are large enough for them."""
         rows, columns = self.counts.shape
         if columns > 8:
             return ""
-        places = [
-            (x, y)
-            for y in (np.arange(rows) + 0.5) * panel.height / rows
-            for x in (np.arange(columns) + 0.5) * panel.width / columns
-        ]
         return "".join(
-            svg.text((x, y + 4), f"{n}", "label halo middle")
-            for (x, y), n in zip(places, self.counts.ravel(), strict=True)
+            svg.text(
+                ((j + 0.5) * panel.width / columns, (i + 0.5) * panel.height / rows + 4), f"{n}", "label halo middle"
+            )
+            for (i, j), n in np.ndenumerate(self.counts)
         )
 
     def _radius(self) -> str:
         edges, picture, corners = self.rings
         left, right, top = 100 * edges[:-1], 100 * edges[1:], 100 * max(picture.max(), corners.max()) * 1.3
         panel = plot.plot_panel("rings", 585, 34, 355, 120, (0, 100), (0, float(top)))
-        content = plot.grid(panel) + plot.bars(panel, left + 0.8, right - 0.8, 100 * corners, "fill-blue")
+        content = plot.bars(panel, left + 0.8, right - 0.8, 100 * corners, "fill-blue")
         steps = np.stack([np.repeat(100 * edges, 2)[1:-1], np.repeat(100 * picture, 2)], -1)
         content += svg.line(panel.place(steps), "orange thick")
         content += plot.legend(panel, [("blue thick", "corners"), ("orange thick", "the picture’s area")], "top right")
-        return panel.show(content, title="How far out") + plot.axes(
-            panel, "from the middle to the corner [%]", "share [%]"
-        )
+        names = "from the middle to the corner [%]", "share [%]"
+        return plot.plotted(panel, content, *names, title="How far out")
 
     def _tilt(self) -> str:
         seen = self.observations
         distance = seen.distances
-        high = 1.12 * float(np.nanmax(distance))
-        panel = plot.plot_panel(
-            "tilt", 585, 226, 355, 130, (0, max(60.0, 1.1 * float(np.nanmax(seen.tilts_deg)))), (0, high)
-        )
+        steepest, farthest = max(60.0, 1.1 * float(np.nanmax(seen.tilts_deg))), 1.12 * float(np.nanmax(distance))
+        panel = plot.plot_panel("tilt", 585, 226, 355, 130, (0, steepest), (0, farthest))
         points = np.stack([seen.tilts_deg, distance], axis=-1)
-        content = plot.grid(panel) + svg.dots(panel.place(points), "blue", 9)
+        content = svg.dots(panel.place(points), "blue", 9)
         if len(seen) <= 40:
             content += "".join(
                 svg.text(panel.place(p) + (6, -5), name, "tick halo")
                 for name, p in zip(short_names(seen.pictures, len(seen)), points, strict=True)
             )
-        return panel.show(content, title="How the board was held", note="one dot per view") + plot.axes(
-            panel, "tilt against the line of sight [°]", "distance [m]"
-        )
+        names = "tilt against the line of sight [°]", "distance [m]"
+        return plot.plotted(panel, content, *names, title="How the board was held", note="one dot per view")

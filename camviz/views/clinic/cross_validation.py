@@ -15,9 +15,10 @@ from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
-from camviz.views.base import View, choice
+from camviz.views.base import Drawn, View, choice
 from camviz.views.clinic.observations import Missing, short_names
 from camviz.views.clinic.uncertainty import adjusted, determined
+from camviz.views.view_bars import names_below
 
 _GRID = (30, 20)
 _PARTS = ("earlier and later", "every other")
@@ -97,7 +98,6 @@ class CrossValidationView(View):
         ]
 
     def description(self) -> str:
-        """The state in words and numbers."""
         worst = int(np.nanargmax(self.held.per_view)) if np.isfinite(self.held.per_view).any() else 0
         return (
             f"{self.camera}: {' '.join(self.sentences())} Worst view held out: {self._name(worst)}, "
@@ -106,16 +106,16 @@ class CrossValidationView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map()
-        body = svg.rectangle(0, 0, 960, 440, "paper") + shown + self._views()
+        body = shown + self._views()
         body += svg.paragraph((20, 386), "\n".join(self.sentences()), 920, "label", line=20)
-        return Picture(body, 960, 440, self.title, self.description(), attached)
+        return self.composed(440, body, attached=attached)
 
     @cached_property
     def _values(self) -> Any:
         apart, expected = self.halves.difference.length, self.halves.expected
         return {"difference": apart, "expected from noise": expected, "ratio": apart / expected}[self.show]
 
-    def _map(self) -> tuple[str, dict[str, bytes]]:
+    def _map(self) -> Drawn:
         k = self.halves.first.cameras[self.camera].intrinsics
         panel = image_panel("halves", 20, 34, 400, k.width, k.height, tallest=330)
         values = np.maximum(self._values, 1e-9)
@@ -145,14 +145,12 @@ class CrossValidationView(View):
         gap = 0.1 if n <= 60 else 0.0
         content = plot.grid(panel, xticks=[]) + plot.bars(panel, x - 0.5 + gap, x + 0.0, fitted, "fill-blue")
         content += plot.bars(panel, x + 0.0, x + 0.5 - gap, held, "fill-orange")
-        level = [(panel.left, self.held.expected_rms), (panel.right, self.held.expected_rms)]
-        content += svg.line(panel.place(level), "ink dashed")
+        content += plot.level(panel, self.held.expected_rms, "ink dashed")
         content += plot.legend(
             panel,
             [("blue thick", "fitted"), ("orange thick", "held out"), ("ink dashed", "held out, expected from noise")],
         )
-        names = short_names(self.pictures, n)
-        ticks = [(t, names[round(t) - 1]) for t in (x.tolist() if n <= 20 else plot.ticks(1, n, 10).tolist())]
+        ticks = names_below(short_names(self.pictures, n), most=20, about=10)
         return panel.show(content, title="Corners of every view") + plot.axes(panel, "view", "RMS [px]", xticks=ticks)
 
     def _name(self, view: int) -> str:

@@ -66,7 +66,6 @@ class DepthErrorView(View):
         return DepthUncertainty(depths, *parts)
 
     def description(self) -> str:
-        """The state in words and numbers."""
         depths = np.array([1.0, self.farthest / 2, self.farthest])
         found = self.uncertainty(depths)
         told = "; ".join(
@@ -83,12 +82,12 @@ class DepthErrorView(View):
         top = 1.08 * float(finite.max()) if finite.size and finite.max() > 0 else 1.0
         unit, factor = ("m", 1.0) if top > 0.5 else ("cm", 100.0) if top > 0.02 else ("mm", 1000.0)
         panel = plot.plot_panel("depth", 70, 34, 590, 280, (0, self.farthest), (0, top * factor))
-        content = plot.grid(panel)
+        content = ""
         classes = {"calibration": "blue thick", "matching": "orange thick", "total": "ink thick"}
         for name, curve in curves.items():
             content += plot.curve(panel, depths, factor * curve, classes[name])
         content += plot.legend(panel, [(classes[name], name) for name in curves])
-        axes = plot.axes(panel, "depth [m]", f"standard deviation [{unit}]")
+        names = "depth [m]", f"standard deviation [{unit}]"
         words = (
             "Both parts grow with the square of the depth: an error of the disparity or of the angle between the "
             "cameras "
@@ -98,12 +97,8 @@ class DepthErrorView(View):
             "the same "
             "for all points of a picture, so averaging does not lessen it. Model error is left out."
         )
-        body = (
-            svg.rectangle(0, 0, 960, 376, "paper")
-            + panel.show(content, title=f"{' and '.join(self.names)}, middle of the picture")
-            + axes
-        )
-        return Picture(body + svg.paragraph((690, 50), words, 255), 960, 376, self.title, self.description())
+        body = plot.plotted(panel, content, *names, title=f"{' and '.join(self.names)}, middle of the picture")
+        return self.composed(376, body + svg.paragraph((690, 50), words, 255))
 
 
 def _metres(value: float) -> str:

@@ -13,6 +13,7 @@ from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import readout
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import View, choice, slider
 from camviz.views.clinic.observations import Missing
@@ -64,12 +65,8 @@ class DifferenceView(View):
             raise Missing(f"The two calibrations cannot be compared: {error}.") from error
         typical = float(np.nanquantile(shift, 0.8)) if np.isfinite(shift).any() else 0.0
         per_pixel = 500 / first.intrinsics.width
-        return cls(
-            first,
-            second,
-            names,
-            scale=float(np.clip(nice(26 / (typical * per_pixel)), 1, 500)) if typical > 1e-9 else 1.0,
-        )
+        scale = float(np.clip(nice(26 / (typical * per_pixel)), 1, 500)) if typical > 1e-9 else 1.0
+        return cls(first, second, names, scale=scale)
 
     def compared(self, columns: int = 45, rows: int = 30) -> Difference:
         """The difference on a grid of pixels."""
@@ -103,7 +100,6 @@ class DifferenceView(View):
         )
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         moved = f" and moved by {1000 * n['shift_m']:.2g} mm" if self.distance != "infinity" else ""
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
@@ -124,11 +120,9 @@ class DifferenceView(View):
         content = colours + self._arrows(panel) + contours(panel, length, shades, " px", strong=1.0)
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
-        body = svg.rectangle(0, 0, 960, 470, "paper") + panel.show(
-            content, title=f"Points {where}", note=f"arrows × {self.scale:g}"
-        )
+        body = panel.show(content, title=f"Points {where}", note=f"arrows × {self.scale:g}")
         body += legend + self._words(panel.x + panel.width + 100)
-        return Picture(body, 960, 470, self.title, self.description(), attached | bar_picture)
+        return self.composed(470, body, attached=attached | bar_picture)
 
     def _arrows(self, panel: Panel) -> str:
         found = self.compared(15, 10)
@@ -145,14 +139,10 @@ class DifferenceView(View):
         ]
         if self.distance != "infinity":
             rows.append(("and moved by", f"{1000 * n['shift_m']:.3g} mm"))
-        words = "".join(
-            svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label")
-            for i, (a, b) in enumerate(rows)
-        )
+        words = readout(rows, (x, 60), (0, 40), (0, 18))
         told = "Turn and move are what the two sets of intrinsics imply; they are taken out, for a pose takes them up."
-        words += svg.paragraph((x, 236), f"{self.names[0]} against {self.names[1]}.", 950 - x) + svg.paragraph(
-            (x, 290), told, 950 - x
-        )
+        words += svg.paragraph((x, 236), f"{self.names[0]} against {self.names[1]}.", 950 - x)
+        words += svg.paragraph((x, 290), told, 950 - x)
         return words + svg.paragraph((x, 380), self.warning, 950 - x, "label red")
 
 

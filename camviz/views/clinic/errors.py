@@ -12,8 +12,7 @@ from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View
 from camviz.views.clinic.observations import Missing
-
-_NAMED = 16  # views whose bars have room for their figures
+from camviz.views.view_bars import bars_of, figures_on, names_below
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,6 @@ class ErrorsView(View):
         return cls(errors, name)
 
     def description(self) -> str:
-        """The state in words and numbers."""
         worst = int(np.nanargmax(self.errors))
         return (
             f"{len(self.errors)} views of {self.name}: view {worst + 1} has the largest error, "
@@ -44,18 +42,12 @@ class ErrorsView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        errors, x = self.errors, np.arange(1, len(self.errors) + 1)
-        median, gap = float(np.nanmedian(errors)), 0.12 if len(errors) <= 60 else 0.0
+        errors, median = self.errors, float(np.nanmedian(self.errors))
         limits = (0.5, len(errors) + 0.5), (0.0, 1.2 * float(max(np.nanmax(errors), 1e-9)))
         panel = plot.plot_panel("bars", 70, 34, 870, 140, *limits)
-        content = plot.grid(panel, xticks=[]) + plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, errors, "fill-blue")
-        content += svg.line(panel.place([(panel.left, median), (panel.right, median)]), "ink dashed")
-        if len(errors) <= _NAMED:
-            places = zip(x, errors, strict=True)
-            content += "".join(svg.text(panel.place(p) + (0, -4), f"{p[1]:.2f}", "tick middle halo") for p in places)
-        ticks = [(t, f"{t:g}") for t in (x.tolist() if len(x) <= _NAMED else plot.ticks(1, len(x), 16).tolist())]
+        content = plot.grid(panel, xticks=[]) + bars_of(panel, errors)
+        content += plot.level(panel, median, "ink dashed") + figures_on(panel, errors)
+        ticks = names_below([f"{i + 1}" for i in range(len(errors))])
         shown = panel.show(content, title=f"Error of every view, {self.name}", note=f"dashed: median, {median:.3g} px")
-        body = svg.rectangle(0, 0, 960, 250, "paper") + shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
-        return Picture(
-            body + svg.paragraph((20, 220), self.description(), 920), 960, 250, self.title, self.description()
-        )
+        body = shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
+        return self.composed(250, body + svg.paragraph((20, 220), self.description(), 920))

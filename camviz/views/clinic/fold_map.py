@@ -13,11 +13,12 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
+from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.lenses.base import Array
-from camviz.views.base import View, slider
+from camviz.views.base import Drawn, View, slider
 from camviz.views.distortion import DistortionView
 
 _WEAK = 0.2  # a denominator below this multiplies what is wrong with the numerator by five
@@ -74,18 +75,17 @@ class FoldView(View):
         return told
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return f"{self.name}: " + " ".join(self.sentences())
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map((24, 18) if draft else (80, 60))
-        body = svg.rectangle(0, 0, 960, 520, "paper") + shown
+        body = shown
         body += DistortionView.of(self.camera).curve_panel(570, 34, 370, 170, equation=False) + self._denominator()
         y = 434.0
         for sentence in self.sentences():
             body += svg.paragraph((20, y), sentence, 920, "label")
             y += 20
-        return Picture(body, 960, 520, self.title, self.description(), attached)
+        return self.composed(520, body, attached=attached)
 
     def resolution(self, columns: int, rows: int) -> tuple[Array, Array]:
         """Pixels (rows, columns, 2) from edge to edge, and how many pixels a degree has there (rows, columns).
@@ -94,17 +94,15 @@ class FoldView(View):
         """
         k = self.camera.intrinsics
         beyond = self.margin / 100 * k.width
-        u, v = (
-            np.linspace(-0.5 - beyond, k.width - 0.5 + beyond, columns),
-            np.linspace(-0.5 - beyond, k.height - 0.5 + beyond, rows),
-        )
+        u = np.linspace(-0.5 - beyond, k.width - 0.5 + beyond, columns)
+        v = np.linspace(-0.5 - beyond, k.height - 0.5 + beyond, rows)
         uv = np.stack(np.meshgrid(u, v), axis=-1)
         rays = self.camera.unproject(uv)
         down, right = np.gradient(rays, v, u, axis=(0, 1))
         with np.errstate(divide="ignore"):
             return uv, np.radians(1) / np.sqrt(np.linalg.norm(np.cross(right, down), axis=-1))
 
-    def _map(self, size: tuple[int, int]) -> tuple[str, dict[str, bytes]]:
+    def _map(self, size: tuple[int, int]) -> Drawn:
         k = self.camera.intrinsics
         panel = image_panel("folds", 20, 34, 420, k.width, k.height, margin=self.margin / 100 * k.width, tallest=360)
         uv, values = self.resolution(*size)
@@ -115,7 +113,7 @@ class FoldView(View):
         content = colours + contours(panel, values, shades) + self._without_ray(panel, uv, values)
         if self.margin:
             rim = panel.place(k.border(2))
-            content += svg.path([np.vstack([rim, rim[:1]])], "ink thick")
+            content += svg.path([closed(rim)], "ink thick")
         legend, bar_picture = bar(panel.x + panel.width + 12, 62, panel.height - 50, "resolution-bar", shades, "px/°")
         words = "red: no ray arrives" if not np.isfinite(values).all() else "a ray arrives everywhere"
         return panel.show(
@@ -147,23 +145,14 @@ class FoldView(View):
         r = np.linspace(0, 1.5 * n["ideal_radius"], 241)
         D = self.camera.lens.denominator(r**2)
         inside = D[r <= n["ideal_radius"]]
-        panel = plot.plot_panel(
-            "denominator",
-            570,
-            282,
-            370,
-            100,
-            (0, float(r[-1])),
-            (min(-0.1, 1.1 * float(inside.min())), min(1.5, 1.15 * float(inside.max()))),
-        )
-        content = plot.grid(panel) + svg.rectangle(
-            0, panel.place((0, _WEAK))[1], panel.width, panel.height, "wash fill-red"
-        )
+        limits = min(-0.1, 1.1 * float(inside.min())), min(1.5, 1.15 * float(inside.max()))
+        panel = plot.plot_panel("denominator", 570, 282, 370, 100, (0, float(r[-1])), limits)
+        content = svg.rectangle(0, panel.place((0, _WEAK))[1], panel.width, panel.height, "wash fill-red")
         content += plot.curve(panel, r, D, "blue thick") + plot.upright(panel, n["ideal_radius"], "green dashed")
         at = panel.place((n["weakest_at"], n["weakest"]))
         content += svg.dots([at], "red", 9) + svg.text(at + (8, -8), f"D = {n['weakest']:.3g}", "red halo")
         note = "red: too weak"
-        return panel.show(content, title="The denominator D(r²)", note=note) + plot.axes(panel, "r, ideal", "D")
+        return plot.plotted(panel, content, "r, ideal", "D", title="The denominator D(r²)", note=note)
 
 
 @lru_cache(maxsize=8)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,13 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.guidance import Candidate, next_board_poses
 from camviz.cameras import transform
 from camviz.draw import svg
-from camviz.draw.items import Face, Item, Line
-from camviz.draw.panel import image_panel, photograph
+from camviz.draw.items import Face, Item, Line, closed
+from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.space import OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import View, slider
+from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline
 from camviz.views.clinic.observations import Missing
@@ -30,7 +30,7 @@ _SIDE = 16  # points along the edge of a square, so that it bends with the lens
 
 
 @dataclass(frozen=True)
-class GuidanceView(View):
+class GuidanceView(OrbitView):
     """The boards of a calibration in space with a ghost among them, and the picture that the ghost would give.
 
     Candidate 1 lessens the mean uncertainty of projection most; the next ones are the best that look different.
@@ -43,7 +43,7 @@ class GuidanceView(View):
     camera: str = "camera"
     choice: int = slider(1, 1, _OFFERED, 1, label="candidate", help="1 lessens the uncertainty most")
     backdrop: NDArray[np.uint8] | None = field(default=None, compare=False, repr=False)
-    eye: Eye = Eye(yaw_deg=-50, pitch_deg=20)
+    eye: OrbitCamera = OrbitCamera(yaw_deg=-50, pitch_deg=20)
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "") -> GuidanceView:
@@ -84,7 +84,6 @@ class GuidanceView(View):
         ]
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return f"{self.camera}, candidate {round(self.choice)} of {len(self.candidates)}. {' '.join(self.sentences())}"
 
     @cached_property
@@ -95,17 +94,17 @@ class GuidanceView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         space, attached = self._space(draft)
         shown, pictures = self._imitate()
-        body = svg.rectangle(0, 0, 960, 432, "paper") + space + shown
+        body = space + shown
         for i, sentence in enumerate(self.sentences()):
             body += svg.text((20, 402 + 20 * i), sentence, "label")
-        return Picture(body, 960, 432, self.title, self.description(), attached | pictures)
+        return self.composed(432, body, attached=attached | pictures)
 
     @cached_property
     def _cam_from_board(self) -> RigidTransform:
         a = self.adjustment
         return a.cameras[self.camera].cam_from_world * a.first_from_board[a.posed]
 
-    def _space(self, draft: bool) -> tuple[str, dict[str, bytes]]:
+    def _space(self, draft: bool) -> Drawn:
         a, standing = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
         boards = BoardPosesView(standing, self._cam_from_board, a.board, "camera")
         size = a.board.square_size
@@ -116,35 +115,28 @@ class GuidanceView(View):
         for pose in self._cam_from_board[: 60 if len(self._cam_from_board) > 60 else None]:
             items += boards.board_items(pose, False)
         ghost = transform(self.chosen.cam_from_board, outline(a.board))
-        items += [Face(ghost, "orange", 0.25), Line(np.vstack([ghost, ghost[:1]]), "orange dashed", 2.2)]
+        items += [Face(ghost, "orange", 0.25), Line(closed(ghost), "orange dashed", 2.2)]
         items += [
             Line(transform(self.chosen.cam_from_board, line), "orange", 1.0)
             for line in _squares(a.board.columns, a.board.rows, size)
         ]
         middle = ghost.mean(axis=0)
-        target = tuple((middle / 2).tolist())
-        farthest = max(
-            float(np.linalg.norm(middle)), float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
-        )
-        eye = replace(self.eye, target=target, distance=1.6 * farthest * self.eye.distance / Eye().distance)
+        typical = float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
+        farthest = max(float(np.linalg.norm(middle)), typical)
+        eye = self.from_afar(middle / 2, 1.6 * farthest)
         panel = space_panel("guidance", 20, 34, 450, 340)
-        content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
         label = "The boards in space; drag or press the arrow keys to walk around them"
-        return panel.show(
-            content, title="Imitate the orange board", hint="drag to turn", drag="eye", label=label
-        ), attached
+        return self.in_space(panel, items, draft, "Imitate the orange board", label, eye=eye)
 
-    def _imitate(self) -> tuple[str, dict[str, bytes]]:
+    def _imitate(self) -> Drawn:
         """The picture that the ghost would give, its squares bent as the lens bends them."""
         a, camera = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
         k, board = camera.intrinsics, a.board
         panel = image_panel("imitate", 490, 34, 450, k.width, k.height, tallest=340)
         content, attached = "", {}
         if self.backdrop is not None:
-            content, attached = (
-                photograph(panel, "backdrop", k.width, k.height, class_="faint"),
-                {"backdrop": jpeg(self.backdrop)},
-            )
+            content = placed_image(panel, "backdrop", k.width, k.height, class_="faint")
+            attached = {"backdrop": jpeg(self.backdrop)}
         along = np.linspace(0, 1, _SIDE, endpoint=False)[:, None]
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
         ring = np.concatenate([p + along * (q - p) for p, q in zip(corners, np.roll(corners, -1, 0), strict=True)])
@@ -162,14 +154,8 @@ class GuidanceView(View):
             if (i + j) % 2 == 0
         ]
         content += svg.path([d for d in dark if np.isfinite(d).all()], "fill-orange", closed=True)
-        content += svg.line(np.vstack([whole, whole[:1]]), "orange thick")
+        content += svg.line(closed(whole), "orange thick")
         return panel.show(content, title="The picture it would give"), attached
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
 
 
 def unlike(ranked: tuple[Candidate, ...], adjustment: Adjustment, name: str) -> tuple[Candidate, ...]:

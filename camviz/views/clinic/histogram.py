@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import erf, ndtri
 
 from camviz.draw import plot, svg
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
-from camviz.views.base import View, choice
-from camviz.views.clinic.observations import Observations
+from camviz.views.base import choice
+from camviz.views.clinic.observations import Observations, ObservedView
 
 _BINS = 61
 
 
 @dataclass(frozen=True)
-class HistogramView(View):
+class HistogramView(ObservedView):
     """How the residuals of all used corners are spread, against a Gaussian; and quantile against quantile.
 
     The Gaussian's width comes from the middle half of the residuals, so that a few gross errors cannot hide in it.
@@ -29,11 +30,6 @@ class HistogramView(View):
 
     observations: Observations = field(compare=False, repr=False)
     component: str = choice("both", "u", "v", label="residuals", help="across the picture, down it, or both together")
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> HistogramView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls(Observations.of(calibration, camera, **options))
 
     @cached_property
     def values(self) -> Array:
@@ -65,13 +61,12 @@ class HistogramView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         which = {"u": "across the picture", "v": "down the picture"}.get(self.component, "in both directions")
-        return f"Residuals {which}: " + "; ".join(f"{name} {value}" for name, value in self.numbers().items()) + "."
+        return f"Residuals {which}: " + listed(self.numbers()) + "."
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, 330, "paper") + self._histogram() + self._quantiles() + self._words()
-        return Picture(body, 960, 330, self.title, self.description())
+        body = self._histogram() + self._quantiles() + self._words()
+        return self.composed(330, body)
 
     @property
     def _reach(self) -> float:
@@ -90,17 +85,13 @@ class HistogramView(View):
         width = edges[1] - edges[0]
         bell = np.zeros(_BINS)
         if self.sigma > 0:
-            bell = (
-                len(x)
-                * width
-                * np.exp(-0.5 * ((middle - np.median(x)) / self.sigma) ** 2)
-                / (self.sigma * np.sqrt(2 * np.pi))
-            )
+            falling = np.exp(-0.5 * ((middle - np.median(x)) / self.sigma) ** 2)
+            bell = len(x) * width * falling / (self.sigma * np.sqrt(2 * np.pi))
         panel = plot.plot_panel("histogram", 70, 34, 400, 240, (-reach, reach), (0, 1.15 * max(1.0, *count, *bell)))
-        content = plot.grid(panel) + plot.bars(panel, edges[:-1], edges[1:], count.astype(float), "fill-blue half")
+        content = plot.bars(panel, edges[:-1], edges[1:], count.astype(float), "fill-blue half")
         content += plot.curve(panel, middle, bell, "orange thick") if self.sigma > 0 else ""
         content += plot.legend(panel, [("blue thick", "residuals"), ("orange thick", "Gaussian")])
-        return panel.show(content, title="How they are spread") + plot.axes(panel, "residual [px]", "corners")
+        return plot.plotted(panel, content, "residual [px]", "corners", title="How they are spread")
 
     def _quantiles(self) -> str:
         """Sorted residuals over what a Gaussian of the same number would have: noise lies on the line."""
@@ -108,31 +99,18 @@ class HistogramView(View):
         reach = max(self._reach, 1e-9)
         sigma = self.sigma if self.sigma > 0 else 1.0
         panel = plot.plot_panel("quantiles", 545, 34, 190, 240, (-3.6, 3.6), (-reach, reach))
-        content = plot.grid(panel) + plot.curve(
-            panel, np.array([-3.6, 3.6]), 3.6 * np.array([-sigma, sigma]), "orange thick"
-        )
+        content = plot.curve(panel, np.array([-3.6, 3.6]), 3.6 * np.array([-sigma, sigma]), "orange thick")
         if len(x):
             normal = ndtri((np.arange(len(x)) + 0.5) / len(x))
-            shown = np.unique(
-                np.concatenate(
-                    [
-                        np.arange(min(40, len(x))),
-                        np.linspace(0, len(x) - 1, 160).astype(int),
-                        np.arange(max(0, len(x) - 40), len(x)),
-                    ]
-                )
-            )
+            ends = np.arange(min(40, len(x))), np.arange(max(0, len(x) - 40), len(x))
+            shown = np.unique(np.concatenate([*ends, np.linspace(0, len(x) - 1, 160).astype(int)]))
             content += svg.dots(panel.place(np.stack([normal[shown], x[shown]], -1)), "blue", 4)
-        return panel.show(content, title="Quantile by quantile") + plot.axes(
-            panel, "of a Gaussian [σ]", "residual [px]"
-        )
+        return plot.plotted(panel, content, "of a Gaussian [σ]", "residual [px]", title="Quantile by quantile")
 
     def _words(self) -> str:
-        rows = []
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((765, 48 + 38 * i), name, "note") + svg.text((765, 65 + 38 * i), value, "label"))
+        figures = readout(self.numbers(), (765, 48), (0, 38), (0, 17))
         advice = (
             "Pure noise follows the orange curve. Tails that stand off it are outliers; a flat or two-peaked "
             "shape is a model that does not fit."
         )
-        return "".join(rows) + svg.paragraph((765, 248), advice, 190)
+        return figures + svg.paragraph((765, 248), advice, 190)

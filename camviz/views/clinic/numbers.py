@@ -10,8 +10,10 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
+from camviz.draw.items import closed
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import listed, true_minus
 from camviz.views.base import View
 from camviz.views.marks import cross
 
@@ -70,8 +72,7 @@ class NumbersView(View):
         return ", ".join(told)
 
     def description(self) -> str:
-        """The state in words and numbers."""
-        return f"{self.name}: " + "; ".join(f"{name} {value}" for name, value in self.rows()) + "."
+        return f"{self.name}: " + listed(self.rows()) + "."
 
     def figure(self, *, draft: bool = False) -> Picture:
         k = self.camera.intrinsics
@@ -81,14 +82,14 @@ class NumbersView(View):
         )
         rim = panel.place(k.border(1))
         middle, axis = panel.place([((k.width - 1) / 2, (k.height - 1) / 2), (k.cx, k.cy)])
-        content = svg.polygon(rim, "wash fill-blue") + svg.path([np.vstack([rim, rim[:1]])], "muted")
+        content = svg.polygon(rim, "wash fill-blue") + svg.path([closed(rim)], "muted")
         content += cross([middle], "muted", 7) + svg.dots([axis], "orange", 9)
         side = "end" if axis[0] > 0.75 * panel.width else "" if axis[0] < 0.25 * panel.width else "middle"
         content += svg.text(axis + (0, 24 if axis[1] < middle[1] else -12), "principal point", f"orange halo {side}")
         body = panel.show(content, title=f"{self.name}: its picture", note="cross: the middle")
         y = 46.0
         for name, value in self.rows():
-            body += svg.text((380, y), name, "note") + svg.paragraph((550, y), value.replace("-", "−"), 400, "label")
+            body += svg.text((380, y), name, "note") + svg.paragraph((550, y), true_minus(value), 400, "label")
             y += 24
         height = max(290.0, y + 40)
-        return Picture(svg.rectangle(0, 0, 960, height, "paper") + body, 960, height, self.title, self.description())
+        return self.composed(height, body)

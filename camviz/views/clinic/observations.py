@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from camviz.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz.views.base import View
 
 if TYPE_CHECKING:
     from camviz.files import Calibration
@@ -78,17 +79,11 @@ class Observations:
             raise Missing(f"The file does not hold where the board was in the views of {name}.")
         if not np.isfinite(calibration.detections[name]).any():
             raise Missing(f"{name} saw no corner of the board in any view.")
-        return cls(
-            calibration.cameras[name].at(RigidTransform.identity()),
-            calibration.board,
-            np.asarray(calibration.detections[name], dtype=float),
-            calibration.cam_from_board[name],
-            calibration.set_aside.get(name),
-            calibration.pictures.get(name, ()),
-            calibration.board_warp,
-            name,
-            photographs,
-        )
+        camera = calibration.cameras[name].at(RigidTransform.identity())
+        corners, poses = np.asarray(calibration.detections[name], dtype=float), calibration.cam_from_board[name]
+        aside, pictures = calibration.set_aside.get(name), calibration.pictures.get(name, ())
+        warp = calibration.board_warp
+        return cls(camera, calibration.board, corners, poses, aside, pictures, warp, name, photographs)
 
     def __len__(self) -> int:
         return len(self.detections)
@@ -184,6 +179,20 @@ class Observations:
     def picture(self, view: int) -> str:
         """What a view is called: its picture's name, or its number."""
         return self.pictures[view] if view < len(self.pictures) else f"view {view + 1}"
+
+
+class ObservedView(View):
+    """A view of what one camera saw, its first field an `Observations`."""
+
+    @classmethod
+    def of(cls, calibration: Any, camera: str = "", **options: Any) -> Self:
+        """The view of a calibration. Raises Missing where it holds no corners or poses."""
+        return cls.about(Observations.of(calibration, camera, **options))
+
+    @classmethod
+    def about(cls, observations: Observations) -> Self:
+        """The view as it opens."""
+        return cls(observations)  # type: ignore[call-arg]
 
 
 def _root_mean(lengths: Array, chosen: NDArray[np.bool_]) -> Array:

@@ -11,26 +11,21 @@ import numpy as np
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, jpeg
-from camviz.views.base import View, slider
-from camviz.views.clinic.observations import Observations
+from camviz.views.base import Drawn, slider
+from camviz.views.clinic.observations import Observations, ObservedView
 from camviz.views.marks import arrows, crop, cross
 
 _COUNT, _COLUMNS = 12, 6
 
 
 @dataclass(frozen=True)
-class OutliersView(View):
+class OutliersView(ObservedView):
     """The twelve corners that are farthest from their projection, used or set aside, enlarged out of their pictures."""
 
     title: ClassVar[str] = "The worst corners"
 
     observations: Observations = field(compare=False, repr=False)
     patch: float = slider(24.0, 8, 96, 4, label="window", unit="px", help="how much of the picture each detail shows")
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> OutliersView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls(Observations.of(calibration, camera, **options))
 
     @cached_property
     def worst(self) -> list[tuple[int, int]]:
@@ -40,7 +35,6 @@ class OutliersView(View):
         return [divmod(int(i), lengths.shape[1]) for i in order if lengths.flat[i] > 0]
 
     def description(self) -> str:
-        """The state in words and numbers."""
         seen = self.observations
         told = [
             f"{seen.picture(view)} row {corner // seen.board.columns + 1} column {corner % seen.board.columns + 1}: "
@@ -54,7 +48,7 @@ class OutliersView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = svg.rectangle(0, 0, 960, 440, "paper"), dict[str, bytes]()
+        body, attached = "", dict[str, bytes]()
         images: dict[int, Any] = {}
         for i, (view, corner) in enumerate(self.worst):
             if view not in images:
@@ -69,9 +63,9 @@ class OutliersView(View):
         )
         if not attached:
             words += " The pictures are not at hand, so the places are bare."
-        return Picture(body + svg.text((20, 424), words, "note"), 960, 440, self.title, self.description(), attached)
+        return self.composed(440, body + svg.text((20, 424), words, "note"), attached=attached)
 
-    def _detail(self, i: int, view: int, corner: int, image: Any, x: float, y: float) -> tuple[str, dict[str, bytes]]:
+    def _detail(self, i: int, view: int, corner: int, image: Any, x: float, y: float) -> Drawn:
         seen = self.observations
         middle = np.round(seen.detections[view, corner])
         half = self.patch / 2

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
-from camviz.views.base import Control, View, slider
+from camviz.views.base import Drawn, slider
 from camviz.views.clinic.observations import Missing, Photographs, no_photographs, short_names
 from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows, clipped, on_photograph
+from camviz.views.view_bars import LABEL, ViewChooser, bars_of, figures_on, names_below
 
 if TYPE_CHECKING:
     from camviz.files import Calibration
@@ -44,11 +45,7 @@ class SharedViews:
     ) -> SharedViews:
         """The first two cameras of a calibration. Raises Missing where it has no pair, or no views that both saw."""
         names = tuple(calibration.cameras)[:2]
-        if len(names) < 2:
-            raise Missing("The file holds one camera; this needs a pair.")
-        left, right = (calibration.cameras[name] for name in names)
-        if not np.linalg.norm(right.centre - left.centre) > 0:
-            raise Missing("The file does not say how one camera stands to the other.")
+        left, right = pair_of(calibration)
         if calibration.board is None or any(name not in calibration.detections for name in names):
             raise Missing(f"The file does not hold the corners that {names[0]} and {names[1]} saw.")
         seen = [np.array(calibration.detections[name], dtype=float) for name in names]
@@ -59,15 +56,9 @@ class SharedViews:
             raise Missing(
                 f"The two cameras have {len(seen[0])} and {len(seen[1])} views: which belong together is not known."
             )
-        found = cls(
-            left,
-            right,
-            (seen[0], seen[1]),
-            calibration.board.columns,
-            (names[0], names[1]),
-            calibration.pictures.get(names[0], ()),
-            photographs,
-        )
+        pictures = calibration.pictures.get(names[0], ())
+        corners, columns = (seen[0], seen[1]), calibration.board.columns
+        found = cls(left, right, corners, columns, (names[0], names[1]), pictures, photographs)
         if not np.isfinite(found.distances[0]).any():
             raise Missing(f"No corner was seen by {names[0]} and {names[1]} in one view.")
         return found
@@ -119,7 +110,7 @@ class SharedViews:
 
 
 @dataclass(frozen=True)
-class EpipolarPairsView(View):
+class EpipolarPairsView(ViewChooser):
     """Every shared view's distance from its epipolar lines, and the chosen view's two pictures with some of the lines.
 
     Arrows lead from each corner towards its line, `scale` times as long. The arrow along the first row tells in which
@@ -149,17 +140,11 @@ class EpipolarPairsView(View):
             shared, worst + 1, float(np.clip(nice(26 / (typical * per_pixel)), 1, 300)) if typical > 1e-9 else 1.0
         )
 
-    def offered(self) -> dict[str, Control]:
-        controls = self.controls()
-        return {**controls, "view": replace(controls["view"], high=len(self.shared))}
-
     @property
-    def index(self) -> int:
-        """The place of the chosen view in the list, from 0."""
-        return min(max(round(self.view), 1), len(self.shared)) - 1
+    def count(self) -> int:
+        return len(self.shared)
 
     def description(self) -> str:
-        """The state in words and numbers."""
         shared, i = self.shared, self.index
         told = f"{shared.rms[i]:.3g} px" if np.isfinite(shared.rms[i]) else "not seen by both"
         return (
@@ -169,7 +154,7 @@ class EpipolarPairsView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = svg.rectangle(0, 0, 960, 600, "paper") + self._bars_panel(), dict[str, bytes]()
+        body, attached = self._bars_panel(), dict[str, bytes]()
         for side, camera in enumerate((self.shared.left, self.shared.right)):
             shown, pictures = self._side(side, camera)
             body, attached = body + shown, attached | pictures
@@ -177,7 +162,7 @@ class EpipolarPairsView(View):
             "Green: the line on which the other picture puts a corner. Blue arrow: the first row, from the first "
             "corner on."
         )
-        return Picture(body + svg.text((20, 588), words, "note"), 960, 600, self.title, self.description(), attached)
+        return self.composed(600, body + svg.text((20, 588), words, "note"), attached=attached)
 
     @property
     def _bars(self) -> Panel:
@@ -185,36 +170,22 @@ class EpipolarPairsView(View):
         return plot.plot_panel("pairs", 70, 34, 870, 110, (0.5, len(self.shared) + 0.5), (0, max(top, 1e-9)))
 
     def _bars_panel(self) -> str:
-        shared, panel, n = self.shared, self._bars, len(self.shared)
-        x, gap = np.arange(1, n + 1), 0.12 if n <= 60 else 0.0
-        chosen = x == self.index + 1
-        content = plot.grid(panel, xticks=[])
-        for mask, class_ in ((~chosen, "fill-blue"), (chosen, "fill-orange")):
-            content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, np.where(mask, shared.rms, np.nan), class_)
-        content += svg.line(
-            panel.place([(panel.left, shared.total_rms), (panel.right, shared.total_rms)]), "ink dashed"
-        )
-        if n <= 16:
-            content += "".join(
-                svg.text(panel.place((i, r)) + (0, -4), f"{r:.2f}", "tick middle halo")
-                for i, r in zip(x, shared.rms, strict=True)
-            )
-        names = short_names(shared.pictures, n)
-        ticks = [(t, names[round(t) - 1]) for t in (x.tolist() if n <= 16 else plot.ticks(1, n, 16).tolist())]
-        label = "One bar per shared view; click, drag or press the arrow keys to choose a view"
-        shown = panel.show(
-            content, title="Distance from the epipolar lines", drag="bars", hint="click a bar", label=label
-        )
+        shared, panel = self.shared, self._bars
+        content = plot.grid(panel, xticks=[]) + bars_of(panel, shared.rms, self.index)
+        content += plot.level(panel, shared.total_rms, "ink dashed") + figures_on(panel, shared.rms)
+        ticks = names_below(short_names(shared.pictures, len(shared)))
+        label, title = LABEL.replace("per view", "per shared view"), "Distance from the epipolar lines"
+        shown = panel.show(content, title=title, drag="bars", hint="click a bar", label=label)
         return shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
 
-    def _side(self, side: int, camera: Camera) -> tuple[str, dict[str, bytes]]:
+    def _side(self, side: int, camera: Camera) -> Drawn:
         shared, i, k = self.shared, self.index, camera.intrinsics
         panel = image_panel(shared.names[side], 20 + 470 * side, 206, 450, k.width, k.height, tallest=350)
         image = shared.photographs[side](i)
         content, attached = "", {}
         if image is not None:
             name = f"pair{side}"
-            content, attached = photograph(panel, name, k.width, k.height), {name: jpeg(image)}
+            content, attached = placed_image(panel, name, k.width, k.height), {name: jpeg(image)}
         content += self._lines(panel, side)
         corners, offsets = shared.detections[side][i], shared.offsets[side][i]
         starts = panel.place(corners)
@@ -241,14 +212,15 @@ class EpipolarPairsView(View):
         curves = twoview.epipolar_curve(cameras[1 - side], cameras[side], other, _DISTANCES)
         return on_photograph(clipped(panel, panel.place(curves)), "green thin")
 
-    # Touch -----------------------------------------------------------------------------------------------------------
 
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(view=int(np.clip(round(self._bars.data((x - self._bars.x, 0))[0]), 1, len(self.shared))))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        step = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
-        return self.but(view=min(max(self.index + 1 + step, 1), len(self.shared)))
+def pair_of(calibration: Calibration) -> tuple[Camera, Camera]:
+    """The first two cameras of a calibration. Raises Missing where there are none, or not in two places."""
+    cameras = list(calibration.cameras.values())[:2]
+    if len(cameras) < 2:
+        raise Missing("The file holds one camera; this needs a pair.")
+    if not np.linalg.norm(cameras[1].centre - cameras[0].centre) > 0:
+        raise Missing("The file does not say how one camera stands to the other.")
+    return cameras[0], cameras[1]
 
 
 def _to_line(lines: Array, uv: Array) -> Array:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
-from camviz.views.base import View, slider
-from camviz.views.clinic.observations import Observations
+from camviz.views.base import slider
+from camviz.views.clinic.observations import Observations, ObservedView
 from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows
 
@@ -23,7 +24,7 @@ _MOST_DOTS = 1500
 
 
 @dataclass(frozen=True)
-class RadiusView(View):
+class RadiusView(ObservedView):
     """Whether the residuals point outward or around the principal point somewhere, as they do under too simple a lens.
 
     Outward and around: each used corner's residual along the line from the principal point and across it, with the mean
@@ -38,12 +39,7 @@ class RadiusView(View):
     )
 
     @classmethod
-    def of(cls, calibration: Any, camera: str = "", **options: Any) -> RadiusView:
-        """The view of a calibration. Raises Missing where it holds no corners or poses."""
-        return cls.about(Observations.of(calibration, camera, **options))
-
-    @classmethod
-    def about(cls, observations: Observations) -> RadiusView:
+    def about(cls, observations: Observations) -> Self:
         """The view with arrows of a length that can be seen."""
         means = np.linalg.norm(cls(observations).cells[1], axis=-1)
         largest = float(np.nanmax(means)) if np.isfinite(means).any() else 0.0
@@ -100,26 +96,23 @@ class RadiusView(View):
         return figures
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         return (
-            f"{self.observations.used.sum()} corners of {self.observations.name}. The ring that stands out most "
-            "is off by "
-            f"{n['outward_px']:+.3f} px outward ({n['outward_errors']:.1f} standard errors) and by "
-            f"{n['around_px']:+.3f} px "
-            f"around ({n['around_errors']:.1f}). Arrows {self.scale:g} times as long as the mean residual of "
-            "their cell."
+            f"{self.observations.used.sum()} corners of {self.observations.name}. The ring that stands out most is off "
+            f"by {n['outward_px']:+.3f} px outward ({n['outward_errors']:.1f} standard errors) and by "
+            f"{n['around_px']:+.3f} px around ({n['around_errors']:.1f}). Arrows {self.scale:g} times as long as the "
+            "mean residual of their cell."
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = svg.rectangle(0, 0, 960, 400, "paper") + self._picture()
+        body = self._picture()
         for i, (name, title) in enumerate((("outward", "Outward"), ("around", "Around the principal point"))):
             body += self._plot(name, title, 1 + i, 34 + 172 * i, 128)
         advice = (
             "Noise scatters around zero. A ring's mean off zero by more than its pale bars says that the model "
             "is too simple there, or the board not flat."
         )
-        return Picture(body + svg.paragraph((20, 356), advice, 440), 960, 400, self.title, self.description())
+        return self.composed(400, body + svg.paragraph((20, 356), advice, 440))
 
     def _plot(self, name: str, title: str, part: int, y: float, height: float) -> str:
         radius, values = self.polar[0], self.polar[part]
@@ -135,8 +128,8 @@ class RadiusView(View):
         dots = np.stack([radius, np.where(np.abs(values) <= 1.1 * reach, values, np.nan)], axis=-1)
         dots = dots[:: max(1, len(dots) // _MOST_DOTS)]
         ticks = plot.ticks(panel.bottom, panel.top, 4) + 0.0
-        yticks = [(y, f"{y:.3g}".replace("-", "−")) for y in ticks.tolist()]
-        content = plot.grid(panel, yticks=yticks) + svg.dots(panel.place(dots), "muted faint", 3)
+        yticks = [(y, true_minus(f"{y:.3g}")) for y in ticks.tolist()]
+        content = svg.dots(panel.place(dots), "muted faint", 3)
         low, high = (panel.place(np.stack([middle, mean + sign * 2 * error], -1)) for sign in (-1, 1))
         content += svg.segments(low, high, "orange half", style="stroke-width:7px;stroke-linecap:butt")
         known = np.isfinite(mean)
@@ -144,9 +137,8 @@ class RadiusView(View):
             panel.place(np.stack([middle, mean], -1)), "orange", 7
         )
         label = "from the principal point [px]" if part == 2 else ""
-        return panel.show(
-            content, title=title, note="mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive"
-        ) + plot.axes(panel, label, "[px]", yticks=yticks)
+        note = "mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive"
+        return plot.plotted(panel, content, label, "[px]", None, yticks, title=title, note=note)
 
     def _picture(self) -> str:
         k = self.observations.camera.intrinsics

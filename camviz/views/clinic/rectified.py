@@ -13,22 +13,23 @@ from numpy.typing import NDArray
 from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views import garden
-from camviz.views.base import Control, View, slider
+from camviz.views.base import Control, slider
 from camviz.views.clinic.observations import Missing
-from camviz.views.clinic.pairs import SharedViews
+from camviz.views.clinic.pairs import SharedViews, pair_of
 from camviz.views.marks import on_photograph
+from camviz.views.view_bars import ViewChooser
 
 _SIDE = 480
 _STAND = RigidTransform.from_translation([-0.4, 0.0, 0.0])  # of the left camera in the garden
 
 
 @dataclass(frozen=True)
-class RectifiedView(View):
+class RectifiedView(ViewChooser):
     """A pair's two pictures after rectification, with rows across both, and how far apart the rows of corners are.
 
     Without photographs the pair stands in the virtual garden. `shared` holds the corners, where there are any.
@@ -45,27 +46,19 @@ class RectifiedView(View):
     @classmethod
     def of(cls, calibration: Any, **options: Any) -> RectifiedView:
         """The view of a calibrated pair. Raises Missing where there is none."""
-        cameras = list(calibration.cameras.values())[:2]
-        if len(cameras) < 2:
-            raise Missing("The file holds one camera; this needs a pair.")
-        if not np.linalg.norm(cameras[1].centre - cameras[0].centre) > 0:
-            raise Missing("The file does not say how one camera stands to the other.")
+        left, right = pair_of(calibration)
         try:
             shared: SharedViews | None = SharedViews.of(calibration, **options)
         except Missing:
             shared = None
-        return cls(cameras[0], cameras[1], shared)
+        return cls(left, right, shared)
 
     def offered(self) -> dict[str, Control]:
-        controls = self.controls()
-        if self.shared is None or len(self.shared) < 2:
-            return {"rows": controls["rows"]}
-        return {**controls, "view": replace(controls["view"], high=len(self.shared))}
+        return super().offered() if self.count > 1 else {"rows": self.controls()["rows"]}
 
     @property
-    def index(self) -> int:
-        """The place of the chosen view in the list, from 0."""
-        return min(max(round(self.view), 1), len(self.shared) if self.shared else 1) - 1
+    def count(self) -> int:
+        return len(self.shared) if self.shared else 1
 
     @cached_property
     def pair(self) -> twoview.RectifiedPair | str:
@@ -122,7 +115,6 @@ class RectifiedView(View):
         return float(np.mean(missing))
 
     def description(self) -> str:
-        """The state in words and numbers."""
         return " ".join(self.sentences())
 
     def figure(self, *, draft: bool = False) -> Picture:
@@ -131,20 +123,16 @@ class RectifiedView(View):
             turned = camera if isinstance(self.pair, str) else (self.pair.left, self.pair.right)[side]
             k = turned.intrinsics
             panel = image_panel(f"rectified {side}", 20 + 470 * side, 34, 450, k.width, k.height, tallest=380)
-            name, title = (
-                f"rectified{side}",
-                f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}",
-            )
-            content = photograph(panel, name, k.width, k.height) + self._marks(panel, side, turned, camera)
+            name = f"rectified{side}"
+            title = f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}"
+            content = placed_image(panel, name, k.width, k.height) + self._marks(panel, side, turned, camera)
             body += panel.show(content, title=title)
             attached[name] = jpeg(self._rectified(side, turned, camera, 240 if draft else _SIDE))
             bottom = max(bottom, panel.y + panel.height)
         height = bottom + 24 + 20 * len(self.sentences())
         for i, sentence in enumerate(self.sentences()):
             body += svg.paragraph((20, bottom + 24 + 20 * i), sentence, 920, "label")
-        return Picture(
-            svg.rectangle(0, 0, 960, height, "paper") + body, 960, height, self.title, self.description(), attached
-        )
+        return self.composed(height, body, attached=attached)
 
     def _rectified(self, side: int, turned: Camera, camera: Camera, size: int) -> NDArray[np.uint8]:
         source = replace(camera, intrinsics=camera.intrinsics.within(size))

@@ -7,26 +7,27 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log10
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.space import Eye, space_panel
+from camviz.draw.readout import listed, readout
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
-from camviz.views.base import Control, View, slider
+from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.observations import Observations, short_names
 from camviz.views.marks import arrows, cross
+from camviz.views.view_bars import LABEL, NAMED, ViewChooser, bars_of, figures_on, names_below, places
 
-_NAMED = 16  # views whose bars have room for names and figures
 ARROW = 26.0  # picture units that a view's 90th percentile residual is drawn long, by default
 
 
 @dataclass(frozen=True)
-class ResidualsView(View):
+class ResidualsView(ViewChooser, OrbitView):
     """Every view's error, and where the chosen view has it: in its picture, in space, and in the board's frame.
 
     An arrow leads from a corner as detected towards where the calibration projects it, `scale` times as long as in the
@@ -40,7 +41,7 @@ class ResidualsView(View):
     scale: float = slider(
         50.0, 1, 300, 1, label="arrows", unit="×", help="how much longer the arrows are than the error"
     )
-    eye: Eye = Eye(yaw_deg=-50, pitch_deg=20)
+    eye: OrbitCamera = OrbitCamera(yaw_deg=-50, pitch_deg=20)
 
     @classmethod
     def of(cls, calibration: Any, camera: str = "", **options: Any) -> ResidualsView:
@@ -52,14 +53,9 @@ class ResidualsView(View):
         """The view of a picture (counted from 1), the worst unless given, with arrows of a length that can be seen."""
         return cls(observations, view or observations.worst + 1, arrow_scale(observations))
 
-    def offered(self) -> dict[str, Control]:
-        controls = self.controls()
-        return {**controls, "view": replace(controls["view"], high=len(self.observations))}
-
     @property
-    def index(self) -> int:
-        """The place of the chosen view in the list, from 0."""
-        return min(max(round(self.view), 1), len(self.observations)) - 1
+    def count(self) -> int:
+        return len(self.observations)
 
     def numbers(self) -> dict[str, str]:
         """The chosen view's key figures, as text."""
@@ -77,9 +73,8 @@ class ResidualsView(View):
         return figures
 
     def description(self) -> str:
-        """The state in words and numbers."""
         seen, i = self.observations, self.index
-        figures = "; ".join(f"{name} {value}" for name, value in self.numbers().items())
+        figures = listed(self.numbers())
         return (
             f"{len(seen)} views of {seen.name}, together {_pixels(seen.total_rms)} RMS; the largest is "
             f"{seen.picture(seen.worst)} with {_pixels(seen.rms_seen[seen.worst])}. "
@@ -91,17 +86,11 @@ class ResidualsView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         image, attached = self.picture_panel(self._image_panel)
         space, sheets = self._poses.space(space_panel("boards", 490, 236, 450, 338), draft)
-        body = "".join(
-            [
-                svg.rectangle(0, 0, 960, 800, "paper"),
-                self.bars_panel(self._bars, handle=True),
-                image,
-                space,
-                self.board_panel(space_panel("board", 20, 610, 450, 180)),
-                self._numbers_block(),
-            ]
+        bars, board = (
+            self.bars_panel(self._bars, handle=True),
+            self.board_panel(space_panel("board", 20, 610, 450, 180)),
         )
-        return Picture(body, 960, 800, self.title, self.description(), attached | sheets)
+        return self.composed(800, bars, image, space, board, self._numbers_block(), attached=attached | sheets)
 
     @property
     def _bars(self) -> Panel:
@@ -115,36 +104,29 @@ class ResidualsView(View):
     def bars_panel(self, panel: Panel, *, handle: bool = False, links: Mapping[int, str] | None = None) -> str:
         """A bar per view, the chosen one orange; with `handle` for the pointer, or with `links` from views (from 0)."""
         seen, n = self.observations, len(self.observations)
-        x, gap = np.arange(1, n + 1), 0.12 if n <= 60 else 0.0
-        chosen = x == self.index + 1
         rms, all_seen = seen.rms, np.where(seen.rms_seen > seen.rms * 1.001, seen.rms_seen, np.nan)
         content = plot.grid(panel, xticks=[])
-        content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, all_seen, "wash fill-red")
+        content += plot.bars(panel, *places(n), all_seen, "wash fill-red")
         if links is None:
-            for mask, class_ in ((~chosen, "fill-blue"), (chosen, "fill-orange")):
-                content += plot.bars(panel, x - 0.5 + gap, x + 0.5 - gap, np.where(mask, rms, np.nan), class_)
+            content += bars_of(panel, rms, self.index)
         else:
-            content += "".join(self._linked_bar(panel, i, gap, links.get(i)) for i in range(n))
-        content += svg.line(panel.place([(panel.left, seen.total_rms), (panel.right, seen.total_rms)]), "ink dashed")
-        if n <= _NAMED:
-            content += "".join(
-                svg.text(panel.place((i, np.nanmax([r, s]))) + (0, -4), f"{r:.2f}", "tick middle halo")
-                for i, r, s in zip(x, rms, np.nan_to_num(all_seen), strict=True)
-                if np.isfinite(r)
-            )
-        label = "One bar per view; click, drag or press the arrow keys to choose a view"
-        touch = {"drag": "bars", "hint": "click a bar", "label": label} if handle else {}
+            content += "".join(self._linked_bar(panel, i, links.get(i)) for i in range(n))
+        content += plot.level(panel, seen.total_rms, "ink dashed")
+        content += figures_on(panel, rms, np.where(np.isfinite(rms), np.fmax(rms, all_seen), np.nan))
+        touch = {"drag": "bars", "hint": "click a bar", "label": LABEL} if handle else {}
         shown = panel.show(content, title=f"Error of every view, {seen.name}", **touch)
         aside = ", pale red with the corners set aside" if np.isfinite(all_seen).any() else ""
         words = f"dashed: all views, {_pixels(seen.total_rms)}{aside}"
         place = (panel.x + panel.width - (90 if handle else 0), panel.y - 8)
         return shown + svg.text(place, words, "note end") + plot.axes(panel, "", "RMS [px]", xticks=self._view_names())
 
-    def _linked_bar(self, panel: Panel, i: int, gap: float, link: str | None) -> str:
+    def _linked_bar(self, panel: Panel, i: int, link: str | None) -> str:
         """One bar, and all above it, as a link to its view; a bar whose view is not shown is none."""
         seen = self.observations
-        left, right = np.array([i + 0.5 + gap]), np.array([i + 1.5 - gap])
-        drawn = plot.bars(panel, left, right, seen.rms[i : i + 1], "fill-blue" if link else "fill-muted")
+        left, right = places(self.count)
+        drawn = plot.bars(
+            panel, left[i : i + 1], right[i : i + 1], seen.rms[i : i + 1], "fill-blue" if link else "fill-muted"
+        )
         if link is None:
             return drawn
         (x0, _), (x1, _) = panel.place([(i + 0.5, 0), (i + 1.5, 0)])
@@ -153,22 +135,18 @@ class ResidualsView(View):
         return svg.element("a", target + drawn, href=link, data_choose=i + 1, aria_label=words)
 
     def _view_names(self) -> list[tuple[float, str]]:
-        seen, n = self.observations, len(self.observations)
-        if n <= _NAMED:
-            return [(i + 1.0, Path(seen.picture(i)).stem[-9:]) for i in range(n)]
-        return [(tick, f"{tick:g}") for tick in plot.ticks(1, n, 16).tolist()]
+        numbers = range(self.count)
+        few = self.count <= NAMED
+        return names_below([Path(self.observations.picture(i)).stem[-9:] if few else f"{i + 1}" for i in numbers])
 
-    def picture_panel(self, panel: Panel) -> tuple[str, dict[str, bytes]]:
+    def picture_panel(self, panel: Panel) -> Drawn:
         """The chosen view's picture with its corners and arrows, and the photographs it needs."""
         seen, i, k = self.observations, self.index, self.observations.camera.intrinsics
         image = seen.photographs(i)
         content, attached, note = self._grid(panel), {}, "the picture is not at hand"
         if image is not None:
-            content, attached, note = (
-                photograph(panel, "photograph", k.width, k.height),
-                {"photograph": jpeg(image)},
-                "",
-            )
+            content, note = placed_image(panel, "photograph", k.width, k.height), ""
+            attached = {"photograph": jpeg(image)}
         starts, ends = panel.place(seen.detections[i]), panel.place(self.arrow_tips())
         content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange")
         content += svg.dots(starts[seen.used[i]], "paper-dot", 6) + svg.dots(starts[seen.used[i]], "green", 4)
@@ -194,10 +172,8 @@ class ResidualsView(View):
         seen, i, board = self.observations, self.index, self.observations.board
         wide, high = (board.columns + 1) * board.square_size, (board.rows + 1) * board.square_size
         scale = min(place.width / wide, place.height / high)
-        left, top = (
-            -board.square_size - (place.width / scale - wide) / 2,
-            -board.square_size - (place.height / scale - high) / 2,
-        )
+        left = -board.square_size - (place.width / scale - wide) / 2
+        top = -board.square_size - (place.height / scale - high) / 2
         panel = replace(place, left=left, top=top, right=left + place.width / scale, bottom=top + place.height / scale)
         corners = seen.corners_board[:, :2]
         grid = panel.place(corners).reshape(board.rows, board.columns, 2)
@@ -225,9 +201,7 @@ class ResidualsView(View):
     @cached_property
     def _poses(self) -> BoardPosesView:
         seen = self.observations
-        eye = replace(
-            self.eye, distance=1.75 * float(np.nanmedian(seen.distances)) * self.eye.distance / Eye().distance
-        )
+        eye = self.from_afar(np.array(self.eye.target), 1.75 * float(np.nanmedian(seen.distances)))
         hidden = frozenset(np.flatnonzero(~seen.shown).tolist())
         names = short_names(seen.pictures, len(seen))
         return BoardPosesView(
@@ -235,26 +209,9 @@ class ResidualsView(View):
         )
 
     def _numbers_block(self) -> str:
-        rows = [svg.text((490, 602), f"{self.observations.picture(self.index)}", "title")]
-        for i, (name, value) in enumerate(self.numbers().items()):
-            rows.append(svg.text((490, 628 + 22 * i), name, "note"))
-            rows.append(svg.text((590, 628 + 22 * i), value, "label"))
-        return "".join(rows)
-
-    # Touch -----------------------------------------------------------------------------------------------------------
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        if handle == "bars":
-            return self.but(
-                view=int(np.clip(round(self._bars.data((x - self._bars.x, 0))[0]), 1, len(self.observations)))
-            )
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        if handle == "bars":
-            step = {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
-            return self.but(view=min(max(self.index + 1 + step, 1), len(self.observations)))
-        return self.but(eye=self.eye.key(key))
+        return svg.text((490, 602), f"{self.observations.picture(self.index)}", "title") + readout(
+            self.numbers(), (490, 628), (0, 22), (100, 0)
+        )
 
 
 def bars_panel(seen: Observations, x: float = 70, y: float = 34, width: float = 870, height: float = 140) -> Panel:

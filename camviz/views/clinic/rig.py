@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.items import Item, Label, Line
 from camviz.draw.picture import Picture
-from camviz.draw.space import Eye, axes_triad, camera_body, draw_space, space_panel
+from camviz.draw.space import OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import View, choice
+from camviz.views.base import OrbitView, choice
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.observations import Missing
 
@@ -27,7 +27,7 @@ _TOLD = 4  # cameras up to which each one's place is told
 
 
 @dataclass(frozen=True)
-class RigView(View):
+class RigView(OrbitView):
     """The cameras as the file places them, with frusta that bend with the lens, axes x right, y down, z forward.
 
     Read the other way round (`reading`), each transform is taken for its inverse: the one that makes sense is right.
@@ -41,7 +41,7 @@ class RigView(View):
     reading: str = choice(
         "as written", "inverted", "both", help="the transforms as the file has them, or each inverted"
     )
-    eye: Eye = Eye(yaw_deg=-40, pitch_deg=25)
+    eye: OrbitCamera = OrbitCamera(yaw_deg=-40, pitch_deg=25)
 
     @classmethod
     def of(cls, calibration: Any) -> RigView:
@@ -72,7 +72,6 @@ class RigView(View):
         )
 
     def description(self) -> str:
-        """The state in words and numbers."""
         names = list(self.cameras)
         told = [f"{len(names)} cameras, transforms {self.reading}."]
         first = self.cameras[names[0]]
@@ -95,15 +94,11 @@ class RigView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         panel = space_panel("rig", 20, 34, 920, 430)
-        content, attached = draw_space(panel, self._items(), self._onlooker, draft=draft, renderer="wire")
         label = "The cameras in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
         note = {"both": "blue: as written; orange: inverted"}.get(self.reading, self.reading)
-        body = svg.rectangle(0, 0, 960, 512, "paper") + panel.show(
-            content, title="The cameras in space", note=note, drag="eye", label=label
-        )
-        return Picture(
-            body + svg.paragraph((20, 486), self.description(), 920), 960, 512, self.title, self.description(), attached
-        )
+        seen: dict[str, Any] = {"eye": self._onlooker, "note": note, "hint": ""}
+        space, attached = self.in_space(panel, self._items(), draft, "The cameras in space", label, **seen)
+        return self.composed(512, space + svg.paragraph((20, 486), self.description(), 920), attached=attached)
 
     @cached_property
     def _places(self) -> Array:
@@ -122,15 +117,11 @@ class RigView(View):
         return float(np.clip(0.5 * np.median(steps) if steps.size else reach, 0.03 * reach, 0.3 * reach))
 
     @property
-    def _onlooker(self) -> Eye:
+    def _onlooker(self) -> OrbitCamera:
         places = self._places
         middle = (places.min(axis=0) + places.max(axis=0)) / 2
         reach = max(float(np.linalg.norm(np.ptp(places, axis=0))), 1e-6)
-        return replace(
-            self.eye,
-            target=tuple(middle.tolist()),
-            distance=1.25 * (reach + self._size) * self.eye.distance / Eye().distance,
-        )
+        return self.from_afar(middle, 1.25 * (reach + self._size))
 
     def _items(self) -> list[Item]:
         items: list[Item] = []
@@ -150,12 +141,6 @@ class RigView(View):
             for pose in self._boards[:_BOARDS]:
                 items += drawn.board_items(pose, False)
         return items
-
-    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
-        return self.but(eye=self.eye.orbited(dx, dy))
-
-    def pressed(self, handle: str, key: str) -> Self:
-        return self.but(eye=self.eye.key(key))
 
 
 def _pyramid(camera: Camera, depth: float) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import inf
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from camviz.cameras import Camera
 from camviz.draw import plot, svg
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
+from camviz.draw.readout import readout
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Missing
+from camviz.views.marks import circle
 
 DISTANCES = {"infinity": inf, "30 m": 30.0, "10 m": 10.0, "3 m": 3.0, "1 m": 1.0, "0.5 m": 0.5, "0.3 m": 0.3}
 LEFT_OUT = (
@@ -28,24 +30,18 @@ LEFT_OUT = (
 
 
 @dataclass(frozen=True)
-class UncertaintyView(View):
-    """The uncertainty of projection at every pixel, in the worst direction, for points at one distance.
-
-    With `ellipses`, how it spreads: ellipses of one standard deviation, enlarged.
-    """
-
-    title: ClassVar[str] = "Uncertainty of projection"
+class SolvedView(View):
+    """A view of a solution whose corners determine it. Raises Missing where they do not."""
 
     adjustment: Adjustment = field(compare=False, repr=False)
     camera: str = ""
-    distance: str = choice(*DISTANCES, help="how far away the points are that a pixel stands for")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         determined(self.adjustment)
 
     @classmethod
-    def of(cls, calibration: Any, camera: str = "") -> UncertaintyView:
+    def of(cls, calibration: Any, camera: str = "") -> Self:
         """The view of a calibration. Raises Missing where it does not hold what its solution was made from."""
         return cls(adjusted(calibration, camera), camera)
 
@@ -53,6 +49,18 @@ class UncertaintyView(View):
     def name(self) -> str:
         """Which camera it is of."""
         return self.camera or next(iter(self.adjustment.cameras))
+
+
+@dataclass(frozen=True)
+class UncertaintyView(SolvedView):
+    """The uncertainty of projection at every pixel, in the worst direction, for points at one distance.
+
+    With `ellipses`, how it spreads: ellipses of one standard deviation, enlarged.
+    """
+
+    title: ClassVar[str] = "Uncertainty of projection"
+
+    distance: str = choice(*DISTANCES, help="how far away the points are that a pixel stands for")
 
     @property
     def seen_by(self) -> Camera:
@@ -87,7 +95,6 @@ class UncertaintyView(View):
         }
 
     def description(self) -> str:
-        """The state in words and numbers."""
         n = self.numbers()
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         return (
@@ -106,8 +113,8 @@ class UncertaintyView(View):
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         shown = panel.show(content, title=f"{self.name}: one standard deviation, points {where}")
-        body = svg.rectangle(0, 0, 960, 470, "paper") + shown + legend + self._words(panel.x + panel.width + 100)
-        return Picture(body, 960, 470, self.title, self.description(), attached | bar_picture)
+        body = shown + legend + self._words(panel.x + panel.width + 100)
+        return self.composed(470, body, attached=attached | bar_picture)
 
     def _ellipses(self, panel: Any) -> str:
         """Ellipses of one standard deviation at a few pixels, all enlarged so that the smallest can be seen."""
@@ -118,12 +125,10 @@ class UncertaintyView(View):
         known = np.isfinite(covariance).all(axis=(1, 2)) & (long > 0)
         if not known.any():
             return ""
-        turn = np.linspace(0, 2 * np.pi, 25)
-        circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         # Lengths by the logarithm, for they differ a hundredfold; the ratio of the axes is kept.
         reach = (7 + 9 * np.clip(np.log10(long / np.median(long[known])) + 0.5, 0, 1)) / np.where(long > 0, long, 1)
         axes = directions * np.sqrt(np.maximum(values, 0))[:, None, :] * reach[:, None, None]
-        lines = panel.place(uv)[:, None] + circle @ np.swapaxes(axes, 1, 2)
+        lines = panel.place(uv)[:, None] + circle(25) @ np.swapaxes(axes, 1, 2)
         return svg.path(lines[known], "paper-line", style="stroke-width:3px") + svg.path(lines[known], "ink thin")
 
     def _words(self, x: float) -> str:
@@ -131,16 +136,13 @@ class UncertaintyView(View):
         rows = [("in the middle", f"±{n['middle']:.3g} px"), ("at worst", f"±{n['worst']:.3g} px"),
                 ("below 1 px over", f"{100 * n['below_1']:.0f} % of the picture"),
                 ("noise of a corner", f"{n['sigma']:.3g} px")]  # fmt: skip
-        words = "".join(
-            svg.text((x, 60 + 40 * i), a, "note") + svg.text((x, 78 + 40 * i), b, "label")
-            for i, (a, b) in enumerate(rows)
-        )
+        words = readout(rows, (x, 60), (0, 40), (0, 18))
         words += svg.paragraph((x, 236), "Ellipses: in which direction (not to scale).", 960 - x - 10)
         return words + svg.paragraph((x, 280), LEFT_OUT, 960 - x - 10)
 
 
 @dataclass(frozen=True)
-class UncertaintyRangeView(View):
+class UncertaintyRangeView(SolvedView):
     """The uncertainty of projection against the distance of the points, at three pixels from the middle outwards.
 
     It is least where the boards were held.
@@ -148,23 +150,7 @@ class UncertaintyRangeView(View):
 
     title: ClassVar[str] = "Uncertainty against range"
 
-    adjustment: Adjustment = field(compare=False, repr=False)
-    camera: str = ""
     scale: str = choice("logarithmic", "linear", label="axis", help="of the uncertainty")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        determined(self.adjustment)
-
-    @classmethod
-    def of(cls, calibration: Any, camera: str = "") -> UncertaintyRangeView:
-        """The view of a calibration. Raises Missing where it does not hold what its solution was made from."""
-        return cls(adjusted(calibration, camera), camera)
-
-    @property
-    def name(self) -> str:
-        """Which camera it is of."""
-        return self.camera or next(iter(self.adjustment.cameras))
 
     @cached_property
     def boards(self) -> Array:
@@ -188,7 +174,6 @@ class UncertaintyRangeView(View):
         return _along(self.adjustment, self.name, distances, tuple(tuple(uv.tolist()) for uv in self.pixels.values()))
 
     def description(self) -> str:
-        """The state in words and numbers."""
         distances, values = self.curves()
         found = np.nan_to_num(values, nan=np.inf)
         best = "; ".join(
@@ -203,31 +188,26 @@ class UncertaintyRangeView(View):
         finite = values[np.isfinite(values) & (values > 0)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.1, 1.0)
         x = np.log10(distances)
-        ylim = (
-            (float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.3 * float(np.log10(high / low)) + 0.1)
-            if log
-            else (0.0, 1.25 * high)
-        )
+        ylim = (0.0, 1.25 * high)
+        if log:
+            ylim = float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.3 * float(np.log10(high / low)) + 0.1
         panel = plot.plot_panel("range", 70, 34, 610, 290, (float(x[0]), float(x[-1])), ylim)
         xticks = plot.logarithmic(panel.left, panel.right)
         yticks = plot.logarithmic(*ylim) if log else None
-        content = plot.grid(panel, xticks, yticks)
         boards = np.log10([self.boards.min(), self.boards.max()])
-        content += plot.band(panel, boards[0] - 0.005, boards[1] + 0.005, "fill-green")
+        content = plot.band(panel, boards[0] - 0.005, boards[1] + 0.005, "fill-green")
         content += svg.text((panel.place((boards.mean(), 0))[0], 16), "the boards", "green halo middle")
         classes = ("blue thick", "orange thick", "purple thick")
         for class_, curve in zip(classes, values, strict=True):
             content += plot.curve(panel, x, np.log10(curve) if log else curve, class_)
         content += plot.legend(panel, list(zip(classes, self.pixels, strict=True)), "top right")
-        axes = plot.axes(panel, "distance of the point [m]", "standard deviation [px]", xticks, yticks)
+        names = "distance of the point [m]", "standard deviation [px]"
         words = (
             "The solution knows the camera best where the boards were held. Nearer than that, the place of the "
             f"camera’s centre is what is uncertain.\n \n{LEFT_OUT}"
         )
-        body = (
-            svg.rectangle(0, 0, 960, 380, "paper") + panel.show(content, title=f"{self.name}: at three pixels") + axes
-        )
-        return Picture(body + svg.paragraph((705, 50), words, 240), 960, 380, self.title, self.description())
+        body = plot.plotted(panel, content, *names, xticks, yticks, title=f"{self.name}: at three pixels")
+        return self.composed(380, body + svg.paragraph((705, 50), words, 240))
 
 
 @lru_cache(maxsize=24)

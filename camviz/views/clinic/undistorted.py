@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, photograph
+from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import on_plane
 from camviz.views import garden
@@ -51,7 +51,6 @@ class UndistortedView(View):
             return f"This picture cannot be undistorted: {error}."
 
     def description(self) -> str:
-        """The state in words and numbers."""
         found = self.target()
         if isinstance(found, str):
             return found
@@ -72,7 +71,8 @@ class UndistortedView(View):
         taken = self._taken(small)
         found, attached = self.target(), {"before": jpeg(taken)}
         body = before.show(
-            photograph(before, "before", k.width, k.height) + self._bent(before, found), title=f"{self.name}: as taken"
+            placed_image(before, "before", k.width, k.height) + self._bent(before, found),
+            title=f"{self.name}: as taken",
         )
         if isinstance(found, str):
             body += after.show(svg.paragraph((16, 34), found, after.width - 30, "label"), title="Undistorted")
@@ -82,18 +82,11 @@ class UndistortedView(View):
                 taken, distortion.undistort_maps(small, target.resized(small.intrinsics.width, small.intrinsics.height))
             )
             attached["after"] = jpeg(straight)
-            content = photograph(after, "after", k.width, k.height) + self._straight(after) + _rectangle(after, roi)
+            content = placed_image(after, "after", k.width, k.height) + self._straight(after) + _rectangle(after, roi)
             body += after.show(content, title=f"Undistorted, alpha = {self.alpha:g}", note="yellow: without black")
         height = max(before.height, after.height) + 82
         words = svg.paragraph((20, height - 24), self.description(), 920, "note")
-        return Picture(
-            svg.rectangle(0, 0, 960, height, "paper") + body + words,
-            960,
-            height,
-            self.title,
-            self.description(),
-            attached,
-        )
+        return self.composed(height, body + words, attached=attached)
 
     def _taken(self, small: Camera) -> NDArray[np.uint8]:
         if self.image is None:
@@ -101,11 +94,7 @@ class UndistortedView(View):
         return cv2.resize(self.image, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA)
 
     def _straight(self, panel: Panel) -> str:
-        return (
-            on_photograph([panel.place(line) for line in _grid(self.camera.intrinsics)], "sky thin")
-            if self.lines
-            else ""
-        )
+        return on_photograph(panel.place(_grid(self.camera.intrinsics)), "sky thin") if self.lines else ""
 
     def _bent(self, panel: Panel, found: tuple[Intrinsics, tuple[int, int, int, int]] | str) -> str:
         """The grid of the undistorted picture where it lies in the photograph."""
@@ -113,9 +102,7 @@ class UndistortedView(View):
             return ""
         rays = on_plane(found[0].from_pixels(_grid(self.camera.intrinsics)))
         bent = self.camera.intrinsics.to_pixels(self.camera.lens.project(rays))
-        return svg.path([panel.place(line) for line in bent], "paper-line") + svg.path(
-            [panel.place(line) for line in bent], "sky thin"
-        )
+        return on_photograph(panel.place(bent), "sky thin")
 
 
 def _grid(k: Intrinsics) -> NDArray[np.float64]:

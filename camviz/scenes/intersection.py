@@ -12,14 +12,14 @@ from camviz.scenes.rays import Floats
 FAR, HALF = np.float32(np.inf), np.float32(0.5)
 
 
-class Meeting(NamedTuple):
+class Hit(NamedTuple):
     """Where n rays meet a surface: the distance (n,) along each, inf on a miss, and `place` (3, n) in its own frame."""
 
     depth: Floats
     place: Floats
 
 
-def meet_plane(start: Floats, step: Floats) -> Meeting:
+def intersect_plane(start: Floats, step: Floats) -> Hit:
     """Where rays from `start` along `step`, (3, ...) in the frame of a plane, meet that plane, z = 0: at t = -z₀ / ż.
 
     The frame's third axis is a unit normal. The third row of `place` is not z, which is 0, but the cosine of the angle
@@ -29,17 +29,17 @@ def meet_plane(start: Floats, step: Floats) -> Meeting:
     step[:2] *= depth
     step[:2] += start[:2]
     np.abs(step[2], out=step[2])
-    return Meeting(depth, step)
+    return Hit(depth, step)
 
 
-def meet_square(start: Floats, step: Floats) -> Meeting:
-    """As `meet_plane` does, where 0 ≤ x, y ≤ 1."""
-    at = meet_plane(start, step)
+def intersect_square(start: Floats, step: Floats) -> Hit:
+    """As `intersect_plane` does, where 0 ≤ x, y ≤ 1."""
+    at = intersect_plane(start, step)
     inside = (np.abs(at.place[0] - HALF) <= HALF) & (np.abs(at.place[1] - HALF) <= HALF) & (at.depth > 0)
     return at._replace(depth=np.where(inside, at.depth, FAR))
 
 
-def meet_circle(start: Floats, step: Floats) -> tuple[Floats, Floats]:
+def intersect_circle(start: Floats, step: Floats) -> tuple[Floats, Floats]:
     """Both distances (n,) to the unit circle or sphere about 0, near one first; NaN where a ray passes it by.
 
     From the point m of the ray that is nearest to the centre it is sqrt(1 - m²) either way; taking m first keeps the

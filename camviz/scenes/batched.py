@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.lenses.base import Array
-from camviz.scenes.meeting import Meeting, meet_square, texels
+from camviz.scenes.intersection import Hit, intersect_square, texels
 from camviz.scenes.rays import Floats
 from camviz.scenes.surfaces import Column, Rectangle, Sphere, Surface
 
@@ -20,19 +20,19 @@ Indices = NDArray[np.intp]
 class Traced(Protocol):
     """What the tracer meets: some surfaces, each with those tiles of rays that come near it."""
 
-    def meet(self, origins: Array, directions: Floats, member: Indices) -> Meeting:
+    def intersect(self, origins: Array, directions: Floats, member: Indices) -> Hit:
         """Where the rays of p tiles, directions (3, p, TILE), meet the surface that each is to meet, `member` (p,).
 
         Origins are (3, 1, 1) or (3, p, TILE); distances and places come flat, (p TILE,) and (3, p TILE).
         """
         ...
 
-    def radiance(self, at: Meeting, spread: float, member: Indices) -> Floats:
+    def radiance(self, at: Hit, spread: float, member: Indices) -> Floats:
         """Linear light (n, LIGHT) that leaves the surfaces `member` (n,) towards rays `spread` radians apart."""
         ...
 
 
-def together(surfaces: Sequence[Surface]) -> list[tuple[Traced, list[int]]]:
+def batched(surfaces: Sequence[Surface]) -> list[tuple[Traced, list[int]]]:
     """What to trace, in the order of the surfaces, and of which of them each consists."""
     groups: dict[Hashable, list[int]] = {}
     for i, surface in enumerate(surfaces):
@@ -55,7 +55,7 @@ def _one(alike: list[Surface]) -> Traced:
     if len(alike) == 1:
         return Alone(alike[0])
     walls = [wall for wall in alike if isinstance(wall, Rectangle)]
-    centres = np.array([surface.balls()[0][0] for surface in alike]).T
+    centres = np.array([surface.bounding_spheres()[0][0] for surface in alike]).T
     return Walls(walls) if walls else Copies(alike[0], centres - centres[:, :1])
 
 
@@ -65,10 +65,10 @@ class Alone:
 
     surface: Surface
 
-    def meet(self, origins: Array, directions: Floats, member: Indices) -> Meeting:
-        return self.surface.meet(origins.reshape(3, -1), directions.reshape(3, -1))
+    def intersect(self, origins: Array, directions: Floats, member: Indices) -> Hit:
+        return self.surface.intersect(origins.reshape(3, -1), directions.reshape(3, -1))
 
-    def radiance(self, at: Meeting, spread: float, member: Indices) -> Floats:
+    def radiance(self, at: Hit, spread: float, member: Indices) -> Floats:
         return self.surface.radiance(at, spread)
 
 
@@ -79,12 +79,12 @@ class Copies:
     first: Surface
     offsets: Array
 
-    def meet(self, origins: Array, directions: Floats, member: Indices) -> Meeting:
+    def intersect(self, origins: Array, directions: Floats, member: Indices) -> Hit:
         """A ray meets a copy where the ray, moved back by the offset, meets the first."""
         starts = np.broadcast_to(origins - self.offsets[:, member, None], directions.shape)
-        return self.first.meet(starts.reshape(3, -1), directions.reshape(3, -1))
+        return self.first.intersect(starts.reshape(3, -1), directions.reshape(3, -1))
 
-    def radiance(self, at: Meeting, spread: float, member: Indices) -> Floats:
+    def radiance(self, at: Hit, spread: float, member: Indices) -> Floats:
         return self.first.radiance(at, spread)
 
 
@@ -98,13 +98,13 @@ class Walls:
         looks = [(*wall.repeats, wall.texels_per_metre, wall.shade) for wall in walls]
         self._looks = np.array(looks, dtype=np.float32).T
 
-    def meet(self, origins: Array, directions: Floats, member: Indices) -> Meeting:
+    def intersect(self, origins: Array, directions: Floats, member: Indices) -> Hit:
         frames = self._frames.take(member, axis=2)
         start = _turned(frames, origins - self._corners.take(member, axis=1)).astype(np.float32)
-        depth, place = meet_square(start, _turned(frames.astype(np.float32), directions))
-        return Meeting(depth.ravel(), place.reshape(3, -1))
+        depth, place = intersect_square(start, _turned(frames.astype(np.float32), directions))
+        return Hit(depth.ravel(), place.reshape(3, -1))
 
-    def radiance(self, at: Meeting, spread: float, member: Indices) -> Floats:
+    def radiance(self, at: Hit, spread: float, member: Indices) -> Floats:
         columns, rows, density, shade = self._looks.take(member, axis=1)
         s, r, cosine = at.place
         apart = texels(at.depth, cosine, spread * density) if spread > 0 else 0.0
