@@ -34,7 +34,8 @@ class ViewTrait(traitlets.Any):
 
     def follow(self, obj: Any, value: Any) -> None:
         """Take the value that the view has now, and tell whoever observes this trait."""
-        super().set(obj, value)
+        if value is not self.get(obj):
+            super().set(obj, value)
 
 
 class Explorer(StillWidget):
