@@ -34,8 +34,7 @@ class ViewTrait(traitlets.Any):
 
     def follow(self, obj: Any, value: Any) -> None:
         """Take the value that the view has now, and tell whoever observes this trait."""
-        if value is not self.get(obj):
-            super().set(obj, value)
+        super().set(obj, value)
 
 
 class Explorer(StillWidget):
