@@ -1,13 +1,21 @@
 """The explorer answers each wish of the browser once, with the newest state, and shows what went wrong."""
 
+import re
 from dataclasses import dataclass
 from typing import Self
 
+import nbclient
+import nbconvert
+import nbformat
+import numpy as np
 import pytest
+from ipywidgets import HTML, FloatSlider, HBox, Tab, VBox, interactive_output, jslink
+from traitlets import TraitError, link
 
 from camviz.draw.picture import Picture
 from camviz.views.base import View, choice, slider, switch
 from camviz.widgets import Explorer, explore
+from camviz.widgets.still import _show_box
 
 
 @dataclass(frozen=True)
@@ -116,3 +124,181 @@ def test_beside_the_widget_the_notebook_keeps_the_present_picture(monkeypatch, s
     assert live["application/vnd.jupyter.widget-view+json"]["model_id"] == explorer.model_id
     assert f'data-camviz-still="{explorer.model_id}"' in kept["text/html"]
     assert explorer.model_id in explorer.still_hidden
+
+
+# Each control a trait ----------------------------------------------------------------------------------------------
+
+
+def test_setting_a_control_redraws_and_tells_whoever_observes_it():
+    explorer, heard = explore(Toy()), []
+    explorer.observe(lambda change: heard.append((change["name"], change["old"], change["new"])), ["size", "colour"])
+    explorer.size = 3.0
+    explorer.colour = "blue"
+    assert heard == [("size", 1.0, 3.0), ("colour", "red", "blue")]
+    assert explorer.view == Toy(size=3.0, colour="blue")
+    assert "size=3.0, colour='blue'" in explorer.frame["svg"]
+    assert explorer.values == {"size": 3.0, "colour": "blue", "lit": True}
+
+
+def test_what_a_hand_does_is_heard_once_and_after_all_of_it_is_done():
+    """An observer that sets another control sees, and leaves, one consistent view."""
+    explorer, heard = explore(Toy()), []
+
+    def follow(change):
+        heard.append((change["new"], explorer.view.size, explorer.values["size"]))
+        explorer.colour = "blue"
+
+    explorer.observe(follow, "size")
+    wish(explorer, values={"size": 2.0, "lit": False}, draft=True)
+    assert heard == [(2.0, 2.0, 2.0)]
+    assert explorer.view == Toy(size=2.0, colour="blue", lit=False)
+    assert (explorer.size, explorer.colour, explorer.lit) == (2.0, "blue", False)
+
+
+def test_a_number_beyond_the_slider_is_held_at_its_end():
+    explorer = explore(Toy(), size=(0, 4))
+    explorer.size = 7
+    assert explorer.size == explorer.view.size == 4
+    explorer.size = np.float32(-3)
+    assert explorer.view.size == 0
+    assert explorer.set(size=4.5).size == 4.5  # `set` asks the view alone
+
+
+def test_what_cannot_be_drawn_is_refused_and_nothing_changes():
+    explorer = explore(Toy())
+    before = explorer.frame
+    with pytest.raises(ValueError, match=r"^size must be at most 5$"):
+        explorer.size = 9.0
+    with pytest.raises(ValueError, match=r"^size must be a finite number, got 'wide'$"):
+        explorer.size = "wide"
+    assert (explorer.size, explorer.view, explorer.frame) == (1.0, Toy(), before)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("zoom", 2, "Toy has no control 'zoom'; it has size, colour, lit"),
+        ("values", {"zoom": 2}, "Toy has no control 'zoom'; it has size, colour, lit"),
+        ("values", 3, "values must be a dict of controls and their values, got int"),
+        ("view", 3, "view must be a Toy, got int"),
+        ("frame", {}, '"frame" trait is read-only'),
+        ("controls", [], '"controls" trait is read-only'),
+    ],
+)
+def test_what_cannot_be_set_says_so_in_one_sentence(name, value, message):
+    with pytest.raises((AttributeError, ValueError, TraitError), match=message):
+        setattr(explore(Toy()), name, value)
+
+
+def test_the_values_the_view_and_the_state_can_be_set():
+    explorer, views = explore(Toy()), []
+    explorer.observe(lambda change: views.append(change["new"]), "view")
+    explorer.values = {"size": 2.0, "lit": False}
+    explorer.view = Toy(x=3.0)
+    explorer.state = {**explorer.state, "size": 4.0}
+    assert views == [Toy(size=2.0, lit=False), Toy(x=3.0), Toy(size=4.0, x=3.0)]
+    assert explorer.state == {"size": 4.0, "colour": "red", "lit": True, "x": 3.0}
+    assert Toy().but(**explorer.state) == explorer.view == explorer.value
+
+
+def test_a_control_that_is_not_shown_is_a_trait_as_well():
+    explorer = explore(Toy(), "lit")
+    explorer.size = 2.0
+    assert explorer.view.size == 2.0
+    assert explorer.values == {"lit": True}
+
+
+def test_two_explorers_and_a_slider_are_linked_without_a_circle():
+    one, other, slider = explore(Toy()), explore(Toy()), FloatSlider(min=0, max=8, step=0.5)
+    drawn = []
+    other.observe(drawn.append, "frame")
+    link((one, "size"), (other, "size"))
+    link((slider, "value"), (one, "size"))
+    drawn.clear()
+    wish(one, values={"size": 3.0})
+    assert (one.view.size, other.view.size, slider.value, len(drawn)) == (3.0, 3.0, 3.0, 1)
+    slider.value = 2.5
+    assert (one.view.size, other.view.size, len(drawn)) == (2.5, 2.5, 2)
+    link((one, "values"), (other, "values"))
+    one.values = {"colour": "blue"}
+    assert other.view == one.view == Toy(size=2.5, colour="blue")
+
+
+def test_a_control_is_sent_to_the_page_where_jslink_finds_it():
+    explorer = explore(Toy())
+    assert {"size", "colour", "lit", "values", "frame"} <= set(explorer.get_state())
+    jslink((FloatSlider(), "value"), (explorer, "size"))
+    explorer.set_state({"size": 2.0})  # as the page sends it
+    assert explorer.view.size == 2.0
+
+
+def test_interactive_output_follows_an_explorer():
+    explorer, seen = explore(Toy()), []
+    interactive_output(lambda view: seen.append(view.size), {"view": explorer})
+    explorer.size = 2.0
+    assert seen == [1.0, 2.0]
+
+
+def test_an_error_under_a_hand_in_the_page_is_shown_and_not_raised(monkeypatch):
+    monkeypatch.setattr("camviz.widgets.explorer._by_hand", lambda: True)
+    explorer = explore(Toy())
+    explorer.size = 9.0
+    assert explorer.frame["error"] == "ValueError: size must be at most 5"
+    assert explorer.size == explorer.view.size == 1.0
+    explorer.size = 2.0
+    assert (explorer.frame["error"], explorer.frame["draft"]) == ("", True)
+
+
+@dataclass(frozen=True)
+class Named(Toy):
+    """A view one of whose controls has a name that the widget needs itself."""
+
+    still: bool = switch(False)
+
+
+def test_a_control_by_a_name_of_the_widget_has_an_underscore_behind_it():
+    explorer = explore(Named())
+    explorer.still_ = True
+    assert explorer.view.still is True
+    assert "Toy" in explorer.still()["text/plain"]
+
+
+# Stills in boxes ---------------------------------------------------------------------------------------------------
+
+
+def test_a_box_shows_the_stills_of_what_lies_in_it(monkeypatch, shown):
+    monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
+    one, other = explore(Toy(size=2.0)), explore(Toy(size=3.0))
+    box = Tab([VBox([HTML("words"), one]), HBox([other])], titles=["near", "far"])
+    _show_box(box)
+    kept, live = shown
+    assert live["application/vnd.jupyter.widget-view+json"]["model_id"] == box.model_id
+    assert re.findall(r'data-camviz-still="(\w+)"><p><b>(\w+)<', kept["text/html"]) == [
+        (one.model_id, "near"),
+        (other.model_id, "far"),
+    ]
+    assert kept["text/plain"] == "Toy. size 2\n\nToy. size 3"
+
+
+def test_a_box_without_stills_is_left_to_its_own_display(shown):
+    with pytest.raises(NotImplementedError):
+        _show_box(VBox([HTML("words")]))
+    assert shown == []
+
+
+def test_a_saved_notebook_shows_the_stills_of_a_tab_as_a_page(tmp_path):
+    """Run by nbclient, checked by nbformat, made a page by nbconvert: what a reader without a kernel sees."""
+    code = "from ipywidgets import HTML, Tab, VBox\nfrom camviz.views.distortion import DistortionView\n"
+    code += "from camviz.widgets import explore\nTab([explore(DistortionView(k1=-0.25), 'k1'), VBox([HTML('words')])])"
+    notebook = nbformat.v4.new_notebook(
+        cells=[nbformat.v4.new_code_cell(one) for one in (code, "VBox([HTML('words')])")]
+    )
+    nbclient.NotebookClient(notebook, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    nbformat.validate(notebook)
+    still, live = notebook.cells[0].outputs
+    assert "image/svg+xml;base64" in still.data["text/html"]
+    assert "application/vnd.jupyter.widget-view+json" in live.data
+    assert set(notebook.cells[1].outputs[0].data) == {"text/plain", "application/vnd.jupyter.widget-view+json"}
+    page, _ = nbconvert.HTMLExporter().from_notebook_node(notebook)
+    assert 'src="data:image/svg+xml;base64' in page
+    assert "A still picture" in page

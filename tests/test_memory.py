@@ -68,3 +68,31 @@ def test_a_picture_s_memory_is_that_of_the_last_one():
         [sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True
     ).stdout.split()
     assert int(kept) < int(alone) / 20
+
+
+CIRCLES = """
+import gc, weakref
+from camviz.widgets.memory import give_back
+
+class Ring(list):
+    pass
+
+def circle(length):
+    ring = Ring()
+    ring.extend([ring] for _ in range(length))
+    return weakref.ref(ring)
+
+gc.collect()
+alive = []
+for length in (10, 30_000):
+    ring = circle(length)
+    give_back()
+    alive.append(ring() is not None)
+print(*alive)
+"""
+
+
+def test_many_objects_in_a_circle_are_given_back_and_a_few_wait():
+    """As matplotlib's closed figures are; Python itself would keep both until a quarter of all objects are new."""
+    alive = subprocess.run([sys.executable, "-c", CIRCLES], capture_output=True, text=True, check=True).stdout.split()
+    assert alive == ["True", "False"]

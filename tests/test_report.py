@@ -199,13 +199,14 @@ def displayed(monkeypatch):
 def test_a_saved_notebook_keeps_the_findings_and_a_still(displayed, monkeypatch):
     monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
     inspection = camviz.inspect(sick())
-    inspection._ipython_display_()
+    live = LiveInspection(inspection)
+    live._ipython_display_()
     words, still, widget = displayed
     assert inspection.findings[0].id in words["text/html"]
     assert inspection.findings[0].sentence in words["text/plain"]
     assert "<img" in still["text/html"]
-    explorer = widget.children[1]
-    assert re.search(r'data-camviz-still="(\w+)"', still["text/html"])[1] in explorer.still_hidden
+    assert widget["application/vnd.jupyter.widget-view+json"]["model_id"] == live.widget.model_id
+    assert re.search(r'data-camviz-still="(\w+)"', still["text/html"])[1] in live.explorer.still_hidden
 
 
 def test_whatever_view_is_chosen_later_hides_the_one_still(displayed):

@@ -2,6 +2,7 @@
 // it tells the kernel what the reader wants and shows the picture that comes back.
 
 const SETTLE_MS = 10;   // idle time after which a draft is replaced by the fine picture; with none, the two would share the processors
+const LINKED_MS = 120;  // the same for a draft that was not asked for here: another widget's hand is at work, and may go on
 const LATE_MS = 6000;   // silence of the kernel after which the reader is told
 const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
 
@@ -84,10 +85,13 @@ function asker(model, root, late) {
   };
   ask.answered = (frame) => {
     if (flying && frame.answers !== flying.id) return;
+    const pause = flying ? SETTLE_MS : LINKED_MS;
     flying = null;
     clearTimeout(patience);
+    clearTimeout(settle);
+    settle = null;
     if (wish) return send();
-    if (frame.draft) settle = setTimeout(() => ask({}, false), SETTLE_MS);
+    if (frame.draft) settle = setTimeout(() => ask({}, false), pause);
   };
   ask.shown = () => { root.dataset.busy = String(Boolean(flying || settle)); };
   ask.pending = (name) => Boolean(wish && name in wish.values);

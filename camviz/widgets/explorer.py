@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import traceback
+from collections.abc import Mapping
+from dataclasses import fields
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
 import traitlets
+from IPython import get_ipython
 
 from camviz.draw.picture import style
 from camviz.views.base import Control, View
 from camviz.widgets.memory import give_back_after_cells, keep_between_pictures
-from camviz.widgets.still import StillWidget
+from camviz.widgets.still import StillWidget, stills_for_boxes
 
 _HERE = files("camviz.widgets")
 _CAPTION = (
@@ -20,8 +24,29 @@ _CAPTION = (
 )
 
 
+class ViewTrait(traitlets.Any):
+    """A trait that follows an explorer's view: whoever sets it changes the view, and the picture is drawn at once."""
+
+    def set(self, obj: Any, value: Any) -> None:
+        """Ask the explorer `obj` for the change; it calls `follow` of every trait that has changed with it."""
+        if value is not self.get(obj):
+            obj._assign(self.name, value)
+
+    def follow(self, obj: Any, value: Any) -> None:
+        """Take the value that the view has now, and tell whoever observes this trait."""
+        super().set(obj, value)
+
+
 class Explorer(StillWidget):
-    """A view under a reader's hands. `view` is the present state; `set` changes it from code.
+    """A view under a reader's hands, and under a program's: each control of the view is a trait.
+
+    `explorer.k1 = -0.2` redraws the picture, `explorer.observe(f, "k1")` hears of every change, and `link` and `jslink`
+    tie `(explorer, "k1")` to other widgets. `view` is the present state, `values` the values of the controls that are
+    shown, and `state` all fields of the view; each of them can be set. `value` is `view` by the name that
+    `interactive_output` expects. A control whose name the widget needs itself has a "_" behind it: `view_`.
+
+    A number outside a control's range is held at its end, as the slider holds it; `set` goes beyond. ValueError says
+    what cannot be drawn, and the last good state stays.
 
     The browser asks for one picture at a time and always for its newest wish, so a slow picture never builds a queue.
     An error in drawing is shown in words above the last good picture.
@@ -30,38 +55,108 @@ class Explorer(StillWidget):
     _esm = (_HERE / "explorer.js").read_text(encoding="utf-8")
     _css = style() + (_HERE / "explorer.css").read_text(encoding="utf-8")
 
-    controls: traitlets.List[Any] = traitlets.List().tag(sync=True)
-    values = traitlets.Dict().tag(sync=True)
-    frame = traitlets.Dict().tag(sync=True)
+    controls: traitlets.List[Any] = traitlets.List(read_only=True).tag(sync=True)
+    frame: traitlets.Dict[Any, Any] = traitlets.Dict(read_only=True).tag(sync=True)
+    values = ViewTrait().tag(sync=True)
+    view = ViewTrait()
+    value = ViewTrait()
 
     def __init__(self, view: View, controls: dict[str, Control]) -> None:
-        self.view = self._first = view
-        described = [{"name": name, **vars(control)} for name, control in controls.items()]
-        super().__init__(controls=described, **_shown(view, controls, answers=0, draft=False))
+        self._first = view
         self._controls = controls
+        self._ranges = {**view.offered(), **controls}
+        self._control_of = {f"{name}_" if hasattr(Explorer, name) else name: name for name in self._ranges}
+        self.add_traits(**{trait: ViewTrait().tag(sync=True) for trait in self._control_of})
+        described = [{"name": name, **vars(control)} for name, control in controls.items()]
+        self.set_trait("controls", described)
+        self._show(view, draft=False)
+        super().__init__()
         self.on_msg(self._receive)
         keep_between_pictures()
         give_back_after_cells()
+        stills_for_boxes()
 
     def set(self, **changes: Any) -> Explorer:
         """Change the view's fields and redraw; errors are raised here, where the code is."""
-        self._show(self.view.but(**changes), answers=0, draft=False)
+        self._show(self.view.but(**changes), draft=False)
         return self
 
-    def _show(self, view: View, *, answers: int, draft: bool) -> None:
-        shown = _shown(view, self._controls, answers=answers, draft=draft)
-        with self.hold_sync():
-            self.view = view
-            self.values, self.frame = shown["values"], shown["frame"]
+    @property
+    def state(self) -> dict[str, Any]:
+        """Every field of the view by its name: `view.but(**explorer.state)` is the present view."""
+        return {field.name: getattr(self.view, field.name) for field in fields(self.view) if field.init}
+
+    @state.setter
+    def state(self, state: Mapping[str, Any]) -> None:
+        self.set(**state)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not name.startswith("_") and not hasattr(type(self), name):
+            raise AttributeError(self._unknown(name))
+        super().__setattr__(name, value)
+
+    def _assign(self, trait: str, value: Any) -> None:
+        """Change the view by one of its traits. What a hand in the page does is drafted, and its errors are shown."""
+        hand = _by_hand()
+        try:
+            view = self._assigned(trait, value)
+            if view is not self.view:
+                self._show(view, draft=hand)
+        # Whatever a view raises belongs in front of the reader whose hand it was, and else where the code is.
+        except Exception as error:
+            if not hand:
+                raise
+            self._tell(error, answers=0)
+
+    def _assigned(self, trait: str, value: Any) -> View:
+        """The view after a trait was set: the present one where that changes nothing."""
+        if trait in ("view", "value"):
+            if type(value) is not type(self.view):
+                raise ValueError(f"{trait} must be a {type(self.view).__name__}, got {type(value).__name__}")
+            return value
+        wished = value if trait == "values" else {self._control_of[trait]: value}
+        if not isinstance(wished, Mapping):
+            raise ValueError(f"values must be a dict of controls and their values, got {type(wished).__name__}")
+        held = {name: self._held(name, one) for name, one in wished.items()}
+        changes = {name: one for name, one in held.items() if one != getattr(self.view, name)}
+        return self.view.but(**changes) if changes else self.view
+
+    def _held(self, name: str, value: Any) -> Any:
+        """The value, a number held within the range of its control; ValueError where there is no such control."""
+        if name not in self._ranges:
+            raise ValueError(self._unknown(name))
+        control = self._ranges[name]
+        value = value.item() if isinstance(value, np.generic) else value
+        if control.low is None or control.high is None:
+            return value
+        return min(max(control.checked(name, value), control.low), control.high)
+
+    def _unknown(self, name: str) -> str:
+        return f"{type(self.view).__name__} has no control {name!r}; it has {', '.join(self._ranges)}"
+
+    def _show(self, view: View, *, draft: bool, answers: int = 0) -> None:
+        picture = view.figure(draft=draft)
+        frame = {"svg": picture.svg(), "photographs": picture.photographs}
+        followed = {"view": view, "value": view, "values": {name: getattr(view, name) for name in self._controls}}
+        followed |= {trait: getattr(view, name) for trait, name in self._control_of.items()}
+        # One message to the page; and nobody hears of a change before all of it is done.
+        with self.hold_sync(), self.hold_trait_notifications():
+            for trait, value in followed.items():
+                getattr(type(self), trait).follow(self, value)
+            self.set_trait("frame", {**frame, "answers": answers, "draft": draft, "error": ""})
+
+    def _tell(self, error: Exception, answers: int) -> None:
+        """Show an error above the last good picture."""
+        told = {"answers": answers, "draft": False, "error": f"{type(error).__name__}: {error}"}
+        self.set_trait("frame", {**self.frame, **told})
+        self.log.warning("%s", "".join(traceback.format_exception(error)))
 
     def _receive(self, _widget: object, message: dict[str, Any], _buffers: object) -> None:
         try:
-            self._show(self._wished(message), answers=message["id"], draft=message["draft"])
+            self._show(self._wished(message), draft=message["draft"], answers=message["id"])
         # The widget's edge: whatever a view raises belongs in front of the reader, and nobody above would show it.
         except Exception as error:
-            told = {"answers": message["id"], "draft": False, "error": f"{type(error).__name__}: {error}"}
-            self.frame = {**self.frame, **told}
-            self.log.warning("%s", "".join(traceback.format_exception(error)))
+            self._tell(error, answers=message["id"])
 
     def _wished(self, message: dict[str, Any]) -> View:
         view = self._first if message.get("reset") else self.view
@@ -101,7 +196,7 @@ def _ranged(control: Control, limits: Any) -> Control:
     return Control(control.label, control.unit, low, high, step[0] if step else control.step, (), control.help)
 
 
-def _shown(view: View, controls: dict[str, Control], *, answers: int, draft: bool) -> dict[str, Any]:
-    picture = view.figure(draft=draft)
-    frame = {"svg": picture.svg(), "photographs": picture.photographs, "answers": answers, "draft": draft, "error": ""}
-    return {"values": {name: getattr(view, name) for name in controls}, "frame": frame}
+def _by_hand() -> bool:
+    """Whether the kernel answers a message of the page, in which a hand moves something, and runs no cell."""
+    kernel = getattr(get_ipython(), "kernel", None)
+    return kernel is not None and kernel.get_parent().get("header", {}).get("msg_type") == "comm_msg"

@@ -135,4 +135,4 @@ class LiveInspection:
             return
         kept = f'<div data-camviz-still="{self.still_id}">{still["text/html"]}</div>'
         display({**still, "text/html": kept}, raw=True)
-        display(self.widget)
+        display(self.widget._repr_mimebundle_(), raw=True)  # the still is shown already

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from html import escape
 from typing import Any
 
 import anywidget
 import traitlets
+from IPython import get_ipython
 from IPython.display import display
+from ipywidgets import Box, Widget
 
 # JupyterLab puts a bare "Error displaying widget: model not found" where a saved widget was; the still says more.
 _STYLE = (
@@ -33,11 +37,49 @@ class StillWidget(anywidget.AnyWidget):
         raise NotImplementedError(f"{type(self).__name__} has no still")
 
     def _ipython_display_(self) -> None:
-        still = self.still()
-        if os.environ.get("CAMVIZ_STATIC"):
-            display(still, raw=True)
-            return
-        kept = f'{_STYLE}<div data-camviz-still="{self.model_id}">{still["text/html"]}</div>'
-        display({**still, "text/html": kept}, raw=True)
-        live = {"model_id": self.model_id, "version_major": 2, "version_minor": 1}
+        _show_with_stills(self, [("", self)])
+
+
+def stills_for_boxes() -> None:
+    """Show the stills of what lies in a box of ipywidgets (VBox, HBox, Tab …) with it, in this notebook.
+
+    IPython asks whoever is registered for a type how to display it. A box without such widgets is shown as ever.
+    """
+    if shell := get_ipython():
+        shell.display_formatter.ipython_display_formatter.for_type(Box, _show_box)
+
+
+def _show_box(box: Box) -> None:
+    held = list(_held(box))
+    if not held:
+        raise NotImplementedError("nothing in this box has a still")  # IPython goes on to the box's own display
+    _show_with_stills(box, held)
+
+
+def _held(box: Box, title: str = "") -> Iterator[tuple[str, StillWidget]]:
+    """What in a box and the boxes within it has a still, each with the titles of the pages on which it lies."""
+    titles = getattr(box, "titles", ()) or ("",) * len(box.children)
+    for child, own in zip(box.children, titles, strict=True):
+        path = " · ".join(filter(None, (title, own)))
+        if isinstance(child, Box):
+            yield from _held(child, path)
+        elif isinstance(child, StillWidget):
+            yield path, child
+
+
+def _show_with_stills(widget: Widget, held: list[tuple[str, StillWidget]]) -> None:
+    """Display the stills of the widgets `held`, by their titles, and then the live `widget` that holds them."""
+    static = bool(os.environ.get("CAMVIZ_STATIC"))
+    stills = [(title, one.model_id, one.still()) for title, one in held]
+    html = "".join(_kept(title, "" if static else model, still["text/html"]) for title, model, still in stills)
+    plain = "\n\n".join(still["text/plain"] for _, _, still in stills)
+    display({"text/html": html if static else f"{_STYLE}{html}", "text/plain": plain}, raw=True)
+    if not static:
+        live = {"model_id": widget.model_id, "version_major": 2, "version_minor": 1}
         display({"application/vnd.jupyter.widget-view+json": live, "text/plain": ""}, raw=True)
+
+
+def _kept(title: str, model: str, still: str) -> str:
+    """A still under its title, marked by the widget that hides it while it lives."""
+    html = f"<p><b>{escape(title)}</b></p>{still}" if title else still
+    return f'<div data-camviz-still="{model}">{html}</div>' if model else html
