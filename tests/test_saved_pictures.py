@@ -3,6 +3,7 @@
 import re
 import sys
 import zlib
+from base64 import b64decode
 from xml.etree import ElementTree
 
 import cv2
@@ -76,7 +77,7 @@ def test_hints_for_the_mouse_are_left_out():
 def embedded(root: ElementTree.Element) -> np.ndarray:
     (image,) = root.iter(f"{SVG}image")
     data = re.fullmatch(r"data:image/png;base64,(.+)", image.get(LINK))[1]
-    return cv2.imdecode(np.frombuffer(__import__("base64").b64decode(data), np.uint8), cv2.IMREAD_UNCHANGED)
+    return cv2.imdecode(np.frombuffer(b64decode(data), np.uint8), cv2.IMREAD_UNCHANGED)
 
 
 def test_a_mask_becomes_transparency():
@@ -92,6 +93,13 @@ def test_hard_pixels_are_given_as_many_that_smoothing_does_not_show():
     found = embedded(plain(svg.image("p", 0, 0, 40, 40, style="image-rendering:pixelated"), p=png(few)))
     assert found.shape == (160, 160)
     np.testing.assert_array_equal(found[::80, ::80], few)
+
+
+def test_a_colour_bar_one_pixel_wide_gets_pixels_enough_that_its_borders_do_not_fade():
+    ramp = np.linspace(0, 255, 64).astype(np.uint8)[:, None]
+    found = embedded(plain(svg.image("p", 0, 0, 14, 40), p=png(ramp)))
+    assert found.shape == (64, 14)
+    np.testing.assert_array_equal(found, np.repeat(ramp, 14, axis=1))
 
 
 def test_the_size_of_a_png_is_its_units_by_their_resolution(tmp_path):

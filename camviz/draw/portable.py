@@ -6,7 +6,7 @@ they draw black what they cannot resolve. Five more things that only browsers dr
 - a nested `<svg>` by a group under a clip path;
 - words with a halo (`paint-order`) by the halo and, over it, the words;
 - a photograph under a mask by one photograph with transparency;
-- a photograph in hard pixels by one with more pixels, so that smoothing does not show;
+- a photograph with few pixels by one with more, so that a program's own smoothing does not show;
 - system fonts by fonts with names.
 """
 
@@ -16,7 +16,6 @@ import re
 from base64 import b64encode
 from collections.abc import Mapping
 from functools import cache
-from math import ceil
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -29,6 +28,7 @@ MONO = "DejaVu Sans Mono, Menlo, Consolas, Courier New, monospace"
 _NAMESPACE = ' xmlns="http://www.w3.org/2000/svg"'
 _SPACE = "{http://www.w3.org/XML/1998/namespace}space"
 _SHARP = 4  # pixels a picture unit that keep hard pixels hard when a program smooths them
+_SMOOTH = 2  # units a pixel beyond which smooth pictures get more pixels
 _KEPT = frozenset({
     "clip-path", "d", "fill", "fill-opacity", "fill-rule", "font-family", "font-size", "font-weight", "height", "href",
     "id", "opacity", "points", "preserveAspectRatio", "rx", "ry", "shape-rendering", "stroke", "stroke-dasharray",
@@ -179,8 +179,8 @@ def _photographs(root: Element, photographs: dict[str, bytes]) -> None:
             data = photographs[_attached(image)]
             if "mask" in image.attrib:
                 data = _masked(data, photographs[masks[image.attrib["mask"][5:-1]]])
-            elif image.get("image-rendering") == "pixelated":
-                data = _enlarged(data, float(image.attrib["width"]))
+            else:
+                data = _enlarged(data, image)
             kind = "png" if data.startswith(b"\x89PNG") else "jpeg"
             image.set("href", f"data:image/{kind};base64,{b64encode(data).decode()}")
 
@@ -195,13 +195,20 @@ def _masked(photograph: bytes, mask: bytes) -> bytes:
     return _png(np.dstack([colour, alpha]))
 
 
-def _enlarged(photograph: bytes, width: float) -> bytes:
-    """The photograph with every pixel repeated, as PNG, where it is shown `width` units wide and has few pixels."""
+def _enlarged(photograph: bytes, image: Element) -> bytes:
+    """The photograph with more pixels, as PNG, where it has few for its place.
+
+    Hard pixels are repeated. Smooth ones are interpolated, for Cairo fades the outermost half of a pixel away.
+    """
+    hard = image.get("image-rendering") == "pixelated"
     pixels = _decoded(photograph, cv2.IMREAD_UNCHANGED)
-    factor = ceil(_SHARP * width / pixels.shape[1])
-    if pixels.shape[1] >= width:
+    size = np.array([float(image.attrib["width"]), float(image.attrib["height"])])
+    stretch = size / pixels.shape[1::-1]
+    if stretch.max() <= (1 if hard else _SMOOTH):
         return photograph
-    return _png(pixels.repeat(factor, axis=0).repeat(factor, axis=1))
+    fx, fy = np.maximum(np.ceil((_SHARP if hard else 1) * stretch), 1)
+    way = cv2.INTER_NEAREST if hard else cv2.INTER_LINEAR
+    return _png(np.asarray(cv2.resize(pixels, None, fx=fx, fy=fy, interpolation=way)))
 
 
 def _decoded(data: bytes, flags: int) -> np.ndarray:
