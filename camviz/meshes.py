@@ -1,7 +1,7 @@
 """Cameras, boards, scenes and residuals as meshes of PyVista, for a plotter or a file of one's own.
 
 Every mesh is in the world's frame, in metres, x right, y down, z forward, and has its colours at its points, as the
-array "rgba": `plotter.add_mesh(mesh, rgb=True)` shows them. PyVista is imported when the first mesh is made.
+array "rgba": `plotter.add_mesh(mesh, rgb=True)` shows them, and `mesh.save("x.ply", texture="rgba")` keeps them. PyVista is imported when the first mesh is made.
 
 The pictures of the views are drawn from the same lines, faces and surfaces, which they hand to VTK themselves: PyVista
 on their path would cost every kernel 80 MB and a second.
@@ -10,7 +10,7 @@ on their path would cost every kernel 80 MB and a second.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 import cv2
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Rig, transform
-from camviz.draw.items import Face, Line, camera_body
+from camviz.draw.items import Face, Item, Line, camera_body
 from camviz.draw.shades import Shades
 from camviz.draw.solid import COLOURS
 from camviz.lenses.base import Array
@@ -30,7 +30,7 @@ from camviz.views.clinic.observations import Observations
 if TYPE_CHECKING:
     import pyvista
 
-__all__ = ["board", "boards", "camera", "points", "residuals", "rig", "scene"]
+__all__ = ["board", "boards", "camera", "joined", "points", "residuals", "rig", "scene"]
 
 _BLACK, _WHITE = (28, 35, 48, 255), (255, 255, 255, 255)
 Colours = NDArray[np.uint8]
@@ -41,7 +41,7 @@ def camera(camera: Camera, depth: float = 0.3, *, colour: str = "blue") -> pyvis
 
     `colour` is a name such as "blue" or "orange", or "#rrggbb".
     """
-    return _joined(_item(item) for item in camera_body(camera, depth, colour=colour) if isinstance(item, Line | Face))
+    return joined(_item(item) for item in camera_body(camera, depth, colour=colour) if _drawn(item))
 
 
 def rig(
@@ -123,28 +123,32 @@ def points(positions: ArrayLike, colours: ArrayLike | None = None) -> pyvista.Po
     return _mesh(positions, np.column_stack([rgb, np.full(len(rgb), 255)]))
 
 
+def joined(meshes: Iterable[pyvista.PolyData]) -> pyvista.PolyData:
+    """Several meshes, such as the blocks of a scene, as one: for a file that holds one mesh, such as PLY."""
+    first, *others = meshes
+    whole = first.append_polydata(*others)
+    whole.set_active_scalars("rgba")
+    return whole
+
+
 # From what the views draw ---------------------------------------------------------------------------------------------
 
 
+def _drawn(item: Item) -> TypeGuard[Line | Face]:
+    """Whether an item is a line, or a face all of whose vertices are known: a lens may fold before the border."""
+    return isinstance(item, Line) or (isinstance(item, Face) and bool(np.isfinite(item.vertices).all()))
+
+
 def _item(item: Line | Face) -> pyvista.PolyData:
-    if isinstance(item, Line):
-        there = np.isfinite(item.points).all(axis=-1)
-        lines = np.flatnonzero(there[1:] & there[:-1])[:, None] + (0, 1)
-        return _mesh(np.where(there[:, None], item.points, 0), _colour(item.class_, 1), lines=lines)
-    if not np.isfinite(item.vertices).all():
-        return _mesh(np.empty((0, 3)), _colour(item.colour, 1))
-    return _mesh(item.vertices, _colour(item.colour, item.opacity), faces=np.arange(len(item.vertices))[None])
+    if isinstance(item, Face):
+        return _mesh(item.vertices, _colour(item.colour, item.opacity), faces=np.arange(len(item.vertices))[None])
+    there = np.isfinite(item.points).all(axis=-1)
+    lines = np.flatnonzero(there[1:] & there[:-1])[:, None] + (0, 1)
+    return _mesh(np.where(there[:, None], item.points, 0), _colour(item.class_, 1), lines=lines)
 
 
 def _colour(name: str, opacity: float) -> Sequence[int]:
     return [*bytes.fromhex(COLOURS.get(name, name).removeprefix("#")), round(255 * opacity)]
-
-
-def _joined(meshes: Iterable[pyvista.PolyData]) -> pyvista.PolyData:
-    first, *others = meshes
-    joined = first.append_polydata(*others)
-    joined.set_active_scalars("rgba")
-    return joined
 
 
 def _painted(mesh: Mesh, detail: int) -> pyvista.PolyData:
