@@ -1,7 +1,8 @@
 """Cameras, boards, scenes and residuals as meshes of PyVista, for a plotter or a file of one's own.
 
 Every mesh is in the world's frame, in metres, x right, y down, z forward, and has its colours at its points, as the
-array "rgba": `plotter.add_mesh(mesh, rgb=True)` shows them, and `mesh.save("x.ply", texture="rgba")` keeps them. PyVista is imported when the first mesh is made.
+array "rgba": `plotter.add_mesh(mesh, rgb=True)` shows them, and `mesh.save("x.ply", texture="rgba")` keeps them.
+PyVista is imported when the first mesh is made.
 
 The pictures of the views are drawn from the same lines, faces and surfaces, which they hand to VTK themselves: PyVista
 on their path would cost every kernel 80 MB and a second.
@@ -12,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, TypeGuard
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -55,7 +55,11 @@ def rig(
 
 
 def board(board: Board, world_from_board: RigidTransform | None = None) -> pyvista.PolyData:
-    """A chessboard with its squares, the first inner corner at the board's origin."""
+    """A chessboard with its squares, the first inner corner at the board's origin.
+
+    >>> board(Board(9, 6, 0.025)).n_cells  # squares: 10 by 7
+    70
+    """
     square, (s, r) = board.square_size, np.indices((board.columns + 1, board.rows + 1)).reshape(2, -1)
     corner = np.stack([s - 1, r - 1, np.zeros_like(s)], axis=-1)[:, None] * square
     outline = corner + square * np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
@@ -77,10 +81,11 @@ def boards(calibration: Calibration, camera: str = "") -> pyvista.MultiBlock:
     if calibration.board is None or name not in calibration.cam_from_board:
         raise ValueError(f"calibration must hold a board and its poses before {name}, got neither or one of the two")
     world_from_board = calibration.cameras[name].world_from_cam * calibration.cam_from_board[name]
-    seen = range(len(world_from_board))
+    seen = np.ones(len(world_from_board), dtype=bool)
     if name in calibration.detections:
-        seen = np.flatnonzero(np.isfinite(calibration.detections[name]).any(axis=(1, 2))).tolist()
-    return pyvista.MultiBlock({f"view {i + 1}": board(calibration.board, world_from_board[i]) for i in seen})
+        seen = np.isfinite(calibration.detections[name]).any(axis=(1, 2))
+    views = np.flatnonzero(seen).tolist()
+    return pyvista.MultiBlock({f"view {i + 1}": board(calibration.board, world_from_board[i]) for i in views})
 
 
 def scene(scene: Scene, detail: int = 128) -> pyvista.MultiBlock:
@@ -142,7 +147,7 @@ def _drawn(item: Item) -> TypeGuard[Line | Face]:
 def _item(item: Line | Face) -> pyvista.PolyData:
     if isinstance(item, Face):
         return _mesh(item.vertices, _colour(item.colour, item.opacity), faces=np.arange(len(item.vertices))[None])
-    there = np.isfinite(item.points).all(axis=-1)
+    there = np.asarray(np.isfinite(item.points).all(axis=-1))
     lines = np.flatnonzero(there[1:] & there[:-1])[:, None] + (0, 1)
     return _mesh(np.where(there[:, None], item.points, 0), _colour(item.class_, 1), lines=lines)
 
@@ -167,9 +172,9 @@ def _sampled(picture: NDArray[np.uint8], uv: Array) -> Colours:
     """The picture's colours (n, 4) at uv (n, 2), which go on from the other side beyond 0 … 1."""
     height, width = picture.shape[:2]
     u, v = uv.T
-    column = np.where(u == 1, width - 1, u % 1 * width).astype(np.float32)
-    row = np.where(v == 0, height - 1, (1 - v) % 1 * height).astype(np.float32)
-    rgb = cv2.remap(picture, column[:, None], row[:, None], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)[:, 0]
+    column = np.where(u == 1, width - 1, u % 1 * width).astype(int)
+    row = np.where(v == 0, height - 1, (1 - v) % 1 * height).astype(int)
+    rgb = picture[row, column]
     return np.column_stack([rgb, np.full(len(rgb), 255, np.uint8)])
 
 
@@ -179,12 +184,12 @@ def _mesh(
     """Points (n, 3) with colours (n, 4) or (4,), and faces or lines (m, k) of their indices."""
     import pyvista
 
-    cells = {
-        name: np.column_stack([np.full(len(indices), indices.shape[1]), indices]).ravel()
-        for name, indices in (("faces", faces), ("lines", lines))
-        if indices is not None
-    }
-    mesh = pyvista.PolyData(np.ascontiguousarray(points, dtype=float), **cells)
+    mesh = pyvista.PolyData(np.ascontiguousarray(points, dtype=float), faces=_counted(faces), lines=_counted(lines))
     mesh.point_data["rgba"] = np.broadcast_to(np.asarray(colours, dtype=np.uint8), (len(points), 4)).copy()
     mesh.set_active_scalars("rgba")
     return mesh
+
+
+def _counted(indices: NDArray[np.intp] | None) -> NDArray[np.intp] | None:
+    """Cells (m, k) as VTK lists them: each as its number of points and their indices."""
+    return None if indices is None else np.column_stack([np.full(len(indices), indices.shape[1]), indices]).ravel()

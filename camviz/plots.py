@@ -39,7 +39,8 @@ def residuals(
     """Arrows from every detected corner towards its projection, `scale` times as long as the residual.
 
     Of the named camera or the first, of all views or of `view`, which counts from 1. Returns the axes. Raises
-    `Missing`, a ValueError, where the calibration holds no corners or poses, and ValueError for a view it does not have.
+    ValueError for a view that there is not, and `Missing`, a ValueError too, where the calibration holds no corners or
+    poses.
     """
     seen = Observations.of(calibration, camera)
     used = seen.used & _chosen(view, len(seen))[:, None]
@@ -64,7 +65,7 @@ def coverage(calibration: Calibration, ax: Any = None, *, camera: str = "", **op
 
 
 def distortion(camera: Camera, ax: Any = None, *, step_px: float | None = None, **options: Any) -> Any:
-    """Arrows from where a perspective lens puts a point to where this lens does, and contours of their length in pixels.
+    """Arrows from where a perspective lens puts a point to where this lens does, with contours of their length.
 
     The arrows start `step_px` apart, a sixteenth of the picture's width unless given. Returns the axes.
     """
@@ -83,6 +84,11 @@ def radial(camera: Camera, ax: Any = None, *, relative: bool = False, **options:
 
     With `relative`, how much farther than behind a perspective lens, which needs angles below 90°. Of a lens that is
     not round, along the picture's x axis. Returns the axes.
+
+    >>> ax = radial(Camera(Intrinsics.from_fov(640, 480, 90)), label="perspective")
+    >>> degrees, pixels = ax.lines[0].get_data()
+    >>> f"{degrees[-1]:.1f}° from the axis, {pixels[-1]:.0f} px from the principal point"
+    '51.3° from the axis, 399 px from the principal point'
     """
     k, ax = camera.intrinsics, ax or _new_axes()
     corner = np.nanmax(np.linalg.norm(k.to_pixels(k.from_pixels(k.border(1))) - (k.cx, k.cy), axis=-1))

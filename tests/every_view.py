@@ -1,4 +1,4 @@
-"""One state of every view that camviz has: those that need nothing by their class, those of the clinic by their entry."""
+"""One state of every view that camviz has, by the name of its class or, in the clinic, of its entry."""
 
 import importlib
 import pkgutil
@@ -26,7 +26,9 @@ BASES = {"View", "BoardPictures", "TwoCameras"}  # what several views share; the
 
 def classes() -> dict[str, type[View]]:
     """Every class of view in camviz.views, by name."""
-    modules = [importlib.import_module(found.name) for found in pkgutil.walk_packages(camviz.views.__path__, "camviz.views.")]
+    modules = [
+        importlib.import_module(found.name) for found in pkgutil.walk_packages(camviz.views.__path__, "camviz.views.")
+    ]
     found = [one for module in modules for one in vars(module).values() if isclass(one) and issubclass(one, View)]
     return {one.__name__: one for one in found if one.__name__ not in BASES}
 
@@ -43,7 +45,9 @@ def noise() -> View:
         return [sensor.expose(np.full((60, 80), photons), seconds, 20.0, rng).dn for _ in range(2)]
 
     times = np.linspace(0.1, 1, 8)
-    return MeasuredNoiseView(measurement=Measurement(tuple(Level.of(t, frames(9000 * t, t), frames(0, t)) for t in times)))
+    return MeasuredNoiseView(
+        measurement=Measurement(tuple(Level.of(t, frames(9000 * t, t), frames(0, t)) for t in times))
+    )
 
 
 def clinic(name: str) -> Callable[[], View]:

@@ -164,7 +164,7 @@ def _panels(root: Element) -> None:
         panel.tag = "g"
         panel.attrib = {"transform": f"translate({x} {y})"}
         clip = SubElement(panel, "clipPath", id=f"panel-{count}")
-        SubElement(clip, "rect", x="0", y="0", **size)
+        SubElement(clip, "rect", {"x": "0", "y": "0"} | size)
         SubElement(panel, "g", {"clip-path": f"url(#panel-{count})"}).extend(content)
 
 

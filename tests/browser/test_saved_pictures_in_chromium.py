@@ -67,7 +67,9 @@ def test_cairosvg_chromium_and_the_notebook_agree(page: Page, name: str, tmp_pat
     picture.save(tmp_path / "saved.svg", theme=page.theme)
     data = b64encode((tmp_path / "saved.svg").read_bytes()).decode()
     by_chromium = in_chromium(page, f'<img src="data:image/svg+xml;base64,{data}">', picture)
-    by_cairo = decoded(cairosvg.svg2png(url=str(tmp_path / "saved.svg")))[: by_chromium.shape[0], : by_chromium.shape[1]]
+    by_cairo = decoded(cairosvg.svg2png(url=str(tmp_path / "saved.svg")))[
+        : by_chromium.shape[0], : by_chromium.shape[1]
+    ]
     in_notebook = in_chromium(page, picture.standalone(), picture)
     assert apart(by_cairo, by_chromium) <= MOST
     assert apart(in_notebook, by_chromium) <= MOST
