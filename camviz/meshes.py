@@ -81,10 +81,8 @@ def boards(calibration: Calibration, camera: str = "") -> pyvista.MultiBlock:
     if calibration.board is None or name not in calibration.cam_from_board:
         raise ValueError(f"calibration must hold a board and its poses before {name}, got neither or one of the two")
     world_from_board = calibration.cameras[name].world_from_cam * calibration.cam_from_board[name]
-    seen = np.ones(len(world_from_board), dtype=bool)
-    if name in calibration.detections:
-        seen = np.isfinite(calibration.detections[name]).any(axis=(1, 2))
-    views = np.flatnonzero(seen).tolist()
+    corners = calibration.detections.get(name, np.zeros((len(world_from_board), 1, 2)))
+    views = np.flatnonzero(np.isfinite(corners).any(axis=(1, 2))).tolist()  # others were seen by other cameras alone
     return pyvista.MultiBlock({f"view {i + 1}": board(calibration.board, world_from_board[i]) for i in views})
 
 

@@ -60,10 +60,12 @@ def test_the_stronger_rule_wins_and_an_elements_own_style_over_both():
     drawn += svg.line([(0, 0), (9, 9)], "blue thick") + svg.line(
         [(0, 0), (9, 9)], "blue thick", style="stroke-width:7px"
     )
-    fill, thick, own = plain(drawn).iter(f"{SVG}path")
+    drawn += svg.polygon([(0, 0), (9, 0), (9, 9)], "wash blue")
+    fill, thick, own, outlined = plain(drawn).iter(f"{SVG}path")
     assert (fill.get("fill"), fill.get("fill-opacity"), fill.get("stroke")) == ("#0067a5", ".16", "none")
     assert (thick.get("fill"), thick.get("stroke"), thick.get("stroke-width")) == ("none", "#0067a5", "2.8")
     assert own.get("stroke-width") == "7"
+    assert outlined.get("stroke") == "#0067a5"  # `path.blue` names more than `.wash`, which comes later
 
 
 def test_words_with_a_halo_stand_over_their_halo():
