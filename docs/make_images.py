@@ -52,4 +52,4 @@ if __name__ == "__main__":
     folder = Path(__file__).with_name("images")
     folder.mkdir(exist_ok=True)
     for name, view in PICTURES.items():
-        view.figure().save(folder / f"{name}.svg")
+        view.figure().save(folder / f"{name}.svg", theme="browser")

@@ -78,7 +78,9 @@ def picture() -> Picture:
 def test_a_saved_picture_needs_nothing_else(tmp_path):
     picture().save(tmp_path / "picture.svg")
     root = ElementTree.parse(tmp_path / "picture.svg").getroot()
-    links = [image.get("href") for image in root.iter("{http://www.w3.org/2000/svg}image")]
+    links = [
+        image.get("{http://www.w3.org/1999/xlink}href") for image in root.iter("{http://www.w3.org/2000/svg}image")
+    ]
     assert [link.partition(";")[0] for link in links] == ["data:image/jpeg", "data:image/png"]
     assert root.find("{http://www.w3.org/2000/svg}desc").text == "f < 3 & rising"
 

@@ -11,6 +11,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+from camviz.draw.portable import portable
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -43,7 +45,7 @@ class Picture:
         return svg
 
     def standalone(self) -> str:
-        """One SVG document with style and photographs inside, that opens anywhere and needs nothing."""
+        """One SVG document with style and photographs inside, for browsers: it follows their light or dark theme."""
         svg = self.embedded().replace("viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1)
         return svg.replace("<title>", f"<style>{style()}</style><title>", 1)
 
@@ -56,9 +58,26 @@ class Picture:
             f'src="data:image/svg+xml;base64,{source}"></figure>'
         )
 
-    def save(self, path: str | Path) -> None:
-        """Write the standalone SVG to `path`."""
-        Path(path).write_text(self.standalone(), encoding="utf-8")
+    def save(self, path: str | Path, *, theme: str = "light", dpi: float = 192) -> None:
+        """Write the picture to a file that ends in .svg, .png or .pdf.
+
+        `theme` is "light" or "dark"; an SVG of the theme "browser" follows the theme of the browser that shows it, and
+        only browsers show it right. A unit of the picture is 1/96 inch: a PNG has `dpi` pixels an inch, so that 192
+        makes two pixels of a unit. Fonts are embedded in a PDF. Raises ValueError for another ending or theme, and
+        ModuleNotFoundError with the remedy where PNG or PDF needs cairosvg and it does not work.
+        """
+        path = Path(path)
+        if path.suffix not in (".svg", ".png", ".pdf"):
+            raise ValueError(f"path must end in .svg, .png or .pdf, got {path.name!r}")
+        if path.suffix == ".svg":
+            text = self.standalone() if theme == "browser" else self.portable(theme)
+            path.write_text(text, encoding="utf-8")
+        else:
+            path.write_bytes(_converted(self.portable(theme), path.suffix, dpi))
+
+    def portable(self, theme: str = "light") -> str:
+        """One SVG document in colours of the "light" or "dark" theme, for programs that are no browser."""
+        return portable(self.svg(), self.photographs, style(), theme)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
         return {"text/html": self.figure(), "text/plain": f"{self.title}. {self.description}"}
@@ -78,6 +97,19 @@ def png(image: np.ndarray) -> bytes:
 def style() -> str:
     """The style sheet that every picture shares."""
     return (files("camviz.draw") / "style.css").read_text(encoding="utf-8")
+
+
+def _converted(svg: str, suffix: str, dpi: float) -> bytes:
+    """An SVG document as PNG or PDF."""
+    try:
+        import cairosvg
+    except (ImportError, OSError) as error:  # OSError where the Cairo library of the system is not found
+        raise ModuleNotFoundError(
+            "PNG and PDF need cairosvg and the Cairo library: `pip install camviz[figures]`, and on Debian and Ubuntu "
+            "`apt install libcairo2`, on macOS `brew install cairo`; SVG needs neither."
+        ) from error
+    convert = cairosvg.svg2png if suffix == ".png" else cairosvg.svg2pdf
+    return bytes(convert(bytestring=svg.encode(), scale=dpi / 96 if suffix == ".png" else 1))
 
 
 def _encode(extension: str, image: np.ndarray, options: list[int]) -> bytes:

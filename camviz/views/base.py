@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
 from math import isfinite
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -134,6 +135,10 @@ class View:
         steps = {"ArrowLeft": (-10, 0), "ArrowRight": (10, 0), "ArrowUp": (0, -10), "ArrowDown": (0, 10)}
         dx, dy = steps.get(key, (0, 0))
         return self.dragged(handle, float("nan"), float("nan"), dx, dy)
+
+    def save(self, path: str | Path, **options: Any) -> None:
+        """Write the picture of this state to a .svg, .png or .pdf file; see `Picture.save` for theme and resolution."""
+        self.figure().save(path, **options)
 
     def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
         return self.figure()._repr_mimebundle_(**options)

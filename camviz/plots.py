@@ -1,0 +1,193 @@
+"""Calibrations and cameras on axes of matplotlib, for a figure of one's own or a paper.
+
+Every function draws on the axes `ax` that it is given, or on new ones, and returns them. Fonts, line widths and colours
+are those of matplotlib's `rcParams`; more keywords go to the lines, arrows or dots that are drawn. Axes over a picture
+count pixels as camviz does: u to the right, v down, whole numbers at the centres of pixels. Axes in space are metres,
+x right, y down, z forward. matplotlib is imported when axes are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.calibration.types import Calibration
+from camviz.cameras import Camera, Intrinsics, Rig, transform
+from camviz.distortion import displacement
+from camviz.draw.items import Line, camera_body
+from camviz.lenses.base import Array
+from camviz.twoview.epipolar import epipolar_curve
+from camviz.views.clinic.observations import Observations
+
+__all__ = ["boards", "coverage", "distortion", "epipolar", "frusta", "radial", "residuals"]
+
+_DISTANCES = np.append(np.geomspace(0.01, 1000, 200), np.inf)  # metres along a ray
+
+
+def residuals(
+    calibration: Calibration,
+    ax: Any = None,
+    *,
+    camera: str = "",
+    view: int | None = None,
+    scale: float = 100,
+    **options: Any,
+) -> Any:
+    """Arrows from every detected corner towards its projection, `scale` times as long as the residual.
+
+    Of the named camera or the first, of all views or of `view`, which counts from 1. Returns the axes. Raises
+    ValueError for a view that there is not, and `Missing`, a ValueError too, where the calibration holds no corners or
+    poses.
+    """
+    seen = Observations.of(calibration, camera)
+    used = seen.used & _chosen(view, len(seen))[:, None]
+    ax = image_axes(seen.camera.intrinsics, ax)
+    starts, arrows = seen.detections[used], -scale * seen.residuals[used]
+    _quiver(ax, starts, arrows, **options)
+    ax.set_title(f"residuals × {scale:g}, {_rms(seen.lengths[used]):.3g} px RMS")
+    return ax
+
+
+def coverage(calibration: Calibration, ax: Any = None, *, camera: str = "", **options: Any) -> Any:
+    """Every corner that the named camera, or the first, detected, a colour for each view. Returns the axes.
+
+    Raises `Missing`, a ValueError, where the calibration holds no corners.
+    """
+    seen = Observations.of(calibration, camera)
+    ax = image_axes(seen.camera.intrinsics, ax)
+    style = {"linestyle": "none", "marker": ".", **options}
+    for corners, shown in zip(seen.detections, seen.used | seen.aside, strict=True):
+        ax.plot(*corners[shown].T, **style)
+    return ax
+
+
+def distortion(camera: Camera, ax: Any = None, *, step_px: float | None = None, **options: Any) -> Any:
+    """Arrows from where a perspective lens puts a point to where this lens does, with contours of their length.
+
+    The arrows start `step_px` apart, a sixteenth of the picture's width unless given. Returns the axes.
+    """
+    k = camera.intrinsics
+    ax = image_axes(k, ax)
+    _quiver(ax, *displacement(camera, step_px or k.width / 16), **options)
+    fine, moved = displacement(camera, k.width / 80)
+    lengths = np.ma.masked_invalid(np.linalg.norm(moved, axis=-1))
+    if lengths.count() and np.ptp(lengths) > 0:
+        ax.clabel(ax.contour(fine[..., 0], fine[..., 1], lengths, linewidths=0.8, colors="gray"), fmt="%g px")
+    return ax
+
+
+def radial(camera: Camera, ax: Any = None, *, relative: bool = False, **options: Any) -> Any:
+    """How far from the principal point a ray lands, in pixels, against its angle to the axis, out to the far corner.
+
+    With `relative`, how much farther than behind a perspective lens, which needs angles below 90°. Of a lens that is
+    not round, along the picture's x axis. Returns the axes.
+
+    >>> ax = radial(Camera(Intrinsics.from_fov(640, 480, 90)), label="perspective")
+    >>> degrees, pixels = ax.lines[0].get_data()
+    >>> f"{degrees[-1]:.1f}° from the axis, {pixels[-1]:.0f} px from the principal point"
+    '51.3° from the axis, 399 px from the principal point'
+    """
+    k, ax = camera.intrinsics, ax or _new_axes()
+    corner = np.nanmax(np.linalg.norm(k.to_pixels(k.from_pixels(k.border(1))) - (k.cx, k.cy), axis=-1))
+    angle = np.linspace(0, np.pi, 3601)[: 1700 if relative else None]
+    rays = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
+    distance = k.to_pixels(camera.lens.project(rays))[:, 0] - k.cx
+    inside = np.logical_and.accumulate(distance <= corner)
+    shown = distance - k.fx * np.tan(angle) if relative else distance
+    ax.plot(np.degrees(angle[inside]), shown[inside], **options)
+    ax.set_xlabel("angle to the axis [°]")
+    ax.set_ylabel("distortion [px]" if relative else "distance from the principal point [px]")
+    return ax
+
+
+def epipolar(left: Camera, right: Camera, uv_left: ArrayLike, ax: Any = None, **options: Any) -> Any:
+    """The epipolar line in the right picture of every left pixel (n, 2), a colour for each; a curve if lenses bend it.
+
+    Returns the axes, over which `ax.imshow` shows the right photograph.
+    """
+    ax = image_axes(right.intrinsics, ax)
+    for curve in epipolar_curve(left, right, np.reshape(uv_left, (-1, 2)), _DISTANCES):
+        ax.plot(*np.where(right.intrinsics.contains(curve)[:, None], curve, np.nan).T, **options)
+    return ax
+
+
+def frusta(
+    cameras: Camera | Rig | Calibration | Mapping[str, Camera], ax: Any = None, *, depth: float = 0.3, **options: Any
+) -> Any:
+    """What cameras see out to `depth` metres, in space, a colour for each. Returns the axes, which are 3D."""
+    ax = space_axes(ax)
+    named = cameras if isinstance(cameras, Mapping) else getattr(cameras, "cameras", {"": cameras})
+    for name, camera in named.items():
+        lines = [item.points for item in camera_body(camera, depth) if isinstance(item, Line)]
+        _lines(ax, lines, label=name or None, **options)
+    ax.set_aspect("equal")
+    return ax
+
+
+def boards(calibration: Calibration, ax: Any = None, *, camera: str = "", **options: Any) -> Any:
+    """The outline of the board at every pose from which the named camera, or the first, saw it, in space.
+
+    Returns the axes, which are 3D. Raises `Missing`, a ValueError, where the calibration holds no corners or poses.
+    """
+    seen, ax = Observations.of(calibration, camera), space_axes(ax)
+    world_from_cam = calibration.cameras[seen.name].world_from_cam
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)])
+    outline = seen.board.square_size * (corners * (seen.board.columns + 1, seen.board.rows + 1, 0) - (1, 1, 0))
+    for view in np.flatnonzero(seen.shown):
+        _lines(ax, [transform(world_from_cam * seen.cam_from_board[view], outline)], **options)
+    ax.set_aspect("equal")
+    return ax
+
+
+# Axes -----------------------------------------------------------------------------------------------------------------
+
+
+def image_axes(intrinsics: Intrinsics, ax: Any = None) -> Any:
+    """Axes over the whole of a picture, u to the right and v down, in pixels."""
+    ax = ax or _new_axes()
+    ax.set(xlim=(-0.5, intrinsics.width - 0.5), ylim=(intrinsics.height - 0.5, -0.5), xlabel="u [px]", ylabel="v [px]")
+    ax.set_aspect("equal")
+    return ax
+
+
+def space_axes(ax: Any = None) -> Any:
+    """Axes in space, y down, in metres. Raises ValueError for axes that are not 3D."""
+    ax = ax or _new_axes(projection="3d")
+    if ax.name != "3d":
+        raise ValueError(f"ax must be 3D axes, as `figure.add_subplot(projection='3d')` makes, got {ax.name!r} axes")
+    ax.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    ax.view_init(elev=-20, azim=-150, roll=180, vertical_axis="y")  # upside down, for an inverted axis would mirror
+    return ax
+
+
+def _new_axes(**options: Any) -> Any:
+    import matplotlib.pyplot as plt
+
+    return plt.figure(layout="constrained").add_subplot(**options)
+
+
+def _lines(ax: Any, lines: list[Array], **options: Any) -> None:
+    """Lines (n, 3) as one line of one colour."""
+    joined = np.concatenate([part for line in lines for part in (line, np.full((1, 3), np.nan))])
+    ax.plot(*joined.T, **options)
+
+
+def _quiver(ax: Any, starts: Array, arrows: Array, **options: Any) -> None:
+    """Arrows in the first colour of the cycle, as long as they are in the units of the axes."""
+    (first,) = ax.plot([], [])
+    style = {"color": first.get_color(), "angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.003, **options}
+    first.remove()
+    ax.quiver(starts[..., 0], starts[..., 1], arrows[..., 0], arrows[..., 1], **style)
+
+
+def _chosen(view: int | None, count: int) -> np.ndarray:
+    if view is not None and not 1 <= view <= count:
+        raise ValueError(f"view must lie between 1 and {count}, got {view}")
+    return np.arange(1, count + 1) == view if view is not None else np.ones(count, dtype=bool)
+
+
+def _rms(lengths: Array) -> float:
+    return float(np.sqrt(np.mean(lengths**2))) if lengths.size else float("nan")
