@@ -9,7 +9,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from camviz.course import notebooks
+from camviz.course import material, notebooks
 from camviz.course.notebooks import Cell, Notebook, exercise_cells, read, solution_code, write
 from camviz.course.questions import Question
 from camviz.course.saved_outputs import tidied
@@ -63,7 +63,7 @@ def write_teacher_edition(
     for path in (*source.glob("images/*"), *source.glob("*.md")):
         (out / path.relative_to(source)).parent.mkdir(exist_ok=True)
         shutil.copyfile(path, out / path.relative_to(source))
-    chosen = lesson_paths(source, only)
+    chosen = chosen_lessons(source, only)
     for count, path in enumerate(chosen, start=1):
         edition = teacher_edition(read(path))
         if run:
@@ -73,9 +73,9 @@ def write_teacher_edition(
     return [out / path.name for path in chosen]
 
 
-def lesson_paths(source: Path, only: Iterable[str] = ()) -> list[Path]:
+def chosen_lessons(source: Path, only: Iterable[str] = ()) -> list[Path]:
     """The lessons in a folder, or those with the numbers `only`. Raises ValueError for a number that none has."""
-    found = {path.name.partition("_")[0]: path for path in sorted(source.glob("*.ipynb"))}
+    found = {path.name.partition("_")[0]: path for path in material.lesson_paths(source)}
     for number in only:
         if number not in found:
             raise ValueError(f"there is no lesson {number}; the lessons are {', '.join(found)}")

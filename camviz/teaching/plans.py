@@ -25,7 +25,6 @@ words. `test_plans.py` holds every plan against its lesson, and the lesson's own
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -34,6 +33,7 @@ from typing import Any
 from camviz.course import notebooks, questions
 from camviz.course.exercises import exercises
 from camviz.course.material import material
+from camviz.course.tables import shaped, table_of
 from camviz.teaching import markup, parts
 
 LONG, SHORT = 90, 45
@@ -43,6 +43,7 @@ MOST_SENTENCES, MOST_WORDS = 3, 35
 MOST_NOTICED = 18
 """Words over a picture."""
 
+_KEYS = {"bring": str, "network": str, "machine": str, "step": list, "votes": list, "notice": list}
 _KINDS = ("header", "section", "question", "exercise", "quiz")
 
 
@@ -159,16 +160,7 @@ def _plans(lesson: str) -> Plan | None:
 def parse(lesson: str, toml: str) -> Plan:
     """The plan in a TOML text. Raises ValueError saying in one sentence what is wrong with it."""
     where = f"plan of lesson {lesson}"
-    try:
-        table = tomllib.loads(toml)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where} is not TOML: {error}") from error
-    _shape(
-        table,
-        {"bring": str, "network": str, "machine": str, "step": list, "votes": list, "notice": list},
-        {"votes", "notice"},
-        where,
-    )
+    table = shaped(table_of(toml, where), _KEYS, where, {"votes", "notice"})
     steps = tuple(_made(Step, one, f"{where}, step {i}") for i, one in enumerate(table["step"], start=1))
     votes = tuple(_made(Votes, one, f"{where}, votes {i}") for i, one in enumerate(table.get("votes", []), start=1))
     notice = tuple(table.get("notice", []))
@@ -223,22 +215,11 @@ def section_names(notebook: notebooks.Notebook) -> set[str]:
 def _made(kind: type, table: Mapping[str, Any], where: str) -> Any:
     """A Step or Votes from its table, its lists as tuples; whatever is wrong says where."""
     types = {"tuple[int, int]": list, "tuple[int, ...]": list, "str": str}
-    _shape(table, {one.name: types[str(one.type)] for one in fields(kind)}, set(), where)
+    shaped(table, {one.name: types[str(one.type)] for one in fields(kind)}, where)
     try:
         return kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in table.items()})
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
-
-
-def _shape(table: object, kinds: dict[str, type], optional: set[str], where: str) -> None:
-    if not isinstance(table, dict):
-        raise ValueError(f"{where}: expected a table, got {table!r}")
-    unknown = sorted(set(table) - set(kinds))
-    if unknown:
-        raise ValueError(f"{where}: knows {', '.join(kinds)}, got {', '.join(unknown)}")
-    for key, kind in kinds.items():
-        if not (isinstance(table.get(key), kind) or (key in optional and key not in table)):
-            raise ValueError(f"{where}: {key} must be given as {kind.__name__}, got {table.get(key)!r}")
 
 
 def _brief(text: str) -> None:
