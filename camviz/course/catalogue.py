@@ -1,7 +1,7 @@
 """The course as a list of lessons, and the tables of lessons that README and lesson 00 show, made from it.
 
-A lesson is a notebook `NN_name.ipynb` and its folder `material/NN`. The notebook's header says the lesson's question and
-its minutes. `lesson.toml` in the folder says the rest:
+A lesson is a notebook `NN_name.ipynb` and its folder `material/NN`. The notebook's header says the lesson's question
+and its minutes. `lesson.toml` in the folder says the rest:
 
     title = "Sharpness and exposure"
     takeaway = "ISO adds no light"         # what a reader will not leave without

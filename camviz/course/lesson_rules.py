@@ -56,7 +56,13 @@ def minutes(notebook: Notebook, number: str) -> int:
 def complaints(notebook: Notebook, file_name: str) -> list[str]:
     """Where a lesson departs from the pattern, in words; empty for a good one. Lesson 00 has no exercises to hold."""
     number = file_name[:2]
-    found = [*_header(notebook, number), *_listed(notebook, file_name), *_setup(notebook), *_cells(notebook), *_links(notebook)]
+    found = [
+        *_header(notebook, number),
+        *_listed(notebook, file_name),
+        *_setup(notebook),
+        *_cells(notebook),
+        *_links(notebook),
+    ]
     if number != "00":
         found += [*_questions(notebook, number), *_exercises(notebook, number), *_ending(notebook)]
         found += [*_own_functions(notebook), *_reads_well(notebook, number)]

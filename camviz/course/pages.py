@@ -1,4 +1,4 @@
-"""The pages that are made from the lessons: README's tables, the map and the glossary in lesson 00, docs/glossary.md."""
+"""The pages made from the lessons: README's tables, the map and the glossary in lesson 00, docs/glossary.md."""
 
 from __future__ import annotations
 

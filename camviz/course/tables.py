@@ -1,4 +1,4 @@
-"""Tables of TOML, held against the keys that they must have; one sentence says what is wrong with a table, and where."""
+"""TOML tables held against the keys that they must have. One sentence says what is wrong with a table, and where."""
 
 from __future__ import annotations
 
