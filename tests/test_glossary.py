@@ -1,4 +1,4 @@
-"""The glossary: every key term of the source text, one sentence each, and links that lead somewhere."""
+"""The glossary: every key term of the source text, in two sentences at most, and links that lead somewhere."""
 
 import re
 from pathlib import Path
@@ -7,6 +7,7 @@ import pytest
 
 from camviz.course.glossary import anchor, glossary, markdown, page, term
 from camviz.course.material import lesson_paths
+from camviz.course.reading import LONGEST_SENTENCE, sentences, words
 
 ROOT = Path(__file__).parents[1]
 
@@ -36,10 +37,13 @@ def test_the_44_key_terms_of_the_source_text_are_all_there_and_no_other_is_calle
 
 
 @ALL
-def test_an_entry_is_one_sentence(one):
+def test_an_entry_has_at_most_two_sentences_that_can_be_read_at_once(one):
     assert one.sentence[0].isupper()
     assert one.sentence.endswith(".")
-    assert not re.search(r"[.?!] [A-Z]", one.sentence)
+    said = list(sentences(one.sentence))
+    assert len(said) <= 2
+    assert len(re.findall(r"[.?!] [A-Z]", one.sentence)) == len(said) - 1
+    assert max(map(words, said)) <= LONGEST_SENTENCE
 
 
 @ALL

@@ -1,4 +1,4 @@
-"""The glossary: one correct sentence for each term, with its formula and the lessons that use it.
+"""The glossary: one or two correct sentences for each term, with its formula and the lessons that use it.
 
     from camviz.course.glossary import glossary, term
 
