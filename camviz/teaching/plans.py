@@ -1,4 +1,4 @@
-"""How to teach a lesson, minute by minute: NN.toml beside this file, read into frozen dataclasses that cannot be wrong.
+"""How to teach a lesson, minute by minute: a lesson's `plan.toml`, read into frozen dataclasses that cannot be wrong.
 
     bring = "What lies ready before the class comes."
     network = "What to do when the network fails."
