@@ -18,6 +18,9 @@ from typing import Any
 from camviz.course.material import material
 from camviz.course.tables import shaped, table_of
 
+LETTERS = "abcdefgh"
+"""What choices are called, in their order."""
+
 _QUESTION_KEYS = {"id": str, "kind": str, "form": str, "concept": str, "text": str, "choice": list}
 _CHOICE_KEYS = {"text": str, "reply": str, "correct": bool, "misconception": str}
 
@@ -51,6 +54,11 @@ class Question:
     def answer(self) -> int:
         """The index of the correct choice."""
         return next(i for i, choice in enumerate(self.choices) if choice.correct)
+
+    @property
+    def lettered(self) -> list[tuple[str, Choice]]:
+        """Each choice with its letter, from "a"."""
+        return list(zip(LETTERS, self.choices, strict=False))
 
     @property
     def misconceptions(self) -> frozenset[str]:
@@ -102,8 +110,18 @@ def question(name: str) -> Question:
 
 def quiz_questions(lesson: str, form: str = "B") -> tuple[Question, ...]:
     """One form of a lesson's quiz, in its order; () where it has none. A quiz without forms counts as form B."""
-    quiz = (one for one in questions(lesson).values() if one.kind == "quiz")
-    return tuple(one for one in quiz if (one.form or "B") == form)
+    return tuple(one for one in _of_kind(lesson, "quiz") if (one.form or "B") == form)
+
+
+def predict_questions(lesson: str) -> tuple[Question, ...]:
+    """The questions that a lesson asks before it shows, in their order; () where it has none."""
+    return _of_kind(lesson, "predict")
+
+
+def _of_kind(lesson: str, kind: str) -> tuple[Question, ...]:
+    if not material(lesson, "questions.toml").is_file():
+        return ()
+    return tuple(one for one in questions(lesson).values() if one.kind == kind)
 
 
 def parse(lesson: str, toml: str) -> dict[str, Question]:

@@ -143,14 +143,20 @@ class Plan:
             begun += step.minutes[which]
         return found
 
+    def timetable(self, dash: str = "–") -> list[tuple[str, str, Step]]:
+        """Each step with its minutes in the plans for 90 and for 45, such as "5–13"; "–" where it is left out."""
+        long, short = ({id(step): f"{a}{dash}{b}" for a, b, step in self.times(length)} for length in (LONG, SHORT))
+        return [(long.get(id(step), "–"), short.get(id(step), "–"), step) for step in self.steps]
 
-def plan(lesson: str) -> Plan | None:
-    """The plan of a lesson ("05"), None where nobody has written one. Raises ValueError for one that is wrong."""
-    return _plans(lesson)
+    @property
+    def cases(self) -> tuple[tuple[str, str], ...]:
+        """What is said beside the steps, each with its title."""
+        return ("Bring", self.bring), ("If the network fails", self.network), ("If a machine fails", self.machine)
 
 
 @lru_cache
-def _plans(lesson: str) -> Plan | None:
+def plan(lesson: str) -> Plan | None:
+    """The plan of a lesson ("05"), None where nobody has written one. Raises ValueError for one that is wrong."""
     path = material(lesson, "plan.toml")
     if not lesson.isalnum() or not path.is_file():
         return None
@@ -169,7 +175,7 @@ def parse(lesson: str, toml: str) -> Plan:
 
 def complaints(made: Plan, notebook: notebooks.Notebook) -> list[str]:
     """Where a plan and its lesson disagree, in words; empty where they agree."""
-    predict = {one.name.partition(".")[2]: one for one in predict_questions(made.lesson)}
+    predict = {one.name.partition(".")[2]: one for one in questions.predict_questions(made.lesson)}
     places = {
         "section": section_names(notebook),
         "question": set(predict),
@@ -193,15 +199,6 @@ def complaints(made: Plan, notebook: notebooks.Notebook) -> list[str]:
     found += [f"the plan never asks the predict question {name}" for name in predict if name not in asked]
     known = {votes.question for votes in made.votes}
     return found + [f"the plan expects no votes for {name}" for name in predict if name not in known]
-
-
-def predict_questions(lesson: str) -> tuple[questions.Question, ...]:
-    """The questions that a lesson asks before it shows, in their order; none for a lesson without questions."""
-    try:
-        asked = questions.questions(lesson)
-    except ValueError:
-        return ()
-    return tuple(one for one in asked.values() if one.kind == "predict")
 
 
 def section_names(notebook: notebooks.Notebook) -> set[str]:
