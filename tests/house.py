@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("camviz", "lessons", "docs", "README.md", "pyproject.toml")
+COPIED = ("camviz", "lessons", "docs", "tests", "README.md", "pyproject.toml", "conftest.py")
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ import nbformat
 import pytest
 from house import ROOT, house
 
+from camviz.lenses import base
+
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
 EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
@@ -118,3 +120,76 @@ def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(less
     assert set(pages) == {"18_exercises.html", "18_marking.html", "18_slides.html"}
     assert "upside down" in pages["18_marking.html"]
     assert all("Shadows" in page for page in pages.values())
+
+
+# The other three -------------------------------------------------------------------------------------------------------
+
+
+def added(tmp_path, where):
+    """A copy of the repository with the one file of an example in a folder."""
+    files = example(where)
+    assert len(files) == 1
+    made = house(tmp_path / "camviz")
+    made.add(files)
+    return made
+
+
+def held(made, tests, words):
+    """How many of the tests in a file that are about these words pass there."""
+    said = made.run("-m", "pytest", "-o", "addopts=", "-p", "no:cacheprovider", tests, "-k", words)
+    return int(re.findall(r"(\d+) passed", said)[0])
+
+
+def test_a_lens_is_one_file(tmp_path):
+    if not hasattr(base, "CalibrationModel"):
+        pytest.skip("lenses do not declare their calibrations yet")
+    made = added(tmp_path, "camviz/lenses/")
+    code = """
+from math import sin, pi
+from camviz.lenses import LENSES, SineFisheye, calibration_models
+
+x, y = SineFisheye(0.7).project([1, 0, 0])
+print(LENSES["sine_fisheye"] is SineFisheye, "sine-fisheye" in calibration_models(), abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
+"""
+    assert made.run("-c", code).split() == ["True"] * 3
+    assert "sine-fisheye" in made.run("-m", "camviz", "calibrate", "--help")
+    assert held(made, "tests/test_lenses.py", "sine_fisheye or SineFisheye") > 20
+
+
+def test_a_calibration_format_is_one_file(tmp_path):
+    pytest.importorskip("camviz.files.registry", reason="formats are not registered yet")
+    made = added(tmp_path, "camviz/files/")
+    (made.root / "a.toy").write_text("toy 640 480 500 321.25 239.5\n")
+    made.run("-m", "camviz", "convert", "a.toy", "b.yml", "--to", "opencv")
+    made.run("-m", "camviz", "convert", "b.yml", "c.toy", "--to", "toy")
+    assert made.text("c.toy") == "toy 640 480 500.0 321.25 239.5\n"
+    assert "Toy (camera.toy), one camera" in made.run("-m", "camviz", "convert", "--help")
+    assert "Toy" in made.run("-m", "camviz", "show", "--help")
+    made.run("-m", "camviz.files.page", "docs/formats.md")
+    assert "| `toy` | Toy: camera.toy | pinhole | one line |" in made.text("docs/formats.md")
+    assert held(made, "tests/test_formats_contract.py", "toy") > 2
+
+
+def test_a_finding_is_one_file(tmp_path):
+    pytest.importorskip("camviz.clinic.checks", reason="findings are not registered yet")
+    made = added(tmp_path, "camviz/clinic/checks/")
+    code = """
+import json
+import numpy as np
+from camviz.clinic import Inspection, faults, kinds
+
+fault = faults()["skew"]
+found = Inspection.of(fault.inject(np.random.default_rng(1), fault.promised)).findings
+print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]))
+"""
+    assert json.loads(made.run("-c", code)) == ["camera: the skew is 2.0% of fx."]
+    K = [[500.0, 50.0, 319.5], [0.0, 500.0, 239.5], [0.0, 0.0, 1.0]]
+    ros = {"image_width": 640, "image_height": 480, "camera_name": "cam", "distortion_model": "plumb_bob"}
+    ros["camera_matrix"] = {"rows": 3, "cols": 3, "data": sum(K, [])}
+    ros["distortion_coefficients"] = {"rows": 1, "cols": 5, "data": [0.0] * 5}
+    (made.root / "camera.yaml").write_text(json.dumps(ros))
+    said = made.run("-m", "camviz", "inspect", "camera.yaml", "--json", status=1)
+    assert "skewed-pixels" in [each["id"] for each in json.loads(said)["findings"]]
+    made.run("-m", "camviz.clinic.statistics", "--page")
+    assert "### `skewed-pixels`" in made.text("docs/clinic.md")
+    assert held(made, "tests/test_faults.py", "promised and skew or healthy_camera or every_finding") >= 8
