@@ -122,7 +122,7 @@ def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(less
     assert all("Shadows" in page for page in pages.values())
 
 
-# The other three -------------------------------------------------------------------------------------------------------
+# The other three ------------------------------------------------------------------------------------------------------
 
 
 def added(tmp_path, where):
@@ -149,7 +149,8 @@ from math import sin, pi
 from camviz.lenses import LENSES, SineFisheye, calibration_models
 
 x, y = SineFisheye(0.7).project([1, 0, 0])
-print(LENSES["sine_fisheye"] is SineFisheye, "sine-fisheye" in calibration_models(), abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
+print(LENSES["sine_fisheye"] is SineFisheye, "sine-fisheye" in calibration_models())
+print(abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
 """
     assert made.run("-c", code).split() == ["True"] * 3
     assert "sine-fisheye" in made.run("-m", "camviz", "calibrate", "--help")
@@ -183,9 +184,9 @@ found = Inspection.of(fault.inject(np.random.default_rng(1), fault.promised)).fi
 print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]))
 """
     assert json.loads(made.run("-c", code)) == ["camera: the skew is 2.0% of fx."]
-    K = [[500.0, 50.0, 319.5], [0.0, 500.0, 239.5], [0.0, 0.0, 1.0]]
+    K = [500.0, 50.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0]
     ros = {"image_width": 640, "image_height": 480, "camera_name": "cam", "distortion_model": "plumb_bob"}
-    ros["camera_matrix"] = {"rows": 3, "cols": 3, "data": sum(K, [])}
+    ros["camera_matrix"] = {"rows": 3, "cols": 3, "data": K}
     ros["distortion_coefficients"] = {"rows": 1, "cols": 5, "data": [0.0] * 5}
     (made.root / "camera.yaml").write_text(json.dumps(ros))
     said = made.run("-m", "camviz", "inspect", "camera.yaml", "--json", status=1)
