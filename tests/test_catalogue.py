@@ -1,5 +1,6 @@
 """The course as a list of lessons: what each says of itself, and the pages that are made from that."""
 
+import doctest
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +9,7 @@ import nbformat
 import pytest
 
 from camviz.commands import lessons as command
-from camviz.course import catalogue, material, pages
+from camviz.course import catalogue, material, pages, tables, trials, yours
 from camviz.course.catalogue import Lesson
 from camviz.course.tables import shaped, table_of
 
@@ -114,3 +115,10 @@ def test_a_table_that_has_another_shape_is_named_with_its_place():
             shaped(table, kinds, "here", {"minutes"})
     with pytest.raises(ValueError, match="here is not TOML: "):
         table_of("title =", "here")
+
+
+@pytest.mark.parametrize("module", [catalogue, tables, trials, yours], ids=lambda module: module.__name__)
+def test_the_examples_in_the_docstrings_come_out_as_they_say(module):
+    tried = doctest.testmod(module)
+    assert tried.failed == 0
+    assert tried.attempted > 0
