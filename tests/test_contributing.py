@@ -7,8 +7,6 @@ import nbformat
 import pytest
 from house import ROOT, house
 
-from camviz.lenses import base
-
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
 EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
@@ -141,19 +139,19 @@ def held(made, tests, words):
 
 
 def test_a_lens_is_one_file(tmp_path):
-    if not hasattr(base, "CalibrationModel"):
-        pytest.skip("lenses do not declare their calibrations yet")
+    pytest.importorskip("camviz.lenses.declarations", reason="lenses do not declare themselves yet")
     made = added(tmp_path, "camviz/lenses/")
     code = """
-from math import sin, pi
+from math import pi, sin
+
 from camviz.lenses import LENSES, SineFisheye, calibration_models
 
 x, y = SineFisheye(0.7).project([1, 0, 0])
-print(LENSES["sine_fisheye"] is SineFisheye, "sine-fisheye" in calibration_models())
+print(LENSES["sine_fisheye"] is SineFisheye, "sine" in calibration_models())
 print(abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
 """
     assert made.run("-c", code).split() == ["True"] * 3
-    assert "sine-fisheye" in made.run("-m", "camviz", "calibrate", "--help")
+    assert "sine " in made.run("-m", "camviz", "calibrate", "--help")
     assert held(made, "tests/test_lenses.py", "sine_fisheye or SineFisheye") > 20
 
 
