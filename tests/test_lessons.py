@@ -23,7 +23,7 @@ LESSONS = sorted((ROOT / "lessons").glob("*.ipynb"))
 EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 
 HEADER = """# 05 Lens distortion
-*What does a polynomial do beyond its last data point?* [launch](https://mybinder.org/v2)
+**What does a polynomial do beyond its last data point?** [launch](https://mybinder.org/v2)
 
 About 65 minutes.
 **Prerequisites:** lesson 03. **What you'll do:** … **What you'll learn:** … **What you’ll need:** …"""

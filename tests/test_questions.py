@@ -7,7 +7,7 @@ import pytest
 
 from camviz.course import prose
 from camviz.course.material import material
-from camviz.course.questions import Question, parse, question, questions, quiz_questions
+from camviz.course.questions import Question, parse, predict_questions, question, questions, quiz_questions
 from camviz.widgets.question import QuestionWidget, Sheet, ask, quiz, score
 
 LESSONS = sorted(path.parent.name for path in material().glob("*/questions.toml"))
@@ -128,10 +128,15 @@ PAIR = "".join(
 
 def test_a_pair_is_read_and_a_quiz_without_forms_is_form_b(monkeypatch):
     assert [one.form for one in parse("99", PAIR).values()] == ["A", "B"]
-    for text, forms in ((PAIR, ["99.colour"]), (GOOD.replace("predict", "quiz"), [])):
+    for text, forms in ((PAIR, ["05.colour"]), (GOOD.replace("predict", "quiz"), [])):
         monkeypatch.setattr("camviz.course.questions.questions", lambda lesson, text=text: parse(lesson, text))
-        assert [one.name for one in quiz_questions("99", "A")] == forms
-        assert len(quiz_questions("99")) == 1
+        assert [one.name for one in quiz_questions("05", "A")] == forms
+        assert len(quiz_questions("05")) == 1
+
+
+def test_a_lesson_without_questions_has_an_empty_quiz_and_asks_nothing():
+    assert quiz_questions("99") == predict_questions("99") == ()
+    assert [one.kind for one in predict_questions("05")] == ["predict"] * 3
 
 
 @pytest.mark.parametrize(

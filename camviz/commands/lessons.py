@@ -1,8 +1,9 @@
-"""Tools for the lessons: what a lesson must have, and its saved outputs.
+"""Tools for the lessons: what a lesson must have, its saved outputs, and the pages that list the lessons.
 
 python -m camviz.commands.lessons check            what departs from the pattern of a lesson
 python -m camviz.commands.lessons refresh [05 …]   run and save with static outputs
 python -m camviz.commands.lessons fresh            which saved outputs are older than their lesson
+python -m camviz.commands.lessons pages            write README's tables, lesson 00's map and both glossaries anew
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 from camviz.course.lesson_rules import complaints
 from camviz.course.material import lessons_folder
 from camviz.course.notebooks import read
+from camviz.course.pages import write_pages
 from camviz.course.saved_outputs import is_fresh, refresh
 from camviz.teaching import plans
 
@@ -31,6 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command = subparsers.add_parser(name, help=text)
         command.add_argument("names", nargs="*", metavar="NAME", help="how a lesson's file name begins; default: all")
         command.set_defaults(run=run)
+    command = subparsers.add_parser("pages", help="write the pages that list the lessons, and the glossary")
+    command.set_defaults(run=_run_pages)
     given = parser.parse_args(arguments)
     try:
         return given.run(given)
@@ -58,6 +62,11 @@ def _run_fresh(given: argparse.Namespace) -> int:
     stale = [path.name for path in _paths(given.names) if not is_fresh(read(path))]
     print("\n".join(f"{name} is stale: {PROGRAM} refresh {name}" for name in stale) or "all fresh")
     return 1 if stale else 0
+
+
+def _run_pages(given: argparse.Namespace) -> int:
+    print("\n".join(f"wrote {path}" for path in write_pages()) or "all pages are fresh")
+    return 0
 
 
 def _run_check(given: argparse.Namespace) -> int:

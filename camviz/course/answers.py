@@ -14,11 +14,10 @@ from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import TextIO
 
-from camviz.course.questions import Question, questions
+from camviz.course.questions import LETTERS, Question, questions
 
 KEPT_IN = "camviz_answers.csv"
 WHEN = ("before", "after")
-_LETTERS = "abcdefgh"
 _KEPT = ["participant", "lesson", "when", "form", "concept", "attempt", "choice"]
 _EXPORTED = [*_KEPT, "correct", "misconception"]
 
@@ -43,7 +42,7 @@ class Answer:
     @property
     def index(self) -> int:
         """The choice counted from 0."""
-        return _LETTERS.index(self.choice)
+        return LETTERS.index(self.choice)
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class AnswerBook:
         attempts = [one for one in before if (one.when, one.concept) == (when, question.concept)]
         participant = before[0].participant if before else secrets.token_hex(4)
         place = (participant, lesson, when, question.form, question.concept)
-        answer = Answer(*place, len(attempts) + 1, _LETTERS[choice])
+        answer = Answer(*place, len(attempts) + 1, LETTERS[choice])
         text = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
         with self.path.open("a", encoding="utf-8", newline="") as file:
             file.write("\n" if text and not text.endswith("\n") else "")
@@ -129,7 +128,7 @@ def _answer(row: list[str], columns: int, where: str) -> Answer:
         raise ValueError(f"{where}: needs {columns} entries, has {len(row)}")
     participant, lesson, when, form, concept, attempt, choice = row[: len(_KEPT)]
     names = participant.isalnum() and lesson.isalnum()  # parts of a file's name
-    if not names or when not in WHEN or not attempt.isdecimal() or len(choice) != 1 or choice not in _LETTERS:
+    if not names or when not in WHEN or not attempt.isdecimal() or len(choice) != 1 or choice not in LETTERS:
         raise ValueError(f"{where}: is no answer: {','.join(row)}")
     answer = Answer(participant, lesson, when, form, concept, int(attempt), choice)
     if columns == len(_KEPT):

@@ -1,24 +1,26 @@
-"""The glossary: one correct sentence for each term, with its formula and the lessons that use it.
+"""The glossary: one or two correct sentences for each term, with its formula and the lessons that use it.
 
     from camviz.course.glossary import glossary, term
 
-`python -m camviz.course.glossary` writes docs/glossary.md anew.
+Its terms stand in lessons/material/glossary.toml. A lesson may bring terms of its own in material/NN/glossary.toml.
+`python -m camviz.commands.lessons pages` writes docs/glossary.md anew.
 """
 
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
 from html import escape
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from camviz.course import prose
-from camviz.course.material import lessons_folder, material
+from camviz.course.material import lesson_paths, material
+from camviz.course.tables import table_of
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ class Glossary:
 @lru_cache
 def glossary() -> Glossary:
     """The whole glossary."""
-    entries = [_term(one) for one in _table()["term"]]
+    own = [_term(one, path.parent.name) for path in sorted(material().glob("*/glossary.toml")) for one in _table(path)]
+    entries = [*(_term(one) for one in _table(material("glossary.toml"))), *own]
     return Glossary(tuple(sorted(entries, key=lambda one: one.name.casefold())))
 
 
@@ -91,7 +94,7 @@ def markdown(lessons: str = "") -> str:
 
 def page() -> str:
     """docs/glossary.md."""
-    made = "<!-- Made from lessons/material/glossary.toml by: python -m camviz.course.glossary -->"
+    made = "<!-- Made from lessons/material/glossary.toml by: python -m camviz.commands.lessons pages -->"
     return f"# Glossary\n\n{made}\n\n{markdown('../lessons/')}"
 
 
@@ -103,7 +106,7 @@ def _entry(one: Term, lessons: str) -> str:
 
 
 def _link(number: str, lessons: str) -> str:
-    notebook = _table()["notebooks"].get(number)
+    notebook = _notebooks().get(number)
     return f"[{number}]({lessons}{notebook})" if notebook else number
 
 
@@ -111,8 +114,9 @@ def _in_words(lessons: tuple[str, ...]) -> str:
     return f" (lesson{'s' if len(lessons) > 1 else ''} {', '.join(lessons)})" if lessons else ""
 
 
-def _term(entry: dict[str, Any]) -> Term:
-    lists: dict[str, Any] = {key: tuple(entry[key]) for key in ("lessons", "also") if key in entry}
+def _term(entry: dict[str, Any], lesson: str = "") -> Term:
+    """An entry of the glossary; one that a lesson brings is used by that lesson, unless it says more."""
+    lists = {"lessons": tuple(entry.get("lessons", [lesson])), "also": tuple(entry.get("also", ()))}
     return Term(**{**entry, **lists})
 
 
@@ -125,9 +129,9 @@ def _names() -> Mapping[str, Term]:
 
 
 @lru_cache
-def _table() -> dict[str, Any]:
-    return tomllib.loads(material("glossary.toml").read_text(encoding="utf-8"))
+def _notebooks() -> Mapping[str, str]:
+    return MappingProxyType({path.name[:2]: path.name for path in lesson_paths()})
 
 
-if __name__ == "__main__":
-    lessons_folder().parent.joinpath("docs", "glossary.md").write_text(page(), encoding="utf-8")
+def _table(path: Path) -> list[dict[str, Any]]:
+    return list(table_of(path.read_text(encoding="utf-8"), str(path))["term"])

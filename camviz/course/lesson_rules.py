@@ -6,7 +6,7 @@ import ast
 import re
 from typing import Any
 
-from camviz.course import glossary, notebooks, questions, reading
+from camviz.course import catalogue, glossary, notebooks, questions, reading
 from camviz.course.exercises import exercises
 
 Notebook = Any
@@ -56,7 +56,13 @@ def minutes(notebook: Notebook, number: str) -> int:
 def complaints(notebook: Notebook, file_name: str) -> list[str]:
     """Where a lesson departs from the pattern, in words; empty for a good one. Lesson 00 has no exercises to hold."""
     number = file_name[:2]
-    found = [*_header(notebook, number), *_setup(notebook), *_cells(notebook), *_links(notebook)]
+    found = [
+        *_header(notebook, number),
+        *_listed(notebook, file_name),
+        *_setup(notebook),
+        *_cells(notebook),
+        *_links(notebook),
+    ]
     if number != "00":
         found += [*_questions(notebook, number), *_exercises(notebook, number), *_ending(notebook)]
         found += [*_own_functions(notebook), *_reads_well(notebook, number)]
@@ -74,6 +80,15 @@ def _header(notebook: Notebook, number: str) -> list[str]:
     if f"about {needed} minutes" not in text:
         found.append(f"the header must say how long the lesson takes, About {needed} minutes")
     return found
+
+
+def _listed(notebook: Notebook, file_name: str) -> list[str]:
+    """Whether README and lesson 00 can list the lesson."""
+    try:
+        catalogue.described(notebook, file_name)
+    except ValueError as error:
+        return [str(error)]
+    return []
 
 
 def _setup(notebook: Notebook) -> list[str]:

@@ -1,7 +1,7 @@
 """Where the lessons are, and what belongs to one of them alone: `material/NN` beside the notebooks.
 
-A lesson's folder holds its `questions.toml`, its `exercises.py`, the teacher's `plan.toml`, and what else only that
-lesson needs.
+A lesson's folder holds its `lesson.toml` (camviz.course.catalogue), its `questions.toml`, its `exercises.py`, the
+teacher's `plan.toml`, its own terms for the glossary in `glossary.toml`, and what else only that lesson needs.
 """
 
 from __future__ import annotations
@@ -33,6 +33,11 @@ def lessons_folder() -> Path:
 def material(*parts: str) -> Path:
     """The way to a file or a folder of material, such as `material("05", "plan.toml")`, whether it is there or not."""
     return lessons_folder().joinpath(MATERIAL, *parts)
+
+
+def lesson_paths(folder: Path | None = None) -> list[Path]:
+    """The notebooks of the lessons in a folder, by default all lessons, in the order of their numbers."""
+    return sorted((folder or lessons_folder()).glob("*.ipynb"))
 
 
 @lru_cache

@@ -33,11 +33,16 @@ def read(path: Path) -> Notebook:
         raise ValueError(f"{path} is not a notebook: {error}") from error
 
 
-def write(notebook: Notebook, path: Path) -> None:
-    """Writes a notebook, with its keys in order and a newline at its end."""
+def text_of(notebook: Notebook) -> str:
+    """A notebook as its file has it: JSON with the keys in order and a newline at its end."""
     import nbformat
 
-    path.write_text(nbformat.writes(notebook).rstrip("\n") + "\n", encoding="utf-8")
+    return str(nbformat.writes(notebook)).rstrip("\n") + "\n"
+
+
+def write(notebook: Notebook, path: Path) -> None:
+    """Writes a notebook to its file."""
+    path.write_text(text_of(notebook), encoding="utf-8")
 
 
 def execute(notebook: Notebook, folder: Path) -> None:

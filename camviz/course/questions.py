@@ -10,13 +10,19 @@ and its `concept`; each concept has one question in either form, and these twins
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 from camviz.course.material import material
+from camviz.course.tables import shaped, table_of
+
+LETTERS = "abcdefgh"
+"""What choices are called, in their order."""
+
+_QUESTION_KEYS = {"id": str, "kind": str, "form": str, "concept": str, "text": str, "choice": list}
+_CHOICE_KEYS = {"text": str, "reply": str, "correct": bool, "misconception": str}
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,11 @@ class Question:
     def answer(self) -> int:
         """The index of the correct choice."""
         return next(i for i, choice in enumerate(self.choices) if choice.correct)
+
+    @property
+    def lettered(self) -> list[tuple[str, Choice]]:
+        """Each choice with its letter, from "a"."""
+        return list(zip(LETTERS, self.choices, strict=False))
 
     @property
     def misconceptions(self) -> frozenset[str]:
@@ -99,18 +110,25 @@ def question(name: str) -> Question:
 
 def quiz_questions(lesson: str, form: str = "B") -> tuple[Question, ...]:
     """One form of a lesson's quiz, in its order; () where it has none. A quiz without forms counts as form B."""
-    quiz = (one for one in questions(lesson).values() if one.kind == "quiz")
-    return tuple(one for one in quiz if (one.form or "B") == form)
+    return tuple(one for one in _of_kind(lesson, "quiz") if (one.form or "B") == form)
+
+
+def predict_questions(lesson: str) -> tuple[Question, ...]:
+    """The questions that a lesson asks before it shows, in their order; () where it has none."""
+    return _of_kind(lesson, "predict")
+
+
+def _of_kind(lesson: str, kind: str) -> tuple[Question, ...]:
+    if not material(lesson, "questions.toml").is_file():
+        return ()
+    return tuple(one for one in questions(lesson).values() if one.kind == kind)
 
 
 def parse(lesson: str, toml: str) -> dict[str, Question]:
     """The questions in a TOML text, by name. Raises ValueError saying which question is wrong, and how."""
-    try:
-        tables = tomllib.loads(toml)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"questions.toml of lesson {lesson} is not TOML: {error}") from error
-    _only(tables, {"question"}, f"{lesson}.toml")
-    parsed = [_question(lesson, number, table) for number, table in enumerate(tables.get("question", []), start=1)]
+    where = f"questions.toml of lesson {lesson}"
+    tables = shaped(table_of(toml, where), {"question": list}, where, {"question"}).get("question", [])
+    parsed = [_question(lesson, number, table) for number, table in enumerate(tables, start=1)]
     names = [one.name for one in parsed]
     for name in names:
         if names.count(name) > 1:
@@ -121,14 +139,13 @@ def parse(lesson: str, toml: str) -> dict[str, Question]:
 
 def _question(lesson: str, number: int, table: dict[str, Any]) -> Question:
     name = f"{lesson}.{table.get('id', f'(number {number}, without an id)')}"
-    _only(table, {"id", "kind", "form", "concept", "text", "choice"}, f"question {name}")
-    _needs(table, {"id": str, "kind": str, "text": str, "choice": list}, f"question {name}")
-    choices = tuple(
-        _choice(choice, f"question {name}, choice {i}") for i, choice in enumerate(table["choice"], start=1)
-    )
-    pair = {key: table.get(key, "") for key in ("form", "concept")}
-    _needs(pair, {"form": str, "concept": str}, f"question {name}")
-    return Question(name, table["kind"], table["text"], choices, **pair)
+    told = dict(shaped(table, _QUESTION_KEYS, f"question {name}", {"form", "concept"}))
+    choices = [
+        Choice(**shaped(one, _CHOICE_KEYS, f"question {name}, choice {i}", {"correct", "misconception"}))
+        for i, one in enumerate(told.pop("choice"), start=1)
+    ]
+    del told["id"]
+    return Question(name, choices=tuple(choices), **told)
 
 
 def _paired(quiz: list[Question]) -> None:
@@ -146,21 +163,3 @@ def _paired(quiz: list[Question]) -> None:
             raise ValueError(f"question {one.name}: no question of form {missing} has its concept, {one.concept!r}")
         if differ := sorted(one.misconceptions ^ twin.misconceptions):
             raise ValueError(f"question {one.name}: its twin {twin.name} must share its misconceptions, not {differ}")
-
-
-def _choice(table: dict[str, Any], where: str) -> Choice:
-    _only(table, {field.name for field in fields(Choice)}, where)
-    _needs(table, {"text": str, "reply": str}, where)
-    return Choice(**table)
-
-
-def _only(table: dict[str, Any], known: set[str], where: str) -> None:
-    unknown = sorted(set(table) - known)
-    if unknown:
-        raise ValueError(f"{where}: knows {', '.join(sorted(known))}, got {', '.join(unknown)}")
-
-
-def _needs(table: dict[str, Any], kinds: dict[str, type], where: str) -> None:
-    for key, kind in kinds.items():
-        if not isinstance(table.get(key), kind):
-            raise ValueError(f"{where}: {key} must be given as {kind.__name__}, got {table.get(key)!r}")

@@ -9,7 +9,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from camviz.course import notebooks
+from camviz.course import material, notebooks
 from camviz.course.notebooks import Cell, Notebook, exercise_cells, read, solution_code, write
 from camviz.course.questions import Question
 from camviz.course.saved_outputs import tidied
@@ -17,6 +17,9 @@ from camviz.teaching import parts, plans
 from camviz.teaching.plans import Plan, Step, Votes
 
 Say = Callable[[str], None]
+
+UNBROKEN_DASH = "\u2060–\u2060"
+"""Between two numbers that are to stay on one line."""
 
 
 def teacher_edition(notebook: Notebook) -> Notebook:
@@ -63,7 +66,7 @@ def write_teacher_edition(
     for path in (*source.glob("images/*"), *source.glob("*.md")):
         (out / path.relative_to(source)).parent.mkdir(exist_ok=True)
         shutil.copyfile(path, out / path.relative_to(source))
-    chosen = lesson_paths(source, only)
+    chosen = chosen_lessons(source, only)
     for count, path in enumerate(chosen, start=1):
         edition = teacher_edition(read(path))
         if run:
@@ -73,9 +76,9 @@ def write_teacher_edition(
     return [out / path.name for path in chosen]
 
 
-def lesson_paths(source: Path, only: Iterable[str] = ()) -> list[Path]:
+def chosen_lessons(source: Path, only: Iterable[str] = ()) -> list[Path]:
     """The lessons in a folder, or those with the numbers `only`. Raises ValueError for a number that none has."""
-    found = {path.name.partition("_")[0]: path for path in sorted(source.glob("*.ipynb"))}
+    found = {path.name.partition("_")[0]: path for path in material.lesson_paths(source)}
     for number in only:
         if number not in found:
             raise ValueError(f"there is no lesson {number}; the lessons are {', '.join(found)}")
@@ -128,11 +131,10 @@ def _planned(plan: Plan | None, notebook: Notebook) -> list[Cell]:
 
 def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
     """The plan as a table of minutes, places, and what teacher and class do; then what to bring, and if it fails."""
-    times = [{id(step): _minutes(a, b) for a, b, step in plan.times(length)} for length in (plans.LONG, plans.SHORT)]
     rows = []
-    for step in plan.steps:
-        cells = [*(one.get(id(step), "–") for one in times), _linked(step, titles)]
-        rows.append(f"| {' | '.join([*cells, _one_line(step.teacher), _one_line(step.students)])} |")
+    for long, short, step in plan.timetable(UNBROKEN_DASH):
+        cells = (long, short, _linked(step, titles), _one_line(step.teacher), _one_line(step.students))
+        rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(
         [
             "## For the teacher: the plan",
@@ -145,9 +147,7 @@ def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
             "",
             "A step marked – is left out in that plan.",
             "",
-            f"* **Bring.** {_one_line(plan.bring)}",
-            f"* **If the network fails.** {_one_line(plan.network)}",
-            f"* **If a machine fails.** {_one_line(plan.machine)}",
+            *(f"* **{title}.** {_one_line(text)}" for title, text in plan.cases),
         ]
     )
 
@@ -181,11 +181,6 @@ def _anchored(cells: list[Cell], plan: Plan, titles: dict[str, str]) -> None:
             cell.source = "\n".join(f'<a id="{anchor}"></a>\n\n{line}' if anchor else line for anchor, line in pairs)
 
 
-def _minutes(begin: int, end: int) -> str:
-    """From when to when, and never broken into two lines."""
-    return f"{begin}\u2060–\u2060{end}"
-
-
 def _keys(cell: Cell, plan: Plan | None) -> list[Cell]:
     asked = parts.asked(cell)
     if not asked:
@@ -197,16 +192,16 @@ def _keys(cell: Cell, plan: Plan | None) -> list[Cell]:
 def key_markdown(question: Question, votes: Votes | None) -> str:
     """The right choice, then for each choice its expected share, the thought behind it and the reply to it."""
     name = question.name.partition(".")[2]
-    right = question.choices[question.answer]
+    letter, right = question.lettered[question.answer]
     lines = [
         f'<a id="key-{name}"></a>',
-        f"> **Key.** Right is **({_letter(question.answer)})** {_markdown(right.text)}",
+        f"> **Key.** Right is **({letter})** {_markdown(right.text)}",
     ]
-    for number, choice in enumerate(question.choices):
+    for number, (letter, choice) in enumerate(question.lettered):
         share = f", {votes.split[number]} % expected" if votes else ""
         thought = f" The thought behind it: *{_markdown(choice.misconception)}*." if choice.misconception else ""
         mark = "✓" if choice.correct else "✗"
-        lines.append(f"> * **({_letter(number)})** {mark}{share}.{thought} Reply: {_markdown(choice.reply)}")
+        lines.append(f"> * **({letter})** {mark}{share}.{thought} Reply: {_markdown(choice.reply)}")
     if votes:
         counted = "nobody has counted votes yet" if votes.guessed else votes.source
         lines += [">", f"> The expected votes are {'a guess: ' if votes.guessed else 'from '}{_markdown(counted)}."]
@@ -225,10 +220,6 @@ def _cell(text: str, name: str, tag: str) -> Cell:
     made = nbformat.v4.new_markdown_cell(text)
     made.id, made.metadata["tags"] = name[:64], [tag]
     return made
-
-
-def _letter(number: int) -> str:
-    return chr(ord("a") + number)
 
 
 def _one_line(text: str) -> str:

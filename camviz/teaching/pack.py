@@ -7,7 +7,7 @@ from pathlib import Path
 
 from camviz.course.notebooks import Notebook, read
 from camviz.teaching.deck import deck
-from camviz.teaching.edition import Say, lesson_paths, write_teacher_edition
+from camviz.teaching.edition import Say, chosen_lessons, write_teacher_edition
 from camviz.teaching.sheets import sheets
 
 
@@ -17,7 +17,7 @@ def write_pack(source: Path, out: Path, only: Sequence[str], *, run: bool, slide
     Raises ValueError for a number that no lesson has, and when `out` is the lessons' own folder.
     """
     write_teacher_edition(source, out, run=run, only=only, say=say)
-    for path in lesson_paths(source, only):
+    for path in chosen_lessons(source, only):
         lesson, number = read(path), path.name.partition("_")[0]
         pages = sheets(lesson, number)
         if slides:

@@ -1,4 +1,4 @@
-"""How to teach a lesson, minute by minute: NN.toml beside this file, read into frozen dataclasses that cannot be wrong.
+"""How to teach a lesson, minute by minute: a lesson's `plan.toml`, read into frozen dataclasses that cannot be wrong.
 
     bring = "What lies ready before the class comes."
     network = "What to do when the network fails."
@@ -25,7 +25,6 @@ words. `test_plans.py` holds every plan against its lesson, and the lesson's own
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -34,6 +33,7 @@ from typing import Any
 from camviz.course import notebooks, questions
 from camviz.course.exercises import exercises
 from camviz.course.material import material
+from camviz.course.tables import shaped, table_of
 from camviz.teaching import markup, parts
 
 LONG, SHORT = 90, 45
@@ -43,6 +43,7 @@ MOST_SENTENCES, MOST_WORDS = 3, 35
 MOST_NOTICED = 18
 """Words over a picture."""
 
+_KEYS = {"bring": str, "network": str, "machine": str, "step": list, "votes": list, "notice": list}
 _KINDS = ("header", "section", "question", "exercise", "quiz")
 
 
@@ -142,14 +143,20 @@ class Plan:
             begun += step.minutes[which]
         return found
 
+    def timetable(self, dash: str = "–") -> list[tuple[str, str, Step]]:
+        """Each step with its minutes in the plans for 90 and for 45, such as "5–13"; "–" where it is left out."""
+        long, short = ({id(step): f"{a}{dash}{b}" for a, b, step in self.times(length)} for length in (LONG, SHORT))
+        return [(long.get(id(step), "–"), short.get(id(step), "–"), step) for step in self.steps]
 
-def plan(lesson: str) -> Plan | None:
-    """The plan of a lesson ("05"), None where nobody has written one. Raises ValueError for one that is wrong."""
-    return _plans(lesson)
+    @property
+    def cases(self) -> tuple[tuple[str, str], ...]:
+        """What is said beside the steps, each with its title."""
+        return ("Bring", self.bring), ("If the network fails", self.network), ("If a machine fails", self.machine)
 
 
 @lru_cache
-def _plans(lesson: str) -> Plan | None:
+def plan(lesson: str) -> Plan | None:
+    """The plan of a lesson ("05"), None where nobody has written one. Raises ValueError for one that is wrong."""
     path = material(lesson, "plan.toml")
     if not lesson.isalnum() or not path.is_file():
         return None
@@ -159,16 +166,7 @@ def _plans(lesson: str) -> Plan | None:
 def parse(lesson: str, toml: str) -> Plan:
     """The plan in a TOML text. Raises ValueError saying in one sentence what is wrong with it."""
     where = f"plan of lesson {lesson}"
-    try:
-        table = tomllib.loads(toml)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where} is not TOML: {error}") from error
-    _shape(
-        table,
-        {"bring": str, "network": str, "machine": str, "step": list, "votes": list, "notice": list},
-        {"votes", "notice"},
-        where,
-    )
+    table = shaped(table_of(toml, where), _KEYS, where, {"votes", "notice"})
     steps = tuple(_made(Step, one, f"{where}, step {i}") for i, one in enumerate(table["step"], start=1))
     votes = tuple(_made(Votes, one, f"{where}, votes {i}") for i, one in enumerate(table.get("votes", []), start=1))
     notice = tuple(table.get("notice", []))
@@ -177,7 +175,7 @@ def parse(lesson: str, toml: str) -> Plan:
 
 def complaints(made: Plan, notebook: notebooks.Notebook) -> list[str]:
     """Where a plan and its lesson disagree, in words; empty where they agree."""
-    predict = {one.name.partition(".")[2]: one for one in predict_questions(made.lesson)}
+    predict = {one.name.partition(".")[2]: one for one in questions.predict_questions(made.lesson)}
     places = {
         "section": section_names(notebook),
         "question": set(predict),
@@ -203,15 +201,6 @@ def complaints(made: Plan, notebook: notebooks.Notebook) -> list[str]:
     return found + [f"the plan expects no votes for {name}" for name in predict if name not in known]
 
 
-def predict_questions(lesson: str) -> tuple[questions.Question, ...]:
-    """The questions that a lesson asks before it shows, in their order; none for a lesson without questions."""
-    try:
-        asked = questions.questions(lesson)
-    except ValueError:
-        return ()
-    return tuple(one for one in asked.values() if one.kind == "predict")
-
-
 def section_names(notebook: notebooks.Notebook) -> set[str]:
     """What `at = "section …"` may name: the number of each heading `## 3 · …`, and each heading's whole text."""
     text = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
@@ -223,22 +212,11 @@ def section_names(notebook: notebooks.Notebook) -> set[str]:
 def _made(kind: type, table: Mapping[str, Any], where: str) -> Any:
     """A Step or Votes from its table, its lists as tuples; whatever is wrong says where."""
     types = {"tuple[int, int]": list, "tuple[int, ...]": list, "str": str}
-    _shape(table, {one.name: types[str(one.type)] for one in fields(kind)}, set(), where)
+    shaped(table, {one.name: types[str(one.type)] for one in fields(kind)}, where)
     try:
         return kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in table.items()})
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
-
-
-def _shape(table: object, kinds: dict[str, type], optional: set[str], where: str) -> None:
-    if not isinstance(table, dict):
-        raise ValueError(f"{where}: expected a table, got {table!r}")
-    unknown = sorted(set(table) - set(kinds))
-    if unknown:
-        raise ValueError(f"{where}: knows {', '.join(kinds)}, got {', '.join(unknown)}")
-    for key, kind in kinds.items():
-        if not (isinstance(table.get(key), kind) or (key in optional and key not in table)):
-            raise ValueError(f"{where}: {key} must be given as {kind.__name__}, got {table.get(key)!r}")
 
 
 def _brief(text: str) -> None:

@@ -31,17 +31,15 @@ def sheets(notebook: Notebook, lesson: str) -> dict[str, str]:
 def plan_page(notebook: Notebook, plan: plans.Plan) -> str:
     """The plan by the minute, then the key to every question: all that a lesson needs when no screen works."""
     titles = parts.titles(notebook)
-    times = [{id(step): f"{a}–{b}" for a, b, step in plan.times(length)} for length in (plans.LONG, plans.SHORT)]
     head = "".join(
         f"<th>{title}</th>" for title in (f"{plans.LONG} min", f"{plans.SHORT} min", "where", "you", "the class")
     )
     rows = ""
-    for step in plan.steps:
-        when = "".join(f"<td>{one.get(id(step), '–')}</td>" for one in times)
+    for long, short, step in plan.timetable():
+        when = f"<td>{long}</td><td>{short}</td>"
         texts = "".join(f"<td>{prose.inline(' '.join(one.split()))}</td>" for one in (step.teacher, step.students))
         rows += f"<tr>{when}<td>{markup.inline(place(step, titles))}</td>{texts}</tr>"
-    cases = (("Bring", plan.bring), ("If the network fails", plan.network), ("If a machine fails", plan.machine))
-    notes = "".join(f"<p><b>{title}.</b> {prose.inline(' '.join(text.split()))}</p>" for title, text in cases)
+    notes = "".join(f"<p><b>{title}.</b> {prose.inline(' '.join(text.split()))}</p>" for title, text in plan.cases)
     keys = "".join(question_key(one, plan.expected(one.name)) for one in _asked(notebook))
     body = (
         f"{notes}<table class='plan'><tr>{head}</tr>{rows}</table><h2 class='keys'>Questions and their keys</h2>{keys}"
@@ -52,11 +50,11 @@ def plan_page(notebook: Notebook, plan: plans.Plan) -> str:
 def question_key(question: Question, votes: plans.Votes | None = None) -> str:
     """A question with, for each choice, whether it is right, how many are expected to choose it, and the reply."""
     rows = ""
-    for number, choice in enumerate(question.choices):
+    for number, (letter, choice) in enumerate(question.lettered):
         share = f"{votes.split[number]} %" if votes else ""
         thought = f"<br><em>{prose.inline(choice.misconception)}</em>" if choice.misconception else ""
         rows += (
-            f"<tr><td>{'✓' if choice.correct else ''} ({chr(97 + number)})</td>"
+            f"<tr><td>{'✓' if choice.correct else ''} ({letter})</td>"
             f"<td>{prose.inline(choice.text)}{thought}</td><td>{share}</td><td>{prose.to_html(choice.reply)}</td></tr>"
         )
     expected = "expected (a guess)" if votes and votes.guessed else "expected" if votes else ""
@@ -79,7 +77,7 @@ def exercise_sheet(notebook: Notebook, lesson: str) -> str:
             f"<pre>{escape(_without_ellipsis(stub.source))}</pre>{'<div class=line></div>' * max(lines, SPARE_LINES)}"
             f"</section>"
         )
-    quiz = "".join(_tick(number, one) for number, one in enumerate(_quiz(lesson), start=1))
+    quiz = "".join(_tick(number, one) for number, one in enumerate(questions.quiz_questions(lesson), start=1))
     return _page(notebook, "exercises", body + (f"<h2 class='quiz'>Exit quiz</h2>{quiz}" if quiz else ""))
 
 
@@ -87,7 +85,7 @@ def marking_scheme(notebook: Notebook, lesson: str) -> str:
     """Each exercise's solution, its points, and the typical wrong answers with the points they keep; the quiz's key."""
     cells, tasks = exercise_cells(notebook), parts.tasks(notebook)
     total = POINTS * len(exercises(lesson))
-    quiz = _quiz(lesson)
+    quiz = questions.quiz_questions(lesson)
     body = f"<p>{escape(' '.join(RULE.split()))}</p><p>Exercises {total} points"
     body += f", exit quiz {len(quiz)}: {total + len(quiz)} in all.</p>" if quiz else ".</p>"
     for name, exercise in exercises(lesson).items():
@@ -117,17 +115,9 @@ def _wrong_row(one: WrongAnswer) -> str:
 
 
 def _tick(number: int, question: Question) -> str:
-    choices = "".join(f"<li>☐ ({chr(97 + i)}) {prose.inline(one.text)}</li>" for i, one in enumerate(question.choices))
+    choices = "".join(f"<li>☐ ({letter}) {prose.inline(one.text)}</li>" for letter, one in question.lettered)
     text = prose.inline(" ".join(question.text.split()))
     return f"<section class='tick'><p><b>{number}.</b> {text}</p><ul>{choices}</ul></section>"
-
-
-def _quiz(lesson: str) -> tuple[Question, ...]:
-    """The quiz at the lesson's end; none in a lesson without questions."""
-    try:
-        return questions.quiz_questions(lesson)
-    except ValueError:
-        return ()
 
 
 def _asked(notebook: Notebook) -> list[Question]:

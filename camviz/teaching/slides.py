@@ -153,17 +153,12 @@ def _question(question: Question, part: str) -> Iterator[Slide]:
     words = sum(len(one.split()) for one in (question.text, *(choice.text for choice in question.choices)))
     kind = "question long" if words > LONG_QUESTION else "question"
     yield Slide(kind, part, "", f"{prose.to_html(question.text)}<ol type='a'>{choices}</ol>")
-    right = question.choices[question.answer]
-    yield Slide("key", part, f"{_letter(question.answer)} {prose.inline(right.text)}", prose.to_html(right.reply))
-    for number, choice in enumerate(question.choices if question.kind == "predict" else ()):
-        if not choice.correct:
+    headings = [f"<b class='letter'>({letter})</b> {prose.inline(one.text)}" for letter, one in question.lettered]
+    yield Slide("key", part, headings[question.answer], prose.to_html(question.choices[question.answer].reply))
+    for heading, choice in zip(headings, question.choices, strict=True):
+        if question.kind == "predict" and not choice.correct:
             thought = f"<p class='thought'>{prose.inline(choice.misconception)}</p>"
-            heading = f"{_letter(number)} {prose.inline(choice.text)}"
             yield Slide("reply", part, heading, thought + prose.to_html(choice.reply))
-
-
-def _letter(number: int) -> str:
-    return f"<b class='letter'>({chr(ord('a') + number)})</b>"
 
 
 # Markdown: equations, misconceptions, claims, the recap --------------------------------------------------------------

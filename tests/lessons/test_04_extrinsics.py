@@ -1,5 +1,6 @@
 """What lesson 04 says about R, t and C, recomputed with NumPy, SciPy and OpenCV."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -468,3 +469,16 @@ def test_before_the_lesson_three_angles_are_not_enough(says):
     y, x = about([0, 1, 0], np.radians(about_y.value)), about([1, 0, 0], np.radians(about_x.value))
     assert apart == angle_of((y @ x).T @ (x @ y))
     assert (about_y.value, about_x.value) == (first.value, second.value)
+
+
+def test_who_skips_exercise_2_has_what_the_later_cells_import():
+    imported, title = set(), ""
+    for cell in notebooks.read(LESSON).cells:
+        if cell.cell_type == "markdown":
+            title = next(iter(re.findall(r"^#{2,} (.*)", cell.source, re.MULTILINE)), title)
+        elif not title.startswith("Exercise 2"):
+            nodes = list(ast.walk(ast.parse(cell.source)))
+            found = [one for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for one in node.names]
+            imported |= {one.asname or one.name for one in found}
+            used = {node.id for node in nodes if isinstance(node, ast.Name)}
+            assert used & {"plt", "attempt", "Rotation", "cv2"} <= imported, cell.source

@@ -5,7 +5,7 @@ Noise figures are standard deviations in electrons, frames are in digital number
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -391,9 +391,13 @@ def dead_only_where_equal(frame, dark, flat):
 
 def merge(electrons: Array, exposures: Array, dark_noise: float, full_well: float) -> Array:
     """Electrons per second (...) from frames (n, ...), weights t² / (σ² + x t); NaN where every frame is full."""
+    return _merged(electrons, exposures, full_well, lambda x, t: t**2 / (dark_noise**2 + x * t))
+
+
+def _merged(electrons: Array, exposures: Array, full_well: float, weight: Callable[[Array, Array], Array]) -> Array:
+    """The mean of the frames, each pixel that is not full with weight(x, t): x its light, t the frame's time."""
     t, usable = _times(electrons, exposures), electrons < full_well
-    x = np.sum(usable * electrons, axis=0) / np.sum(usable * t, axis=0)
-    return _weighed(usable * t**2 / (dark_noise**2 + x * t), electrons / t)
+    return _weighed(usable * weight(_light(electrons, t, usable), t), electrons / t)
 
 
 def _times(electrons: Array, exposures: Array) -> Array:
@@ -462,7 +466,7 @@ def pixel_by_pixel(electrons, exposures, dark_noise, full_well):
 
 @MERGE.wrong("All usable frames count alike in yours. The short ones are noisier by far: weigh by 1 / variance.")
 def all_alike(electrons, exposures, dark_noise, full_well):
-    return _weighed(1.0 * (electrons < full_well), electrons / _times(electrons, exposures))
+    return _merged(electrons, exposures, full_well, lambda x, t: 1.0)
 
 
 @MERGE.wrong(
@@ -509,32 +513,27 @@ def weights_from_each_count(electrons, exposures, dark_noise, full_well):
 
 @MERGE.wrong("You weigh by the variance: the noisiest count most. Take its inverse.")
 def weighed_by_the_variance(electrons, exposures, dark_noise, full_well):
-    t, usable = _times(electrons, exposures), electrons < full_well
-    return _weighed(usable * (dark_noise**2 + _light(electrons, t, usable) * t) / t**2, electrons / t)
+    return _merged(electrons, exposures, full_well, lambda x, t: (dark_noise**2 + x * t) / t**2)
 
 
 @MERGE.wrong("You weigh by 1 / deviation. The least noise is left by 1 / *variance*: no root.")
 def weighed_by_the_deviation(electrons, exposures, dark_noise, full_well):
-    t, usable = _times(electrons, exposures), electrons < full_well
-    return _weighed(usable * t / np.sqrt(dark_noise**2 + _light(electrons, t, usable) * t), electrons / t)
+    return _merged(electrons, exposures, full_well, lambda x, t: t / np.sqrt(dark_noise**2 + x * t))
 
 
 @MERGE.wrong("e / t has the variance (σ² + x t) / t²: the t below comes squared. Yours is not.")
 def time_not_squared(electrons, exposures, dark_noise, full_well):
-    t, usable = _times(electrons, exposures), electrons < full_well
-    return _weighed(usable * t / (dark_noise**2 + _light(electrons, t, usable) * t), electrons / t)
+    return _merged(electrons, exposures, full_well, lambda x, t: t / (dark_noise**2 + x * t))
 
 
 @MERGE.wrong("The read noise is a deviation. Beside the photons' variance x t belongs its square.")
 def read_noise_not_squared_in_the_weights(electrons, exposures, dark_noise, full_well):
-    t, usable = _times(electrons, exposures), electrons < full_well
-    return _weighed(usable * t**2 / (dark_noise + _light(electrons, t, usable) * t), electrons / t)
+    return _merged(electrons, exposures, full_well, lambda x, t: t**2 / (dark_noise + x * t))
 
 
 @MERGE.wrong("Weights of t² are right for read noise alone. Light brings noise of its own, x t.")
 def weights_without_photons(electrons, exposures, dark_noise, full_well):
-    t = _times(electrons, exposures)
-    return _weighed((electrons < full_well) * t**2, electrons / t)
+    return _merged(electrons, exposures, full_well, lambda x, t: t**2)
 
 
 @MERGE.wrong("You average electrons. The frames had different times: average e / t, electrons per second.")

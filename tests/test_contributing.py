@@ -1,0 +1,191 @@
+"""CONTRIBUTING.md's examples, carried out word for word in a copy of the repository."""
+
+import json
+import re
+
+import nbformat
+import pytest
+from house import ROOT, house
+
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
+EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
+CELL = re.compile(r"^# %%(?P<words>.*)$", re.MULTILINE)
+
+
+def notebook(text):
+    """The notebook whose cells stand one below the other, each under `# %%` and its tags."""
+    _, *pieces = CELL.split(text)
+    cells = [cell(words.split(), source.strip("\n")) for words, source in zip(pieces[::2], pieces[1::2], strict=True)]
+    return nbformat.writes(nbformat.v4.new_notebook(cells=cells))
+
+
+def cell(words, source):
+    tags = [word for word in words if word.isalpha()]
+    exercises = [word for word in words if word[0].isdigit()]
+    metadata = {"tags": tags} | ({"camviz": {"exercise": exercises[0]}} if exercises else {})
+    if "[markdown]" in words:
+        return nbformat.v4.new_markdown_cell(re.sub(r"^# ?", "", source, flags=re.MULTILINE), metadata=metadata)
+    return nbformat.v4.new_code_cell(source, metadata=metadata)
+
+
+def example(where):
+    """The files of one example, as they are written: a notebook from its cells."""
+    found = {path: text for path, text in EXAMPLES.items() if path.startswith(where)}
+    assert found, f"CONTRIBUTING.md has no example of {where}"
+    return {path: notebook(text) if path.endswith(".ipynb") else text for path, text in found.items()}
+
+
+@pytest.fixture(scope="module")
+def lesson(tmp_path_factory):
+    """The lesson of the page, written, and the pages made anew."""
+    made = house(tmp_path_factory.mktemp("house") / "camviz")
+    made.add(example("lessons/"))
+    made.run("-m", "camviz.commands.lessons", "pages")
+    return made
+
+
+def test_a_lesson_is_a_notebook_and_its_folder():
+    written = example("lessons/")
+    assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {"18_shadows.ipynb", "material/18"}
+
+
+def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(lesson):
+    made = {"README.md", "docs/glossary.md", "lessons/00_start_here.ipynb"}
+    assert lesson.touched() == {*made, *example("lessons/")}
+    readme = lesson.text("README.md")
+    assert "| **[18 Shadows](lessons/18_shadows.ipynb)** |" in readme
+    row = "How tall is a tree that you cannot climb? | the sun measures every tree at once | a tree of your own | 10 |"
+    assert f"| 18 Shadows | {row}" in readme
+    start = "".join(one.source for one in nbformat.reads(lesson.text("lessons/00_start_here.ipynb"), 4).cells)
+    assert "| 18 | [Shadows](18_shadows.ipynb) | How tall is a tree that you cannot climb? | 10 |" in start
+    for page, way in ((readme, r"^\| (\d\d) "), (start, r"^\| (\d\d) \|")):
+        order = re.findall(way, page, re.MULTILINE)
+        assert order[order.index("18") - 1 :][:3] == ["01", "18", "02"]
+    assert '<a id="gnomon"></a>**Gnomon.** An upright stick' in start
+    assert "*Lesson [18](../lessons/18_shadows.ipynb).*" in lesson.text("docs/glossary.md")
+
+
+def test_the_check_of_the_lesson_finds_nothing_wrong_and_says_what_is_still_lacking(lesson):
+    said = lesson.run("-m", "camviz.commands.lessons", "check", "18", status=1)
+    assert {line.partition(": ")[2] for line in said.splitlines()} == {
+        "no cell is tagged nbval-check-output, so no number of this lesson is held",
+        "at least two predict questions are wanted, 1 are asked",
+        'the lesson must end with one quiz("18"), has []',
+        "three to five exercises are wanted, there are 1",
+        "one exercise should be to find a bug",
+        "at least two of the reader's functions must run in the lesson, [] do",
+        "no visualizer runs a function of the reader's: explore(…View(…, yours=…))",
+        "nothing of the reader's own is plotted: attempt(…) and plt",
+        "there is no heading 'Recap'",
+        "there is no heading 'Further reading'",
+        "at least three terms should be linked to the glossary, as 00_start_here.ipynb#principal-point",
+        "no cell has a note for the teacher in its metadata",
+    }
+
+
+def test_the_lesson_s_question_and_exercise_are_asked_and_answered(lesson):
+    code = """
+import json
+from pathlib import Path
+
+from camviz.course import notebooks
+from camviz.course.exercises import Tutor, exercise
+from camviz.course.questions import question
+
+lesson = notebooks.read(Path("lessons/18_shadows.ipynb"))
+wrong = exercise("18.height").misconceptions[0].function
+print(json.dumps({
+    "question": question("18.stick").choices[1].misconception,
+    "stub": notebooks.verdicts(lesson, solved=False)["18.height"].status,
+    "solution": notebooks.verdicts(lesson, solved=True)["18.height"].status,
+    "right": [Tutor()("18.height", way).status for way in exercise("18.height").right_ways],
+    "wrong": Tutor()("18.height", wrong).message,
+}))
+"""
+    said = json.loads(lesson.run("-c", code))
+    assert said["question"] == "the proportion is upside down"
+    assert (said["stub"], said["solution"], said["right"]) == ("unsolved", "correct", ["correct"])
+    assert said["wrong"].startswith("The proportion is upside down.")
+
+
+def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(lesson, tmp_path):
+    lesson.run("-m", "camviz", "teacher", str(tmp_path / "out"), "--no-run", "--slides", "--lesson", "18")
+    edition = (tmp_path / "out" / "18_shadows.ipynb").read_text(encoding="utf-8")
+    assert "Right is **(a)** 6 m" in edition
+    assert "### BEGIN SOLUTION" in edition
+    pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").glob("18_*.html")}
+    assert set(pages) == {"18_exercises.html", "18_marking.html", "18_slides.html"}
+    assert "upside down" in pages["18_marking.html"]
+    assert all("Shadows" in page for page in pages.values())
+
+
+# The other three ------------------------------------------------------------------------------------------------------
+
+
+def added(tmp_path, where):
+    """A copy of the repository with the one file of an example in a folder."""
+    files = example(where)
+    assert len(files) == 1
+    made = house(tmp_path / "camviz")
+    made.add(files)
+    return made
+
+
+def held(made, tests, words):
+    """How many of the tests in a file that are about these words pass there."""
+    said = made.run("-m", "pytest", "-o", "addopts=", "-p", "no:cacheprovider", tests, "-k", words)
+    return int(re.findall(r"(\d+) passed", said)[0])
+
+
+def test_a_lens_is_one_file(tmp_path):
+    made = added(tmp_path, "camviz/lenses/")
+    code = """
+from math import pi, sin
+
+from camviz.lenses import LENSES, SineFisheye, calibration_models
+
+x, y = SineFisheye(0.7).project([1, 0, 0])
+print(LENSES["sine_fisheye"] is SineFisheye, "sine" in calibration_models())
+print(abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
+"""
+    assert made.run("-c", code).split() == ["True"] * 3
+    assert "sine " in made.run("-m", "camviz", "calibrate", "--help")
+    assert held(made, "tests/test_lenses.py", "sine_fisheye or SineFisheye") > 20
+
+
+def test_a_calibration_format_is_one_file(tmp_path):
+    made = added(tmp_path, "camviz/files/")
+    (made.root / "a.toy").write_text("toy 640 480 500 321.25 239.5\n")
+    made.run("-m", "camviz", "convert", "a.toy", "b.yml", "--to", "opencv")
+    made.run("-m", "camviz", "convert", "b.yml", "c.toy", "--to", "toy")
+    assert made.text("c.toy") == "toy 640 480 500.0 321.25 239.5\n"
+    assert "Toy (camera.toy), one camera" in made.run("-m", "camviz", "convert", "--help")
+    assert "Toy" in made.run("-m", "camviz", "show", "--help")
+    made.run("docs/formats.py")
+    assert "| `toy` | Toy: camera.toy | pinhole | one line |" in made.text("docs/formats.md")
+    assert held(made, "tests/test_formats_contract.py", "toy") > 2
+
+
+def test_a_finding_is_one_file(tmp_path):
+    made = added(tmp_path, "camviz/clinic/checks/")
+    code = """
+import json
+import numpy as np
+from camviz.clinic import Inspection, faults, kinds
+
+fault = faults()["skew"]
+found = Inspection.of(fault.inject(np.random.default_rng(1), fault.promised)).findings
+print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]))
+"""
+    assert json.loads(made.run("-c", code)) == ["camera: the skew is 2.0% of fx."]
+    K = [500.0, 50.0, 319.5, 0.0, 500.0, 239.5, 0.0, 0.0, 1.0]
+    ros = {"image_width": 640, "image_height": 480, "camera_name": "cam", "distortion_model": "plumb_bob"}
+    ros["camera_matrix"] = {"rows": 3, "cols": 3, "data": K}
+    ros["distortion_coefficients"] = {"rows": 1, "cols": 5, "data": [0.0] * 5}
+    (made.root / "camera.yaml").write_text(json.dumps(ros))
+    said = made.run("-m", "camviz", "inspect", "camera.yaml", "--json", status=1)
+    assert "skewed-pixels" in [each["id"] for each in json.loads(said)["findings"]]
+    made.run("-m", "camviz.clinic.statistics", "--page")
+    assert "### `skewed-pixels`" in made.text("docs/clinic.md")
+    assert held(made, "tests/test_faults.py", "promised and skew or healthy_camera or every_finding") >= 8
