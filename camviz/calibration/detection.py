@@ -186,7 +186,8 @@ def _in_processes(paths: list[str], board: Board, finder: str, workers: int) -> 
                 _hand_out(waiting, pipe, busy)
             while busy:
                 hear()
-                for pipe in wait(list(busy), timeout=LISTEN):
+                ready: list[Any] = wait(list(busy), timeout=LISTEN)
+                for pipe in ready:
                     place, found = busy.pop(pipe), pipe.recv()
                     _hand_out(waiting, pipe, busy)
                     if isinstance(found, Exception):

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from camviz.commands.common import OK, Refusal, add_command, loaded, refuse_output, size, write_whole
+from camviz.commands.common import OK, Refusal, add_command, loaded, narrator, refuse_output, size, write_whole
 
 SHOW = """\
 Writes one HTML page that shows the cameras of a calibration: where they stand and what they see, how their lenses
@@ -20,7 +20,7 @@ is only read: nothing in it is run, and it is not changed.
 
 def add(commands: Any) -> None:
     command = add_command(commands, "show", show, "write a page that shows a calibration", SHOW)
-    command.add_argument("file", metavar="FILE", type=Path, help="the calibration")
+    command.add_argument("file", metavar="FILE", type=Path, help="the calibration; - is stdin")
     command.add_argument("-o", "--output", metavar="OUT.html", type=Path, help="the page (default: FILE's name, .html)")
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
 
@@ -34,9 +34,10 @@ def show(options: argparse.Namespace) -> int:
     from camviz.report.page import write_page
 
     write_whole(output, lambda path: write_page(calibration, path))
+    told = narrator(output)
     for note in calibration.notes:
-        print(note)
-    print(f"{output}: open it in a browser.")
+        told(note)
+    told(f"{output}: open it in a browser.")
     return OK
 
 
