@@ -27,6 +27,13 @@ bench:
 	$(BIN)/python benchmarks/browser.py
 
 # Newest versions that pyproject.toml allows, for every platform and Python, with hashes and without naming any host.
+# The reader's lock holds the build backend, too; the tester's holds only what it adds.
+LOCK := uv pip compile --universal --generate-hashes --no-header --no-annotate --no-emit-index-url
 lock:
-	uv pip compile --universal --generate-hashes --no-header --no-annotate --no-emit-index-url --upgrade \
-	  pyproject.toml --extra test --output-file requirements.lock
+	mkdir -p build
+	printf 'hatchling\neditables\n' > build/backend.in
+	$(LOCK) --upgrade pyproject.toml build/backend.in --extra lab --output-file requirements.lock
+	$(LOCK) pyproject.toml --extra test -c requirements.lock --output-file build/all.lock
+	python3 -c "import re, pathlib; read = lambda p: re.split(r'\n(?=\S)', pathlib.Path(p).read_text().strip()); \
+	held = {each.split('==')[0] for each in read('requirements.lock')}; \
+	pathlib.Path('requirements-test.lock').write_text('\n'.join(e for e in read('build/all.lock') if e.split('==')[0] not in held) + '\n')"

@@ -1,15 +1,18 @@
 """Set camviz up and open its lessons. Needs Python 3.11 or newer, nothing else; the first time also a network.
 
     python start.py                 open the lessons in JupyterLab
+    python start.py --light         the same without VTK, 600 MB smaller: 3D is drawn as wireframes
     python start.py test            run the tests: the package's, and every lesson from top to bottom
     python start.py COMMAND ...     any other command of camviz, such as: doctor, show FILE
 
+--light may stand before a command, too; what is installed already is not taken away.
 Everything is installed into the folder .venv beside this file and nowhere else. Delete that folder to undo it.
 """
 
 import hashlib
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -19,6 +22,10 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 STAMP = VENV / "camviz-setup.txt"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+READER, TESTER = ROOT / "requirements.lock", ROOT / "requirements-test.lock"
+SOLID = ("pyvista", "vtk")  # what --light leaves out
+LARGER = ("light", "reader", "test")  # each holds the one before
+SIZE = {"light": "0.7 GB", "reader": "1.3 GB", "test": "1.9 GB"}
 TESTS = ("-m", "pytest", "-n", "auto", "--dist", "loadscope")
 
 
@@ -26,15 +33,20 @@ def main(words):
     if words and words[0] in ("-h", "--help"):
         print(__doc__)
         return 0
-    set_up()
-    if words and words[0] == "test":
+    light = words[:1] == ["--light"]
+    words = words[light:]
+    testing = words[:1] == ["test"]
+    set_up("test" if testing else "light" if light else "reader")
+    if testing:
         return run(PYTHON, *TESTS, *words[1:], cwd=ROOT)
     return run(PYTHON, "-m", "camviz", *(words or ["lab"]))
 
 
-def set_up():
-    """Make .venv hold exactly what requirements.lock says; at once, and offline, when it already does."""
-    if STAMP.exists() and STAMP.read_text() == fingerprint():
+def set_up(what):
+    """Make .venv hold what the locks say for "light", "reader" or "test"; at once and offline when it already does."""
+    held = STAMP.read_text().split() if STAMP.exists() else []
+    current = held[:1] == [fingerprint()]
+    if current and LARGER.index(held[1]) >= LARGER.index(what):
         return
     if sys.version_info < (3, 11):  # noqa: UP036 - this file must also run where the package cannot
         sys.exit("camviz needs Python 3.11 or newer; this is {}.{}.".format(*sys.version_info[:2]))
@@ -42,14 +54,27 @@ def set_up():
         sys.exit("This Python cannot make virtual environments. On Debian and Ubuntu: sudo apt install python3-venv")
     if VENV.exists() and not STAMP.exists():
         sys.exit(f"{VENV} was not made by start.py. Move it away, or delete it, and start again.")
-    print(f"Setting up camviz in {VENV}: once, some minutes and about 1.7 GB.", flush=True)
-    make_venv()
+    print(f"Setting up camviz in {VENV}: once, some minutes and about {SIZE[what]}.", flush=True)
+    if not current:
+        make_venv()
     pip = [PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install"]
     if not sys.stdout.isatty():
         pip.append("--quiet")  # a log needs no progress bars
-    if run(*pip, "--require-hashes", "-r", ROOT / "requirements.lock") or run(*pip, "--no-deps", "--editable", ROOT):
+    locks = [lock for path in locked(what) for lock in ("-r", path)]
+    itself = ["--no-deps", "--no-build-isolation", "--editable", ROOT]  # by the build backend that the lock holds
+    if run(*pip, "--require-hashes", "--no-deps", *locks) or run(*pip, *itself):
         sys.exit("The set-up did not finish: pip says why above. With no network it cannot; otherwise start again.")
-    STAMP.write_text(fingerprint())
+    STAMP.write_text(f"{fingerprint()} {what}")
+
+
+def locked(what):
+    """The locks of what is to be installed; for "light" a copy of the reader's without what draws solid 3D."""
+    if what != "light":
+        return [READER, TESTER] if what == "test" else [READER]
+    entries = re.split(r"\n(?=\S)", READER.read_text())
+    light = VENV / "light.lock"
+    light.write_text("\n".join(each for each in entries if each.split("==")[0] not in SOLID))
+    return [light]
 
 
 def make_venv():
@@ -63,7 +88,7 @@ def make_venv():
 
 def fingerprint():
     """What the installation depends on: the lock, the package's metadata, this Python and this place."""
-    parts = [(ROOT / name).read_bytes() for name in ("requirements.lock", "pyproject.toml")]
+    parts = [(ROOT / name).read_bytes() for name in (READER.name, TESTER.name, "pyproject.toml")]
     parts += [sys.version.encode(), sys.base_prefix.encode(), str(ROOT).encode()]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()
 

@@ -94,13 +94,15 @@ def test_a_file_name_cannot_forge_lines(capsys, room):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "COMMAND"),
         (["shwo"], "invalid choice"),
+        (["shwo"], "did you mean show?"),
+        (["calibrate", "a", "--board", "9x6", "--square-mm", "25", "--model", "fishey"], "did you mean fisheye?"),
+        (["convert", str(DATA / "opencv_stereo.xml"), "out", "--to", "kalbr"], "did you mean kalibr?"),
         (["show"], "FILE"),
         (["show", "a.yml", "--size", "640"], "such as 640x480, got '640'"),
         (["show", "a.yml", "--size", "640x-480"], "such as 640x480"),
-        (["doctor", "--", "x"], "camviz lab"),
-        (["doctor", "--jsn"], "unrecognized arguments: --jsn"),
+        (["doctor", "--", "x"], "unrecognized arguments: -- x"),
+        (["doctor", "--jsn"], "unrecognized arguments: --jsn; did you mean --json?"),
     ],
 )
 def test_a_mistaken_command_gets_one_sentence(capsys, room, words, said):

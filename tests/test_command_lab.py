@@ -136,7 +136,12 @@ def jupyter(monkeypatch):
 def test_a_checkout_opens_its_own_lessons(jupyter, room, capsys):
     assert main(["lab", "--no-browser", "--", "--port=9999"]) == 0
     (words,) = jupyter
-    assert words[:3] == [f"--ServerApp.root_dir={(ROOT / 'lessons').resolve()}", "--no-browser", "--port=9999"]
+    assert words[:4] == [
+        f"--ServerApp.root_dir={(ROOT / 'lessons').resolve()}",
+        "--ServerApp.jpserver_extensions=camviz.server=True",
+        "--no-browser",
+        "--port=9999",
+    ]
     assert list(room.iterdir()) == []
 
 
@@ -155,7 +160,8 @@ def test_an_installed_package_lays_out_a_copy(jupyter, room, lessons, monkeypatc
     monkeypatch.setattr(lab, "lessons_folder", lambda: lessons)
     assert main(["lab"]) == 0
     copy = room / "camviz-lessons"
-    assert jupyter == [[f"--ServerApp.root_dir={copy}", str(copy / "00_start.ipynb")]]
+    (words,) = jupyter
+    assert (words[0], words[-1]) == (f"--ServerApp.root_dir={copy}", str(copy / "00_start.ipynb"))
     assert "camviz-lessons" in capsys.readouterr().out
 
 
@@ -190,7 +196,7 @@ def test_lab_refuses_a_file_for_a_folder(jupyter, room, capsys):
 
 def test_lab_without_jupyterlab_says_how_to_get_it(room, monkeypatch, capsys):
     monkeypatch.setattr(lab, "find_spec", lambda name: None)
-    assert main(["lab"]) == 1
+    assert main(["lab"]) == 3
     assert "pip install 'camviz[lab]'" in capsys.readouterr().err
     assert list(room.iterdir()) == []
 

@@ -1,6 +1,6 @@
 """The garden's quick pictures against traced ones, and the connection that carries them."""
 
-import json
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -70,7 +70,8 @@ def test_the_server_sends_pictures_without_waiting_for_the_browsers_acknowledgem
     assert calls == [("nodelay", True), ("connect",)]
 
 
-def test_an_installation_switches_the_server_extension_on():
-    shipped = json.loads((Path(__file__).parents[1] / "jupyter/camviz.json").read_text())
-    (module,) = shipped["ServerApp"]["jpserver_extensions"]
-    assert module == server._jupyter_server_extension_points()[0]["module"] == server.__name__
+def test_an_installation_leaves_other_jupyter_servers_alone():
+    """Only `camviz lab` switches the extension on, for the server that it starts."""
+    assert server._jupyter_server_extension_points()[0]["module"] == "camviz.server" == server.__name__
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+    assert "shared-data" not in project["tool"]["hatch"]["build"]["targets"]["wheel"]

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import nbformat
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+LOCKS = ("requirements.lock", "requirements-test.lock")
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)|(?:src|href)=\"([^\"#]+)\"")
 
 
@@ -56,8 +58,9 @@ def test_the_first_floors_modules_are_had_from_the_package_itself() -> None:
     )
 
 
-def test_the_lock_pins_every_dependency_with_hashes_and_names_no_host() -> None:
-    lock = (ROOT / "requirements.lock").read_text()
+@pytest.mark.parametrize("name", LOCKS)
+def test_the_lock_pins_every_dependency_with_hashes_and_names_no_host(name: str) -> None:
+    lock = (ROOT / name).read_text()
     assert "://" not in lock
     assert not re.search(r"^\s*-[a-z-]", lock.replace("--hash=", ""), flags=re.MULTILINE)
     entries = re.split(r"\n(?=\S)", lock.strip())
@@ -68,8 +71,28 @@ def test_the_lock_covers_every_dependency_that_the_package_declares() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     declared = chain(project["dependencies"], *project["optional-dependencies"].values())
     names = {re.match(r"[\w.-]+", one)[0].lower().replace("_", "-") for one in declared} - {"camviz"}  # type: ignore[index]
-    locked = set(re.findall(r"^([\w.-]+)==", (ROOT / "requirements.lock").read_text(), flags=re.MULTILINE))
-    assert names <= locked
+    reader, tester = (set(re.findall(r"^([\w.-]+)==", (ROOT / name).read_text(), flags=re.MULTILINE)) for name in LOCKS)
+    assert names <= reader | tester
+    assert {"jupyterlab", "vtk", "hatchling", "editables"} <= reader
+    assert {"pytest", "playwright", "mypy"} <= tester
+    assert not reader & tester
+
+
+def test_light_leaves_out_what_draws_solid_3d_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT)
+    start = import_module("start")
+    monkeypatch.setattr(start, "VENV", tmp_path)
+    (light,) = start.locked("light")
+    names = [set(re.findall(r"^([\w.-]+)==", lock.read_text(), flags=re.MULTILINE)) for lock in (start.READER, light)]
+    assert names[0] - names[1] == {"vtk", "pyvista"}
+    assert not names[1] - names[0]
+    assert start.locked("test") == [start.READER, start.TESTER]
+
+
+def test_ci_names_every_action_by_its_commit() -> None:
+    used = re.findall(r"uses: (\S+)", (ROOT / ".github/workflows/ci.yml").read_text())
+    assert used
+    assert [each for each in used if not re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", each)] == []
 
 
 @pytest.mark.parametrize(
@@ -103,6 +126,7 @@ def test_repo2docker_builds_binder_with_the_libraries_that_3d_needs() -> None:
     assert f"environment.py-{python_version}" in dockerfile.replace("-2d", "-").replace("-2e", ".")
     assert "apt-get install --yes --no-install-recommends libegl1 libgl1" in dockerfile
     assert 'pip install --no-cache-dir -r "binder/requirements.txt"' in dockerfile
+    assert "./binder/postBuild" in dockerfile
     assert 'R2D_ENTRYPOINT="${REPO_DIR}/binder/start"' in dockerfile
 
 

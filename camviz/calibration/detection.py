@@ -6,21 +6,20 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
 from os import PathLike
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import cv2
 import numpy as np
 
-from camviz.calibration.finding import charuco_detector, find_corners, look
+from camviz.calibration.finding import charuco_detector, find_corners, look, look_on_request
 from camviz.calibration.types import Board, Mask
 from camviz.lenses.base import Array
 
@@ -29,6 +28,7 @@ __all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corne
 Progress = Callable[[int, int], object]
 Look = tuple[tuple[int, int] | None, Array | None, str]
 
+LISTEN = 0.1  # seconds after which it is asked whether there was a Ctrl-C
 WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictures take
 
 
@@ -173,26 +173,98 @@ def _looks(paths: list[str], board: Board, finder: str, workers: int | None) -> 
 
 
 def _in_processes(paths: list[str], board: Board, finder: str, workers: int) -> Iterator[tuple[int, Look]]:
-    plain: Any = SimpleNamespace(**vars(board))  # what a process can unpack without importing half of camviz
-    before = set(multiprocessing.active_children())
+    """Each process has one picture at a time, by a pipe of its own; signals are heard between two pictures.
+
+    Python raises KeyboardInterrupt between any two of its steps. Where that is just after a lock was taken, as in
+    `concurrent.futures`, the lock is never given back and everybody waits for it. So no lock takes part in this.
+    """
+    waiting = enumerate(paths)
+    busy: dict[Any, int] = {}  # the picture's place, by pipe
+    with _signals_put_off() as hear, _running(min(workers, len(paths)), board, finder) as pipes:
+        try:
+            for pipe in pipes:
+                _hand_out(waiting, pipe, busy)
+            while busy:
+                hear()
+                ready: list[Any] = wait(list(busy), timeout=LISTEN)
+                for pipe in ready:
+                    place, found = busy.pop(pipe), pipe.recv()
+                    _hand_out(waiting, pipe, busy)
+                    if isinstance(found, Exception):
+                        raise found
+                    yield place, found
+        except (EOFError, ConnectionError) as error:
+            raise CannotCalibrate(
+                "a process that was looking for boards was ended from outside, perhaps because memory ran out: "
+                "try again with fewer processes at a time (--workers 1)"
+            ) from error
+
+
+def _hand_out(waiting: Iterator[tuple[int, str]], pipe: Connection, busy: dict[Any, int]) -> None:
+    """Send the next picture to a process, if there is one."""
+    for place, path in waiting:
+        busy[pipe] = place
+        pipe.send(path)
+        return
+
+
+@contextmanager
+def _running(count: int, board: Board, finder: str) -> Iterator[list[Connection]]:
+    """The pipes to `count` processes that look for boards; the processes are gone when the block is left."""
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=cv2.setNumThreads, initargs=(1,))
+    plain: Any = SimpleNamespace(**vars(board))  # what a process can unpack without importing half of camviz
+    started: list[tuple[Any, Connection]] = []
     try:
         with _starting_processes():
-            futures = {pool.submit(look, path, plain, finder): place for place, path in enumerate(paths)}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BrokenProcessPool as error:
-        raise CannotCalibrate(
-            "a process that was looking for boards was ended from outside, perhaps because memory ran out: "
-            "try again with fewer processes at a time (--workers 1)"
-        ) from error
-    except BaseException:
-        for process in set(multiprocessing.active_children()) - before:
-            process.terminate()
-        raise
+            for _ in range(count):
+                ours, theirs = context.Pipe()
+                process = context.Process(target=look_on_request, args=(theirs, plain, finder), daemon=True)
+                process.start()
+                theirs.close()
+                started.append((process, ours))
+        yield [pipe for _, pipe in started]
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        for process, _ in started:
+            process.kill()
+        for process, pipe in started:
+            process.join()
+            pipe.close()
+
+
+@contextmanager
+def _signals_put_off() -> Iterator[Callable[[], None]]:
+    """Ctrl-C and SIGTERM wait until what this gives is called, or the block is left."""
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: None  # signals interrupt the main thread only
+        return
+    came: list[int] = []
+    handlers: dict[int, Any] = {
+        number: signal.getsignal(number)
+        for number in (signal.SIGINT, signal.SIGTERM)
+        if signal.getsignal(number) not in (signal.SIG_IGN, None)
+    }
+
+    def note(number: int, _: object) -> None:
+        came.append(number)
+
+    def hear() -> None:
+        while came:
+            number = came.pop(0)
+            signal.signal(number, handlers[number])
+            try:
+                signal.raise_signal(number)
+            finally:
+                signal.signal(number, note)
+
+    for number in handlers:
+        signal.signal(number, note)
+    try:
+        yield hear
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in came:
+            signal.raise_signal(number)
 
 
 @contextmanager
@@ -201,6 +273,10 @@ def _starting_processes() -> Iterator[None]:
     main = sys.modules["__main__"]
     held = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
     block: Any = getattr(signal, "pthread_sigmask", lambda *_: set())  # inherited; not on Windows
+    if os.name == "posix":
+        from multiprocessing import resource_tracker
+
+        resource_tracker.ensure_running()  # which would come with the first process, and unblock SIGINT
     mask = block(getattr(signal, "SIG_BLOCK", None), {signal.SIGINT})
     try:
         main.__spec__ = None

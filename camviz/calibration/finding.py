@@ -5,6 +5,11 @@ Imports little, because every process that looks for boards begins with this fil
 
 from __future__ import annotations
 
+import multiprocessing.connection
+import os
+import signal
+import threading
+from contextlib import suppress
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
     from camviz.calibration.types import Board
 
 Array = NDArray[np.float64]
@@ -141,3 +148,28 @@ def look(path: str, board: Board, finder: str) -> tuple[tuple[int, int] | None, 
     corners = find_corners(gray, board, finder)
     why = "the board was not found in it" if board.dictionary is None else "too little of the board was found in it"
     return (gray.shape[1], gray.shape[0]), corners, why if corners is None else ""
+
+
+def look_on_request(requests: Connection, board: Board, finder: str) -> None:
+    """In a process of its own: `look` at each picture asked for, until nobody asks any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    cv2.setNumThreads(1)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with suppress(EOFError, ConnectionError):  # whoever asked has gone
+        while True:
+            requests.send(_look_or_error(requests.recv(), board, finder))
+
+
+def _look_or_error(path: str, board: Board, finder: str) -> object:
+    try:
+        return look(path, board, finder)
+    except Exception as error:
+        return error
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it is gone, however it ended (the system closes the sentinel)."""
+    parent = multiprocessing.parent_process()
+    if parent:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)

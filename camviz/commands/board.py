@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, refuse_output, write_whole
+from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, narrator, refuse_output, write_whole
 
 BOARD = """\
 Writes a calibration board as a PDF of one page that prints at true scale, with its numbers and a ruler of 100 mm to
@@ -40,5 +40,5 @@ def board(options: argparse.Namespace) -> int:
         raise Refusal(f"{error}.") from error
     refuse_output(options.output, "PDF")
     write_whole(options.output, lambda path: path.write_bytes(pdf(sheet)))
-    print(f"{options.output}: print it at 100 %, and see that its ruler measures 100 mm.")
+    narrator(options.output)(f"{options.output}: print it at 100 %, and see that its ruler measures 100 mm.")
     return OK

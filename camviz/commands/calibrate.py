@@ -13,7 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, refuse_output, write_whole
+from camviz.commands.common import (
+    OK,
+    Refusal,
+    add_board,
+    add_command,
+    board_of,
+    narrator,
+    refuse_exhausted,
+    refuse_output,
+    write_calibration,
+    write_whole,
+)
+from camviz.commands.terminal import tell
 from camviz.lenses import calibration_models
 
 if TYPE_CHECKING:
@@ -61,7 +73,6 @@ def calibrate(options: argparse.Namespace) -> int:
     """Detect, solve and write the calibration, whole or not at all."""
     from camviz.calibration import CannotCalibrate
     from camviz.files import CalibrationError
-    from camviz.files.writing import write
 
     board = board_of(options)
     left = pictures(options.images)
@@ -71,16 +82,19 @@ def calibrate(options: argparse.Namespace) -> int:
         refuse_output(options.report, "page", options.output, *left, *right)
     try:
         calibration = _pair(left, right, board, options) if right else _single(left, board, options)
-        write(calibration, options.output, "opencv")
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
+    try:
+        write_calibration(calibration, options.output, "opencv")
     except CalibrationError as error:
         raise Refusal(str(error)) from error
     except OSError as error:
+        refuse_exhausted(error)
         raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
+    told = narrator(options.output)
     for sentence in report(calibration):
-        print(sentence)
-    print(f"{options.output}: written.")
+        told(sentence)
+    told(f"{options.output}: written.")
     if options.report:
         _inspect(calibration, left[0].parent, options.report)
     return OK
@@ -93,7 +107,7 @@ def _inspect(calibration: Calibration, folder: Path, page: Path) -> None:
 
     inspection = inspect(calibration)
     write_whole(page, lambda path: write_report(inspection, path, images=folder))
-    print(f"\n{inspection.as_text()}\n{page}: open it in a browser.")
+    tell(f"\n{inspection.as_text()}\n{page}: open it in a browser.")
 
 
 def pictures(words: Sequence[str]) -> list[Path]:
@@ -208,7 +222,8 @@ class Bar:
         if self.shown:
             full = self.WIDTH * done // count
             bar = "█" * full + "░" * (self.WIDTH - full)
-            print(f"\r{bar} {done} of {count} pictures", end="", file=sys.stderr, flush=True)
+            line = f"\r{bar} {done} of {count} pictures".encode(sys.stderr.encoding, "replace")
+            print(line.decode(sys.stderr.encoding), end="", file=sys.stderr, flush=True)
 
     def __exit__(self, *_: object) -> None:
         if self.shown:

@@ -4,12 +4,29 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import camviz
-from camviz.commands import board, calibrate, convert, doctor, inspect, lab, mtf, noise, reproject, show, teacher
-from camviz.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, say
+from camviz.commands import (
+    board,
+    calibrate,
+    completion,
+    convert,
+    doctor,
+    inspect,
+    lab,
+    mtf,
+    noise,
+    reproject,
+    show,
+    teacher,
+)
+from camviz.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, did_you_mean, refuse_exhausted
+from camviz.commands.terminal import say
 
 DESCRIPTION = """\
 camviz is one virtual camera, taken apart piece by piece: lessons to do in JupyterLab,
@@ -32,23 +49,37 @@ examples:
   camviz mtf photo.png --roi 300,200,80,120  measure sharpness from a slanted edge
   camviz teacher for-me --slides             write the lessons with plans and keys, sheets and slides into ./for-me
 
+A file called - is stdin, or stdout. Colour is for terminals; NO_COLOR and --color never turn it off.
+
 exit status:
   0    done
-  1    something is missing on this machine (camviz doctor says what, and how to mend it); or, of camviz inspect,
-       something was found
+  1    camviz inspect found something
   2    the command or the file it names cannot be used; one sentence on stderr says why
-  130  interrupted
+  3    something is missing on this machine; camviz doctor says what, and how to mend it
+  130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
+COMMANDS = (lab, doctor, board, calibrate, inspect, show, convert, reproject, noise, mtf, teacher, completion)
+
+
+class Ended(BaseException):
+    """A signal that ends the command; what it was writing is removed on the way out."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run `camviz` with these words (default: those it was started with) and return its exit status."""
-    words, beyond = _split(sys.argv[1:] if words is None else list(words))
+    if words is not None:
+        return _status(list(words))
+    with _ended_by_signals(), _quiet_libraries(sys.argv[1:2] == ["lab"]):
+        return _status(sys.argv[1:])
+
+
+def _status(words: list[str]) -> int:
     try:
-        options = parser().parse_args(words)
-        if beyond and options.run is not lab.lab:
-            raise Refusal("only `camviz lab` passes on what follows --.")
-        return int(options.run(options, beyond) if options.run is lab.lab else options.run(options))
+        try:
+            return _run(words)
+        except OSError as error:
+            refuse_exhausted(error)
+            raise
     except Refusal as refusal:
         return _say(str(refusal), refusal.status)
     except BrokenPipeError:
@@ -58,6 +89,60 @@ def main(words: Sequence[str] | None = None) -> int:
         return _say(f"{error.filename}: {error.strerror}" if error.filename else str(error), REFUSED)
     except KeyboardInterrupt:
         return INTERRUPTED
+    except Ended as ended:
+        return 128 + int(ended.args[0])
+
+
+def _run(words: list[str]) -> int:
+    everything = parser()
+    if not words:
+        everything.print_help()
+        return OK
+    words, beyond = _split(words) if words[0] == "lab" else (words, [])
+    options, unknown = everything.parse_known_args(words)
+    if unknown:
+        near = did_you_mean(unknown[0], options.parser._option_string_actions)
+        raise Refusal(f"unrecognized arguments: {' '.join(unknown)}{near}; see `{options.parser.prog} --help`.")
+    return int(options.run(options, beyond) if options.run is lab.lab else options.run(options))
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """SIGTERM, and SIGHUP where it is not ignored, end the command as Ctrl-C does: nothing half written stays."""
+
+    def end(number: int, _: object) -> None:
+        raise Ended(number)
+
+    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    held = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    for number in held:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in held:
+            signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def _quiet_libraries(heard: bool) -> Iterator[None]:
+    """What libpng, libjpeg and NumPy mutter about a picture is not said beside the command's own sentence."""
+    if heard or sys.warnoptions:
+        yield
+        return
+    warnings.simplefilter("ignore")
+    try:
+        aside = os.dup(2)
+    except OSError:  # closed
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    os.close(nowhere)
+    sys.stderr = open(aside, "w", encoding=sys.stderr.encoding, errors="backslashreplace", buffering=1)  # noqa: SIM115
+    yield
+    sys.stderr.flush()
+    os.dup2(aside, 2)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -67,7 +152,7 @@ def parser() -> argparse.ArgumentParser:
     )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
     commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    for subcommand in (lab, doctor, board, calibrate, inspect, show, convert, reproject, noise, mtf, teacher):
+    for subcommand in COMMANDS:
         subcommand.add(commands)
     return everything
 

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import re
+import shutil
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
+
+from camviz.commands.terminal import say, tell
 
 if TYPE_CHECKING:
     import numpy as np
 
     from camviz.calibration.types import Board, Calibration
 
-OK, LACKING, REFUSED, INTERRUPTED = 0, 1, 2, 130
+OK, FOUND, REFUSED, LACKING, INTERRUPTED = 0, 1, 2, 3, 130
+STREAM = Path("-")  # stdin or stdout in place of a file
+LARGEST = 2**28  # bytes read from stdin
+EXHAUSTED = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN)  # the machine's limits, whatever the file
 
 
 class Refusal(Exception):  # noqa: N818 - said to a person, not raised at a programmer
@@ -28,15 +36,11 @@ class Refusal(Exception):  # noqa: N818 - said to a person, not raised at a prog
         self.status = status
 
 
-def say(sentence: str) -> None:
-    """One line on stderr, whatever a file name or a key may hold."""
-    printable = "".join(c if c.isprintable() else " " for c in sentence)
-    with suppress(OSError):
-        print(f"camviz: {' '.join(printable.split())}", file=sys.stderr)
-
-
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one sentence; `listing` makes what its help says beside, when it is asked for."""
+    """A parser whose errors are one sentence, with what may have been meant.
+
+    `listing` makes what its help says beside, when it is asked for.
+    """
 
     listing: Callable[[], str] | None = None
 
@@ -49,38 +53,117 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> Any:
         raise Refusal(f"{message}; see `{self.prog} --help`.")
 
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError as error:
+            raise argparse.ArgumentError(
+                action, f"{error.message}{did_you_mean(value, action.choices or ())}"
+            ) from None
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """ "; did you mean inspect?", where a known word is near."""
+    near = get_close_matches(word, list(known), 1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def add_colour(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--color", choices=("auto", "always", "never"), default="auto", help="auto: on a terminal, without NO_COLOR"
+    )
+
 
 def add_command(commands: Any, name: str, run: Callable[..., int], what: str, description: str) -> Parser:
     command: Parser = commands.add_parser(
         name, help=what, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    command.set_defaults(run=run)
+    command.set_defaults(run=run, parser=command)
     return command
 
 
 def loaded(path: Path, size: tuple[int, int] | None) -> Calibration:
+    """The calibration of a file, or of stdin where the file is called -."""
     from camviz.files import CalibrationError, load
 
-    try:
-        return load(path, size=size)
-    except CalibrationError as error:
-        raise Refusal(str(error)) from error
+    with on_disk(path) as file:
+        try:
+            return load(file, size=size)
+        except CalibrationError as error:
+            raise Refusal(str(error)) from error
 
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file by way of another beside it, so that there is never half a file under its name."""
+@contextmanager
+def on_disk(path: Path) -> Iterator[Path]:
+    """The file itself; for - what stdin holds, in a file of its own as long as it is needed."""
+    if path != STREAM:
+        yield path
+        return
+    with TemporaryDirectory() as room:
+        held = Path(room) / "stdin"
+        data = sys.stdin.buffer.read(LARGEST + 1)
+        if len(data) > LARGEST:
+            raise Refusal(f"stdin: expected at most {LARGEST >> 20} MB.")
+        held.write_bytes(data)
+        try:
+            yield held
+        except Refusal as refusal:
+            raise Refusal(str(refusal).replace(str(held), "stdin"), refusal.status) from refusal
+
+
+def narrator(output: Path) -> Callable[[str], object]:
+    """What says how it went: on stdout, or on stderr where stdout is the output."""
+    return say if output == STREAM else tell
+
+
+def write_whole(path: Path, write: Callable[[Path], object], name: str = "page.part") -> None:
+    """Write a file by way of another beside it, so that there is never half a file under its name; - is stdout.
+
+    A file that is replaced keeps its permissions. `name` is what `write` sees, where the ending matters to it.
+    """
     target = path.resolve()  # a link is followed, not replaced
     try:
-        with TemporaryDirectory(dir=target.parent, prefix=".camviz-") as beside:
-            temporary = Path(beside) / "page.part"
+        with TemporaryDirectory(dir=None if path == STREAM else target.parent, prefix=".camviz-") as beside:
+            temporary = Path(beside) / name
             write(temporary)
+            if path == STREAM:
+                sys.stdout.flush()
+                sys.stdout.buffer.write(temporary.read_bytes())
+                return
+            if target.exists():
+                shutil.copymode(target, temporary)
             os.replace(temporary, target)
+    except BrokenPipeError:
+        raise
     except OSError as error:  # whose file name is that of the part
+        refuse_exhausted(error)
         raise Refusal(f"{path}: cannot be written ({error.strerror or error}).") from error
+
+
+def write_calibration(calibration: Calibration, output: Path, form: str) -> tuple[str, ...]:
+    """Write a calibration to a file or to stdout; what the format could not hold, in sentences."""
+    from camviz.files.writing import write
+
+    if output != STREAM:
+        return write(calibration, output, form)
+    if form.startswith("colmap"):
+        raise Refusal(f"-: a {form} model is a folder, which stdout cannot hold.")
+    left_out: list[str] = []
+    write_whole(output, lambda path: left_out.extend(write(calibration, path, form)), "camera.yml")
+    return tuple(left_out)
+
+
+def refuse_exhausted(error: OSError) -> None:
+    """Where a limit of this machine is the reason, blame the limit and not the file at which it showed."""
+    if error.errno in EXHAUSTED:
+        limit = " (`ulimit -n` says how many this process may open)" if error.errno == errno.EMFILE else ""
+        raise Refusal(f"this machine gives no more: {error.strerror}{limit}.", LACKING) from error
 
 
 def refuse_output(output: Path, what: str, *sources: Path) -> None:
     """Refuses a name that `what` (a page, a calibration …) cannot be written under, or that one of `sources` has."""
+    if output == STREAM:
+        return
     if "\0" in str(output):
         raise Refusal(f"{str(output)!r} is not a file name.")
     if output.is_dir():
@@ -104,9 +187,10 @@ def read_picture(path: Path) -> np.ndarray:
 
     from camviz.panoramas.reprojection import LONGEST
 
-    if not path.is_file():
+    if path != STREAM and not path.is_file():
         raise Refusal(f"{path}: there is no such picture." if not path.exists() else f"{path}: this is not a file.")
-    data = np.frombuffer(path.read_bytes(), np.uint8)
+    with on_disk(path) as file:
+        data = np.frombuffer(file.read_bytes(), np.uint8)
     log = cv2.utils.logging
     level = log.setLogLevel(log.LOG_LEVEL_SILENT)  # what is wrong with a picture is said here, once
     try:

@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from camviz.commands.common import OK, Refusal, add_command, loaded, size
+from camviz.commands.common import (
+    OK,
+    Refusal,
+    add_command,
+    did_you_mean,
+    loaded,
+    narrator,
+    size,
+    write_calibration,
+)
 
 CONVERT = """\
 Writes a calibration for another program. Pixels, lens and poses are carried from one set of conventions to the other
@@ -19,6 +28,7 @@ out. The format of IN is told by its content. A COLMAP model is a folder.
 EXAMPLES = """\
 examples:
   camviz convert camera.yml camera.cameramodel --to mrcal
+  camviz convert - - --to ros < camera.yml > camera.yaml
   camviz convert stereo.yml chain.yaml --to kalibr --size 640x480
   camviz convert sparse/0 left.yml --to opencv --camera left.jpg --first-as-world
 """
@@ -49,17 +59,24 @@ def convert(options: argparse.Namespace) -> int:
     if options.output.exists() and options.output.samefile(options.file):
         raise Refusal(f"{options.output}: this would overwrite the calibration; choose another name.")
     from camviz.files import CalibrationError
-    from camviz.files.writing import alone, from_first_camera, write
+    from camviz.files.registry import written
+    from camviz.files.writing import alone, from_first_camera
+
+    known = written()
+    if options.to not in known:
+        near = did_you_mean(options.to, known)
+        raise Refusal(f"format: expected one of {', '.join(known)}, got {options.to!r}{near}.")
 
     try:
         if options.camera is not None:
             calibration = alone(calibration, options.camera)
         if options.first_as_world:
             calibration = from_first_camera(calibration)
-        left_out = write(calibration, options.output, options.to)
+        left_out = write_calibration(calibration, options.output, options.to)
     except CalibrationError as error:
         raise Refusal(str(error)) from error
+    told = narrator(options.output)
     for sentence in (*calibration.notes, *left_out):
-        print(sentence)
-    print(f"{options.output}: written from {calibration.format}, read back and found the same.")
+        told(sentence)
+    told(f"{options.output}: written from {calibration.format}, read back and found the same.")
     return OK

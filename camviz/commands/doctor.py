@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from camviz.commands.common import LACKING, OK, add_command
+from camviz.commands.common import LACKING, OK, add_colour, add_command
+from camviz.commands.terminal import tell, tell_json
 
 DOCTOR = """\
 Says what camviz finds on this machine, line by line: what works, what works less well, what is missing, and what to
@@ -16,6 +17,7 @@ do about it. Solid 3D is tried in a process of its own, so that asking cannot do
 def add(commands: Any) -> None:
     command = add_command(commands, "doctor", doctor, "say what this machine can do, and how to mend it", DOCTOR)
     command.add_argument("--json", action="store_true", help="the same for programs")
+    add_colour(command)
 
 
 def doctor(options: argparse.Namespace) -> int:
@@ -23,5 +25,8 @@ def doctor(options: argparse.Namespace) -> int:
     from camviz.commands import machine as examination
 
     findings = examination.examine()
-    print(examination.as_json(findings) if options.json else examination.as_text(findings))
+    if options.json:
+        tell_json(examination.as_json(findings))
+    else:
+        tell(examination.as_text(findings), {"^ok": "green", "^warn": "yellow", "^missing": "red"}, options.color)
     return LACKING if any(finding.status == "missing" for finding in findings) else OK

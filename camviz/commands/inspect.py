@@ -11,24 +11,27 @@ from typing import TYPE_CHECKING, Any
 
 from camviz.commands.calibrate import PICTURES, Bar, pictures
 from camviz.commands.common import (
+    FOUND,
     OK,
     REFUSED,
     Refusal,
     add_board,
+    add_colour,
     add_command,
     board_of,
     loaded,
+    on_disk,
     refuse_output,
-    say,
     size,
     write_whole,
 )
+from camviz.commands.terminal import say, tell, tell_json
 
 if TYPE_CHECKING:
     from camviz.clinic import Inspection
     from camviz.files import Board, Calibration
 
-FOUND = 1
+PAINT = {r"^\S+ fault\b": "red", r"^\S+ warning\b": "yellow", r"^\S+ note\b": "blue"}
 
 INSPECT = """\
 Says what is wrong with a calibration: each finding in a plain sentence with the number that shows it, its likely causes
@@ -55,12 +58,15 @@ exit status:
 def add(commands: Any) -> None:
     command = add_command(commands, "inspect", inspect, "say what is wrong with a calibration", INSPECT)
     command.epilog = EPILOG
-    command.add_argument("files", metavar="FILE", nargs="+", help="calibrations, a folder of pictures, or pictures")
+    command.add_argument(
+        "files", metavar="FILE", nargs="+", help="calibrations (- is stdin), pictures or a folder of them"
+    )
     command.add_argument("--images", metavar="IMAGES", nargs="+", help="pictures that the calibration is for")
     add_board(command, required=False, default=False)
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
     command.add_argument("--compare", metavar="OTHER", type=Path, help="another calibration of the same cameras")
     command.add_argument("--json", action="store_true", help="the same for programs")
+    add_colour(command)
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with pictures as well")
 
 
@@ -83,7 +89,7 @@ def inspect(options: argparse.Namespace) -> int:
                 raise
             say(str(refusal))
             unreadable = True
-    _print(inspections, len(named) > 1, options.json)
+    _print(inspections, len(named) > 1, options)
     if options.report:
         _report(next(iter(inspections.values())), options)
     if unreadable:
@@ -132,12 +138,13 @@ def _inspected(
     if PICTURES.fullmatch(paths[0].suffix):
         return inspect(_calibrated(paths, board), compare=compare, pictures=sizes_of(images), board=board)
     add = None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
-    try:
-        return inspect_file(
-            paths[0], size=options.size, compare=compare, pictures=sizes_of(images), board=board, prepare=add
-        )
-    except CalibrationError as error:
-        raise Refusal(str(error)) from error
+    with on_disk(paths[0]) as file:
+        try:
+            return inspect_file(
+                file, size=options.size, compare=compare, pictures=sizes_of(images), board=board, prepare=add
+            )
+        except CalibrationError as error:
+            raise Refusal(str(error)) from error
 
 
 def _calibrated(paths: list[Path], board: Board | None) -> Calibration:
@@ -171,13 +178,13 @@ def _with_corners(calibration: Calibration, images: list[Path], board: Board) ->
         raise Refusal(f"{error}.") from error
 
 
-def _print(inspections: dict[str, Inspection], several: bool, as_json: bool) -> None:
-    if as_json:
+def _print(inspections: dict[str, Inspection], several: bool, options: argparse.Namespace) -> None:
+    if options.json:
         trees = [({"file": name} if several else {}) | each.as_tree() for name, each in inspections.items()]
-        print(json.dumps(trees if several else trees[0], indent=2, ensure_ascii=False))
+        tell_json(json.dumps(trees if several else trees[0], indent=2, ensure_ascii=False))
         return
     for name, inspection in inspections.items():
-        print(f"{name}\n" * several + inspection.as_text() + "\n" * several)
+        tell(f"{name}\n" * several + inspection.as_text() + "\n" * several, PAINT, options.color)
 
 
 def _report(inspection: Inspection, options: argparse.Namespace) -> None:
@@ -188,4 +195,4 @@ def _report(inspection: Inspection, options: argparse.Namespace) -> None:
     held = folder if options.images or PICTURES.fullmatch(first.suffix) or first.is_dir() else None
     write_whole(options.report, lambda path: write_report(inspection, path, images=held))
     if not options.json:
-        print(f"{options.report}: open it in a browser.")
+        tell(f"{options.report}: open it in a browser.")

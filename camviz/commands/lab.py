@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import camviz
+from camviz import server
 from camviz.commands.common import LACKING, OK, Refusal, add_command
+from camviz.commands.terminal import tell
 from camviz.course.material import checkout_lessons, lessons_folder
 from camviz.course.working_copy import edition, lay_out
 
@@ -39,13 +41,10 @@ def lab(options: argparse.Namespace, beyond: list[str]) -> int:
         raise Refusal(f"{folder}: expected a folder for the lessons, this is a file.")
     if not (folder.exists() and folder.samefile(source)) and edition(folder) != "teacher":
         for sentence in lay_out(source, folder, camviz.__version__):
-            print(sentence)
+            tell(sentence)
     extra = ["--no-browser"] * options.no_browser + beyond
     if hasattr(os, "geteuid") and os.geteuid() == 0 and "--allow-root" not in extra:
-        print(
-            "You are root, as one is in a container, so JupyterLab runs as root: what you run in it may do anything.",
-            flush=True,
-        )
+        tell("You are root, as one is in a container, so JupyterLab runs as root: what you run in it may do anything.")
         extra.append("--allow-root")
     return _start_jupyter(folder.resolve(), extra)
 
@@ -56,6 +55,7 @@ def _start_jupyter(folder: Path, extra: list[str]) -> int:
 
     if lessons := checkout_lessons():  # which need not be installed for its lessons to import it
         os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(lessons.parent), os.environ.get("PYTHONPATH")]))
+    words = [f"--ServerApp.root_dir={folder}", f"--ServerApp.jpserver_extensions={server.__name__}=True", *extra]
     first = sorted(folder.glob("00*.ipynb"))[:1]
-    LabApp.launch_instance([f"--ServerApp.root_dir={folder}", *extra, *map(str, first)])
+    LabApp.launch_instance([*words, *map(str, first)])
     return OK

@@ -18,10 +18,22 @@ from urllib.request import Request, urlopen
 
 from packaging.requirements import Requirement
 
+from camviz import server
+
 Status = Literal["ok", "warn", "missing"]
 OLDEST_PYTHON = (3, 11)
 ENOUGH_MEMORY = 10**9  # bytes: JupyterLab, a browser tab and one lesson drawn solid
 WIDGET_EXTENSIONS = {"@jupyter-widgets/jupyterlab-manager": "jupyterlab_widgets", "anywidget": "anywidget"}
+OPENCV = "opencv-contrib-python-headless"
+OPENCV_WHEELS = frozenset(f"opencv-{kind}python{head}" for kind in ("", "contrib-") for head in ("", "-headless"))
+OPENCV_FUNCTIONS = (
+    "omnidir.calibrate",
+    "ximgproc.createDisparityWLSFilter",
+    "aruco.CharucoDetector",
+    "fisheye.calibrate",
+    "mcc.CCheckerDetector",
+    "findChessboardCornersSB",
+)
 EXTRAS = {"": "missing", "lab": "warn"}  # what it means that a package of this extra is not there
 
 
@@ -38,7 +50,7 @@ class Finding:
 def examine() -> list[Finding]:
     """Everything, in the order of the report. Takes some seconds where OpenGL is tried."""
     packages = [package(requirement, extra) for extra, requirement in requirements()]
-    return [python(), *packages, *widgets(), renderer(), opengl(), memory(), samples()]
+    return [python(), *packages, opencv(), *widgets(), promptness(), renderer(), opengl(), memory(), samples()]
 
 
 def as_text(findings: list[Finding]) -> str:
@@ -103,6 +115,31 @@ def package(requirement: Requirement, extra: str = "") -> Finding:
     if requirement.specifier.contains(version, prereleases=True):
         return Finding(requirement.name, "ok", version)
     return Finding(requirement.name, absent, f"{version}, needs {requirement.specifier}", remedy)
+
+
+def opencv() -> Finding:
+    """Whether OpenCV has the functions that camviz calls: of several wheels side by side, the last one's files stay."""
+    wheels = sorted(
+        {each.metadata["Name"].lower() for each in metadata.distributions() if each.metadata["Name"]} & OPENCV_WHEELS
+    )
+    program = f"import cv2\nfrom operator import attrgetter\nfor name in {OPENCV_FUNCTIONS}: attrgetter(name)(cv2)"
+    tried = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    remedy = f"pip uninstall --yes {' '.join(wheels)}, then pip install --no-deps {OPENCV}"
+    if tried.returncode:
+        why = (tried.stderr.strip().splitlines() or ["it ended at once"])[-1]
+        return Finding("OpenCV's functions", "missing", f"{why} (installed: {', '.join(wheels) or 'none'})", remedy)
+    if len(wheels) > 1:
+        return Finding("OpenCV's functions", "warn", f"{', '.join(wheels)} overwrite each other's files", remedy)
+    return Finding("OpenCV's functions", "ok", "omnidir, ximgproc, aruco, fisheye and mcc answer")
+
+
+def promptness() -> Finding:
+    """How a Jupyter server that `camviz lab` does not start sends a slider's pictures without delay."""
+    return Finding(
+        "Jupyter server",
+        "ok",
+        f"`camviz lab` is prompt; others after `jupyter server extension enable {server.__name__}`",
+    )
 
 
 def widgets() -> Iterator[Finding]:
@@ -173,7 +210,7 @@ def memory() -> Finding:
 
 def _free_memory() -> int | None:
     """Bytes that a new program can have; None where the system does not say."""
-    with suppress(ImportError):
+    with suppress(ImportError, OSError):  # without /proc
         import psutil  # type: ignore[import-untyped, unused-ignore]
 
         return int(psutil.virtual_memory().available)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz.commands.common import OK, Refusal, add_command, read_picture, refuse_output, write_whole
+from camviz.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,9 +76,12 @@ def mtf(options: argparse.Namespace) -> int:
     if options.report:
         text = page(edge, options.photo.name, taken_as)
         write_whole(options.report, lambda path: path.write_text(text, encoding="utf-8"))
-    print(as_json(edge) if options.json else as_text(edge, options.photo, taken_as))
-    if options.report and not options.json:
-        print(f"{options.report}: open it in a browser.")
+    if options.json:
+        tell_json(as_json(edge))
+        return OK
+    tell(as_text(edge, options.photo, taken_as))
+    if options.report:
+        tell(f"{options.report}: open it in a browser.")
     return OK
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz.commands.common import OK, Refusal, add_command, refuse_output, write_whole
+from camviz.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
     from camviz.sensors.measurement import Measurement
@@ -73,9 +74,12 @@ def noise(options: argparse.Namespace) -> int:
         _refuse_frame(options.report, recording)
         text = page(found, recording)
         write_whole(options.report, lambda path: path.write_text(text, encoding="utf-8"))
-    print(as_json(found) if options.json else as_text(found, recording))
-    if options.report and not options.json:
-        print(f"{options.report}: open it in a browser.")
+    if options.json:
+        tell_json(as_json(found))
+        return OK
+    tell(as_text(found, recording))
+    if options.report:
+        tell(f"{options.report}: open it in a browser.")
     return OK
 
 

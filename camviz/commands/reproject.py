@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz.commands.common import OK, Refusal, add_command, loaded, read_picture, refuse_output, size, write_whole
+from camviz.commands.terminal import tell
 
 if TYPE_CHECKING:
     import numpy as np
@@ -92,9 +93,7 @@ def reproject(options: argparse.Namespace) -> int:
     seen = reprojected(picture, source, target, nothing=0.0 if picture.ndim == 3 and picture.shape[2] == 4 else None)
     data = _encoded(_finished(seen, picture, options.output), options.output)
     write_whole(options.output, lambda path: path.write_bytes(data))
-    print(
-        f"{options.output}: written, {target.intrinsics.width} × {target.intrinsics.height} pixels, {options.target}."
-    )
+    tell(f"{options.output}: written, {target.intrinsics.width} × {target.intrinsics.height} pixels, {options.target}.")
     return OK
 
 

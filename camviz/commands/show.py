@@ -7,7 +7,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-from camviz.commands.common import OK, Refusal, add_command, loaded, refuse_output, size, write_whole
+from camviz.commands.common import OK, Refusal, add_command, loaded, narrator, refuse_output, size, write_whole
 
 SHOW = """\
 Writes one HTML page that shows the cameras of a calibration: where they stand and what they see, how their lenses
@@ -21,7 +21,7 @@ is not changed.
 def add(commands: Any) -> None:
     command = add_command(commands, "show", show, "write a page that shows a calibration", SHOW)
     command.listing = _listing
-    command.add_argument("file", metavar="FILE", type=Path, help="the calibration")
+    command.add_argument("file", metavar="FILE", type=Path, help="the calibration; - is stdin")
     command.add_argument("-o", "--output", metavar="OUT.html", type=Path, help="the page (default: FILE's name, .html)")
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
 
@@ -41,9 +41,10 @@ def show(options: argparse.Namespace) -> int:
     from camviz.report.page import write_page
 
     write_whole(output, lambda path: write_page(calibration, path))
+    told = narrator(output)
     for note in calibration.notes:
-        print(note)
-    print(f"{output}: open it in a browser.")
+        told(note)
+    told(f"{output}: open it in a browser.")
     return OK
 
 

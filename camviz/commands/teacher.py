@@ -9,7 +9,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import camviz
-from camviz.commands.common import LACKING, OK, Refusal, add_command, say
+from camviz.commands.common import LACKING, OK, Refusal, add_command
+from camviz.commands.terminal import say, tell
 from camviz.course.working_copy import edition, lay_out
 
 TEACHER = """\
@@ -59,5 +60,5 @@ def teacher(options: argparse.Namespace) -> int:
         except ValueError as error:
             raise Refusal(f"{error}.") from error
         for sentence in lay_out(Path(made), options.out, camviz.__version__, "teacher"):
-            print(sentence)
+            tell(sentence)
     return OK

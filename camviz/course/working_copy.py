@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import TemporaryDirectory
 
 from camviz.course.material import MATERIAL
 
@@ -42,11 +43,13 @@ def _lay_out_one(content: bytes, folder: Path, name: Path, version: str, laid_ou
     new, before = _sha256(content), laid_out.get(name.as_posix())
     if _place(content, folder, name, laid_out) or new == before:
         return []
-    beside = name.with_name(f"{name.stem}.new-{version}{name.suffix}")
-    known = (folder / beside).exists()
-    if not _place(content, folder, beside, laid_out) or known:
-        return []
-    return [f"You changed {name}: it stays as it is, and its new version is beside it as {beside.name}."]
+    for again in ("", *(f"-{count}" for count in range(2, 100))):  # a new version may have been changed, too
+        beside = name.with_name(f"{name.stem}.new-{version}{again}{name.suffix}")
+        known = (folder / beside).exists()
+        if _place(content, folder, beside, laid_out):
+            said = f"You changed {name}: it stays as it is, and its new version is beside it as {beside.name}."
+            return [] if known else [said]
+    return []
 
 
 def _place(content: bytes, folder: Path, name: Path, laid_out: dict[str, str]) -> bool:
@@ -79,10 +82,15 @@ def _manifest(folder: Path) -> dict[str, object]:
 def _write(path: Path, content: bytes) -> None:
     if path.is_file() and path.read_bytes() == content:
         return
-    with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as part:
-        part.write(content)
-    os.chmod(part.name, 0o644)
-    os.replace(part.name, path)
+    try:
+        with TemporaryDirectory(dir=path.parent, prefix=".camviz-") as room:
+            part = Path(room) / path.name
+            part.write_bytes(content)
+            if path.exists():
+                shutil.copymode(path, part)
+            os.replace(part, path)
+    except OSError as error:  # whose file name is that of the part
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def _sha256(content: bytes) -> str:

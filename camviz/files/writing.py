@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -96,6 +97,8 @@ def _file(calibration: Calibration, path: Path, content: bytes) -> tuple[str, ..
         part = Path(room) / path.name
         _put(part, content)
         left_out = _left_out(calibration, part, path)
+        if path.exists():
+            shutil.copymode(path, part)
         os.replace(part, path)
     return left_out
 

@@ -48,12 +48,10 @@ def jupyterlab(folder: Path, home: Path, **environment: str) -> Iterator[str]:
     """The address, up to a path, of a JupyterLab server that serves `folder` and keeps its files in `home`."""
     (home / "app").mkdir(parents=True, exist_ok=True)
     (home / "app/overrides.json").write_text(QUIET)
-    extensions = home / "jupyter_config_dir/jupyter_server_config.d"  # where an installed camviz puts its own
-    extensions.mkdir(parents=True, exist_ok=True)
-    shutil.copy(ROOT / "jupyter/camviz.json", extensions)
     port, token = _free_port(), secrets.token_hex(16)
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--expose-app-in-browser"]
     command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0", f"--ServerApp.root_dir={folder}"]
+    command += ["--ServerApp.jpserver_extensions=camviz.server=True"]  # as `camviz lab` does
     command += [f"--IdentityProvider.token={token}", f"--LabApp.app_settings_dir={home / 'app'}"]
     command += ["--LabApp.extension_manager=readonly", "--ServerApp.ip=127.0.0.1"]
     log = home / "server.log"
