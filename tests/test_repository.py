@@ -124,7 +124,7 @@ def test_repo2docker_builds_binder_with_the_libraries_that_3d_needs() -> None:
     assert done.returncode == 0, dockerfile
     python_version = (ROOT / "binder/runtime.txt").read_text().strip().removeprefix("python-")
     assert f"environment.py-{python_version}" in dockerfile.replace("-2d", "-").replace("-2e", ".")
-    assert "apt-get install --yes --no-install-recommends libegl1 libgl1" in dockerfile
+    assert "apt-get install --yes --no-install-recommends libcairo2 libegl1 libgl1" in dockerfile
     assert 'pip install --no-cache-dir -r "binder/requirements.txt"' in dockerfile
     assert "./binder/postBuild" in dockerfile
     assert 'R2D_ENTRYPOINT="${REPO_DIR}/binder/start"' in dockerfile
