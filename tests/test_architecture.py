@@ -53,7 +53,8 @@ def imported(path: Path) -> set[str]:
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are absolute here"
-            names |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
+            whole = {f"{node.module}.{alias.name}" for alias in node.names}  # of a package, its modules by name
+            names |= whole & MODULES.keys() or {node.module or ""}
     return names & MODULES.keys() - {"camviz"}
 
 
