@@ -34,6 +34,4 @@ lock:
 	printf 'hatchling\neditables\n' > build/backend.in
 	$(LOCK) --upgrade pyproject.toml build/backend.in --extra lab --output-file requirements.lock
 	$(LOCK) pyproject.toml --extra test -c requirements.lock --output-file build/all.lock
-	python3 -c "import re, pathlib; read = lambda p: re.split(r'\n(?=\S)', pathlib.Path(p).read_text().strip()); \
-	held = {each.split('==')[0] for each in read('requirements.lock')}; \
-	pathlib.Path('requirements-test.lock').write_text('\n'.join(e for e in read('build/all.lock') if e.split('==')[0] not in held) + '\n')"
+	python3 .github/tester_lock.py build/all.lock
