@@ -1,6 +1,6 @@
 """Write requirements-test.lock: what a lock of everything has beyond requirements.lock.
 
-    python .github/tester_lock.py build/all.lock
+python .github/tester_lock.py build/all.lock
 """
 
 import re

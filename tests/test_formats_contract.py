@@ -28,10 +28,11 @@ MADE = Calibration({"camera": CAMERA}, Path("made.yml"), "made", world_from_imu=
 
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
-    """The format of docs/formats.md, "Adding a format", as the one file of a folder in which formats are looked for."""
+    """The format of CONTRIBUTING.md as the one file of a folder in which formats are looked for."""
     folder = tmp_path / "more"
     folder.mkdir()
-    code = PAGE.read_text(encoding="utf-8").split("## Adding a format")[1].split("```python\n")[1].split("```")[0]
+    page = (PAGE.parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    code = page.split("## A calibration format")[1].split("```python\n")[1].split("```")[0]
     (folder / "toy.py").write_text(code, encoding="utf-8")
     monkeypatch.setattr(camviz.files, "__path__", [*camviz.files.__path__, str(folder)])
     yield folder
