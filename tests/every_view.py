@@ -14,14 +14,15 @@ import camviz.views
 from camviz.draw.picture import Picture
 from camviz.optics import SlantedEdge
 from camviz.sensors import Sensor
-from camviz.sensors.measurement import Level, Measurement
+from camviz.sensors.measurement import Measurement
+from camviz.sensors.readings import Level
 from camviz.views.base import View
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.catalogue import VIEWS, Case
 from camviz.views.measured_edge import MeasuredEdgeView
 from camviz.views.measured_noise import MeasuredNoiseView
 
-BASES = {"View", "BoardPictures", "TwoCameras"}  # what several views share; they draw nothing themselves
+BASES = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser")
 
 
 def classes() -> dict[str, type[View]]:

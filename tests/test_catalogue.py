@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 
 from camviz.commands import lessons as command
@@ -119,6 +120,7 @@ def test_a_table_that_has_another_shape_is_named_with_its_place():
 
 @pytest.mark.parametrize("module", [catalogue, tables, trials, yours], ids=lambda module: module.__name__)
 def test_the_examples_in_the_docstrings_come_out_as_they_say(module):
-    tried = doctest.testmod(module)
+    with np.printoptions(legacy=False):  # whatever another library has set
+        tried = doctest.testmod(module)
     assert tried.failed == 0
     assert tried.attempted > 0

@@ -5,13 +5,15 @@ import re
 import cv2
 import numpy as np
 import pytest
-from camviz.course.exercises.lesson12 import edge_green, malvar_green
 
 from camviz import mosaics
+from camviz.course.material import module
 from camviz.mosaics import BAYER, PATTERNS, XTRANS
 from camviz.scenes import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views.demosaicing import LAYOUTS, LOUPE, DemosaicingView, _everywhere, nearest_carrier
+
+edge_green, malvar_green = module("12").edge_green, module("12").malvar_green
 
 
 def attached(picture, name):

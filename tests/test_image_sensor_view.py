@@ -5,13 +5,15 @@ import html
 import cv2
 import numpy as np
 import pytest
-from camviz.course.exercises.lesson14 import expected_electrons, row_time
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.course.material import module
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors import decibel, gliding, rolling_picture
 from camviz.views.image_sensor import ImageSensorView
 from camviz.views.readout import LARGE, ROWS, ReadoutView, fan
+
+expected_electrons, row_time = module("14").expected_electrons, module("14").row_time
 
 VIEWS = (ReadoutView(), ReadoutView(subject="view from a train"), ImageSensorView())
 ENDS = [

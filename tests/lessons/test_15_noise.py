@@ -483,24 +483,26 @@ def test_a_camera_s_jpeg_has_two_more_faults(says):
 
 def test_the_quiz_about_decibels(says):
     holds_of_decibels(
-        says,
-        ("A sensor saturates at 1200 times its threshold.",),
-        ("… 61.6 dB.", "Yes: 20 log10 1200. That is also 10.2 stops."),
-        ("… 141.8 dB.", "That is 20 ln 1200."),
-        ("… 30.8 dB.", "That is 10 log10 1200, right for a ratio of powers. EMVA 1288 counts signals, with 20."),
+        says("A sensor saturates at 1200 times its threshold."),
+        (says("… 61.6 dB."), says("Yes: 20 log10 1200. That is also 10.2 stops.")),
+        (says("… 141.8 dB."), says("That is 20 ln 1200.")),
+        (
+            says("… 30.8 dB."),
+            says("That is 10 log10 1200, right for a ratio of powers. EMVA 1288 counts signals, with 20."),
+        ),
     )
 
 
-def holds_of_decibels(says, asked, common, natural_logarithm, ratio_of_powers):
+def holds_of_decibels(asked, common, natural_logarithm, ratio_of_powers):
     """What a form of the quiz asks, and each choice with its reply: 20 log10, 20 ln and 10 log10 of one ratio."""
-    (ratio,) = says(*asked)
-    (right,), (twenty, again, stops) = map(says, common)
+    (ratio,) = asked
+    (right,), (twenty, again, stops) = common
     assert again == ratio.value
     assert right == twenty.value * np.log10(ratio.value) == db(ratio.value)
     assert stops == np.log2(ratio.value)
-    (natural,), (twenty, again) = map(says, natural_logarithm)
+    (natural,), (twenty, again) = natural_logarithm
     assert natural == twenty.value * np.log(again.value)
-    (half,), (ten, again, signals) = map(says, ratio_of_powers)
+    (half,), (ten, again, signals) = ratio_of_powers
     assert half == ten.value * np.log10(again.value)
     assert signals == 2 * ten.value
 
@@ -559,11 +561,10 @@ def test_before_the_lesson_the_part_of_the_curve_that_tells_the_gain(says):
 
 def test_before_the_lesson_five_hundred_to_one(says):
     holds_of_decibels(
-        says,
-        ("A sensor is saturated at 500 times its threshold.",),
-        ("… 54.0 dB.", "Yes: 20 log10 500, or 9.0 stops."),
-        ("… 124.3 dB.", "That is 20 ln 500."),
-        ("… 27.0 dB.", "That is 10 log10 500. The standard counts signals, and so with 20."),
+        says("A sensor is saturated at 500 times its threshold."),
+        (says("… 54.0 dB."), says("Yes: 20 log10 500, or 9.0 stops.")),
+        (says("… 124.3 dB."), says("That is 20 ln 500.")),
+        (says("… 27.0 dB."), says("That is 10 log10 500. The standard counts signals, and so with 20.")),
     )
 
 
