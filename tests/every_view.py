@@ -22,7 +22,15 @@ from camviz.views.clinic.catalogue import VIEWS, Case
 from camviz.views.measured_edge import MeasuredEdgeView
 from camviz.views.measured_noise import MeasuredNoiseView
 
-BASES = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser")
+BASES = {
+    "View",
+    "OrbitView",
+    "ObservedView",
+    "SolvedView",
+    "ViewChooser",
+    "BoardPictures",
+    "TwoCameras",
+}  # they draw nothing
 
 
 def classes() -> dict[str, type[View]]:
