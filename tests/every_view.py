@@ -22,15 +22,8 @@ from camviz.views.clinic.catalogue import VIEWS, Case
 from camviz.views.measured_edge import MeasuredEdgeView
 from camviz.views.measured_noise import MeasuredNoiseView
 
-BASES = {
-    "View",
-    "OrbitView",
-    "ObservedView",
-    "SolvedView",
-    "ViewChooser",
-    "BoardPictures",
-    "TwoCameras",
-}  # they draw nothing
+SHARED = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras")
+"""Classes of what several views have in common; they draw nothing themselves."""
 
 
 def classes() -> dict[str, type[View]]:
@@ -39,7 +32,7 @@ def classes() -> dict[str, type[View]]:
         importlib.import_module(found.name) for found in pkgutil.walk_packages(camviz.views.__path__, "camviz.views.")
     ]
     found = [one for module in modules for one in vars(module).values() if isclass(one) and issubclass(one, View)]
-    return {one.__name__: one for one in found if one.__name__ not in BASES}
+    return {one.__name__: one for one in found if one.__name__ not in SHARED}
 
 
 def edge() -> View:
