@@ -52,6 +52,7 @@ exit status:
   0  nothing worse than a note was found
   1  something was found
   2  a file cannot be read, or the command cannot be used; one sentence on stderr says why
+  3  something is missing on this machine
 """
 
 
