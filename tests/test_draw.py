@@ -72,7 +72,7 @@ def test_an_axis_names_two_values_at_least(limits, height):
 def picture() -> Picture:
     grey = np.full((4, 6), 100, np.uint8)
     body = svg.image("a", 0, 0, 6, 4) + svg.image("b", 6, 0, 6, 4)
-    return Picture(body, 12, 4, "Title", "f < 3 & rising", {"a": jpeg(grey), "b": png(grey)})
+    return Picture.whole(body, 12, 4, "Title", "f < 3 & rising", {"a": jpeg(grey), "b": png(grey)})
 
 
 def test_a_saved_picture_needs_nothing_else(tmp_path):

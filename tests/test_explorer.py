@@ -30,7 +30,7 @@ class Toy(View):
     def figure(self, *, draft: bool = False) -> Picture:
         if self.size > 5:
             raise ValueError("size must be at most 5")
-        return Picture(f"<!--{self} {draft}-->", 10, 10, "Toy", f"size {self.size:g}")
+        return Picture.whole(f"<!--{self} {draft}-->", 10, 10, "Toy", f"size {self.size:g}")
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         return self.but(x=self.x + dx)
@@ -50,11 +50,11 @@ def test_a_wish_is_answered_by_its_number_with_the_new_state():
 
 def test_an_error_is_shown_and_the_last_good_state_kept():
     explorer = explore(Toy())
-    good = explorer.frame["svg"]
+    good = explorer.frame["html"]
     frame = wish(explorer, 2, values={"size": 9.0})
     assert frame["error"] == "ValueError: size must be at most 5"
     assert frame["answers"] == 2
-    assert frame["svg"] == good
+    assert frame["html"] == good
     assert explorer.view == Toy()
     assert wish(explorer, 3, values={"size": 2.0})["error"] == ""
 
@@ -136,7 +136,7 @@ def test_setting_a_control_redraws_and_tells_whoever_observes_it():
     explorer.colour = "blue"
     assert heard == [("size", 1.0, 3.0), ("colour", "red", "blue")]
     assert explorer.view == Toy(size=3.0, colour="blue")
-    assert "size=3.0, colour='blue'" in explorer.frame["svg"]
+    assert "size=3.0, colour='blue'" in explorer.frame["html"]
     assert explorer.values == {"size": 3.0, "colour": "blue", "lit": True}
 
 

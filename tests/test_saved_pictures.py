@@ -18,7 +18,7 @@ from camviz.views.pinhole import PinholeView
 
 SVG = "{http://www.w3.org/2000/svg}"
 LINK = "{http://www.w3.org/1999/xlink}href"
-PLAIN = {"circle", "svg", "title", "desc", "g", "path", "text", "rect", "image", "clipPath"}
+PLAIN = {"circle", "svg", "title", "tspan", "desc", "g", "path", "text", "rect", "image", "clipPath"}
 
 
 def test_a_state_of_every_view_is_among_them():
@@ -48,7 +48,7 @@ def test_light_and_dark_differ_in_their_colours_alone():
 
 
 def picture(body: str, **photographs: bytes) -> Picture:
-    return Picture(svg.rectangle(0, 0, 40, 40, "paper") + body, 40, 40, "Title", "What it shows", photographs)
+    return Picture.whole(body, 40, 40, "Title", "What it shows", photographs)
 
 
 def plain(body: str, **photographs: bytes) -> ElementTree.Element:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camviz.draw import svg
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 
@@ -20,5 +19,4 @@ def side_by_side(images: Mapping[str, np.ndarray], title: str = "Pictures") -> P
         bottom = max(bottom, panel.y + panel.height)
     described = "From left to right: " + "; ".join(images) + "."
     attached = {f"picture{i}": jpeg(image) for i, image in enumerate(images.values())}
-    paper = svg.rectangle(0, 0, 960, bottom + 14, "paper")
-    return Picture(paper + body, 960, bottom + 14, title, described, attached)
+    return Picture.whole(body, 960, bottom + 14, title, described, attached)

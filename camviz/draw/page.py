@@ -6,7 +6,7 @@ from html import escape
 from importlib.resources import files
 
 from camviz import __version__
-from camviz.draw.picture import Picture, style
+from camviz.draw.picture import Picture, page_style
 
 
 def document(title: str, body: str, *, layout: str = "", script: str = "") -> str:
@@ -16,7 +16,7 @@ def document(title: str, body: str, *, layout: str = "", script: str = "") -> st
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name} · camviz</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{style()}{_layout()}{layout}</style></head><body><h1>{name}</h1>{body}"
+        f"<style>{page_style()}{_layout()}{layout}</style></head><body><h1>{name}</h1>{body}"
         f"<footer>Made by camviz {__version__}. Pixels count from the centre of the first one; metres; "
         f"x right, y down, z forward.</footer>{code}</body></html>\n"
     )

@@ -1,8 +1,11 @@
 """A finished picture: SVG text with photographs attached, that can show itself anywhere."""
 
+from __future__ import annotations
+
 from base64 import b64encode
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -11,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from camviz.draw.flow import FLOW_WIDTH, Tile
 from camviz.draw.portable import portable
 
 
@@ -18,15 +22,42 @@ from camviz.draw.portable import portable
 class Picture:
     """What a view looks like now. `description` states the present state in words and numbers (the alternative text).
 
-    The body refers to photographs as `attached:name`; a live pane receives them as bytes, a file carries them inside.
+    The tiles refer to photographs as `attached:name`; a live pane receives them as bytes, a file carries them inside.
     """
 
-    body: str
-    width: float
-    height: float
+    tiles: tuple[Tile, ...]
     title: str
     description: str
     photographs: dict[str, bytes] = field(default_factory=dict)
+
+    @classmethod
+    def whole(
+        cls,
+        body: str,
+        width: float,
+        height: float,
+        title: str,
+        description: str,
+        photographs: dict[str, bytes] | None = None,
+    ) -> Picture:
+        """A picture of one tile."""
+        return cls((Tile(title, (0, 0, width, height), body),), title, description, photographs or {})
+
+    @property
+    def width(self) -> float:
+        """Picture units."""
+        return max(x + width for x, _, width, _ in (tile.cell for tile in self.tiles))
+
+    @property
+    def height(self) -> float:
+        """Picture units."""
+        return max(y + height for _, y, _, height in (tile.cell for tile in self.tiles))
+
+    @cached_property
+    def body(self) -> str:
+        """All tiles at their places, as SVG."""
+        paper = f'<rect x="0" y="0" width="{self.width:g}" height="{self.height:g}" class="paper"/>'
+        return paper + "".join(tile.uncluttered() for tile in self.tiles)
 
     def svg(self) -> str:
         """The body as an `<svg>` element whose photographs are still `attached:name`."""
@@ -37,26 +68,43 @@ class Picture:
             f'viewBox="0 0 {self.width:g} {self.height:g}">{words}{self.body}</svg>'
         )
 
+    def flow(self, units: Mapping[str, float] | None = None) -> str:
+        """HTML whose tiles flow, for a page with the style sheet `flow.css`; photographs are still `attached:name`.
+
+        `units` says how many picture units make a CSS pixel in the tile of a name, where it is not one.
+        """
+        tiles = "".join(tile.html((units or {}).get(tile.name, 1.0)) for tile in self.tiles)
+        return f'<div class="camviz-flow" role="group" aria-label="{escape(self.title)}">{tiles}</div>'
+
     def embedded(self) -> str:
-        """The `<svg>` element with its photographs inside, for a page that has the style sheet."""
-        svg = self.svg()
+        """The flowing tiles with their photographs inside, for a page that has the style sheets."""
+        return self._with_photographs(self.flow())
+
+    def _with_photographs(self, markup: str) -> str:
         for name, data in self.photographs.items():
-            svg = svg.replace(f'"attached:{name}"', f'"data:{_mime(data)};base64,{b64encode(data).decode()}"')
-        return svg
+            markup = markup.replace(f'"attached:{name}"', f'"data:{_mime(data)};base64,{b64encode(data).decode()}"')
+        return markup
 
     def standalone(self) -> str:
         """One SVG document with style and photographs inside, for browsers: it follows their light or dark theme."""
-        svg = self.embedded().replace("viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1)
+        svg = self._with_photographs(self.svg()).replace(
+            "viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1
+        )
         return svg.replace("<title>", f"<style>{style()}</style><title>", 1)
 
     def figure(self) -> str:
-        """An HTML figure with alternative text."""
-        source = b64encode(self.standalone().encode()).decode()
-        alternative = escape(f"{self.title}. {self.description}")
-        return (
-            f'<figure style="margin:0"><img alt="{alternative}" style="width:100%;max-width:{self.width:g}px" '
-            f'src="data:image/svg+xml;base64,{source}"></figure>'
+        """An HTML figure whose tiles flow, each an image; the first has the whole alternative text."""
+        alternatives = [f"{self.title}. {self.description}", *(tile.name for tile in self.tiles[1:])]
+        images = "".join(
+            f'<img alt="{escape(words)}" style="{tile.style}" src="data:image/svg+xml;base64,{self._alone(tile)}">'
+            for tile, words in zip(self.tiles, alternatives, strict=True)
         )
+        return f'<figure style="margin:0;display:flex;flex-wrap:wrap;max-width:{FLOW_WIDTH}">{images}</figure>'
+
+    def _alone(self, tile: Tile) -> str:
+        """A tile as an SVG document in base64; its words grow where it is shown small."""
+        sheet = f"<style>{page_style()}</style>"
+        return b64encode(self._with_photographs(tile.document(sheet)).encode()).decode()
 
     def save(self, path: str | Path, *, theme: str = "light", dpi: float = 192) -> None:
         """Write the picture to a file that ends in .svg, .png or .pdf.
@@ -97,6 +145,12 @@ def png(image: np.ndarray) -> bytes:
 def style() -> str:
     """The style sheet that every picture shares."""
     return (files("camviz.draw") / "style.css").read_text(encoding="utf-8")
+
+
+@cache
+def page_style() -> str:
+    """The style sheets of a page on which tiles flow: no word on it is below 12 CSS pixels."""
+    return style() + (files("camviz.draw") / "flow.css").read_text(encoding="utf-8")
 
 
 def _converted(svg: str, suffix: str, dpi: float) -> bytes:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 from base64 import b64encode
 from collections.abc import Mapping
+from copy import deepcopy
 from functools import cache
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -30,8 +31,8 @@ _SPACE = "{http://www.w3.org/XML/1998/namespace}space"
 _SHARP = 4  # pixels a picture unit that keep hard pixels hard when a program smooths them
 _SMOOTH = 2  # units a pixel beyond which smooth pictures get more pixels
 _KEPT = frozenset({
-    "clip-path", "d", "fill", "fill-opacity", "fill-rule", "font-family", "font-size", "font-weight", "height", "href",
-    "id", "opacity", "points", "preserveAspectRatio", "rx", "ry", "shape-rendering", "stroke", "stroke-dasharray",
+    "clip-path", "d", "dy", "fill", "fill-opacity", "fill-rule", "font-family", "font-size", "font-weight",
+    "height", "href", "id", "opacity", "points", "preserveAspectRatio", "rx", "ry", "shape-rendering", "stroke", "stroke-dasharray",
     "stroke-linecap", "stroke-linejoin", "stroke-opacity", "stroke-width", "text-anchor", "transform", "viewBox",
     "width", "x", "x1", "x2", "y", "y1", "y2", "cx", "cy", "r", _SPACE,
 })  # fmt: skip
@@ -146,8 +147,8 @@ def _halos(root: Element) -> None:
     for parent in list(root.iter()):
         for place, child in reversed(list(enumerate(parent))):
             if child.tag == "text" and child.get("paint-order") == "stroke":
-                halo = Element("text", {**child.attrib, "fill": child.attrib["stroke"]})
-                halo.text = child.text
+                halo = deepcopy(child)
+                halo.set("fill", child.attrib["stroke"])
                 for name in [name for name in child.attrib if name.startswith("stroke")]:
                     del child.attrib[name]
                 parent.insert(place, halo)

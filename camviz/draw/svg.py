@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 from html import escape
 from math import isfinite
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -68,12 +67,9 @@ def text(point: Sequence[float] | np.ndarray, words: str, class_: str = "label",
     return element("text", escape(words, quote=False), x=x, y=y, class_=class_, **attributes)
 
 
-def paragraph(point: ArrayLike, words: str, width: float, class_: str = "note", line: float = 17) -> str:
-    """Words from a point (2,) on, broken into lines that fit `width` as nearly as letters of unknown width can tell."""
-    x, y = np.asarray(point, dtype=float)
-    letters = max(8, int(width / (6.3 if "note" in class_ else 7.1)))
-    lines = [part for given in words.splitlines() for part in wrap(given, letters) or [""]]
-    return "".join(text((x, y + line * i), part, class_) for i, part in enumerate(lines))
+def paragraph(point: ArrayLike, words: str, width: float, class_: str = "note") -> str:
+    """Words from a point (2,) on; the picture breaks them into lines that fit `width` (draw/labels.py)."""
+    return text(np.asarray(point, dtype=float), words, class_, data_width=float(width))
 
 
 def rectangle(x: float, y: float, width: float, height: float, class_: str, **attributes: Any) -> str:

@@ -137,8 +137,8 @@ def _linked(case: Case, name: str, headed: bool) -> str:
     view = ResidualsView.about(seen)
     links = {i: f"#{_id(name)}-{i + 1}" for i in shown}
     panel = bars_panel(seen)
-    bars = Picture(
-        svg.rectangle(0, 0, 960, 206, "paper") + view.bars_panel(panel, links=links), 960, 206,
+    bars = Picture.whole(
+        view.bars_panel(panel, links=links), 960, 206,
         f"Error of every view of {name}", view.description().split(" Shown:")[0],
     )  # fmt: skip
     few = f"<p>Of the {len(seen)} views the {len(shown)} worst are shown.</p>" if len(shown) < seen.shown.sum() else ""
@@ -172,8 +172,8 @@ def _view_figure(view: ResidualsView, name: str, i: int) -> str:
     )
     height = below + 196 + 20 * len(view.numbers())
     described = view.description().split("Shown: ")[1]
-    picture = Picture(
-        svg.rectangle(0, 0, 470, height, "paper") + image + board + rows,
+    picture = Picture.whole(
+        image + board + rows,
         470,
         height,
         view.observations.picture(i),
@@ -213,12 +213,12 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
             tabindex=-1,
             aria_label=f"the board of {seen.picture(i)}",
         )
-    body = svg.rectangle(0, 0, 490, 514, "paper") + panel.show(content, title="Where the boards were held")
+    body = panel.show(content, title="Where the boards were held")
     told = (
         f"The boards of {len(seen)} views of {name}, {np.nanmin(seen.distances):.2g} m to "
         f"{np.nanmax(seen.distances):.2g} m before the camera."
     )
-    return Picture(body, 490, 514, "Boards in space", told)
+    return Picture.whole(body, 490, 514, "Boards in space", told)
 
 
 def _picture(picture: Picture) -> str:

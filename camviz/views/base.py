@@ -12,12 +12,12 @@ import numpy as np
 
 from camviz.course.yours import tried
 from camviz.draw import svg
+from camviz.draw.flow import WIDTH, Cell, Tile
 from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Item, draw_space
 
-WIDTH = 960  # picture units, of every picture
 Function = Callable[..., Any]
 """What a reader writes."""
 Drawn = tuple[str, dict[str, bytes]]
@@ -106,9 +106,23 @@ class View:
         self, height: float, *parts: str, attached: Mapping[str, bytes] | None = None, described: str | None = None
     ) -> Picture:
         """A picture of the parts, with the photographs attached that they need, under the state's description."""
-        body = svg.rectangle(0, 0, WIDTH, height, "paper") + "".join(parts)
         words = self.description() if described is None else described
-        return Picture(body, WIDTH, height, self.title, words, dict(attached or {}))
+        return Picture.whole("".join(parts), WIDTH, height, self.title, words, dict(attached or {}))
+
+    def tiled(
+        self,
+        layout: Mapping[str, Cell],
+        parts: Mapping[str, str],
+        attached: Mapping[str, bytes] | None = None,
+        described: str | None = None,
+    ) -> Picture:
+        """A picture whose tiles are the parts by their names in the layout, under the state's description.
+
+        A part that is "" has no tile. `attached` are the photographs that the parts need.
+        """
+        tiles = tuple(Tile(name, layout[name], body) for name, body in parts.items() if body)
+        words = self.description() if described is None else described
+        return Picture(tiles, self.title, words, dict(attached or {}))
 
     def _told(self) -> dict[str, str]:
         """The figures that the panels speak of: names and values."""

@@ -116,10 +116,10 @@ class BoardPosesView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         space, attached = self.space(space_panel("poses", 20, 34, 540, 452), draft)
-        body = svg.rectangle(0, 0, 960, 500, "paper") + space + self._image() + self._equation()
+        body = space + self._image() + self._equation()
         if self.photographs:
             attached = attached | {"photograph": jpeg(self.photographs[self.index])}
-        return Picture(body, 960, 500, "Camera and board", self.description(), attached)
+        return Picture.whole(body, 960, 500, "Camera and board", self.description(), attached)
 
     def space(self, panel: Panel, draft: bool) -> Drawn:
         """The panel with the poses in space, a handle called "eye", and the photographs it needs."""

@@ -16,6 +16,7 @@ from camviz import twoview
 from camviz.cameras import Camera, transform
 from camviz.course.yours import tried
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -31,7 +32,10 @@ _DISTANCES = np.concatenate([np.geomspace(0.02, 400, 120), [np.inf]])
 _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point
 _PATCH = 48  # pixels on a side of the details that are compared
 _PLANES = 40  # epipolar planes in a full turn around the baseline
-_WIDTH, _TALLEST = 455, 342
+_WIDTH, _TALLEST = 460, 345
+_LAYOUT = rows(
+    (388, {"left picture": 480, "right picture": 480}), (236, {"space": 500, "numbers": 280, "details": 180})
+)
 _PANELS = {"space", "match", "epipoles", "F"}
 
 
@@ -75,7 +79,8 @@ class EpipolarView(OrbitView, TwoCameras):
         outside = "" if self.right.sees(self.point) else ", outside"
         figures["point, right"] = _pixel(self.uv_right, "no image") + outside
         if self.estimate is not None:
-            figures["estimated lines"] = f"off by {self.estimate_error:.3g} px ({len(self.pairs[0])} matches)"
+            figures["estimated lines"] = f"off by {self.estimate_error:.3g} px"
+            figures["estimated from"] = f"{len(self.pairs[0])} matches"
             figures["its epipole"] = f"turned by {self.epipole_error:.3g}°"
         elif self.F is not None and self.noise:
             figures["no estimate"] = f"only {len(self.pairs[0])} points in both"
@@ -169,8 +174,9 @@ class EpipolarView(OrbitView, TwoCameras):
         left = self._picture_panel(self._left_panel, self.left, self.right, "drag the point", "move the point")
         along = self.equation(), "move it along its ray"
         right = self._picture_panel(self._right_panel, self.right, self.left, *along)
-        body = left + right + space + self._numbers_block() + details
-        return self.composed(622, body, attached=attached | sheets | crops)
+        parts = {"left picture": left, "right picture": right, "space": space}
+        parts |= {"numbers": self._numbers_block(), "details": details}
+        return self.tiled(_LAYOUT, parts, attached | sheets | crops)
 
     def _pictures(self, draft: bool) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
         """What the two cameras see, as pixels and as JPEG."""
@@ -187,12 +193,12 @@ class EpipolarView(OrbitView, TwoCameras):
     @property
     def _left_panel(self) -> Panel:
         size = self.left.intrinsics
-        return image_panel("left", 20, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
+        return image_panel("left", 10, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
     @property
     def _right_panel(self) -> Panel:
         size = self.right.intrinsics
-        return image_panel("right", 485, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
+        return image_panel("right", 490, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
     def _picture_panel(self, panel: Panel, camera: Camera, other: Camera, note: str, action: str) -> str:
         content = (
@@ -288,7 +294,7 @@ class EpipolarView(OrbitView, TwoCameras):
     # The space -------------------------------------------------------------------------------------------------------
 
     def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> Drawn:
-        panel = space_panel("space", 20, 409, 500, 200)
+        panel = space_panel("space", 10, 414, 480, 200)
         scenery = () if self.photographs else scene_items(textured_scene(), "wire")
         scenery += self._bodies(images, draft)
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
@@ -332,7 +338,7 @@ class EpipolarView(OrbitView, TwoCameras):
     # The numbers -----------------------------------------------------------------------------------------------------
 
     def _numbers_block(self) -> str:
-        x, y, rows = 540, 401, list[str]()
+        x, y, rows = 512, 406, list[str]()
         if "F" in self._shown:
             rows.append(svg.text((x, y), "F, of unit norm" if self.F is not None else "No F here", "title"))
             for i, row in enumerate(self.F if self.F is not None else ()):
@@ -351,13 +357,13 @@ class EpipolarView(OrbitView, TwoCameras):
         for i, (name, camera, uv) in enumerate(
             (("left", self.left, np.array([self.u, self.v])), ("right", self.right, self.uv_right))
         ):
-            panel = Panel(f"{name} detail", 796 + 75 * i, 409, 69, 69, 0, 69, 0, 69)
+            panel = Panel(f"{name} detail", 796 + 75 * i, 414, 69, 69, 0, 69, 0, 69)
             content = svg.text((34, 38), "outside", "note middle")
             if camera.intrinsics.contains(uv):
                 crops[panel.name] = jpeg(crop(images[name], camera.intrinsics, uv, _PATCH))
                 content = svg.image(panel.name, 0, 0, 69, 69) + ring(np.array([34.5, 34.5]), "red", 5)
             drawn += panel.show(content) + svg.text((panel.x + 34, 494), f"{name}, here", "note middle")
-        return svg.text((796, 401), "Do they match?", "title") + drawn, crops
+        return svg.text((796, 406), "Do they match?", "title") + drawn, crops
 
 
 def _half_planes(along: Array, across: Array, samples: int) -> Array:

@@ -238,7 +238,7 @@ class FaultLabView(ViewChooser):
             body += svg.rectangle(x, y - 14, 4, 58, f"fill-{colour}")
             body += svg.text((x + 14, y), f"{finding.id}{times}", colour, style="font-size:17px;font-weight:600")
             body += svg.text((x + 448, y), finding.severity, f"note end {colour}")
-            body += svg.paragraph((x + 14, y + 18), _short(finding.sentence), 436, "label", line=16)
+            body += svg.paragraph((x + 14, y + 18), _short(finding.sentence), 436, "label")
             y += 78
         if len(listed) > _MOST:
             body += svg.text((x, y), f"and {len(listed) - _MOST} more", "note")

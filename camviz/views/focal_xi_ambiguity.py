@@ -20,7 +20,7 @@ def focal_xi_ambiguity_picture(
     """
     shades = Shades(0.05, 20.0, logarithmic=True)
     width = (880 - 80 * len(maps)) / len(maps)
-    body, attached = svg.rectangle(0, 0, 960, 400, "paper"), dict[str, bytes]()
+    body, attached = "", dict[str, bytes]()
     for i, (caption, one) in enumerate(maps):
         x = 64 + i * (width + 80)
         panel = plot.plot_panel(f"valley{i}", x, 40, width, 300, (one.xi[0], one.xi[-1]), (one.focal[0], one.focal[-1]))
@@ -37,7 +37,7 @@ def focal_xi_ambiguity_picture(
     scale, picture = bar(900, 60, 280, "scale", shades, "RMS, px")
     lowest = "; ".join(f"{caption}: least {np.nanmin(one.misfit):.2f} px" for caption, one in maps)
     words = f"The misfit over ξ and f, with the dashed line f/(1 + ξ) = const through the solution. {lowest}."
-    return Picture(body + scale, 960, 400, "The valley along f/(1 + ξ)", words, attached | picture)
+    return Picture.whole(body + scale, 960, 400, "The valley along f/(1 + ξ)", words, attached | picture)
 
 
 def _line(panel: Panel, one: FocalXiAmbiguity) -> str:

@@ -278,7 +278,7 @@ class ReadoutView(View):
         return marks + svg.text((panel.width - 8, 54), "dots: read, by your row time", "orange halo end")
 
     def _numbers(self) -> str:
-        words = svg.paragraph((690, 340), _WORDS[self.readout], 250, "label", 19) if "time" in self.panels else ""
+        words = svg.paragraph((690, 340), _WORDS[self.readout], 250, "label") if "time" in self.panels else ""
         return (
             svg.text((690, 26), "This read-out", "title") + readout(self._told(), (690, 50), (0, 44), (0, 19)) + words
         )

@@ -39,11 +39,15 @@ function render({ model, el }) {
       newest = null;
       say(frame.error ? `This state could not be drawn. ${frame.error}` : "");
       await swap(picture, frame);
+      refold();
       root.dataset.rendered = String(Number(root.dataset.rendered) + 1);
     }
     showing = false;
     ask.shown();
   };
+  const watcher = new ResizeObserver(() => tellUnits(picture, ask));
+  watcher.observe(picture);
+  const refold = folding(picture);
   const stopHands = hands(picture, ask);
   keepKeys(root);
   model.on("change:values", showValues);
@@ -51,6 +55,7 @@ function render({ model, el }) {
   showValues();
   showFrame();
   return () => {
+    watcher.disconnect();
     stopHands();
     model.off("change:values", showValues);
     model.off("change:frame", showFrame);
@@ -71,9 +76,10 @@ function asker(model, root, late) {
     clearTimeout(settle);
     settle = null;
     if (part.reset) wish = null;
-    wish ??= { values: {}, drags: [], keys: [], draft };
+    wish ??= { values: {}, drags: [], keys: [], units: {}, draft };
     wish.draft = draft;
     wish.reset ||= part.reset;
+    Object.assign(wish.units, part.units);
     Object.assign(wish.values, part.values);
     for (const [handle, x, y, dx, dy] of part.drags ?? []) {
       const last = wish.drags.at(-1);
@@ -101,21 +107,49 @@ function asker(model, root, late) {
 // Photographs are loaded before the picture is replaced: no flash, no half-drawn state. They travel as data: addresses,
 // for a blob's address is resolved by another process, which takes longer than all the rest of this function.
 async function swap(picture, frame) {
-  let svg = frame.svg;
+  let html = frame.html;
   await Promise.all(Object.entries(frame.photographs ?? {}).map(async ([name, data]) => {
     const address = dataAddress(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
-    svg = svg.replaceAll(`"attached:${name}"`, `"${address}"`);
+    html = html.replaceAll(`"attached:${name}"`, `"${address}"`);
     await loaded(address);
   }));
   const held = (element) => (picture.contains(element) ? element.dataset.drag : null);
   const focused = held(document.activeElement);
-  const fresh = build(svg);
+  const fresh = build(html);
   keepKeys(fresh);
   if (picture.firstElementChild) patch(picture.firstElementChild, fresh);
   else picture.append(fresh);
   if (focused && held(document.activeElement) !== focused) {
     picture.querySelector(`[data-drag="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
   }
+}
+
+// In a narrow page each tile but the first folds away under its name; what the reader folded stays so in the next picture.
+function folding(picture) {
+  const folded = new Set();
+  const refold = () => {
+    for (const button of picture.querySelectorAll(".camviz-fold")) {
+      button.setAttribute("aria-expanded", String(!folded.has(button.textContent)));
+    }
+  };
+  picture.addEventListener("click", ({ target }) => {
+    const name = target.closest(".camviz-fold")?.textContent;
+    if (name && !folded.delete(name)) folded.add(name);
+    if (name) refold();
+  });
+  return refold;
+}
+
+// Words are larger, in the picture's units, where a tile is shown small: the kernel is told, so that they make room.
+const TOLD = Symbol("the unit of a tile as the kernel was told");
+function tellUnits(picture, ask) {
+  const units = {};
+  for (const tile of picture.querySelectorAll(".camviz-tile")) {
+    const svg = tile.lastElementChild, wide = svg.clientWidth;
+    const unit = wide ? Math.max(1, svg.viewBox.baseVal.width / wide) : 1;
+    if (Math.abs(unit / (tile[TOLD] ?? 1) - 1) > 0.04) units[tile.dataset.tile] = tile[TOLD] = Number(unit.toFixed(2));
+  }
+  if (Object.keys(units).length) ask({ units }, false);
 }
 
 // Make `old` equal to `fresh`, child by child. Most of a picture stays as it is from one change to the next, and what is
@@ -157,23 +191,23 @@ function loaded(address) {
 // Pointer and keys on the picture's handles, in the picture's own units.
 function hands(picture, ask) {
   let held = null;
-  const at = (event) => {
-    const svg = picture.querySelector("svg");
-    const box = svg.getBoundingClientRect(), view = svg.viewBox.baseVal;
-    return [(event.clientX - box.left) * view.width / box.width, (event.clientY - box.top) * view.height / box.height];
+  const at = (event, svg) => {
+    const box = svg.getBoundingClientRect(), view = svg.viewBox.baseVal, scale = view.width / box.width;
+    return [view.x + (event.clientX - box.left) * scale, view.y + (event.clientY - box.top) * scale];
   };
   const down = (event) => {
     const handle = event.target.closest("[data-drag]")?.dataset.drag;
     if (!handle || event.button) return;
-    const [x, y] = at(event);
-    held = { handle, x, y, moved: false };
+    const svg = event.target.closest("svg.camviz-svg");
+    const [x, y] = at(event, svg);
+    held = { handle, svg, x, y, moved: false };
     picture.setPointerCapture(event.pointerId);
     picture.querySelector(`[data-drag="${CSS.escape(handle)}"]`).focus({ preventScroll: true });
     event.preventDefault();
   };
   const move = (event) => {
     if (!held) return;
-    const [x, y] = at(event);
+    const [x, y] = at(event, held.svg);
     ask({ drags: [[held.handle, x, y, x - held.x, y - held.y]] }, true);
     Object.assign(held, { x, y, moved: true });
   };

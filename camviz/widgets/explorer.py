@@ -12,7 +12,7 @@ import numpy as np
 import traitlets
 from IPython import get_ipython
 
-from camviz.draw.picture import style
+from camviz.draw.picture import page_style
 from camviz.views.base import Control, View
 from camviz.widgets.memory import give_back_after_cells, keep_between_pictures
 from camviz.widgets.still import StillWidget, stills_for_boxes
@@ -53,7 +53,7 @@ class Explorer(StillWidget):
     """
 
     _esm = (_HERE / "explorer.js").read_text(encoding="utf-8")
-    _css = style() + (_HERE / "explorer.css").read_text(encoding="utf-8")
+    _css = page_style() + (_HERE / "explorer.css").read_text(encoding="utf-8")
 
     controls: traitlets.List[Any] = traitlets.List(read_only=True).tag(sync=True)
     frame: traitlets.Dict[Any, Any] = traitlets.Dict(read_only=True).tag(sync=True)
@@ -63,6 +63,7 @@ class Explorer(StillWidget):
 
     def __init__(self, view: View, controls: dict[str, Control]) -> None:
         self._first = view
+        self._units: dict[str, float] = {}  # of each tile in the page
         self._controls = controls
         self._ranges = {**view.offered(), **controls}
         self._control_of = {f"{name}_" if hasattr(Explorer, name) else name: name for name in self._ranges}
@@ -136,14 +137,15 @@ class Explorer(StillWidget):
 
     def _show(self, view: View, *, draft: bool, answers: int = 0) -> None:
         picture = view.figure(draft=draft)
-        frame = {"svg": picture.svg(), "photographs": picture.photographs}
+        frame: dict[str, Any] = {"html": picture.flow(self._units), "photographs": picture.photographs}
+        frame |= {"described": picture.description, "answers": answers, "draft": draft, "error": ""}
         followed = {"view": view, "value": view, "values": {name: getattr(view, name) for name in self._controls}}
         followed |= {trait: getattr(view, name) for trait, name in self._control_of.items()}
         # One message to the page; and nobody hears of a change before all of it is done.
         with self.hold_sync(), self.hold_trait_notifications():
             for trait, value in followed.items():
                 getattr(type(self), trait).follow(self, value)
-            self.set_trait("frame", {**frame, "answers": answers, "draft": draft, "error": ""})
+            self.set_trait("frame", frame)
 
     def _tell(self, error: Exception, answers: int) -> None:
         """Show an error above the last good picture."""
@@ -159,6 +161,7 @@ class Explorer(StillWidget):
             self._tell(error, answers=message["id"])
 
     def _wished(self, message: dict[str, Any]) -> View:
+        self._units |= message.get("units", {})
         view = self._first if message.get("reset") else self.view
         if message.get("values"):
             view = view.but(**message["values"])

@@ -144,7 +144,7 @@ class BoardResidualsView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         space, sheets = self._bent(draft)
-        words = svg.paragraph((20, 386), self._solved(), 920, "label", line=20)
+        words = svg.paragraph((20, 386), self._solved(), 920, "label")
         return self.composed(440, self._means_panel(), space, words, attached=sheets)
 
     def _means_panel(self) -> str:

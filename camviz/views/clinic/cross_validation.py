@@ -107,7 +107,7 @@ class CrossValidationView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map()
         body = shown + self._views()
-        body += svg.paragraph((20, 386), "\n".join(self.sentences()), 920, "label", line=20)
+        body += svg.paragraph((20, 386), "\n".join(self.sentences()), 920, "label")
         return self.composed(440, body, attached=attached)
 
     @cached_property

@@ -19,4 +19,4 @@ class MissingView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         words = svg.text((20, 26), self.subject, "title") + svg.paragraph((36, 62), self.sentence, 860, "label")
         card = svg.rectangle(20, 38, 920, 70, "card") + svg.rectangle(20, 38, 920, 70, "frame")
-        return Picture(svg.rectangle(0, 0, 960, 122, "paper") + card + words, 960, 122, self.subject, self.sentence)
+        return Picture.whole(card + words, 960, 122, self.subject, self.sentence)

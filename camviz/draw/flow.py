@@ -1,0 +1,86 @@
+"""The layout of a picture: tiles that stand in rows where there is room, and flow below each other where there is none.
+
+One description serves every place. A saved picture has its tiles where the rows put them; a page lays out the same
+tiles by `flow.css`, from a telephone to a projector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+
+from camviz.draw import labels
+
+WIDTH = 960  # picture units, of every row
+FLOW_WIDTH = "max(800px,138vh)"  # of a picture, so that its main panel and the controls fit a screen together
+SCROLLED = 620  # picture units: a wider tile is scrolled sideways on a telephone
+
+Cell = tuple[float, float, float, float]
+"""Left, top, width and height, in picture units."""
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A part of a picture that can stand alone: its name, its cell, and its SVG in the picture's units."""
+
+    name: str
+    cell: Cell
+    body: str
+
+    def uncluttered(self, unit: float = 1.0) -> str:
+        """The SVG with its words clear of each other, where `unit` picture units make a CSS pixel."""
+        x, y, width, height = self.cell
+        return labels.uncluttered(self.body, (x, y, x + width, y + height), max(unit, 1.0))
+
+    @property
+    def style(self) -> str:
+        """How the tile takes its place among others in a line that wraps, as CSS.
+
+        In a wide line the tiles of a row fill it as in the saved picture. A tile goes to the next line rather than
+        shrink to less than 0.72 of its size, and grows to half as much again; words alone keep their size more closely.
+        """
+        width = self.cell[2]
+        least, most = (0.72, 1.5) if "data-panel" in self.body else (0.92, 1.15)
+        share = 100 * width / WIDTH
+        return (
+            f"--w:{width:g};flex:{width:g} 1 max({least * width:g}px,{0.97 * share:.4g}%);min-width:0;"
+            f"max-width:max({most * width:g}px,{share:.4g}%)"
+        )
+
+    def html(self, unit: float = 1.0) -> str:
+        """The tile as an element of a page that has `flow.css`; `unit` is how many picture units make a CSS pixel."""
+        kind = "camviz-tile camviz-scrolled" if self.cell[2] > SCROLLED else "camviz-tile"
+        name = escape(self.name)
+        fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
+        return f'<div class="{kind}" data-tile="{name}" style="{self.style}">{fold}{self._svg(unit)}</div>'
+
+    def document(self, sheet: str) -> str:
+        """The tile as an SVG document with a style sheet."""
+        _, _, width, height = self.cell
+        size = f'width="{width:g}" height="{height:g}" style="--w:{width:g};--shown:100vw" '
+        return self._svg(1.0, sheet).replace("<svg ", f"<svg {size}", 1)
+
+    def _svg(self, unit: float, sheet: str = "") -> str:
+        box = " ".join(f"{value:g}" for value in self.cell)
+        return (
+            f'<svg xmlns="http://www.w3.org/2000/svg" class="camviz-svg camviz-fitted" role="group" '
+            f'aria-label="{escape(self.name)}" viewBox="{box}">{sheet}{self.uncluttered(unit)}</svg>'
+        )
+
+
+def rows(*rows: tuple[float, Mapping[str, float]]) -> dict[str, Cell]:
+    """The cells of tiles in rows, each row its height and the widths of its tiles by name.
+
+    >>> rows((300, {"camera": 560, "picture": 400}), (120, {"numbers": 960}))["picture"]
+    (560.0, 0.0, 400, 300)
+    """
+    cells: dict[str, Cell] = {}
+    top = 0.0
+    for height, widths in rows:
+        left = 0.0
+        for name, width in widths.items():
+            cells[name] = (left, top, width, height)
+            left += width
+        top += height
+    return cells

@@ -1,0 +1,85 @@
+"""Pictures flow: on a telephone as on a desk, no two words of a view stand over each other and none is cut off."""
+
+from itertools import combinations
+
+import pytest
+from every_view import STATES
+
+from camviz.draw import labels, svg
+from camviz.draw.flow import SCROLLED, WIDTH, Tile, rows
+from camviz.draw.labels import overlap, uncluttered, words_of
+
+TELEPHONE = 259  # CSS pixels that a picture has in JupyterLab on a screen of 375
+DESK = (0.0, 0.0, 400.0, 300.0)
+
+
+def ends(view):
+    """The view as it is, and with each control at each of its ends or choices."""
+    yield view
+    for name, control in view.offered().items():
+        for value in control.choices or ((False, True) if control.low is None else (control.low, control.high)):
+            yield view.but(**{name: value})
+
+
+def problems(tile: Tile, unit: float) -> list[str]:
+    """The words of a tile that stand over others or reach out of what is seen, at so many picture units a CSS pixel."""
+    x, y, width, height = tile.cell
+    box = (x, y, x + width, y + height)
+    drawn = tile.uncluttered(unit)
+    found = [(words, drawn[words.start : words.end]) for words in words_of(drawn, box, unit)]
+    clashes = [f"{a} over {b}" for (one, a), (other, b) in combinations(found, 2) if overlap(one.box, other.box)]
+    return clashes + [f"{a} is cut" for words, a in found if reaches_out(words.box, words.seen)]
+
+
+def reaches_out(box: labels.Box, seen: labels.Box) -> bool:
+    return any(low < edge - 0.5 for low, edge in zip(box[:2], seen[:2], strict=True)) or any(
+        high > edge + 0.5 for high, edge in zip(box[2:], seen[2:], strict=True)
+    )
+
+
+def unit_on_a_telephone(tile: Tile) -> float:
+    width = tile.cell[2]
+    return max(1.0, width / (560 if width > SCROLLED else TELEPHONE))
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_words_stand_free_at_both_ends_of_every_control(name):
+    for view in ends(STATES[name]()):
+        tiles = view.figure(draft=True).tiles
+        for tile in tiles:
+            assert problems(tile, 1.0) == []
+            assert len(tiles) == 1 or problems(tile, unit_on_a_telephone(tile)) == []
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_the_tiles_of_a_row_fill_it_and_none_covers_another(name):
+    cells = [tile.cell for tile in STATES[name]().figure().tiles]
+    assert max(x + width for x, _, width, _ in cells) <= WIDTH
+    boxes = [(x, y, x + width, y + height) for x, y, width, height in cells]
+    assert [pair for pair in combinations(boxes, 2) if overlap(*pair)] == []
+
+
+def test_a_tick_gives_way_to_a_title_and_a_label_moves_beside_another():
+    title, tick = svg.text((10, 20), "Title", "title"), svg.text((12, 22), "0.5", "tick")
+    assert uncluttered(title + tick, DESK) == title
+    panel = svg.element("svg", svg.text((50, 50), "one") + svg.text((52, 52), "two"), x=0, y=0, width=400, height=300)
+    assert 'x="52" y="67.21"' in uncluttered(panel, DESK)
+
+
+def test_a_label_at_the_edge_of_a_panel_moves_inside():
+    panel = svg.element("svg", svg.text((380, 50), "a long label"), x=0, y=0, width=400, height=300)
+    moved = words_of(uncluttered(panel, DESK), DESK)[0]
+    assert moved.box[2] == pytest.approx(400)
+
+
+def test_a_paragraph_has_more_lines_where_its_letters_are_larger():
+    text = svg.paragraph(
+        (10, 20), "No word of a picture is smaller than twelve pixels of the page on which it stands.", 300
+    )
+    small, large = (uncluttered(text, DESK, unit).count("<tspan") for unit in (1.0, 2.0))
+    assert (small, large) == (2, 4)
+
+
+def test_rows_stand_below_each_other():
+    cells = rows((300, {"camera": 560, "picture": 400}), (120, {"numbers": 960}))
+    assert cells == {"camera": (0, 0, 560, 300), "picture": (560, 0, 400, 300), "numbers": (0, 300, 960, 120)}
