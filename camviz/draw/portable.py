@@ -31,10 +31,10 @@ _SPACE = "{http://www.w3.org/XML/1998/namespace}space"
 _SHARP = 4  # pixels a picture unit that keep hard pixels hard when a program smooths them
 _SMOOTH = 2  # units a pixel beyond which smooth pictures get more pixels
 _KEPT = frozenset({
-    "clip-path", "d", "dy", "fill", "fill-opacity", "fill-rule", "font-family", "font-size", "font-weight",
-    "height", "href", "id", "opacity", "points", "preserveAspectRatio", "rx", "ry", "shape-rendering", "stroke", "stroke-dasharray",
-    "stroke-linecap", "stroke-linejoin", "stroke-opacity", "stroke-width", "text-anchor", "transform", "viewBox",
-    "width", "x", "x1", "x2", "y", "y1", "y2", "cx", "cy", "r", _SPACE,
+    "clip-path", "cx", "cy", "d", "dy", "fill", "fill-opacity", "fill-rule", "font-family", "font-size",
+    "font-weight", "height", "href", "id", "opacity", "points", "preserveAspectRatio", "r", "rx", "ry",
+    "shape-rendering", "stroke", "stroke-dasharray", "stroke-linecap", "stroke-linejoin", "stroke-opacity",
+    "stroke-width", "text-anchor", "transform", "viewBox", "width", "x", "x1", "x2", "y", "y1", "y2", _SPACE,
 })  # fmt: skip
 
 Style = dict[str, str]
