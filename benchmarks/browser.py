@@ -1,4 +1,4 @@
-"""Slider to changed pixels in a real JupyterLab, three visualizers beside their naive equivalents in the same run.
+"""Slider to changed pixels in a real JupyterLab: three visualizers, their naive equivalents, and the smallest widget.
 
     python benchmarks/browser.py [--changes 40] [--memory 500] [--renderer wire solid] [--no-later]
 
@@ -53,6 +53,7 @@ def notebook(renderer: str) -> nbformat.NotebookNode:
     for view in SLIDERS:
         module = view.removesuffix("View").lower()
         cells.append(f"from camviz.views.{module} import {view}\nexplore({view}())")
+    cells.append("from smallest import Smallest\nSmallest()")
     naive = "%matplotlib inline\nimport naive\nfrom ipywidgets import FloatSlider, interact\n"
     for view, (name, low, high, step) in SLIDERS.items():
         slider = f"FloatSlider({low}, min={low}, max={high}, step={step})"
@@ -106,16 +107,22 @@ def report(open_notebook: Notebook, renderer: str, changes: int, memory: int) ->
     explorers = open_notebook.page.query_selector_all(".camviz-explorer")
     naives = open_notebook.page.query_selector_all(".widget-interact")
     rows, grown = [], []
+    smallest = open_notebook.page.query_selector(".camviz-smallest")
+    smallest.scroll_into_view_if_needed()
+    floor = measured(open_notebook, [smallest, ["x", 0.0, 100.0]], "explorer", changes)
+    rows.append(["the smallest widget", *(f"{value:.0f}" for value in floor), "", ""])
     for (view, slider), explorer, naive in zip(SLIDERS.items(), explorers, naives, strict=True):
         explorer.scroll_into_view_if_needed()
         ours = measured(open_notebook, [explorer, slider], "explorer", changes)
         size, kernel_mb, page_mb = growth(open_notebook, [explorer, slider], kernel, memory)
         naive.scroll_into_view_if_needed()
         theirs = measured(open_notebook, [naive, slider], "naive", changes)
-        rows.append([view, *(f"{value:.0f}" for value in ours), f"{theirs[0] / ours[0]:.1f}×"])
-        rows.append([f"{view}, naive", *(f"{value:.0f}" for value in theirs), ""])
+        rows.append(
+            [view, *(f"{value:.0f}" for value in ours), f"{theirs[0] / ours[0]:.1f}×", f"{ours[0] / floor[0]:.2f}×"]
+        )
+        rows.append([f"{view}, naive", *(f"{value:.0f}" for value in theirs), "", ""])
         grown.append([view, f"{size:.0f}", f"{kernel_mb:+.1f}", f"{page_mb:+.1f}"])
-    speed = table(rows, [f"{renderer} renderer", *COLUMNS, "faster"])
+    speed = table(rows, [f"{renderer} renderer", *COLUMNS, "faster", "of the smallest"])
     return f"{speed}\n\n" + table(grown, ["memory", "kernel MB", f"after {memory} changes, kernel MB", "page MB"])
 
 

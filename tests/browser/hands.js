@@ -15,7 +15,7 @@ window.hands = {
 
   // The picture as text, with every photograph in it replaced by the digest of its bytes.
   async picture(root) {
-    let svg = root.querySelector(".camviz-picture svg")?.outerHTML ?? "";
+    let svg = root.querySelector(".camviz-flow")?.outerHTML ?? "";
     for (const url of new Set(svg.match(/blob:[^"]+/g))) {
       const bytes = await (await fetch(url)).arrayBuffer();
       const digest = new Uint8Array(await crypto.subtle.digest("SHA-1", bytes));
@@ -47,7 +47,7 @@ window.hands = {
 
   // The middle one of the points of the page where the pointer would take hold of a handle.
   async grip(root, name) {
-    const svg = root.querySelector(".camviz-picture svg");
+    const svg = root.querySelector(`.camviz-picture [data-drag="${CSS.escape(name)}"]`).closest(".camviz-fitted");
     for (let i = 0; i < 5; i++) {      // cells that come into view take their true height only then, and push
       svg.scrollIntoView({ block: "center" });
       await hands.pause(40);

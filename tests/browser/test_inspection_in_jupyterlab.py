@@ -72,7 +72,7 @@ def test_a_click_on_a_bar_chooses_its_view(notebook):
 def test_another_view_is_chosen_above_and_the_still_stays_hidden(notebook):
     explorer(notebook)
     notebook.page.locator(".widget-dropdown select").first.select_option(label="Coverage")
-    notebook.page.wait_for_selector(".camviz-picture svg[aria-label^='Coverage']")
+    notebook.page.wait_for_selector(".camviz-flow[aria-label^='Coverage']")
     found = explorer(notebook)
     assert found.evaluate("root => hands.controls(root)") == ["cells", "count"]
     assert not notebook.page.locator("[data-camviz-still]").is_visible()
