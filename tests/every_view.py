@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+import re
 from collections.abc import Callable
 from dataclasses import MISSING, fields, replace
 from functools import cache
@@ -24,6 +25,11 @@ from camviz.views.measured_noise import MeasuredNoiseView
 
 SHARED = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras")
 """Classes of what several views have in common; they draw nothing themselves."""
+
+
+def words(svg: str) -> str:
+    """Everything that is written in a picture, the lines of its paragraphs joined."""
+    return " ".join(found.strip() for found in re.findall(r">([^<>]+)</t(?:ext|span)>", svg))
 
 
 def classes() -> dict[str, type[View]]:
