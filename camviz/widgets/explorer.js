@@ -45,7 +45,8 @@ function render({ model, el }) {
     showing = false;
     ask.shown();
   };
-  const watcher = new ResizeObserver(() => tellUnits(picture, ask));
+  const told = {};      // by the name of the tile
+  const watcher = new ResizeObserver(() => tellUnits(picture, told, ask));
   watcher.observe(picture);
   const refold = folding(picture);
   const stopHands = hands(picture, ask);
@@ -141,13 +142,13 @@ function folding(picture) {
 }
 
 // Words are larger, in the picture's units, where a tile is shown small: the kernel is told, so that they make room.
-const TOLD = Symbol("the unit of a tile as the kernel was told");
-function tellUnits(picture, ask) {
+function tellUnits(picture, told, ask) {
   const units = {};
   for (const tile of picture.querySelectorAll(".camviz-tile")) {
     const svg = tile.lastElementChild, wide = svg.clientWidth;
     const unit = wide ? Math.max(1, svg.viewBox.baseVal.width / wide) : 1;
-    if (Math.abs(unit / (tile[TOLD] ?? 1) - 1) > 0.04) units[tile.dataset.tile] = tile[TOLD] = Number(unit.toFixed(2));
+    const name = tile.dataset.tile;
+    if (Math.abs(unit / (told[name] ?? 1) - 1) > 0.04) units[name] = told[name] = Number(unit.toFixed(2));
   }
   if (Object.keys(units).length) ask({ units }, false);
 }

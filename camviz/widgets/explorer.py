@@ -19,7 +19,7 @@ from camviz.widgets.still import StillWidget, stills_for_boxes
 
 _HERE = files("camviz.widgets")
 _CAPTION = (
-    '<figcaption style="font-size:12px;opacity:.75">'
+    '<figcaption style="font-size:12px;opacity:.75;flex-basis:100%">'
     "A still picture: run this cell (Shift + Enter), and it moves.</figcaption>"
 )
 
