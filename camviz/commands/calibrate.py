@@ -91,6 +91,7 @@ def calibrate(options: argparse.Namespace) -> int:
     except OSError as error:
         refuse_exhausted(error)
         raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
+    calibration = replace(calibration, source=options.output)
     told = narrator(options.output)
     for sentence in report(calibration):
         told(sentence)
@@ -144,12 +145,11 @@ def report(calibration: Calibration) -> list[str]:
             f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]:.2f}" if key in of else "")
             for key in ("fx", "fy", "cx", "cy")
         ]
-        used = np.isfinite(calibration.detections[name]).all(axis=-1) & ~calibration.set_aside[name]
-        squares = calibration.per_view_errors[name] ** 2 * used.sum(axis=1)
-        rms = np.sqrt(squares.sum() / used.sum())
+        used = calibration.used(name)
         views = int(used.any(axis=1).sum())
         said.append(
-            f"{name}: {', '.join(values)} px; RMS error {rms:.3f} px over {used.sum()} corners in {views} views."
+            f"{name}: {', '.join(values)} px; RMS error {calibration.rms(name):.3f} px over {used.sum()} corners in "
+            f"{views} views."
         )
     if "right" in calibration.cameras:
         x, y, z = 1000 * calibration.cameras["right"].centre

@@ -14,6 +14,7 @@ from camviz.lenses.base import Array
 from camviz.views.base import Control, View, step_of
 
 NAMED = 16  # views whose bars have room for names and figures
+CUT = 8.0  # times the median of all bars
 LABEL = "One bar per view; click, drag or press the arrow keys to choose a view"
 
 
@@ -68,15 +69,31 @@ def bars_of(panel: Panel, values: Array, chosen: int = -1) -> str:
     )
 
 
-def figures_on(panel: Panel, values: Array, tops: Array | None = None) -> str:
-    """Every value (views,) above its bar, where there is room for it; `tops` (views,) are where the bars end."""
-    if len(values) > NAMED:
-        return ""
-    ends = values if tops is None else tops
-    return "".join(
-        svg.text(panel.place((i + 1, top)) + (0, -4), f"{value:.2f}", "tick middle halo")
-        for i, (value, top) in enumerate(zip(values, ends, strict=True))
-    )
+def ceiling(values: Array) -> float:
+    """The upper end of the axis of bars as high as `values` (n,).
+
+    A bar more than CUT times the median would flatten all others: it is cut, and leaves the axis to them.
+    """
+    known = values[np.isfinite(values)]
+    limit = CUT * float(np.median(known)) if known.size else 0.0
+    whole = known[known <= limit] if limit > 0 else known
+    return 1.2 * max(float(whole.max(initial=0.0)), 1e-9)
+
+
+def figures_on(panel: Panel, values: Array) -> str:
+    """Every value (views,) where its bar ends, where there is room for it; a bar that is cut has a break below it."""
+    drawn = []
+    for i in np.flatnonzero(values > panel.top):
+        x, gap = panel.place((i + 1, 0))[0], 22.0
+        half = 0.5 * panel.width / (panel.right - panel.left)
+        broken = [(x + side * half, gap + (4 if number % 2 else -4)) for number, side in enumerate(np.linspace(-1, 1, 7))]
+        drawn.append(svg.line(broken, "paper-line cut"))
+    if len(values) <= NAMED:
+        drawn += [
+            svg.text((x, max(y - 4, 12)), f"{value:.2f}", "tick middle halo")
+            for (x, y), value in zip(panel.place(np.stack([np.arange(len(values)) + 1, values], -1)), values, strict=True)
+        ]
+    return "".join(drawn)
 
 
 def names_below(names: Sequence[str], most: int = NAMED, about: int = NAMED) -> list[tuple[float, str]]:
