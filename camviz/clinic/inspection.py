@@ -10,8 +10,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
 from camviz.clinic import words
@@ -75,9 +73,7 @@ class Inspection:
         rms = self.calibration.rms(name) if self.calibration else None
         pinhole = {key: getattr(grid, key) for key in ("width", "height", "fx", "fy", "cx", "cy")}
         distortion = {key: float(value) for key, value in asdict(lens).items()}
-        return (
-            {"name": name, "model": type(lens).__name__} | pinhole | {"distortion": distortion, "rms": rms}
-        )
+        return {"name": name, "model": type(lens).__name__} | pinhole | {"distortion": distortion, "rms": rms}
 
     @cached_property
     def summary(self) -> Summary | None:

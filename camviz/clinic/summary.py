@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -18,8 +18,8 @@ from camviz.clinic.evidence import Evidence
 GOOD = 1.0  # pixels: where every corner of the picture is known this well, no more pictures are asked for
 UNKNOWN = "not in the file"
 MOST_CAMERAS = 4
-RMS, MIDDLE, CORNER = "RMS error", "projection, middle", "projection, worst corner"
-LEGEND = "± is one standard deviation; projection: of where a far point is seen."
+RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
+LEGEND = "± is one standard deviation; uncertainty: of the pixel where a far point is seen, by corner noise alone."
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +43,13 @@ class Summary:
         """The file, when it was written, its format, the cameras, and how many pictures were used."""
         calibration, cameras = self.calibration, self.calibration.cameras
         path = calibration.source
-        written = f"{datetime.fromtimestamp(path.stat().st_mtime):%Y-%m-%d %H:%M}" if path.exists() else ""
+        written = (
+            f"{datetime.fromtimestamp(path.stat().st_mtime):%Y-%m-%d %H:%M}" if path.name and path.exists() else ""
+        )
         sizes = {f"{k.width} × {k.height}" for k in (camera.intrinsics for camera in cameras.values())}
-        names = ", ".join(list(cameras)[:4]) + f" and {len(cameras) - 4} more" * (len(cameras) > 4)
-        shown = f"{'camera' if len(cameras) == 1 else f'{len(cameras)} cameras'}: {names}, {', '.join(sorted(sizes))} px"
-        if names == "camera":
-            shown = f"one camera, {', '.join(sizes)} px"
+        named = ", ".join(list(cameras)[:MOST_CAMERAS]) + ", …" * (len(cameras) > MOST_CAMERAS)
+        shown = "one camera" if named == "camera" else f"{len(cameras)} camera{'s' * (len(cameras) > 1)}: {named}"
+        shown += f", {', '.join(sorted(sizes))} px"
         parts = (path.name, written and f"written {written}", calibration.format, shown, self.pictures)
         return tuple(part for part in parts if part)
 
@@ -58,7 +59,7 @@ class Summary:
         calibration = self.calibration
         used = [calibration.used(name).any(axis=1) for name in calibration.detections]
         if used:
-            count, given = sum(int(mask.sum()) for mask in used), sum(map(len, used))
+            count, given = sum(int(mask.sum()) for mask in used), sum(mask.size for mask in used)
             return f"{count} of {given + len({name for name, _ in calibration.skipped})} pictures used"
         views = sum(len(errors) for errors in calibration.per_view_errors.values())
         return f"{views} views" if views else "the file does not name its pictures"
@@ -106,7 +107,8 @@ class Summary:
         middle, corner = (UNKNOWN,) * 2 if known is None else map(_pixels, known)
         yield MIDDLE, middle
         yield CORNER, corner
-        yield "image, lens", f"{grid.width} × {grid.height} px, {type(lens).__name__}"
+        yield "image", f"{grid.width} × {grid.height} px"
+        yield "lens", type(lens).__name__
         values = {key: getattr(grid, key) for key in ("fx", "fy", "cx", "cy", "skew")} | _parameters(lens)
         for key, value in values.items():
             sigma = self.evidence.sigma_of(name, key)
@@ -135,12 +137,12 @@ class Summary:
         try:
             best = next_board_poses(self.evidence.adjustment(name), camera=name)[0]
         except (ValueError, np.linalg.LinAlgError):  # no pose shows the whole board
-            return f"Add pictures with the board near the corners, the worst of which is known to {known_to}."
+            return f"Take more pictures with the board near the corners, the worst of which is known to {known_to}."
         hold = instruction(self.evidence.adjustment(name), best, name)
         of = "" if len(self.names) == 1 else f" of {name}"
         return (
-            f"The worst corner{of} is known to {known_to}; to know it better add a picture: {hold}. The mean "
-            f"uncertainty falls from {best.before:.2g} px to {best.after:.2g} px."
+            f"The worst corner{of} is known to {known_to}; to know it better take one picture more: {hold} (mean "
+            f"uncertainty {best.before:.2g} px → {best.after:.2g} px)."
         )
 
 
@@ -158,7 +160,7 @@ def measured(value: float, sigma: float | None) -> str:
     return f"{value:.{decimals}f} ± {sigma:.{decimals}f}".replace("-", "−")
 
 
-def _parameters(lens: Any) -> Mapping[str, float]:
+def _parameters(lens: Any) -> dict[str, float]:
     return {key: float(getattr(lens, key)) for key in lens.parameters()}
 
 

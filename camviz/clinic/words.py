@@ -37,7 +37,8 @@ def verdict(findings: Sequence[Finding], checked: Sequence[str], skipped: Sequen
         below = f", {counts} below" if findings else ""
         return f"Nothing wrong was found{below}; {len(checked)} checks ran{_lacking(skipped)}."
     cause = f" Likely: {worst.causes[0]}." if worst.causes else ""
-    return f"{counts}. {'The worst: ' * (len(findings) > 1)}{worst.sentence}{cause}"
+    claim = worst.sentence.split(". ")[0].removesuffix(".")
+    return f"{counts}: {'the worst, ' * (len(findings) > 1)}{claim}.{cause}"
 
 
 def worst_of(findings: Sequence[Finding]) -> Finding | None:
@@ -86,7 +87,9 @@ def text(
 
     Where nothing is wrong the verdict comes first, with what to do `then`.
     """
-    lines = [] if worst_of(findings) else [verdict(findings, checked, skipped), *([f"Next: {then}"] if then else []), ""]
+    lines = []
+    if worst_of(findings) is None:
+        lines += [verdict(findings, checked, skipped), *([f"Next: {then}"] if then else []), ""]
     for finding in findings:
         lines.append(f"{heading(finding)} {finding.id}: {finding.sentence}")
         lines += [*(f"    {label}: {said}" for label, said in advice(finding).items()), ""]

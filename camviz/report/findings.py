@@ -41,8 +41,8 @@ def glance_html(summary: Summary) -> str:
     few = f"<p>The first {len(table)} of {len(table) + more} cameras.</p>" if more else ""
     notes = "".join(f'<p class="note">{escape(note)}</p>' for note in summary.calibration.notes)
     return (
-        f'<p class="origin">{escape(" · ".join(summary.origin))}</p>{notes}<div class="scroll" style="overflow-x:auto">'
-        f'<table class="glance"><tr><td></td>{head}</tr>{body}</table></div>{few}<p>{LEGEND}</p>'
+        f'<p class="origin">{escape(" · ".join(summary.origin))}</p><div class="scroll" style="overflow-x:auto">'
+        f'<table class="glance"><tr><td></td>{head}</tr>{body}</table></div>{few}<p>{LEGEND}</p>{notes}'
     )
 
 

@@ -189,7 +189,7 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
     panel = space_panel("boards", 10, 34, 470, 470)
     away = float(np.nanmedian(seen.distances))
     middle = np.nanmedian(seen.corners_cam.mean(axis=1), axis=0)
-    eye = OrbitCamera(tuple((0.62 * middle).tolist()), 1.5 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
+    eye = OrbitCamera(tuple((0.7 * middle).tolist()), 1.9 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
     items: list[Item] = [*camera_body(standing, 2 * size, colour="blue"), *axes_triad(_STILL, 2 * size)]
     others = [i for i in range(len(seen)) if i not in links and seen.shown[i]][:MOST_BOARDS]
     items += [item for i in others for item in drawn.board_items(seen.cam_from_board[i], False)]

@@ -14,7 +14,7 @@ from camviz.lenses.base import Array
 from camviz.views.base import Control, View, step_of
 
 NAMED = 16  # views whose bars have room for names and figures
-CUT = 8.0  # times the median of all bars
+CUT = 10.0  # times the median of all bars
 LABEL = "One bar per view; click, drag or press the arrow keys to choose a view"
 
 
@@ -82,18 +82,26 @@ def ceiling(values: Array) -> float:
 
 def figures_on(panel: Panel, values: Array) -> str:
     """Every value (views,) where its bar ends, where there is room for it; a bar that is cut has a break below it."""
-    drawn = []
-    for i in np.flatnonzero(values > panel.top):
-        x, gap = panel.place((i + 1, 0))[0], 22.0
-        half = 0.5 * panel.width / (panel.right - panel.left)
-        broken = [(x + side * half, gap + (4 if number % 2 else -4)) for number, side in enumerate(np.linspace(-1, 1, 7))]
-        drawn.append(svg.line(broken, "paper-line cut"))
-    if len(values) <= NAMED:
-        drawn += [
-            svg.text((x, max(y - 4, 12)), f"{value:.2f}", "tick middle halo")
-            for (x, y), value in zip(panel.place(np.stack([np.arange(len(values)) + 1, values], -1)), values, strict=True)
-        ]
-    return "".join(drawn)
+    places_of = panel.place(np.stack([np.arange(len(values)) + 1, values], axis=-1))
+    width = 0.9 * panel.width / (panel.right - panel.left)
+    zigzag = np.stack([np.linspace(-width / 2, width / 2, 7), 22 + 4.0 * (-1) ** np.arange(7)], axis=-1)
+    breaks = [zigzag + (x, 0) for (x, _), value in zip(places_of, values, strict=True) if value > panel.top]
+    figures = [
+        svg.text((x, max(y - 4, 12)), f"{value:.2f}", "tick middle halo")
+        for (x, y), value in zip(places_of, values, strict=True)
+    ]
+    return svg.path(breaks, "paper-line cut") + "".join(figures if len(values) <= NAMED else ())
+
+
+def figures_in(panel: Panel, values: Array) -> str:
+    """Every value (views,) below the end of its bar, where both bars and names have room for it; NaN has none."""
+    if len(values) > NAMED:
+        return ""
+    return "".join(
+        svg.text(panel.place((i + 1, value)) + (0, 14), f"{value:.2f}", "tick middle", style="fill:var(--paper)")
+        for i, value in enumerate(values)
+        if np.isfinite(value) and panel.height * min(value / panel.top, 1) > 20
+    )
 
 
 def names_below(names: Sequence[str], most: int = NAMED, about: int = NAMED) -> list[tuple[float, str]]:

@@ -89,7 +89,9 @@ def inverted_transform(evidence: Evidence) -> Iterator[Finding]:
     """
     known = list(references(evidence))
     if not known:
-        raise evidence.without_pair("it needs boards seen by both cameras of a pair, or another calibration (--compare)")
+        raise evidence.without_pair(
+            "it needs boards seen by both cameras of a pair, or another calibration (--compare)"
+        )
     yield from changed(inverted_transform, known, RigidTransform.inv, "when it is inverted")
 
 

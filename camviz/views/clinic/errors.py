@@ -48,6 +48,8 @@ class ErrorsView(View):
         content = plot.grid(panel, xticks=[]) + bars_of(panel, errors)
         content += plot.level(panel, median, "ink dashed") + figures_on(panel, errors)
         ticks = names_below([f"{i + 1}" for i in range(len(errors))])
-        shown = panel.show(content, title=f"RMS error of every view, {self.name}", note=f"dashed: median, {median:.3g} px")
+        shown = panel.show(
+            content, title=f"RMS error of every view, {self.name}", note=f"dashed: median, {median:.3g} px"
+        )
         body = shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
         return self.composed(250, body + svg.paragraph((20, 220), self.description(), 920))

@@ -40,10 +40,7 @@ def short_names(pictures: Sequence[str], views: int) -> tuple[str, ...]:
 
 def not_at_hand(panel: Panel) -> str:
     """What stands in a panel for want of its photograph: how to have it."""
-    words = (
-        "The picture is not at hand. Name its folder: camviz inspect … --images FOLDER, "
-        "or in a notebook camviz.inspect(…).explore(images=FOLDER)."
-    )
+    words = "The picture is not at hand: name its folder, --images FOLDER or camviz.inspect(…).explore(images=FOLDER)."
     return svg.paragraph((8, panel.height - 26), words, panel.width - 16, "note halo")
 
 

@@ -21,7 +21,17 @@ from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.observations import Observations, not_at_hand, short_names
 from camviz.views.marks import arrows, cross
-from camviz.views.view_bars import LABEL, NAMED, ViewChooser, bars_of, ceiling, figures_on, names_below, places
+from camviz.views.view_bars import (
+    LABEL,
+    NAMED,
+    ViewChooser,
+    bars_of,
+    ceiling,
+    figures_in,
+    figures_on,
+    names_below,
+    places,
+)
 
 ARROW = 26.0  # picture units that a view's 90th percentile residual is drawn long, by default
 
@@ -112,11 +122,12 @@ class ResidualsView(ViewChooser, OrbitView):
         else:
             content += "".join(self._linked_bar(panel, i, links.get(i)) for i in range(n))
         content += plot.level(panel, seen.total_rms, "ink dashed")
-        room = panel.height * (all_seen - rms) / panel.top > 16  # units, for a figure at each of the two ends
-        content += figures_on(panel, np.where(room, rms, np.nan)) + figures_on(panel, np.fmax(rms, all_seen))
+        content += figures_on(panel, np.fmax(rms, all_seen))
+        content += figures_in(panel, np.where(np.isfinite(all_seen), rms, np.nan))
         touch = {"drag": "bars", "hint": "click a bar", "label": LABEL} if handle else {}
         shown = panel.show(content, title=f"RMS error of every view, {seen.name}", **touch)
         aside = "; blue: corners used, pale red: with those set aside" if np.isfinite(all_seen).any() else ""
+        aside += "; broken: cut" if np.nanmax(seen.rms_seen, initial=0) > panel.top else ""
         words = f"dashed: all views, {_pixels(seen.total_rms)}{aside}"
         place = (panel.x + panel.width - (90 if handle else 0), panel.y - 8)
         return shown + svg.text(place, words, "note end") + plot.axes(panel, "", "RMS [px]", xticks=self._view_names())
