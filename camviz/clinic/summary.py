@@ -43,14 +43,13 @@ class Summary:
         """The file, when it was written, its format, the cameras, and how many pictures were used."""
         calibration, cameras = self.calibration, self.calibration.cameras
         path = calibration.source
-        written = (
-            f"{datetime.fromtimestamp(path.stat().st_mtime):%Y-%m-%d %H:%M}" if path.name and path.exists() else ""
-        )
+        known = path.name and path.exists()
+        written = f"written {datetime.fromtimestamp(path.stat().st_mtime):%Y-%m-%d %H:%M}" if known else ""
         sizes = {f"{k.width} × {k.height}" for k in (camera.intrinsics for camera in cameras.values())}
         named = ", ".join(list(cameras)[:MOST_CAMERAS]) + ", …" * (len(cameras) > MOST_CAMERAS)
         shown = "one camera" if named == "camera" else f"{len(cameras)} camera{'s' * (len(cameras) > 1)}: {named}"
         shown += f", {', '.join(sorted(sizes))} px"
-        parts = (path.name, written and f"written {written}", calibration.format, shown, self.pictures)
+        parts = (path.name, written, calibration.format, shown, self.pictures)
         return tuple(part for part in parts if part)
 
     @property

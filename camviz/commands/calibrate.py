@@ -6,7 +6,7 @@ import argparse
 import glob
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -97,17 +97,18 @@ def calibrate(options: argparse.Namespace) -> int:
         told(sentence)
     told(f"{options.output}: written.")
     if options.report:
-        _inspect(calibration, left[0].parent, options.report)
+        folders = [each[0].parent for each in (left, right) if each]
+        _inspect(calibration, dict(zip(calibration.cameras, folders, strict=True)), options.report)
     return OK
 
 
-def _inspect(calibration: Calibration, folder: Path, page: Path) -> None:
+def _inspect(calibration: Calibration, folders: Mapping[str, Path], page: Path) -> None:
     """Say what an inspection finds, and write its page."""
     from camviz.clinic import inspect
     from camviz.report.inspection import write_report
 
     inspection = inspect(calibration)
-    write_whole(page, lambda path: write_report(inspection, path, images=folder))
+    write_whole(page, lambda path: write_report(inspection, path, images=folders))
     tell(f"\n{inspection.as_text()}\n{page}: open it in a browser.")
 
 

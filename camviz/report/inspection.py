@@ -35,14 +35,16 @@ MOST_VIEWS = 24  # pictures of views that a page holds: the worst of them
 MOST_BOARDS = 20  # of views whose pictures are not on the page
 
 
-def write_report(
-    inspection: Inspection, path: str | PathLike[str], *, images: str | PathLike[str] | None = None
-) -> None:
-    """Write the report of an inspection to `path`; `images` is the folder of the calibration's pictures."""
+Folders = str | PathLike[str] | Mapping[str, Path]
+"""The folder of a calibration's pictures, or one by the name of each camera."""
+
+
+def write_report(inspection: Inspection, path: str | PathLike[str], *, images: Folders | None = None) -> None:
+    """Write the report of an inspection to `path`; `images` says where the calibration's pictures are."""
     Path(path).write_text(report(inspection, images=images), encoding="utf-8")
 
 
-def report(inspection: Inspection, *, images: str | PathLike[str] | None = None) -> str:
+def report(inspection: Inspection, *, images: Folders | None = None) -> str:
     """The report as HTML text, readable without a network and without JavaScript."""
     layout, script = (
         (files("camviz.report") / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
@@ -52,7 +54,8 @@ def report(inspection: Inspection, *, images: str | PathLike[str] | None = None)
         body = verdict_html(inspection) + _findings(inspection) + _missing(dict.fromkeys(views, _UNREAD))
         name = inspection.source.name if inspection.source else "A calibration"
         return document(f"{name}: it could not be read", body, layout=layout, script=script)
-    case = Case(inspection.calibration, inspection.compare, images=None if images is None else Path(images))
+    folders = images if images is None or isinstance(images, Mapping) else Path(images)
+    case = Case(inspection.calibration, inspection.compare, images=folders)
     sections: list[tuple[Entry, str]] = []
     missing: dict[str, str] = {}
     for entry in VIEWS.values():
