@@ -3,6 +3,7 @@
 The names below are imported when they are first used, so that `import camviz` costs next to nothing.
 """
 
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -52,3 +53,20 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+def _show_calibrations() -> None:
+    """Have IPython, where it runs, show a bare calibration by `camviz.report.glance`, imported when it is wanted."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if shell is None:
+        return
+    formatters, calibration = shell.display_formatter.formatters, ("camviz.calibration.types", "Calibration")
+    formatters["text/html"].for_type_by_name(
+        *calibration, lambda shown: import_module("camviz.report.glance").html(shown)
+    )
+    formatters["text/plain"].for_type_by_name(
+        *calibration, lambda shown, printer, _: printer.text(import_module("camviz.report.glance").text(shown))
+    )
+
+
+_show_calibrations()

@@ -66,17 +66,58 @@ def test_the_error_of_every_view_is_opencvs():
 
 
 def test_every_bar_is_as_high_as_its_views_error():
-    view = ResidualsView.of(sick())
+    view = ResidualsView.of(single())
     panel = view._bars
-    paths = re.findall(r'<path d="([^"]*)" class="fill-(blue|orange)"', view.bars_panel(panel))
-    tops = {}
-    for data, _ in paths:
+    tops = heights(panel, view.bars_panel(panel), "fill-blue|fill-orange")
+    rms = view.observations.rms
+    np.testing.assert_allclose(tops, rms, atol=0.06 / panel.scale[1] * -1)  # of 0.1 picture units
+    assert len(tops) == 10
+
+
+def test_the_number_at_a_bar_is_its_height_with_and_without_the_corners_set_aside():
+    healthy = single()
+    detections, aside = healthy.detections["camera"].copy(), np.zeros((10, 54), bool)
+    detections[6, :5] += 1.0
+    aside[6, :5] = True
+    view = ResidualsView.of(replace(healthy, detections={"camera": detections}, set_aside={"camera": aside}))
+    panel, seen = view._bars, view.observations
+    drawn = view.bars_panel(panel)
+    solid = heights(panel, drawn, "fill-blue|fill-orange")
+    pale = heights(panel, drawn, "wash fill-red")
+    assert seen.rms_seen[6] > 2 * seen.rms[6]
+    assert pale[6] == pytest.approx(seen.rms_seen[6], rel=0.01)
+    assert solid[6] == pytest.approx(seen.rms[6], rel=0.01)
+    written = re.findall(r'<text x="([\d.]+)" y="[\d.]+" class="tick middle(?: halo)?"[^>]*>(\d\.\d\d)<', drawn)
+    at = [(round(panel.data((float(x), 0))[0]) - 1, float(number)) for x, number in written]
+    ends = [(i, value) for tops in (solid, pale) for i, value in enumerate(tops) if np.isfinite(value)]
+    assert sorted(at) == [(i, pytest.approx(value, abs=0.006)) for i, value in sorted(ends)]
+    assert "RMS [px]" in drawn
+    assert "blue: corners used, pale red: with those set aside" in drawn
+
+
+def test_a_rejected_board_leaves_the_axis_to_the_other_bars():
+    healthy = single()
+    detections, aside = healthy.detections["camera"].copy(), np.zeros((10, 54), bool)
+    detections[8] += np.random.default_rng(3).normal(0, 30, (54, 2))
+    aside[8] = True
+    view = ResidualsView.of(replace(healthy, detections={"camera": detections}, set_aside={"camera": aside}))
+    panel = view._bars
+    drawn = view.bars_panel(panel)
+    tops = heights(panel, drawn, "fill-blue|fill-orange")
+    assert np.nanmax(tops) > 0.8 * panel.top
+    assert f">{view.observations.rms_seen[8]:.2f}<" in drawn
+    assert drawn.count("paper-line cut") == 1
+    assert "broken: cut" in drawn
+
+
+def heights(panel, picture, classes):
+    """The upper ends (10,) of the bars of some classes, in the panel's own unit; NaN where there is no bar."""
+    tops = np.full(10, np.nan)
+    for data in re.findall(rf'<path d="([^"]*)" class="(?:{classes})"', picture):
         for corners in re.findall(r"M([^Z]*)Z", data):
             places = panel.data(np.array([list(map(float, p.split(","))) for p in corners.split()]))
-            tops[round(places[:, 0].mean())] = places[:, 1].max()
-    heights = np.array([tops[i + 1] for i in range(len(view.observations))])
-    np.testing.assert_allclose(heights, view.observations.rms, atol=0.06 / panel.scale[1] * -1)  # of 0.1 picture units
-    assert len(heights) == 10
+            tops[round(places[:, 0].mean()) - 1] = places[:, 1].max()
+    return tops
 
 
 @pytest.mark.parametrize("scale", [1.0, 40.0])

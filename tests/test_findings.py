@@ -213,7 +213,10 @@ def test_the_json_has_the_form_that_the_documentation_gives(left_classic):
 
 def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(healthy):
     _, calibration = healthy
-    assert inspect(calibration).as_text().startswith("Nothing found.\n\nChecked: not-a-rotation, bad-k")
+    said = inspect(calibration).as_text()
+    assert said.startswith("Nothing wrong was found; 20 checks ran, 5 could not because the file holds one camera")
+    assert "\nNext: " in said
+    assert "\nChecked: not-a-rotation, bad-k" in said
     K = calibration.cameras["camera"]
     wide = replace(K, intrinsics=replace(K.intrinsics, fx=2 * K.intrinsics.fx), lens=BrownConrady(k1=-0.3, k2=-0.5))
     severities = [finding.severity for finding in inspect(replace(calibration, cameras={"camera": wide})).findings]
@@ -353,7 +356,7 @@ def test_a_view_without_corners_is_no_reason_to_stop(healthy):
 
 def test_the_exit_status_is_a_gate(capsys, tmp_path):
     assert main(["inspect", str(DATA / "ros_file.yaml")]) == 0
-    assert capsys.readouterr().out.startswith("Nothing found.")
+    assert capsys.readouterr().out.startswith("Nothing wrong was found; ")
     assert main(["inspect", str(DATA / "opencv_fisheye.yml")]) == 0  # a note
     assert "note fold" in capsys.readouterr().out
     bad = tmp_path / "bad.yaml"

@@ -83,7 +83,7 @@ def test_findings_come_first_with_their_words(page):
     for finding in inspection.findings:
         assert finding.id in text
     if not inspection.findings:
-        assert "Nothing found" in text
+        assert "Nothing wrong was found" in text
 
 
 def test_the_bars_pictures_and_boards_of_a_view_share_its_number():
@@ -102,7 +102,9 @@ def test_photographs_are_embedded_small(tmp_path):
         cv2.imwrite(str(tmp_path / name), cv2.GaussianBlur(noise, (0, 0), 3))
     text = report(inspect(calibration), images=tmp_path)
     assert len(text) < 5e6
-    assert "the picture is not at hand" not in text
+    assert "is not at hand" not in text
+    without = report(inspect(calibration))
+    assert "The picture is not at hand: name its folder, --images FOLDER" in without
     assert text.count("data:image/jpeg") >= 10
 
 

@@ -1,7 +1,7 @@
 """What views share: numbers as text, rows beside a picture, bars that choose a view, the walk around a space."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from camviz.draw.panel import Panel
 from camviz.draw.readout import decimal, listed, readout, seconds, signed, vector
 from camviz.draw.space import OrbitCamera, space_panel
 from camviz.views.base import OrbitView, View, answered, step_of, without
-from camviz.views.view_bars import ViewChooser, bars_of, figures_on, names_below
+from camviz.views.view_bars import ViewChooser, bars_of, ceiling, figures_on, names_below
 
 TEXT = re.compile(r'<text x="([-\d.]+)" y="([-\d.]+)" class="([^"]*)"[^>]*>([^<]*)</text>')
 
@@ -116,6 +116,19 @@ def test_the_chosen_bar_alone_is_orange_and_a_missing_value_has_none():
     counts = {class_: path.count("M") for path, class_ in re.findall(r'<path d="([^"]*)" class="([^"]*)"', drawn)}
     assert counts == {"fill-blue": 1, "fill-orange": 1}
     assert [words for *_, words in texts(figures_on(panel, np.array([1.0, np.nan, 2.0])))] == ["1.00", "2.00"]
+
+
+def test_a_bar_that_would_flatten_the_rest_is_cut_and_keeps_its_number():
+    values = np.array([0.10, 0.20, 0.15, 44.0, np.nan])
+    assert ceiling(values) == pytest.approx(1.2 * 0.20)
+    assert ceiling(values[:3]) == ceiling(values)
+    assert ceiling(np.array([0.1, 0.1, 0.9])) == pytest.approx(1.2 * 0.9)  # tall, and yet the others can be read
+    panel = replace(Bars()._bars, top=ceiling(values))
+    drawn = figures_on(panel, values)
+    assert re.findall(r'<path d="(M[^"]*)" class="paper-line cut"', drawn)[0].count("M") == 1
+    (x, y, *_), *_ = [found for found in texts(drawn) if found[-1] == "44.00"]
+    assert x == pytest.approx(panel.place((4, 0))[0], abs=0.1)
+    assert 0 < y < panel.height / 2
 
 
 def test_names_stand_below_all_bars_or_below_round_ones():

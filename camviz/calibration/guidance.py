@@ -16,7 +16,7 @@ from camviz.calibration.difference import pixel_grid
 from camviz.calibration.problem import moved
 from camviz.calibration.types import Board
 from camviz.calibration.uncertainty import projection_jacobian, worst_deviation
-from camviz.cameras import Camera
+from camviz.cameras import Camera, transform
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation
 
@@ -67,6 +67,18 @@ def next_board_poses(
     tilts = tilt_deg(candidates, adjustment.board)
     after = [_mean_uncertainty(jacobian, covariance) for covariance in changed]
     return tuple(Candidate(candidates[i], float(tilts[i]), before, after[i]) for i in np.argsort(after))
+
+
+def instruction(adjustment: Adjustment, candidate: Candidate, camera: str) -> str:
+    """How to hold the board, as a clause: "hold the board on the left, at the top, 0.4 m away, tilted by 25°"."""
+    seen_by, board = adjustment.cameras[camera], adjustment.board
+    points = transform(candidate.cam_from_board, board.corners)
+    k = seen_by.intrinsics
+    middle = k.to_pixels(seen_by.lens.project(points)).mean(axis=0)
+    across = ("on the left", "in the middle", "on the right")[int(np.clip(3 * (middle[0] + 0.5) / k.width, 0, 2))]
+    down = ("at the top", "half way down", "at the bottom")[int(np.clip(3 * (middle[1] + 0.5) / k.height, 0, 2))]
+    away = float(np.linalg.norm(points.mean(axis=0)))
+    return f"hold the board {across}, {down}, {away:.2g} m away, tilted by {candidate.tilt_deg:.0f}°"
 
 
 def tilt_deg(cam_from_board: RigidTransform, board: Board) -> Array:

@@ -110,3 +110,22 @@ class Calibration:
     def rig(self) -> Rig:
         """The cameras as one rig."""
         return Rig(self.cameras)
+
+    def used(self, name: str) -> Mask:
+        """Which corners (views, corners) of a camera were seen and not set aside; (0, 0) where none are known."""
+        if name not in self.detections:
+            return np.zeros((0, 0), bool)
+        seen = np.isfinite(self.detections[name]).all(axis=-1)
+        return np.asarray(seen & ~self.set_aside[name] if name in self.set_aside else seen)
+
+    def rms(self, name: str) -> float | None:
+        """The RMS in pixels over all corners used, as the errors of the views tell it; None where they are not known.
+
+        Where the corners are not known, all views count alike.
+        """
+        errors = np.asarray(self.per_view_errors.get(name, ()), dtype=float)
+        counts = self.used(name).sum(axis=1)
+        weights = np.where(np.isfinite(errors), counts if counts.shape == errors.shape else 1, 0)
+        if not weights.any():
+            return None
+        return float(np.sqrt(np.sum(weights * np.nan_to_num(errors) ** 2) / weights.sum()))

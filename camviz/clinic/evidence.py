@@ -111,6 +111,11 @@ class Evidence:
             raise NotChecked("the file holds no detected corners of a known board")
         return self.observed
 
+    def without_pair(self, otherwise: str) -> NotChecked:
+        """Why a check of pairs is not made: there is one camera alone, or else what `otherwise` says."""
+        alone = len(self.calibration.cameras) == 1
+        return NotChecked("the file holds one camera, not a pair" if alone else otherwise)
+
     def picture(self, name: str, view: int) -> str:
         """What to call a view: the name of its picture, or its number."""
         pictures = self.calibration.pictures.get(name)

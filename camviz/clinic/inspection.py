@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
-
-import numpy as np
 
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
@@ -17,6 +16,7 @@ from camviz.clinic import words
 from camviz.clinic.checks import kinds
 from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.registry import SEVERITIES, Finding
+from camviz.clinic.summary import Summary
 from camviz.files import CalibrationError, load
 
 
@@ -32,6 +32,7 @@ class Inspection:
     checked: tuple[str, ...]
     skipped: tuple[tuple[str, str], ...] = ()
     compare: Calibration | None = field(default=None, repr=False)
+    source: Path | None = None  # of a file that could not be read
 
     @classmethod
     def of(cls, evidence: Evidence) -> Self:
@@ -69,22 +70,33 @@ class Inspection:
     def _camera(self, name: str, camera: Camera) -> dict[str, Any]:
         grid = camera.intrinsics
         lens: Any = camera.lens
+        rms = self.calibration.rms(name) if self.calibration else None
         pinhole = {key: getattr(grid, key) for key in ("width", "height", "fx", "fy", "cx", "cy")}
         distortion = {key: float(value) for key, value in asdict(lens).items()}
-        return (
-            {"name": name, "model": type(lens).__name__} | pinhole | {"distortion": distortion, "rms": self.rms(name)}
-        )
+        return {"name": name, "model": type(lens).__name__} | pinhole | {"distortion": distortion, "rms": rms}
 
-    def rms(self, name: str) -> float | None:
-        """The error of a camera in pixels over all its views, None where the calibration does not hold it."""
-        errors = self.calibration.per_view_errors.get(name) if self.calibration else None
-        if errors is None or not np.isfinite(errors).any():
-            return None
-        return float(np.sqrt(np.nanmean(np.square(errors))))
+    @cached_property
+    def summary(self) -> Summary | None:
+        """The calibration at a glance; None where there is nothing to look at."""
+        return None if self.calibration is None else Summary.of(self.calibration)
+
+    @property
+    def verdict(self) -> str:
+        """One line: the worst finding with its likely cause, or that nothing wrong was found and by how many checks."""
+        return words.verdict(self.findings, self.checked, self.skipped)
+
+    @property
+    def next_step(self) -> str:
+        """What to do: the worst finding's remedy, else where to hold the board next, or why nothing needs doing."""
+        worst = words.worst_of(self.findings)
+        if worst is not None:
+            return worst.remedy
+        return self.summary.guidance if self.summary else ""
 
     def as_text(self) -> str:
-        """For people: the findings in plain words, then what was checked, and what was not and why."""
-        return words.text(self.findings, self.checked, self.skipped)
+        """For people: the findings or that there are none, the calibration at a glance, and what was checked."""
+        glance = tuple(self.summary.lines()) if self.summary else ()
+        return words.text(self.findings, self.checked, self.skipped, self.next_step, glance)
 
     def __str__(self) -> str:
         return self.as_text()
@@ -126,6 +138,7 @@ def inspect_file(
             raise
         finding = kinds()[error.id].found(f"{str(error).removeprefix(f'{Path(path)}: ')}.", error.value)
         why = "the file could not be read beyond the fault above"
-        return Inspection(None, (finding,), (error.id,), tuple((id, why) for id in kinds() if id != error.id))
+        skipped = tuple((id, why) for id in kinds() if id != error.id)
+        return Inspection(None, (finding,), (error.id,), skipped, source=Path(path))
     calibration = prepare(calibration) if prepare else calibration
     return inspect(calibration, compare=compare, pictures=pictures, board=board)

@@ -155,6 +155,28 @@ With `--json` the output is `{"cameras": [{name, model, width, height, fx, fy, c
 [{id, severity, sentence, value, unit, camera, view, causes, remedy}], "checked": [id, …], "skipped": [{id, why}]}`.
 Of several files it is a list of these, each with its `file`.
 
+## The report in ten seconds
+
+`camviz inspect FILE --report page.html`, `camviz calibrate … --report page.html` and a notebook's
+`camviz.inspect(calibration)` begin alike. The terminal has the same words.
+
+- **The verdict.** The worst finding and its likely cause; or "Nothing wrong was found", how many checks ran, how many
+  could not and why. That is an answer, not a want of data.
+- **Next.** The worst finding's remedy. Where nothing is wrong, how to hold the board for the picture that would help
+  most, or that nothing needs doing: every corner of the image is then known to 1 px.
+- **The file.** Its date is that of the file on this disk. Pictures used of those given: one that was skipped, or whose
+  corners were all set aside, was not used.
+- **The numbers, each ± one standard deviation.** From the covariance in the file, or else from its corners. The RMS is
+  over the corners used. The uncertainty is that of the pixel at which a far point is seen, at the centre of the image
+  and in its worst corner. It is the corners' noise alone: a lens that the model cannot describe is off by more.
+- **Notes.** How many corners were set aside, and in which pictures.
+
+Each bar of "Residuals, view by view" is as high as the RMS written on it: blue over the corners used, pale red with
+those that were set aside. A bar of more than ten times the median is cut, with a break and its number.
+
+A bare `calibration` as the last line of a notebook's cell shows the same table and a still picture. Views show
+photographs where their folder is named: `--images FOLDER`, or `camviz.inspect(calibration).explore(images=FOLDER)`.
+
 ## Findings
 """
 MIDDLE = """\

@@ -6,7 +6,7 @@ import argparse
 import glob
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,22 +91,24 @@ def calibrate(options: argparse.Namespace) -> int:
     except OSError as error:
         refuse_exhausted(error)
         raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
+    calibration = replace(calibration, source=options.output)
     told = narrator(options.output)
     for sentence in report(calibration):
         told(sentence)
     told(f"{options.output}: written.")
     if options.report:
-        _inspect(calibration, left[0].parent, options.report)
+        folders = [each[0].parent for each in (left, right) if each]
+        _inspect(calibration, dict(zip(calibration.cameras, folders, strict=True)), options.report)
     return OK
 
 
-def _inspect(calibration: Calibration, folder: Path, page: Path) -> None:
+def _inspect(calibration: Calibration, folders: Mapping[str, Path], page: Path) -> None:
     """Say what an inspection finds, and write its page."""
     from camviz.clinic import inspect
     from camviz.report.inspection import write_report
 
     inspection = inspect(calibration)
-    write_whole(page, lambda path: write_report(inspection, path, images=folder))
+    write_whole(page, lambda path: write_report(inspection, path, images=folders))
     tell(f"\n{inspection.as_text()}\n{page}: open it in a browser.")
 
 
@@ -144,12 +146,11 @@ def report(calibration: Calibration) -> list[str]:
             f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]:.2f}" if key in of else "")
             for key in ("fx", "fy", "cx", "cy")
         ]
-        used = np.isfinite(calibration.detections[name]).all(axis=-1) & ~calibration.set_aside[name]
-        squares = calibration.per_view_errors[name] ** 2 * used.sum(axis=1)
-        rms = np.sqrt(squares.sum() / used.sum())
+        used = calibration.used(name)
         views = int(used.any(axis=1).sum())
         said.append(
-            f"{name}: {', '.join(values)} px; RMS error {rms:.3f} px over {used.sum()} corners in {views} views."
+            f"{name}: {', '.join(values)} px; RMS error {calibration.rms(name):.3f} px over {used.sum()} corners in "
+            f"{views} views."
         )
     if "right" in calibration.cameras:
         x, y, z = 1000 * calibration.cameras["right"].centre

@@ -31,7 +31,12 @@ if TYPE_CHECKING:
     from camviz.clinic import Inspection
     from camviz.files import Board, Calibration
 
-PAINT = {r"^\S+ fault\b": "red", r"^\S+ warning\b": "yellow", r"^\S+ note\b": "blue"}
+PAINT = {
+    "^Nothing wrong was found": "green",
+    r"^\S+ fault\b": "red",
+    r"^\S+ warning\b": "yellow",
+    r"^\S+ note\b": "blue",
+}
 
 INSPECT = """\
 Says what is wrong with a calibration: each finding in a plain sentence with the number that shows it, its likely causes

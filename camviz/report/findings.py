@@ -1,4 +1,4 @@
-"""The findings as HTML, for the report and for a notebook: it needs no style sheet."""
+"""The verdict, the findings and the numbers as HTML, for the report and for a notebook: it needs no style sheet."""
 
 from __future__ import annotations
 
@@ -8,9 +8,42 @@ from html import escape
 from camviz.clinic import words
 from camviz.clinic.inspection import Inspection
 from camviz.clinic.registry import Finding
+from camviz.clinic.summary import LEGEND, Summary
 from camviz.views.clinic.catalogue import title_of
 
 _COLOURS = {"fault": "#c2185b", "warning": "#c05300", "note": "#5b6577"}
+_HEALTHY = "#00785a"
+
+
+def verdict_html(inspection: Inspection) -> str:
+    """What is wrong in one line, what to do in another, and the calibration at a glance."""
+    worst = words.worst_of(inspection.findings)
+    colour = _COLOURS[worst.severity] if worst else _HEALTHY
+    said = f'<p class="verdict" style="border-left:5px solid {colour};padding-left:.9em">'
+    said += f"<strong>{escape(inspection.verdict)}</strong>"
+    said += f"<br><b>Next:</b> {escape(inspection.next_step)}" if inspection.next_step else ""
+    return said + "</p>" + (glance_html(inspection.summary) if inspection.summary else "")
+
+
+def glance_html(summary: Summary) -> str:
+    """Where a calibration comes from, its numbers with their ± σ in a table, and the file's notes."""
+    table = summary.table()
+    rows = list(dict.fromkeys(row for column in table.values() for row in column))
+    cell = 'style="text-align:left;padding:.1em 1.2em .1em 0"'
+    head = "".join(f"<th {cell}>{escape(name)}</th>" for name in table)
+    body = "".join(
+        f"<tr><th {cell}>{row}</th>"
+        + "".join(f"<td {cell}>{escape(column.get(row, ''))}</td>" for column in table.values())
+        + "</tr>"
+        for row in rows
+    )
+    more = len(summary.evidence.cameras) - len(table)
+    few = f"<p>The first {len(table)} of {len(table) + more} cameras.</p>" if more else ""
+    notes = "".join(f'<p class="note">{escape(note)}</p>' for note in summary.calibration.notes)
+    return (
+        f'<p class="origin">{escape(" · ".join(summary.origin))}</p><div class="scroll" style="overflow-x:auto">'
+        f'<table class="glance"><tr><td></td>{head}</tr>{body}</table></div>{few}<p>{LEGEND}</p>{notes}'
+    )
 
 
 def findings_html(inspection: Inspection, see: Callable[[Finding], str] | None = None) -> str:
@@ -25,12 +58,11 @@ def findings_html(inspection: Inspection, see: Callable[[Finding], str] | None =
 def _item(finding: Finding, where: str) -> str:
     number = words.number(finding)
     shown = f' (<data value="{finding.value!r}">{escape(number)}</data>)' if number else ""
-    camera = f" <b>{escape(finding.camera)}</b>" if finding.camera else ""
     advice = "".join(f"<br><i>{label}</i>: {escape(said)}" for label, said in words.advice(finding).items())
     colour = _COLOURS[finding.severity]
     return (
         f'<li class="{finding.severity}" style="border-left:5px solid {colour};padding-left:.9em;margin:0 0 1em">'
-        f"<strong>{words.heading(finding)}</strong> <code>{escape(finding.id)}</code>{camera}: "
+        f"<strong>{words.heading(finding)}</strong> <code>{escape(finding.id)}</code>: "
         f"{escape(finding.sentence)}{shown} {where}{advice}</li>"
     )
 

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from camviz.cameras import transform
+from camviz.clinic import words
 from camviz.clinic.inspection import Inspection
 from camviz.clinic.registry import Finding
-from camviz.clinic.words import verdict
+from camviz.clinic.summary import MOST_CAMERAS
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Label, Line
 from camviz.draw.page import document, figure
@@ -22,8 +23,7 @@ from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import OrbitCamera, axes_triad, camera_body, draw_space, space_panel
 from camviz.poses import RigidTransform
-from camviz.report.findings import findings_html
-from camviz.report.page import numbers_table
+from camviz.report.findings import findings_html, verdict_html
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.chessboard import outline
 from camviz.views.clinic.catalogue import ALIASES, VIEWS, Case, Entry, title_of
@@ -32,27 +32,30 @@ from camviz.views.clinic.observations import Observations, short_names
 from camviz.views.clinic.residuals import ResidualsView, bars_panel
 
 MOST_VIEWS = 24  # pictures of views that a page holds: the worst of them
-MOST_CAMERAS = 4
 MOST_BOARDS = 20  # of views whose pictures are not on the page
 
 
-def write_report(
-    inspection: Inspection, path: str | PathLike[str], *, images: str | PathLike[str] | None = None
-) -> None:
-    """Write the report of an inspection to `path`; `images` is the folder of the calibration's pictures."""
+Folders = str | PathLike[str] | Mapping[str, Path]
+"""The folder of a calibration's pictures, or one by the name of each camera."""
+
+
+def write_report(inspection: Inspection, path: str | PathLike[str], *, images: Folders | None = None) -> None:
+    """Write the report of an inspection to `path`; `images` says where the calibration's pictures are."""
     Path(path).write_text(report(inspection, images=images), encoding="utf-8")
 
 
-def report(inspection: Inspection, *, images: str | PathLike[str] | None = None) -> str:
+def report(inspection: Inspection, *, images: Folders | None = None) -> str:
     """The report as HTML text, readable without a network and without JavaScript."""
     layout, script = (
         (files("camviz.report") / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
     )
     if inspection.calibration is None:
         views = (finding.view for finding in inspection.findings)
-        body = _findings(inspection) + _missing(dict.fromkeys(views, _UNREAD))
-        return document("A calibration that could not be read", body, layout=layout, script=script)
-    case = Case(inspection.calibration, inspection.compare, images=None if images is None else Path(images))
+        body = verdict_html(inspection) + _findings(inspection) + _missing(dict.fromkeys(views, _UNREAD))
+        name = inspection.source.name if inspection.source else "A calibration"
+        return document(f"{name}: it could not be read", body, layout=layout, script=script)
+    folders = images if images is None or isinstance(images, Mapping) else Path(images)
+    case = Case(inspection.calibration, inspection.compare, images=folders)
     sections: list[tuple[Entry, str]] = []
     missing: dict[str, str] = {}
     for entry in VIEWS.values():
@@ -61,10 +64,9 @@ def report(inspection: Inspection, *, images: str | PathLike[str] | None = None)
         missing |= {entry.name: why} if why else {}
     contents = "".join(f'<a href="#view-{entry.name}">{escape(entry.title)}</a> ' for entry, _ in sections)
     parts = [
-        f"<p>{escape(inspection.calibration.format)}</p>",
+        verdict_html(inspection),
         _findings(inspection),
         f'<nav aria-label="Views">{contents}</nav>',
-        numbers_table(inspection.calibration),
         *(shown for _, shown in sections),
         _missing(missing),
     ]
@@ -77,7 +79,7 @@ _UNREAD = "The file could not be read beyond the fault above."
 
 def _findings(inspection: Inspection) -> str:
     listed = findings_html(inspection, lambda finding: _see(inspection, finding))
-    return f'<section id="findings"><h2>{verdict(inspection.findings)}</h2>{listed}</section>'
+    return f'<section id="findings"><h2>{words.counted(inspection.findings) or "Checks"}</h2>{listed}</section>'
 
 
 def _see(inspection: Inspection, finding: Finding) -> str:
@@ -142,11 +144,11 @@ def _linked(case: Case, name: str, headed: bool) -> str:
         f"Error of every view of {name}", view.description().split(" Shown:")[0],
     )  # fmt: skip
     few = f"<p>Of the {len(seen)} views the {len(shown)} worst are shown.</p>" if len(shown) < seen.shown.sum() else ""
-    words = f'{few}<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.</p>'
+    said = f'{few}<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.</p>'
     figures = "".join(_view_figure(view.but(view=i + 1), name, i) for i in shown)
     heading = f"<h3>{escape(name)}</h3>" if headed else ""
     return (
-        f'<div class="linked" data-worst="{seen.worst + 1}">{heading}{words}{_picture(bars)}'
+        f'<div class="linked" data-worst="{seen.worst + 1}">{heading}{said}{_picture(bars)}'
         '<div class="side-by-side"><div '
         f'class="pictures">{figures}</div>{_picture(_boards(seen, name, links))}</div></div>'
     )
@@ -190,7 +192,7 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
     panel = space_panel("boards", 10, 34, 470, 470)
     away = float(np.nanmedian(seen.distances))
     middle = np.nanmedian(seen.corners_cam.mean(axis=1), axis=0)
-    eye = OrbitCamera(tuple((0.62 * middle).tolist()), 1.5 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
+    eye = OrbitCamera(tuple((0.7 * middle).tolist()), 1.9 * away + 0.5 * float(np.nanmax(seen.distances)), -50, 20)
     items: list[Item] = [*camera_body(standing, 2 * size, colour="blue"), *axes_triad(_STILL, 2 * size)]
     others = [i for i in range(len(seen)) if i not in links and seen.shown[i]][:MOST_BOARDS]
     items += [item for i in others for item in drawn.board_items(seen.cam_from_board[i], False)]

@@ -14,6 +14,7 @@ from camviz.lenses.base import Array
 from camviz.views.base import Control, View, step_of
 
 NAMED = 16  # views whose bars have room for names and figures
+CUT = 10.0  # times the median of all bars
 LABEL = "One bar per view; click, drag or press the arrow keys to choose a view"
 
 
@@ -68,14 +69,38 @@ def bars_of(panel: Panel, values: Array, chosen: int = -1) -> str:
     )
 
 
-def figures_on(panel: Panel, values: Array, tops: Array | None = None) -> str:
-    """Every value (views,) above its bar, where there is room for it; `tops` (views,) are where the bars end."""
+def ceiling(values: Array) -> float:
+    """The upper end of the axis of bars as high as `values` (n,).
+
+    A bar more than CUT times the median would flatten all others: it is cut, and leaves the axis to them.
+    """
+    known = values[np.isfinite(values)]
+    limit = CUT * float(np.median(known)) if known.size else 0.0
+    whole = known[known <= limit] if limit > 0 else known
+    return 1.2 * max(float(whole.max(initial=0.0)), 1e-9)
+
+
+def figures_on(panel: Panel, values: Array) -> str:
+    """Every value (views,) where its bar ends, where there is room for it; a bar that is cut has a break below it."""
+    places_of = panel.place(np.stack([np.arange(len(values)) + 1, values], axis=-1))
+    width = 0.9 * panel.width / (panel.right - panel.left)
+    zigzag = np.stack([np.linspace(-width / 2, width / 2, 7), 22 + 4.0 * (-1) ** np.arange(7)], axis=-1)
+    breaks = [zigzag + (x, 0) for (x, _), value in zip(places_of, values, strict=True) if value > panel.top]
+    figures = [
+        svg.text((x, max(y - 4, 12)), f"{value:.2f}", "tick middle halo")
+        for (x, y), value in zip(places_of, values, strict=True)
+    ]
+    return svg.path(breaks, "paper-line cut") + "".join(figures if len(values) <= NAMED else ())
+
+
+def figures_in(panel: Panel, values: Array) -> str:
+    """Every value (views,) below the end of its bar, where both bars and names have room for it; NaN has none."""
     if len(values) > NAMED:
         return ""
-    ends = values if tops is None else tops
     return "".join(
-        svg.text(panel.place((i + 1, top)) + (0, -4), f"{value:.2f}", "tick middle halo")
-        for i, (value, top) in enumerate(zip(values, ends, strict=True))
+        svg.text(panel.place((i + 1, value)) + (0, 14), f"{value:.2f}", "tick middle", style="fill:var(--paper)")
+        for i, value in enumerate(values)
+        if np.isfinite(value) and panel.height * min(value / panel.top, 1) > 20
     )
 
 

@@ -14,13 +14,13 @@ from ipywidgets import Dropdown, HBox, Layout, VBox
 from camviz.calibration.types import Board, Calibration
 from camviz.clinic.evidence import Evidence
 from camviz.clinic.inspection import Inspection
-from camviz.clinic.words import verdict
-from camviz.report.findings import findings_html
+from camviz.report.findings import findings_html, verdict_html
 from camviz.views.base import View
 from camviz.views.clinic.catalogue import ALIASES, VIEWS, Case
 from camviz.views.distortion import DistortionView
 from camviz.widgets.explorer import Explorer, explore
 
+LOOK, CAMERA = "look at", "of camera"  # what the two choosers are called, and no control of any view
 _LARGEST = 800  # pixels, of the longer side of a photograph
 _OF_DISTORTION = ("show", "hide_fold")  # the sliders would make it another lens
 
@@ -62,9 +62,9 @@ class LiveInspection:
         folder = None if images is None else Path(images)
         self.case = Case(inspection.calibration, inspection.compare, images=folder, largest=_LARGEST)
         self._view = Dropdown(
-            options=self._options(), value=self._first(), description="view", layout=Layout(width="28em")
+            options=self._options(), value=self._first(), description=LOOK, layout=Layout(width="28em")
         )
-        self._camera = Dropdown(options=self.case.names, value=self._camera_of(self._view.value), description="camera")
+        self._camera = Dropdown(options=self.case.names, value=self._camera_of(self._view.value), description=CAMERA)
         several = len(self.case.names) > 1
         self._above = HBox([self._view, self._camera] if several else [self._view])
         self._still_hidden = ""
@@ -121,7 +121,7 @@ class LiveInspection:
             before.close()
 
     def _ipython_display_(self) -> None:
-        html = f"<p><b>{verdict(self.inspection.findings)}</b></p>{findings_html(self.inspection)}"
+        html = verdict_html(self.inspection) + findings_html(self.inspection)
         self.display({"text/html": html, "text/plain": self.inspection.as_text()})
 
     def display(self, words: Mapping[str, str]) -> None:

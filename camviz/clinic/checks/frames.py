@@ -89,7 +89,9 @@ def inverted_transform(evidence: Evidence) -> Iterator[Finding]:
     """
     known = list(references(evidence))
     if not known:
-        raise NotChecked("it needs boards seen by both cameras of a pair, or another calibration (--compare)")
+        raise evidence.without_pair(
+            "it needs boards seen by both cameras of a pair, or another calibration (--compare)"
+        )
     yield from changed(inverted_transform, known, RigidTransform.inv, "when it is inverted")
 
 
@@ -180,7 +182,7 @@ def corner_order(evidence: Evidence) -> Iterator[Finding]:
     """The check finds the pair's relative pose from every view, from the corners of each camera alone."""
     stereo = [pair for pair in evidence.pairs if pair.by_view is not None and len(pair.views) > 2]
     if not stereo:
-        raise NotChecked("it needs corners of at least three views that both cameras of a pair saw")
+        raise evidence.without_pair("it needs corners of at least three views that both cameras of a pair saw")
     for pair in stereo:
         yield from _other_order(evidence, pair)
 

@@ -39,7 +39,7 @@ def baseline_sign(evidence: Evidence) -> Iterator[Finding]:
     of_file = named(evidence, "baseline-sign")
     declared = [pair for pair in evidence.pairs if pair.declared and pair.baseline > 0]
     if not declared and not of_file:
-        raise NotChecked("the file does not say where a left and a right camera stand")
+        raise evidence.without_pair("the file does not say where a left and a right camera stand")
     for fault in of_file:
         yield baseline_sign.found(f"{fault}.", fault.value, "m")
     for pair in declared:
@@ -167,7 +167,7 @@ def rectified_black(evidence: Evidence) -> Iterator[Finding]:
     """
     stereo = [pair for pair in evidence.pairs if pair.baseline > 0]
     if not stereo:
-        raise NotChecked("the file holds no stereo pair")
+        raise evidence.without_pair("the file holds no stereo pair")
     for pair in stereo:
         yield from _rectified(pair)
 

@@ -44,12 +44,12 @@ LARGEST = 640  # pixels, of the longer side of a photograph as it is shown
 
 @dataclass(frozen=True, eq=False)
 class Case(Evidence):
-    """The evidence about a calibration as views show it: with the folder of its pictures.
+    """The evidence about a calibration as views show it: with the folder of its pictures, or one for each camera.
 
     What several views need is made once. `largest` is how many pixels the longer side of a shown photograph has.
     """
 
-    images: Path | None = None
+    images: Path | Mapping[str, Path] | None = None
     largest: int = LARGEST
 
     @cached_property
@@ -76,7 +76,7 @@ class Case(Evidence):
         pictures, k = self.calibration.pictures.get(name, ()), self.calibration.cameras[name].intrinsics
 
         def photograph(view: int) -> NDArray[np.uint8] | None:
-            path = self._path(pictures[view]) if view < len(pictures) else None
+            path = self._path(name, pictures[view]) if view < len(pictures) else None
             if path is None:
                 return None
             image = _read(path)
@@ -86,11 +86,12 @@ class Case(Evidence):
 
         return photograph if full else lru_cache(maxsize=32)(photograph)
 
-    def _path(self, picture: str) -> Path | None:
-        """Where a picture lies: in the named folder or beside the file, never outside, wherever the file points."""
+    def _path(self, name: str, picture: str) -> Path | None:
+        """Where a camera's picture lies: in its folder or beside the file, never outside, wherever the file points."""
         named = Path(picture)
         inside = named if not named.is_absolute() and ".." not in named.parts else Path(named.name)
-        folders = [folder for folder in (self.images, self.calibration.source.parent) if folder]
+        images = self.images.get(name) if isinstance(self.images, Mapping) else self.images
+        folders = [folder for folder in (images, self.calibration.source.parent) if folder]
         tried = (folder / part for folder in folders for part in (inside, Path(named.name)))
         return next((path for path in tried if path.is_file()), None)
 

@@ -12,7 +12,7 @@ from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View
 from camviz.views.clinic.observations import Missing
-from camviz.views.view_bars import bars_of, figures_on, names_below
+from camviz.views.view_bars import bars_of, ceiling, figures_on, names_below
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,13 @@ class ErrorsView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         errors, median = self.errors, float(np.nanmedian(self.errors))
-        limits = (0.5, len(errors) + 0.5), (0.0, 1.2 * float(max(np.nanmax(errors), 1e-9)))
+        limits = (0.5, len(errors) + 0.5), (0.0, ceiling(errors))
         panel = plot.plot_panel("bars", 70, 34, 870, 140, *limits)
         content = plot.grid(panel, xticks=[]) + bars_of(panel, errors)
         content += plot.level(panel, median, "ink dashed") + figures_on(panel, errors)
         ticks = names_below([f"{i + 1}" for i in range(len(errors))])
-        shown = panel.show(content, title=f"Error of every view, {self.name}", note=f"dashed: median, {median:.3g} px")
+        shown = panel.show(
+            content, title=f"RMS error of every view, {self.name}", note=f"dashed: median, {median:.3g} px"
+        )
         body = shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
         return self.composed(250, body + svg.paragraph((20, 220), self.description(), 920))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.guidance import Candidate, next_board_poses
+from camviz.calibration.guidance import Candidate, instruction, next_board_poses
 from camviz.cameras import transform
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Line, closed
@@ -69,27 +69,17 @@ class GuidanceView(OrbitView):
 
     def sentences(self) -> list[str]:
         """What to do, in words."""
-        c, k = self.chosen, self.adjustment.cameras[self.camera].intrinsics
-        middle = self._uv.mean(axis=0)
-        across = ("on the left", "in the middle", "on the right")[int(np.clip(3 * (middle[0] + 0.5) / k.width, 0, 2))]
-        down = ("at the top", "half way down", "at the bottom")[int(np.clip(3 * (middle[1] + 0.5) / k.height, 0, 2))]
-        points = transform(c.cam_from_board, self.adjustment.board.corners)
-        away = float(np.linalg.norm(points.mean(axis=0)))
+        c = self.chosen
+        hold = instruction(self.adjustment, c, self.camera)
         gain = 100 * (1 - c.after / c.before)
         return [
-            f"Hold the board {across}, {down}, {away:.2g} m away, tilted by {c.tilt_deg:.0f}°, as in the picture "
-            "on the right.",
+            f"{hold[0].upper()}{hold[1:]}, as in the picture on the right.",
             f"One such view would lessen the mean uncertainty from {c.before:.3g} px to {c.after:.3g} px, by "
             f"{gain:.0f} %.",
         ]
 
     def description(self) -> str:
         return f"{self.camera}, candidate {round(self.choice)} of {len(self.candidates)}. {' '.join(self.sentences())}"
-
-    @cached_property
-    def _uv(self) -> Array:
-        camera = self.adjustment.cameras[self.camera].at(RigidTransform.identity())
-        return camera.project(transform(self.chosen.cam_from_board, self.adjustment.board.corners))
 
     def figure(self, *, draft: bool = False) -> Picture:
         space, attached = self._space(draft)

@@ -32,9 +32,7 @@ class NumbersView(View):
     def of(cls, calibration: Any, camera: str = "") -> NumbersView:
         """The numbers of a camera of a calibration, the first unless named."""
         name = camera or next(iter(calibration.cameras))
-        errors = calibration.per_view_errors.get(name)
-        known = errors is not None and np.isfinite(errors).any()
-        return cls(calibration.cameras[name], name, float(np.sqrt(np.nanmean(np.square(errors)))) if known else None)
+        return cls(calibration.cameras[name], name, calibration.rms(name))
 
     def rows(self) -> list[tuple[str, str]]:
         """What is said and its value, in words."""

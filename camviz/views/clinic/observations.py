@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from camviz.calibration.pairing import last_number
 from camviz.calibration.types import Board
 from camviz.cameras import Camera
+from camviz.draw import svg
+from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import View
@@ -34,6 +36,12 @@ def short_names(pictures: Sequence[str], views: int) -> tuple[str, ...]:
     numbers = tuple(last_number(Path(name)) for name in pictures)
     usable = len(set(numbers)) == len(numbers) == views and all(0 < len(number) <= _SHORT for number in numbers)
     return numbers if usable else tuple(str(view + 1) for view in range(views))
+
+
+def not_at_hand(panel: Panel) -> str:
+    """What stands in a panel for want of its photograph: how to have it."""
+    words = "The picture is not at hand: name its folder, --images FOLDER or camviz.inspect(…).explore(images=FOLDER)."
+    return svg.paragraph((8, panel.height - 26), words, panel.width - 16, "note halo")
 
 
 def no_photographs(view: int) -> None:

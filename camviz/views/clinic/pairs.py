@@ -16,10 +16,10 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
 from camviz.views.base import Drawn, slider
-from camviz.views.clinic.observations import Missing, Photographs, no_photographs, short_names
+from camviz.views.clinic.observations import Missing, Photographs, no_photographs, not_at_hand, short_names
 from camviz.views.clinic.residuals import nice
 from camviz.views.marks import arrows, clipped, on_photograph
-from camviz.views.view_bars import LABEL, ViewChooser, bars_of, figures_on, names_below
+from camviz.views.view_bars import LABEL, ViewChooser, bars_of, ceiling, figures_on, names_below
 
 if TYPE_CHECKING:
     from camviz.files import Calibration
@@ -166,8 +166,7 @@ class EpipolarPairsView(ViewChooser):
 
     @property
     def _bars(self) -> Panel:
-        top = 1.25 * float(np.nanmax(self.shared.rms))
-        return plot.plot_panel("pairs", 70, 34, 870, 110, (0.5, len(self.shared) + 0.5), (0, max(top, 1e-9)))
+        return plot.plot_panel("pairs", 70, 34, 870, 110, (0.5, len(self.shared) + 0.5), (0, ceiling(self.shared.rms)))
 
     def _bars_panel(self) -> str:
         shared, panel = self.shared, self._bars
@@ -196,8 +195,8 @@ class EpipolarPairsView(ViewChooser):
             content += arrows(row[:1], row[-1:], "blue thick", 12) + svg.text(
                 row[0] + (-4, -10), "1", "blue halo middle"
             )
-        note = "" if image is not None else "the picture is not at hand"
-        return panel.show(content, title=f"{shared.names[side]}: arrows × {self.scale:g}", note=note), attached
+        content += not_at_hand(panel) if image is None else ""
+        return panel.show(content, title=f"{shared.names[side]}: arrows × {self.scale:g}"), attached
 
     def _lines(self, panel: Panel, side: int) -> str:
         """The other picture's rays of a few corners, as this camera sees them."""

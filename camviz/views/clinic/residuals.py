@@ -19,9 +19,19 @@ from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
 from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
-from camviz.views.clinic.observations import Observations, short_names
+from camviz.views.clinic.observations import Observations, not_at_hand, short_names
 from camviz.views.marks import arrows, cross
-from camviz.views.view_bars import LABEL, NAMED, ViewChooser, bars_of, figures_on, names_below, places
+from camviz.views.view_bars import (
+    LABEL,
+    NAMED,
+    ViewChooser,
+    bars_of,
+    ceiling,
+    figures_in,
+    figures_on,
+    names_below,
+    places,
+)
 
 ARROW = 26.0  # picture units that a view's 90th percentile residual is drawn long, by default
 
@@ -104,7 +114,7 @@ class ResidualsView(ViewChooser, OrbitView):
     def bars_panel(self, panel: Panel, *, handle: bool = False, links: Mapping[int, str] | None = None) -> str:
         """A bar per view, the chosen one orange; with `handle` for the pointer, or with `links` from views (from 0)."""
         seen, n = self.observations, len(self.observations)
-        rms, all_seen = seen.rms, np.where(seen.rms_seen > seen.rms * 1.001, seen.rms_seen, np.nan)
+        rms, all_seen = seen.rms, np.where(seen.rms_seen > np.nan_to_num(seen.rms) * 1.001, seen.rms_seen, np.nan)
         content = plot.grid(panel, xticks=[])
         content += plot.bars(panel, *places(n), all_seen, "wash fill-red")
         if links is None:
@@ -112,10 +122,12 @@ class ResidualsView(ViewChooser, OrbitView):
         else:
             content += "".join(self._linked_bar(panel, i, links.get(i)) for i in range(n))
         content += plot.level(panel, seen.total_rms, "ink dashed")
-        content += figures_on(panel, rms, np.where(np.isfinite(rms), np.fmax(rms, all_seen), np.nan))
+        content += figures_on(panel, np.fmax(rms, all_seen))
+        content += figures_in(panel, np.where(np.isfinite(all_seen), rms, np.nan))
         touch = {"drag": "bars", "hint": "click a bar", "label": LABEL} if handle else {}
-        shown = panel.show(content, title=f"Error of every view, {seen.name}", **touch)
-        aside = ", pale red with the corners set aside" if np.isfinite(all_seen).any() else ""
+        shown = panel.show(content, title=f"RMS error of every view, {seen.name}", **touch)
+        aside = "; blue: corners used, pale red: with those set aside" if np.isfinite(all_seen).any() else ""
+        aside += "; broken: cut" if np.nanmax(seen.rms_seen, initial=0) > panel.top else ""
         words = f"dashed: all views, {_pixels(seen.total_rms)}{aside}"
         place = (panel.x + panel.width - (90 if handle else 0), panel.y - 8)
         return shown + svg.text(place, words, "note end") + plot.axes(panel, "", "RMS [px]", xticks=self._view_names())
@@ -143,9 +155,9 @@ class ResidualsView(ViewChooser, OrbitView):
         """The chosen view's picture with its corners and arrows, and the photographs it needs."""
         seen, i, k = self.observations, self.index, self.observations.camera.intrinsics
         image = seen.photographs(i)
-        content, attached, note = self._grid(panel), {}, "the picture is not at hand"
+        content, attached, missing = self._grid(panel), {}, not_at_hand(panel)
         if image is not None:
-            content, note = placed_image(panel, "photograph", k.width, k.height), ""
+            content, missing = placed_image(panel, "photograph", k.width, k.height), ""
             attached = {"photograph": jpeg(image)}
         starts, ends = panel.place(seen.detections[i]), panel.place(self.arrow_tips())
         content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange")
@@ -154,7 +166,7 @@ class ResidualsView(ViewChooser, OrbitView):
             starts[seen.aside[i]], "red"
         )
         title = f"{seen.picture(i)}: residuals × {self.scale:g}"
-        return panel.show(content, title=title, note=note or "from detected to projected"), attached
+        return panel.show(content + missing, title=title, note="from detected to projected"), attached
 
     def arrow_tips(self) -> Array:
         """Where (corners, 2) the chosen view's arrows end, in pixels: `scale` times the way to the projection."""
@@ -216,8 +228,7 @@ class ResidualsView(ViewChooser, OrbitView):
 
 def bars_panel(seen: Observations, x: float = 70, y: float = 34, width: float = 870, height: float = 140) -> Panel:
     """Where the bars go: views 1 … n to the right, pixels upwards."""
-    tallest = np.nanmax(np.concatenate([seen.rms, seen.rms_seen, [1e-9]]))
-    return plot.plot_panel("bars", x, y, width, height, (0.5, len(seen) + 0.5), (0, 1.2 * float(tallest)))
+    return plot.plot_panel("bars", x, y, width, height, (0.5, len(seen) + 0.5), (0, ceiling(seen.rms_seen)))
 
 
 def arrow_scale(seen: Observations) -> float:

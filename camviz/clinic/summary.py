@@ -1,0 +1,167 @@
+"""A calibration at a glance: where it comes from, its numbers with their uncertainties, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from camviz.calibration.guidance import instruction, next_board_poses
+from camviz.calibration.types import Calibration
+from camviz.calibration.uncertainty import projection_uncertainty
+from camviz.clinic.evidence import Evidence
+
+GOOD = 1.0  # pixels: where every corner of the picture is known this well, no more pictures are asked for
+UNKNOWN = "not in the file"
+MOST_CAMERAS = 4
+RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
+LEGEND = "± is one standard deviation; uncertainty: of the pixel where a far point is seen, by corner noise alone."
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """What an engineer asks of a calibration first, in words and numbers without markup."""
+
+    evidence: Evidence
+
+    @classmethod
+    def of(cls, calibration: Calibration) -> Summary:
+        """The summary of a calibration by itself."""
+        return cls(Evidence(calibration))
+
+    @property
+    def calibration(self) -> Calibration:
+        """What it is of."""
+        return self.evidence.calibration
+
+    @cached_property
+    def origin(self) -> tuple[str, ...]:
+        """The file, when it was written, its format, the cameras, and how many pictures were used."""
+        calibration, cameras = self.calibration, self.calibration.cameras
+        path = calibration.source
+        known = path.name and path.exists()
+        written = f"written {datetime.fromtimestamp(path.stat().st_mtime):%Y-%m-%d %H:%M}" if known else ""
+        sizes = {f"{k.width} × {k.height}" for k in (camera.intrinsics for camera in cameras.values())}
+        named = ", ".join(list(cameras)[:MOST_CAMERAS]) + ", …" * (len(cameras) > MOST_CAMERAS)
+        shown = "one camera" if named == "camera" else f"{len(cameras)} camera{'s' * (len(cameras) > 1)}: {named}"
+        shown += f", {', '.join(sorted(sizes))} px"
+        parts = (path.name, written, calibration.format, shown, self.pictures)
+        return tuple(part for part in parts if part)
+
+    @property
+    def pictures(self) -> str:
+        """How many pictures were used, of how many that were given."""
+        calibration = self.calibration
+        used = [calibration.used(name).any(axis=1) for name in calibration.detections]
+        if used:
+            count, given = sum(int(mask.sum()) for mask in used), sum(mask.size for mask in used)
+            return f"{count} of {given + len({name for name, _ in calibration.skipped})} pictures used"
+        views = sum(len(errors) for errors in calibration.per_view_errors.values())
+        return f"{views} views" if views else "the file does not name its pictures"
+
+    def rms(self, name: str) -> float | None:
+        """The RMS in pixels of a camera's corners: the file's, else of its corners; None where both are unknown."""
+        stated, observed = self.calibration.rms(name), self.evidence.observed.get(name)
+        if stated is not None or observed is None:
+            return stated
+        used = observed.adjustment.used[name]
+        return float(np.sqrt(np.mean(np.sum(observed.residuals[used] ** 2, axis=-1)))) if used.any() else None
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The cameras that are told of: those that differ, the first few of many."""
+        return tuple(self.evidence.cameras)[:MOST_CAMERAS]
+
+    @cached_property
+    def uncertainty(self) -> dict[str, tuple[float, float] | None]:
+        """By camera, 1σ in pixels of where a far point is seen, in the middle and in the worst corner of the picture.
+
+        None where the file's corners do not determine it; NaN for a corner of the picture that has no ray.
+        """
+        return {name: self._uncertainty(name) for name in self.names}
+
+    def _uncertainty(self, name: str) -> tuple[float, float] | None:
+        k = self.calibration.cameras[name].intrinsics
+        right, bottom = k.width - 1, k.height - 1
+        pixels = [(right / 2, bottom / 2), (0, 0), (right, 0), (0, bottom), (right, bottom)]
+        try:
+            middle, *corners = projection_uncertainty(self.evidence.adjustment(name), pixels, camera=name)
+        except (ValueError, np.linalg.LinAlgError):  # no corners or poses, or too few to solve from
+            return None
+        return (float(middle), float(np.max(corners))) if np.isfinite(middle) else None
+
+    def table(self) -> dict[str, dict[str, str]]:
+        """By camera: every number with its ± σ, the RMS and the uncertainty of projection, as text."""
+        return {name: dict(self._rows(name)) for name in self.names}
+
+    def _rows(self, name: str) -> Iterator[tuple[str, str]]:
+        camera = self.calibration.cameras[name]
+        grid, lens = camera.intrinsics, camera.lens
+        rms, known = self.rms(name), self.uncertainty[name]
+        yield RMS, UNKNOWN if rms is None else f"{rms:.3f} px"
+        middle, corner = (UNKNOWN,) * 2 if known is None else map(_pixels, known)
+        yield MIDDLE, middle
+        yield CORNER, corner
+        yield "image", f"{grid.width} × {grid.height} px"
+        yield "lens", type(lens).__name__
+        values = {key: getattr(grid, key) for key in ("fx", "fy", "cx", "cy", "skew")} | _parameters(lens)
+        for key, value in values.items():
+            sigma = self.evidence.sigma_of(name, key)
+            if sigma is not None or value or key in ("cx", "cy"):
+                yield key, measured(value, sigma)
+
+    def lines(self) -> Iterator[str]:
+        """The same in a few lines: the origin, and each camera's RMS and uncertainty."""
+        yield " · ".join(self.origin)
+        for name, rows in self.table().items():
+            pinhole = ", ".join(f"{key} = {rows[key]}" for key in ("fx", "fy", "cx", "cy"))
+            others = "; ".join(f"{key} {rows[key]}" for key in (RMS, MIDDLE, CORNER) if rows[key] != UNKNOWN)
+            yield f"{name}: {pinhole} px{'; ' * bool(others)}{others}."
+
+    @cached_property
+    def guidance(self) -> str:
+        """Where to hold the board next, or why nothing needs doing; of the camera that is known worst."""
+        known = self.uncertainty.items()
+        corners = {name: np.nan_to_num(sigmas[1], nan=np.inf) for name, sigmas in known if sigmas}
+        if not corners:
+            return "Nothing needs doing that this file could tell: it lacks the corners, which camviz calibrate keeps."
+        name = max(corners, key=lambda each: corners[each])
+        known_to = _pixels(corners[name])
+        if corners[name] <= GOOD:
+            return f"Nothing needs doing: even in its worst corner the picture is known to {known_to}."
+        try:
+            best = next_board_poses(self.evidence.adjustment(name), camera=name)[0]
+        except (ValueError, np.linalg.LinAlgError):  # no pose shows the whole board
+            return f"Take more pictures with the board near the corners, the worst of which is known to {known_to}."
+        hold = instruction(self.evidence.adjustment(name), best, name)
+        of = "" if len(self.names) == 1 else f" of {name}"
+        return (
+            f"The worst corner{of} is known to {known_to}; to know it better take one picture more: {hold} (mean "
+            f"uncertainty {best.before:.2g} px → {best.after:.2g} px)."
+        )
+
+
+def measured(value: float, sigma: float | None) -> str:
+    """A number with its standard deviation, both to the second digit of that: "532.92 ± 0.41".
+
+    >>> measured(532.9187, 0.4112), measured(0.0828, 0.000213), measured(0.25, None), measured(1, 0)
+    ('532.92 ± 0.41', '0.08280 ± 0.00021', '0.25', '1 ± 0')
+    """
+    if sigma is None:
+        return f"{value:.6g}".replace("-", "−")
+    if not (np.isfinite(sigma) and sigma > 0):
+        return f"{value:.6g} ± {sigma:g}".replace("-", "−")
+    decimals = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 9))
+    return f"{value:.{decimals}f} ± {sigma:.{decimals}f}".replace("-", "−")
+
+
+def _parameters(lens: Any) -> dict[str, float]:
+    return {key: float(getattr(lens, key)) for key in lens.parameters()}
+
+
+def _pixels(sigma: float) -> str:
+    return f"±{sigma:.2g} px" if np.isfinite(sigma) else "no ray"
