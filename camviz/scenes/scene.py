@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import cv2
@@ -16,7 +16,6 @@ from camviz.lenses import Lens
 from camviz.lenses.base import Array, as_points
 from camviz.scenes.batched import Indices, Traced, batched
 from camviz.scenes.intersection import Hit
-from camviz.scenes.kept import kept
 from camviz.scenes.light import to_display
 from camviz.scenes.rays import SIDE, TILE, Bounds, Floats, Rays
 from camviz.scenes.surfaces import Mesh, Rectangle, Surface, on_sphere
@@ -207,4 +206,9 @@ def _rays(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Rays, ...], float]:
     return tuple(blocks), float(np.median(apart)) if apart.size else 0.0
 
 
-_kept_rays = kept(maxsize=1)(_rays)  # while the camera only moves; one, for a class shares one memory
+_kept_rays = lru_cache(maxsize=1)(_rays)  # while the camera only moves; one, for a class shares one memory
+
+
+def forget_rays() -> None:
+    """Free the rays that are kept from one picture of a camera to the next: 2 MB or more, made in some milliseconds."""
+    _kept_rays.cache_clear()

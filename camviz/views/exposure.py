@@ -20,7 +20,6 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds, signed
 from camviz.optics import exposure_value, relative_illumination, unvignetted_share
 from camviz.scenes import render, textured_scene, to_display
-from camviz.scenes.kept import kept
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.views import garden
@@ -247,7 +246,7 @@ def _light(subject: str, side: int) -> np.ndarray:
     return light
 
 
-@kept(maxsize=2)
+@lru_cache(maxsize=2)
 def _heights_mm(side: int) -> np.ndarray:
     """How far (height, width) each pixel of such a picture is from the axis, on the sensor."""
     height, width = _light("garden", side).shape[:2]
@@ -255,6 +254,6 @@ def _heights_mm(side: int) -> np.ndarray:
     return np.hypot(u - (width - 1) / 2, v - (height - 1) / 2) * SENSOR_MM[0] / width
 
 
-@kept(maxsize=2)
+@lru_cache(maxsize=2)
 def _draw(shape: tuple[int, ...]) -> Draw:
     return Draw.of(shape, shape, 27)

@@ -20,7 +20,6 @@ from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds
 from camviz.scenes import render, textured_scene, to_display
-from camviz.scenes.kept import kept
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.sensors.statistics import slope_through_origin
@@ -360,7 +359,7 @@ def _measured(view: PhotonTransferView, pixels: int) -> tuple[np.ndarray, np.nda
     return signal, view._noise(lit), view._noise(unlit)
 
 
-@kept(maxsize=12)
+@lru_cache(maxsize=12)
 def _draw(frames: tuple[int, ...], pattern: tuple[int, ...], seed: int) -> Draw:
     return Draw.of(frames, pattern, seed)
 

@@ -10,7 +10,7 @@ from weakref import WeakSet
 
 from IPython import get_ipython
 
-from camviz.scenes.kept import forget
+from camviz.scenes.scene import forget_rays
 
 _c = ctypes.CDLL(None) if sys.platform == "linux" else None
 _trim, _mallopt = getattr(_c, "malloc_trim", None), getattr(_c, "mallopt", None)  # glibc's
@@ -35,7 +35,7 @@ def give_back(*_: object) -> None:
     Matplotlib's closed figures are circles of objects. Python alone looks for such circles only when a quarter of all
     objects are new, and keeps some 10 MB of them till then. To look takes 50 ms: cells that made little are spared.
     """
-    forget()
+    forget_rays()
     for holder in _holders:
         holder.forget()
     if gc.get_count()[2] >= _MANY:
