@@ -192,7 +192,8 @@ def test_the_notebook_chooses_between_cameras():
 @pytest.fixture
 def displayed(monkeypatch):
     shown = []
-    monkeypatch.setattr("camviz.widgets.inspection.display", lambda what, **_: shown.append(what))
+    for module in ("inspection", "still"):
+        monkeypatch.setattr(f"camviz.widgets.{module}.display", lambda what, **_: shown.append(what))
     return shown
 
 
