@@ -70,6 +70,7 @@ function render({ model, el }) {
     controls.inert = true;
   });
   keepKeys(root);
+  requestAnimationFrame(() => unclip(root));   // when it is on the page
   model.on("change:values", showValues);
   model.on("change:frame", showFrame);
   model.on("change:frame", tell);
@@ -92,6 +93,11 @@ function nameApart(title) {
   let name = title;
   for (let i = 2; taken.has(name); i++) name = `${title}, ${i}`;
   return name;
+}
+
+// JupyterLab lets what is too wide scroll in its output, and therefore nothing can stick to the notebook's upper edge.
+function unclip(root) {
+  for (let one = root.parentElement; one && !one.matches(".jp-Cell"); one = one.parentElement) one.classList.add("camviz-unclipped");
 }
 
 // Calls `gone` with a sentence as soon as the kernel that draws is no more. JupyterLab and Notebook lend widgets their
@@ -365,12 +371,26 @@ function makeSlider(control, id, element, changed, hint) {
     show(held, true);
     changed(held, false);
   };
-  range.addEventListener("input", () => { show(range.valueAsNumber, true); changed(shown, true); });
+  const moved = (value) => { show(value, true); changed(value, true); };
+  const swiped = fingers(range, moved);
+  range.addEventListener("input", () => { if (swiped(range.valueAsNumber)) range.value = shown; else moved(range.valueAsNumber); });
   number.addEventListener("input", () => { typing = true; });
   number.addEventListener("change", commit);
   number.addEventListener("keydown", (event) => { if (event.key === "Enter") commit(); });  // no change event in JupyterLab
   element.append(track, number);
   return [range, show];
+}
+
+// A slider jumps to a finger at once, though the finger may be about to scroll the page. Until it goes sideways or lifts,
+// the function that this returns keeps the value and says true; the browser takes a finger that scrolls (pointercancel).
+function fingers(range, moved) {
+  let finger = null;
+  const on = (type, listener) => range.addEventListener(type, listener);
+  on("pointerdown", (event) => { finger = event.pointerType === "touch" ? { x: event.clientX, value: range.valueAsNumber } : null; });
+  on("pointermove", (event) => { if (finger && Math.abs(event.clientX - finger.x) > SWIPE_PX) finger = null; });
+  on("pointercancel", () => { finger = null; });
+  on("pointerup", () => { if (finger) moved(finger.value); finger = null; });
+  return (value) => { if (finger) finger.value = value; return finger !== null; };
 }
 
 function makeChoice({ choices }, id, element, changed) {
