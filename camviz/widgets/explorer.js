@@ -6,6 +6,7 @@ const LINKED_MS = 120;  // the same for a draft that was not asked for here: ano
 const LATE_MS = 6000;   // silence of the kernel after which the reader is told
 const TELL_MS = 1000;   // rest after which a screen reader is told what has changed
 const SWIPE_PX = 8;     // by which a finger shows whether it means the slider or the page
+const STICKY = 0.45;    // of the window's height: larger controls would hide the picture that they change
 const MOST_KEYS = 100;  // waiting for a slow picture; the kernel takes no more than twice as many
 const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
 const AGAIN = "Run this cell again (Shift + Enter).";
@@ -70,7 +71,7 @@ function render({ model, el }) {
     controls.inert = true;
   });
   keepKeys(root);
-  requestAnimationFrame(() => unclip(root));   // when it is on the page
+  const stopSticking = stick(root, controls);
   model.on("change:values", showValues);
   model.on("change:frame", showFrame);
   model.on("change:frame", tell);
@@ -79,6 +80,7 @@ function render({ model, el }) {
   tell();
   return () => {
     stopHands();
+    stopSticking();
     stopWatching();
     ask.stop();
     model.off("change:values", showValues);
@@ -95,9 +97,15 @@ function nameApart(title) {
   return name;
 }
 
-// JupyterLab lets what is too wide scroll in its output, and therefore nothing can stick to the notebook's upper edge.
-function unclip(root) {
-  for (let one = root.parentElement; one && !one.matches(".jp-Cell"); one = one.parentElement) one.classList.add("camviz-unclipped");
+// Controls that are not too large stay at the notebook's upper edge. JupyterLab lets what is too wide scroll within its
+// output, where nothing can stick to the edge of the notebook: not so around a visualizer, which is never too wide.
+function stick(root, controls) {
+  const watcher = new ResizeObserver(([{ contentRect }]) => {
+    for (let one = root.parentElement; one && !one.matches(".jp-Cell"); one = one.parentElement) one.classList.add("camviz-unclipped");
+    controls.classList.toggle("camviz-sticky", contentRect.height < STICKY * innerHeight);
+  });
+  watcher.observe(controls);
+  return () => watcher.disconnect();
 }
 
 // Calls `gone` with a sentence as soon as the kernel that draws is no more. JupyterLab and Notebook lend widgets their

@@ -165,7 +165,8 @@ class Explorer(StillWidget):
             return f"{type(error).__name__}: {error}"
         words = str(error)
         for name, control in self._ranges.items():
-            words = re.sub(rf"\b{name}\b" if "_" in name else rf"^{name}\b", lambda _, c=control: c.label, words)
+            as_name = rf"\b{name}\b" if "_" in name else rf"^{name}\b"  # elsewhere "size" may be a word like any other
+            words = re.sub(as_name, control.label, words)
         return words
 
     def _receive(self, _widget: object, message: object, _buffers: object) -> None:
@@ -195,7 +196,7 @@ def explore(view: View, *names: str, **ranges: Any) -> Explorer:
     """The view with controls for the fields in `names`, then `ranges`; for all of its fields when none is given.
 
     `ranges` narrows or widens: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words for a choice.
-    The notebook is saved with the picture of the state in which one left it; a cell that is run again begins with `view`.
+    The notebook is saved with the picture of the state in which one left it; a cell run again begins with `view`.
     Raises ValueError naming the fields there are when one is unknown.
     """
     declared = view.offered()

@@ -15,7 +15,7 @@ _KEYS = ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "+", "-")
 
 @dataclass(frozen=True)
 class Wish:
-    """Begin with the first state where `reset`, then set `values`, then drag handles by (x, y, dx, dy), then press keys."""
+    """In this order: the first state if `reset`, `values` set, handles dragged (x, y, dx, dy), keys pressed on handles."""
 
     draft: bool
     reset: bool

@@ -1,4 +1,4 @@
-"""The controls under fingers, keys and screen readers in a real JupyterLab, and what they say when the kernel is gone."""
+"""The controls under fingers, keys and screen readers in a real JupyterLab, and when the kernel is gone."""
 
 import json
 import re
