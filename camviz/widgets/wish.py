@@ -15,7 +15,7 @@ _KEYS = ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "+", "-")
 
 @dataclass(frozen=True)
 class Wish:
-    """In this order: the first state if `reset`, `values` set, handles dragged (x, y, dx, dy), keys pressed on handles."""
+    """In this order: the first state if `reset`, `values` set, handles dragged by (x, y, dx, dy), keys pressed."""
 
     draft: bool
     reset: bool
