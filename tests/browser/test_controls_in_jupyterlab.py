@@ -150,6 +150,7 @@ def test_one_control_goes_back_by_the_keyboard_alone(notebook):
     assert values(notebook) == ("-0.28", "-0.28")
     assert slider(notebook).evaluate("it => it === document.activeElement")
     assert not back.is_visible()
+    assert "k1 −0.2800" in notebook.page.locator(FIRST).locator(".camviz-picture").text_content()
     assert notebook.page.locator(FIRST).locator("[data-control=k2] input[type=range]").input_value() == "0.2"
 
 
