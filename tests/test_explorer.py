@@ -1,5 +1,6 @@
 """The explorer answers each wish of the browser once, with the newest state, and shows what went wrong."""
 
+import asyncio
 import re
 from dataclasses import dataclass
 from typing import Self
@@ -14,6 +15,7 @@ from traitlets import TraitError, link
 
 from camviz.draw.picture import Picture
 from camviz.views.base import View, choice, slider, switch
+from camviz.views.frustum import FrustumView
 from camviz.widgets import Explorer, explore
 from camviz.widgets.still import _show_box
 
@@ -36,6 +38,17 @@ class Toy(View):
         return self.but(x=self.x + dx)
 
 
+@dataclass(frozen=True)
+class Large(Toy):
+    """A view that draws every size, and whose size is dragged."""
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        return Picture("", 10, 10, "Large", f"size {self.size:g}")
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        return self.but(size=self.size + dx)
+
+
 def wish(explorer: Explorer, number: int = 1, *, draft: bool = False, **parts: object) -> dict:
     explorer._receive(explorer, {"id": number, "draft": draft, **parts}, [])
     return explorer.frame
@@ -52,7 +65,7 @@ def test_an_error_is_shown_and_the_last_good_state_kept():
     explorer = explore(Toy())
     good = explorer.frame["html"]
     frame = wish(explorer, 2, values={"size": 9.0})
-    assert frame["error"] == "ValueError: size must be at most 5"
+    assert frame["error"] == "size must be at most 5"
     assert frame["answers"] == 2
     assert frame["html"] == good
     assert explorer.view == Toy()
@@ -104,7 +117,7 @@ def test_an_unknown_control_is_named_beside_those_there_are():
 @pytest.fixture
 def shown(monkeypatch):
     bundles = []
-    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, raw: bundles.append(bundle))
+    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, **_: bundles.append(bundle))
     return bundles
 
 
@@ -243,7 +256,7 @@ def test_an_error_under_a_hand_in_the_page_is_shown_and_not_raised(monkeypatch):
     monkeypatch.setattr("camviz.widgets.explorer._by_hand", lambda: True)
     explorer = explore(Toy())
     explorer.size = 9.0
-    assert explorer.frame["error"] == "ValueError: size must be at most 5"
+    assert explorer.frame["error"] == "size must be at most 5"
     assert explorer.size == explorer.view.size == 1.0
     explorer.size = 2.0
     assert (explorer.frame["error"], explorer.frame["draft"]) == ("", True)
@@ -302,3 +315,106 @@ def test_a_saved_notebook_shows_the_stills_of_a_tab_as_a_page(tmp_path):
     page, _ = nbconvert.HTMLExporter().from_notebook_node(notebook)
     assert 'src="data:image/svg+xml;base64' in page
     assert "A still picture" in page
+
+
+# The widget's edge ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("value", "held"), [(1e308, 10), (-1e308, 0), (10**400, 10), (7.0, 7.0)])
+def test_a_number_from_the_page_is_held_within_the_slider(value, held):
+    explorer = explore(Large())
+    assert wish(explorer, values={"size": value})["error"] == ""
+    assert explorer.view.size == held
+
+
+def test_a_drag_and_a_key_are_held_within_the_slider_as_well():
+    explorer = explore(Large(), size=(0, 4))
+    wish(explorer, drags=[["size", 0, 0, 99999, 0]])
+    assert explorer.view.size == 4
+    wish(explorer, keys=[["size", "ArrowLeft"]])
+    assert explorer.view.size == 0
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "9" * 10**6, None, [], {}, True])
+def test_what_is_no_number_is_refused_in_one_short_sentence(value):
+    explorer = explore(Large())
+    error = wish(explorer, values={"size": value})["error"]
+    assert re.fullmatch(r"size must be a finite number, got .{1,40}", error)
+    assert explorer.view == Large()
+
+
+@pytest.mark.parametrize(
+    ("message", "error"),
+    [
+        ([], r"a message must be a dict, got \[\]"),
+        ({"values": [1]}, r"values must be a dict of at most 200 controls, got \[1\]"),
+        ({"values": {"x": 2.0}}, r"Large has no control 'x'; it has size, colour, lit"),
+        ({"drags": [["size", 0, 0, 1, 0]] * 200_000}, r"drags must be a list of at most 200, got .*\.\.\.\]"),
+        ({"drags": [["size", float("nan"), 0, 1, 0]]}, r"a drag must be a handle and x, y, dx, dy within .*nan.*"),
+        ({"drags": [["size", 0, 0, 1e308, 0]]}, r"a drag must be a handle and x, y, dx, dy within .*1e\+308.*"),
+        ({"drags": ["size"]}, r"a drag must be a handle .*'size'"),
+        ({"keys": [["size", "Delete"]]}, r"a key must be a handle and one of ArrowLeft, .*'Delete'\]"),
+        ({"keys": {"size": 1}}, r"keys must be a list of at most 200, got .*"),
+    ],
+)
+def test_a_message_that_no_page_sends_is_refused_in_words_and_changes_nothing(message, error):
+    explorer = explore(Large())
+    explorer._receive(explorer, {"id": 3, "draft": True, **message} if isinstance(message, dict) else message, [])
+    assert re.fullmatch(error, explorer.frame["error"])
+    assert explorer.frame["answers"] == (3 if isinstance(message, dict) else 0)
+    assert explorer.view == Large()
+
+
+def test_a_message_without_a_number_is_obeyed_and_answers_none():
+    explorer = explore(Large())
+    explorer._receive(explorer, {"values": {"size": 3.0}}, [])
+    assert (explorer.view.size, explorer.frame["answers"], explorer.frame["error"]) == (3.0, 0, "")
+
+
+def test_an_error_speaks_of_a_control_by_its_label():
+    frame = wish(explore(FrustumView()), values={"hfov_deg": "wide"})
+    assert frame["error"] == "field of view must be a finite number, got 'wide'"
+
+
+# The state one left -----------------------------------------------------------------------------------------------
+
+
+def test_the_saved_still_follows_once_the_view_has_come_to_rest(monkeypatch, shown):
+    """One drawing for any number of changes, in the place of the output, and none where nothing has changed."""
+    monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
+    monkeypatch.setattr("camviz.widgets.still._REST_S", 0.05)
+    kept = []
+    monkeypatch.setattr("camviz.widgets.still.update_display", lambda bundle, **where: kept.append((bundle, where)))
+    places = []
+    monkeypatch.setattr("camviz.widgets.still.display", lambda _, raw, **where: places.append(where))
+
+    async def cell() -> None:
+        explorer = explore(Toy())
+        explorer.size = 2.0  # before it is displayed
+        explorer._ipython_display_()
+        await asyncio.sleep(0.2)
+        assert kept == []
+        for number in range(10):
+            wish(explorer, number, values={"size": number / 5}, draft=True)
+        wish(explorer, 10)
+        await asyncio.sleep(0.2)
+
+    asyncio.run(cell())
+    ((bundle, where),) = kept
+    assert "size 1.8" in bundle["text/html"]
+    assert where["display_id"] == places[0]["display_id"]
+
+
+def test_a_static_page_has_no_still_that_follows(monkeypatch, shown):
+    monkeypatch.setenv("CAMVIZ_STATIC", "1")
+    monkeypatch.setattr("camviz.widgets.still._REST_S", 0.0)
+    monkeypatch.setattr("camviz.widgets.still.update_display", lambda bundle, **_: shown.append(bundle))
+
+    async def cell() -> None:
+        explorer = explore(Toy())
+        explorer._ipython_display_()
+        explorer.size = 2.0
+        await asyncio.sleep(0.05)
+
+    asyncio.run(cell())
+    assert len(shown) == 1

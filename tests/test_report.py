@@ -1,5 +1,6 @@
 """The clinic's report: every finding leads to its view, everything is inside one file, and pictures are linked."""
 
+import asyncio
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -194,7 +195,8 @@ def test_the_notebook_chooses_between_cameras():
 @pytest.fixture
 def displayed(monkeypatch):
     shown = []
-    monkeypatch.setattr("camviz.widgets.inspection.display", lambda what, **_: shown.append(what))
+    for module in ("inspection", "still"):
+        monkeypatch.setattr(f"camviz.widgets.{module}.display", lambda what, **_: shown.append(what))
     return shown
 
 
@@ -209,6 +211,23 @@ def test_a_saved_notebook_keeps_the_findings_and_a_still(displayed, monkeypatch)
     assert "<img" in still["text/html"]
     assert widget["application/vnd.jupyter.widget-view+json"]["model_id"] == live.widget.model_id
     assert re.search(r'data-camviz-still="(\w+)"', still["text/html"])[1] in live.explorer.still_hidden
+
+
+def test_the_saved_still_is_of_the_view_that_was_chosen_last(displayed, monkeypatch):
+    monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
+    monkeypatch.setattr("camviz.widgets.still._REST_S", 0.0)
+    kept = []
+    monkeypatch.setattr("camviz.widgets.still.update_display", lambda bundle, **_: kept.append(bundle["text/plain"]))
+
+    async def cell() -> None:
+        live = LiveInspection(inspect(sick()))
+        live._ipython_display_()
+        live.show("coverage")
+        await asyncio.sleep(0.01)
+
+    asyncio.run(cell())
+    (words,) = kept
+    assert words.startswith("Coverage")
 
 
 def test_whatever_view_is_chosen_later_hides_the_one_still(displayed):

@@ -42,7 +42,7 @@ def intrinsic_matrix(x: float, y: float, title: str, values: np.ndarray, changed
 def _entry(x: float, y: float, row: int, column: int, values: np.ndarray, changed: bool) -> str:
     right, base = x + _STEP * (column + 1), y + _ROW * row + 10
     if row > column or (row, column) == (values.shape[0] - 1, values.shape[1] - 1):
-        return svg.text((right, base), true_minus(f"{values[row, column] + 0.0:g}"), "number end half")
+        return svg.text((right, base), true_minus(f"{values[row, column] + 0.0:g}"), "number end fill-muted")
     back = svg.rectangle(right - 58, base - 16, 62, 23, "wash fill-orange", rx=3) if changed else ""
     words = true_minus(f"{values[row, column] + 0.0:.2f}")
     return back + svg.text((right, base), words, "number end orange" if changed else "number end")

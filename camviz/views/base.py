@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
 from functools import cached_property
-from math import isfinite
+from math import inf
 from pathlib import Path
+from reprlib import repr as short
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -42,15 +43,20 @@ class Control:
         """The value if the control allows it; ValueError saying what `name` takes if not."""
         if self.choices:
             if value not in self.choices:
-                raise ValueError(f"{name} must be one of {', '.join(map(repr, self.choices))}, got {value!r}")
+                raise ValueError(f"{name} must be one of {', '.join(map(repr, self.choices))}, got {short(value)}")
             return value
         if self.low is None or self.high is None:
             if not isinstance(value, bool):
-                raise ValueError(f"{name} must be True or False, got {value!r}")
+                raise ValueError(f"{name} must be True or False, got {short(value)}")
             return value
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise ValueError(f"{name} must be a finite number, got {value!r}")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < inf:
+            raise ValueError(f"{name} must be a finite number, got {short(value)}")
         return value
+
+    def held(self, name: str, value: Any) -> Any:
+        """The value as `checked` has it, a number beyond the control's range at the end of that range."""
+        value = self.checked(name, value)
+        return value if self.low is None or self.high is None else min(max(value, self.low), self.high)
 
 
 def slider(

@@ -261,7 +261,7 @@ class CalibrationView(OrbitView, BoardPictures):
             y = _STRIP.y + 22 * row + 15
             free = name in FREE[self.free]
             value, sigma = self.estimates.get(name, (np.nan, np.nan))
-            class_ = "number" if free else "number faint"
+            class_ = "number" if free else "number fill-muted"
             parts.append(svg.text((x[0], y), name, class_))
             words = (
                 _number(name, self.true[name]) if self.truth else "",

@@ -387,7 +387,7 @@ class DistortionView(OrbitView):
             coefficients = {name: value for name, value in coefficients.items() if value or name == "k1"}
         rows = [svg.text((_COLUMN, 26), "This lens", "title")]
         for i, (name, value) in enumerate(coefficients.items()):  # the lens's own, where one is given
-            class_ = "number" if value else "number faint"
+            class_ = "number" if value else "number fill-muted"
             rows.append(svg.text((_COLUMN, 50 + 18 * i), true_minus(f"{name} {value:+.4f}"), class_))
         top = 80 + 18 * len(coefficients)
         rows.append(readout(self._told(), (_COLUMN, top), (0, 40), (0, 17)))

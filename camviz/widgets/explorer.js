@@ -4,25 +4,43 @@
 const SETTLE_MS = 10;   // idle time after which a draft is replaced by the fine picture; with none, the two would share the processors
 const LINKED_MS = 120;  // the same for a draft that was not asked for here: another widget's hand is at work, and may go on
 const LATE_MS = 6000;   // silence of the kernel after which the reader is told
+const TELL_MS = 1000;   // rest after which a screen reader is told what has changed
+const SWIPE_PX = 8;     // by which a finger shows whether it means the slider or the page
+const STICKY = 0.45;    // of the window's height: larger controls would hide the picture that they change
+const MOST_KEYS = 100;  // waiting for a slow picture; the kernel takes no more than twice as many
 const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
+const AGAIN = "Run this cell again (Shift + Enter).";
+const GONE = {
+  restarting: `The kernel was restarted, and this picture stands still. ${AGAIN}`,
+  autorestarting: `The kernel died and was started again; this picture stands still. ${AGAIN}`,
+  dead: "The kernel has died, and this picture stands still. Restart it (menu Kernel), and run this cell again.",
+  terminating: `The kernel was shut down, and this picture stands still. ${AGAIN}`,
+};
 
 function render({ model, el }) {
-  const root = build(`<div class="camviz-explorer" data-busy="false" data-rendered="0">
-    <div class="camviz-controls"></div><div class="camviz-error" role="alert" hidden></div><div class="camviz-picture"></div></div>`);
-  const [controls, error, picture] = root.children;
+  const root = build(`<div class="camviz-explorer" role="group" data-busy="false" data-rendered="0">
+    <div class="camviz-controls" role="group"></div><div class="camviz-error" role="alert" hidden></div><div class="camviz-picture"></div>
+    <div class="camviz-said" role="status"></div></div>`);
+  const [controls, error, picture, said] = root.children;
+  const name = nameApart(model.get("_title"));
+  root.setAttribute("aria-label", name);
+  controls.setAttribute("aria-label", `Controls of ${name}`);
   const hidesStill = build("<style></style>");   // while this lives, the saved picture is not needed
   hidesStill.textContent = model.get("still_hidden");
   el.replaceChildren(hidesStill, root);
 
   const say = (words) => { error.hidden = !words; error.textContent = words; };
   const ask = asker(model, root, () => say(LATE));
+  const foot = build(`<div class="camviz-foot"><button type="button" data-action="reset">Reset</button><p class="camviz-help" aria-hidden="true"></p></div>`);
+  const [reset, help] = foot.children;
+  const hint = (words) => { said.textContent = help.textContent = words; };
   const inputs = model.get("controls").map((control) => makeControl(control, (value, draft) => {
     ask({ values: { [control.name]: value } }, draft);
-  }));
+  }, hint));
   inputs.forEach((input) => controls.append(input.element));
-  const reset = build(`<button type="button" data-action="reset">Reset</button>`);
   reset.addEventListener("click", () => ask({ reset: true }, false));
-  controls.append(reset);
+  controls.append(foot);
+  showHelp(controls, help);
 
   const showValues = () => {
     const values = model.get("values");
@@ -49,23 +67,102 @@ function render({ model, el }) {
   const watcher = new ResizeObserver(() => tellUnits(picture, told, ask));
   watcher.observe(picture);
   const refold = folding(picture);
+  const tell = announcer(model, picture, said);
   const stopHands = hands(picture, ask);
+  const stopWatching = watchKernel(model, (words) => {
+    ask.stop();
+    say(words);
+    root.dataset.live = "false";
+    controls.inert = true;
+  });
   keepKeys(root);
+  const stopSticking = stick(root, controls);
   model.on("change:values", showValues);
   model.on("change:frame", showFrame);
+  model.on("change:frame", tell);
   showValues();
   showFrame();
+  tell();
   return () => {
     watcher.disconnect();
     stopHands();
+    stopSticking();
+    stopWatching();
+    ask.stop();
     model.off("change:values", showValues);
     model.off("change:frame", showFrame);
+    model.off("change:frame", tell);
   };
+}
+
+// The title, with a number where the page has a visualizer of that name already: no two groups are called the same.
+function nameApart(title) {
+  const taken = new Set([...document.querySelectorAll(".camviz-explorer")].map((one) => one.ariaLabel));
+  let name = title;
+  for (let i = 2; taken.has(name); i++) name = `${title}, ${i}`;
+  return name;
+}
+
+// Controls that are not too large stay at the notebook's upper edge. JupyterLab lets what is too wide scroll within its
+// output, where nothing can stick to the edge of the notebook: not so around a visualizer, which is never too wide.
+function stick(root, controls) {
+  const watcher = new ResizeObserver(([{ contentRect }]) => {
+    for (let one = root.parentElement; one && !one.matches(".jp-Cell"); one = one.parentElement) one.classList.add("camviz-unclipped");
+    controls.classList.toggle("camviz-sticky", contentRect.height < STICKY * innerHeight);
+  });
+  watcher.observe(controls);
+  return () => watcher.disconnect();
+}
+
+// Calls `gone` with a sentence as soon as the kernel that draws is no more. JupyterLab and Notebook lend widgets their
+// connection (IKernelConnection); where a page lends none, the comm tells, and after that only silence.
+function watchKernel(model, gone) {
+  const kernel = model.widget_manager?.kernel;
+  const changed = (_, status) => { if (GONE[status]) gone(GONE[status]); };
+  const shut = () => gone(GONE.terminating);
+  const cut = () => { if (!kernel?.statusChanged) gone(GONE.restarting); };
+  kernel?.statusChanged?.connect(changed);
+  kernel?.disposed?.connect(shut);
+  model.on("comm_live_update", cut);
+  return () => {
+    kernel?.statusChanged?.disconnect(changed);
+    kernel?.disposed?.disconnect(shut);
+    model.off("comm_live_update", cut);
+  };
+}
+
+// Tells a screen reader, once a state that was asked for here has rested, in which words its description differs.
+function announcer(model, picture, said) {
+  let before = null, timer = null;
+  return () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => {
+      const { described, draft, answers } = model.get("frame");
+      const words = described ?? picture.querySelector("desc")?.textContent ?? "";
+      if (draft || words === before) return;
+      const known = new Set(before?.split("; "));
+      if (before !== null && answers) said.textContent = words.split("; ").filter((part) => !known.has(part)).join("; ");
+      before = words;
+    }, TELL_MS);
+  };
+}
+
+// The help of the control under the pointer, or else of the one that has the focus.
+function showHelp(controls, help) {
+  const show = (event) => {
+    const control = event.target.closest(".camviz-control") ?? document.activeElement.closest?.(".camviz-control");
+    help.textContent = controls.contains(control) ? control.lastElementChild.textContent : "";
+  };
+  const focus = () => show({ target: document.activeElement });
+  controls.addEventListener("pointerover", show);
+  controls.addEventListener("pointerleave", focus);
+  controls.addEventListener("focusin", show);
+  controls.addEventListener("focusout", (event) => { if (!controls.contains(event.relatedTarget)) help.textContent = ""; });
 }
 
 // At most one request is under way; wishes that come meanwhile merge into the next one, so the latest wins.
 function asker(model, root, late) {
-  let id = Date.now() % 1e9, flying = null, wish = null, settle = null, patience = null;
+  let id = Date.now() % 1e9, flying = null, wish = null, settle = null, patience = null, stopped = false;
   const send = () => {
     flying = wish; wish = null;
     flying.id = ++id;
@@ -74,6 +171,7 @@ function asker(model, root, late) {
     model.send(flying);
   };
   const ask = (part, draft) => {
+    if (stopped) return;
     clearTimeout(settle);
     settle = null;
     if (part.reset) wish = null;
@@ -87,7 +185,7 @@ function asker(model, root, late) {
       if (last && last[0] === handle) wish.drags[wish.drags.length - 1] = [handle, x, y, last[3] + dx, last[4] + dy];
       else wish.drags.push([handle, x, y, dx, dy]);
     }
-    wish.keys.push(...(part.keys ?? []));
+    if (wish.keys.length < MOST_KEYS) wish.keys.push(...(part.keys ?? []));
     if (!flying) send();
   };
   ask.answered = (frame) => {
@@ -99,6 +197,13 @@ function asker(model, root, late) {
     settle = null;
     if (wish) return send();
     if (frame.draft) settle = setTimeout(() => ask({}, false), pause);
+  };
+  ask.stop = () => {
+    stopped = true;
+    clearTimeout(patience);
+    clearTimeout(settle);
+    flying = wish = settle = null;
+    ask.shown();
   };
   ask.shown = () => { root.dataset.busy = String(Boolean(flying || settle)); };
   ask.pending = (name) => Boolean(wish && name in wish.values);
@@ -146,7 +251,7 @@ function tellUnits(picture, told, ask) {
   const units = {};
   for (const tile of picture.querySelectorAll(".camviz-tile")) {
     const svg = tile.lastElementChild, wide = svg.clientWidth;
-    const unit = wide ? Math.max(1, svg.viewBox.baseVal.width / wide) : 1;
+    const unit = wide ? Math.min(20, Math.max(1, svg.viewBox.baseVal.width / wide)) : 1;
     const name = tile.dataset.tile;
     if (Math.abs(unit / (told[name] ?? 1) - 1) > 0.04) units[name] = told[name] = Number(unit.toFixed(2));
   }
@@ -189,32 +294,40 @@ function loaded(address) {
   });
 }
 
-// Pointer and keys on the picture's handles, in the picture's own units.
+// Pointer and keys on the picture's handles, in the picture's own units. An svg is measured when the pointer goes down,
+// and again only after the page has scrolled: never in between, for that would lay the page out at every move.
 function hands(picture, ask) {
   let held = null;
-  const at = (event, svg) => {
+  const measure = (svg) => {
     const box = svg.getBoundingClientRect(), view = svg.viewBox.baseVal, scale = view.width / box.width;
-    return [view.x + (event.clientX - box.left) * scale, view.y + (event.clientY - box.top) * scale];
+    return { x: view.x - box.left * scale, y: view.y - box.top * scale, scale };
+  };
+  const at = (event) => {
+    held.place ??= measure(held.svg);
+    return [held.place.x + event.clientX * held.place.scale, held.place.y + event.clientY * held.place.scale];
   };
   const down = (event) => {
-    const handle = event.target.closest("[data-drag]")?.dataset.drag;
-    if (!handle || event.button) return;
-    const svg = event.target.closest("svg.camviz-svg");
-    const [x, y] = at(event, svg);
-    held = { handle, svg, x, y, moved: false };
+    const target = event.target.closest("[data-drag]");
+    if (!target || event.button || held) return;
+    held = { id: event.pointerId, handle: target.dataset.drag, svg: target.closest("svg.camviz-svg"), moved: false };
+    [held.x, held.y] = at(event);
     picture.setPointerCapture(event.pointerId);
-    picture.querySelector(`[data-drag="${CSS.escape(handle)}"]`).focus({ preventScroll: true });
+    target.focus({ preventScroll: true });
     event.preventDefault();
   };
   const move = (event) => {
-    if (!held) return;
-    const [x, y] = at(event, held.svg);
+    if (event.pointerId !== held?.id) return;
+    const [x, y] = at(event);
     ask({ drags: [[held.handle, x, y, x - held.x, y - held.y]] }, true);
     Object.assign(held, { x, y, moved: true });
   };
-  const up = () => {      // a click is a drag of no length
-    if (held && !held.moved) ask({ drags: [[held.handle, held.x, held.y, 0, 0]] }, false);
+  const up = (event) => {      // a click is a drag of no length
+    if (event.pointerId !== held?.id) return;
+    if (!held.moved) ask({ drags: [[held.handle, held.x, held.y, 0, 0]] }, false);
     held = null;
+  };
+  const touch = (event) => {      // a finger on a handle drags it, and scrolls elsewhere; Chromium obeys no touch-action inside an svg
+    if (event.touches.length === 1 && event.target.closest("[data-drag]")) event.preventDefault();
   };
   const key = (event) => {
     const handle = event.target.closest?.("[data-drag]")?.dataset.drag;
@@ -228,9 +341,14 @@ function hands(picture, ask) {
     ask({ keys: [[handle, event.deltaY < 0 ? "+" : "-"]] }, true);
     event.preventDefault();
   };
-  const all = { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, keydown: key, wheel };
+  const scrolled = () => { if (held?.svg.isConnected) held.place = null; };
+  const all = { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, touchstart: touch, keydown: key, wheel };
   for (const [type, listener] of Object.entries(all)) picture.addEventListener(type, listener, { passive: false });
-  return () => { for (const [type, listener] of Object.entries(all)) picture.removeEventListener(type, listener); };
+  document.addEventListener("scroll", scrolled, { capture: true, passive: true });
+  return () => {
+    for (const [type, listener] of Object.entries(all)) picture.removeEventListener(type, listener);
+    document.removeEventListener("scroll", scrolled, { capture: true });
+  };
 }
 
 // JupyterLab takes the arrow keys from whatever does not say, on the focused element itself, that it needs them.
@@ -240,40 +358,82 @@ function keepKeys(part) {
 
 let count = 0;
 
-function makeControl(control, changed) {
+function makeControl(control, changed, hint) {
   const id = `camviz-${++count}`;
   const make = control.choices.length ? makeChoice : control.low === null ? makeSwitch : makeSlider;
   const element = build(`<div class="camviz-control"><label for="${id}"></label></div>`);
   element.dataset.control = control.name;
-  element.title = control.help;
   const label = element.firstElementChild;
   label.textContent = control.label;
   if (control.unit) label.append(" ", build(`<span class="unit"></span>`)), (label.lastChild.textContent = `[${control.unit}]`);
-  const show = make(control, id, element, changed);
-  return { name: control.name, element, show };
+  const back = build(`<button type="button" class="camviz-back">↺</button>`);
+  const [input, show] = make(control, id, element, changed, hint);
+  const restore = () => { show(control.first, true); changed(control.first, false); showBack(control.first); input.focus(); };
+  const showBack = (value) => { back.hidden = value === control.first; };
+  back.setAttribute("aria-label", `Reset ${control.label}`);
+  back.title = `back to ${control.first === true ? "on" : control.first === false ? "off" : written(control, control.first)}`;
+  back.addEventListener("click", restore);
+  label.addEventListener("dblclick", restore);
+  const help = build(`<span hidden id="${id}-help"></span>`);
+  help.textContent = [control.help, rangeOf(control)].filter(Boolean).join(" — ");
+  element.querySelectorAll("input, select").forEach((one) => one.setAttribute("aria-describedby", help.id));
+  element.append(back, help);
+  return { name: control.name, element, show: (value) => { show(value, false); showBack(value); } };
 }
 
-function makeSlider({ label, low, high, step }, id, element, changed) {
-  const range = build(`<input type="range" id="${id}" min="${low}" max="${high}" step="${step}">`);
-  const number = build(`<input type="number" step="${step}" aria-label="number">`);
-  number.setAttribute("aria-label", `${label}, as a number`);
+// A slider's value in as many decimals as its steps have, and two more.
+function written({ step }, value) {
+  if (typeof value !== "number") return value;
   const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
-  const written = (value) => Number(value.toFixed(decimals + 2));
-  let shown = low;
-  const commit = () => {
-    if (Number.isNaN(number.valueAsNumber)) return void (number.value = written(shown));
-    if (number.valueAsNumber === written(shown)) return;
-    range.value = number.value;
-    changed(shown = number.valueAsNumber, false);
+  return Number(value.toFixed(decimals + 2));
+}
+
+function rangeOf(control) {
+  if (control.low === null || control.choices.length) return "";
+  const unit = control.unit && ` ${control.unit}`;
+  return `${written(control, control.low)} to ${written(control, control.high)}${unit}, at first ${written(control, control.first)}`;
+}
+
+function makeSlider(control, id, element, changed, hint) {
+  const { label, low, high, step, first } = control;
+  const track = build(`<span class="camviz-track"><input type="range" id="${id}" min="${low}" max="${high}" step="${step}"></span>`);
+  const number = build(`<input type="number" min="${low}" max="${high}" step="${step}">`);
+  const range = track.firstElementChild;
+  track.style.setProperty("--first", String((first - low) / (high - low)));
+  number.setAttribute("aria-label", `${label}, as a number`);
+  let shown = low, typing = false;
+  const show = (value, force) => {
+    range.value = shown = value;
+    if (!typing || force) number.value = written(control, value), (typing = false);
   };
-  range.addEventListener("input", () => { number.value = range.value; changed(shown = range.valueAsNumber, true); });
+  const commit = () => {
+    typing = false;
+    const typed = number.valueAsNumber, held = Math.min(Math.max(typed, low), high);
+    if (Number.isNaN(typed) || typed === written(control, shown)) return show(shown, true);
+    if (held !== typed) hint(`${label} goes from ${rangeOf(control).split(",")[0]}: ${typed} is held at ${written(control, held)}.`);
+    show(held, true);
+    changed(held, false);
+  };
+  const moved = (value) => { show(value, true); changed(value, true); };
+  const swiped = fingers(range, moved);
+  range.addEventListener("input", () => { if (swiped(range.valueAsNumber)) range.value = shown; else moved(range.valueAsNumber); });
+  number.addEventListener("input", () => { typing = true; });
   number.addEventListener("change", commit);
   number.addEventListener("keydown", (event) => { if (event.key === "Enter") commit(); });  // no change event in JupyterLab
-  element.append(range, number);
-  return (value) => {
-    range.value = shown = value;
-    if (document.activeElement !== number) number.value = written(value);
-  };
+  element.append(track, number);
+  return [range, show];
+}
+
+// A slider jumps to a finger at once, though the finger may be about to scroll the page. Until it goes sideways or lifts,
+// the function that this returns keeps the value and says true; the browser takes a finger that scrolls (pointercancel).
+function fingers(range, moved) {
+  let finger = null;
+  const on = (type, listener) => range.addEventListener(type, listener);
+  on("pointerdown", (event) => { finger = event.pointerType === "touch" ? { x: event.clientX, value: range.valueAsNumber } : null; });
+  on("pointermove", (event) => { if (finger && Math.abs(event.clientX - finger.x) > SWIPE_PX) finger = null; });
+  on("pointercancel", () => { finger = null; });
+  on("pointerup", () => { if (finger) moved(finger.value); finger = null; });
+  return (value) => { if (finger) finger.value = value; return finger !== null; };
 }
 
 function makeChoice({ choices }, id, element, changed) {
@@ -281,14 +441,14 @@ function makeChoice({ choices }, id, element, changed) {
   select.append(...choices.map((words) => new Option(words, words)));
   select.addEventListener("change", () => changed(select.value, false));
   element.append(select);
-  return (value) => { select.value = value; };
+  return [select, (value) => { select.value = value; }];
 }
 
 function makeSwitch(_control, id, element, changed) {
   const box = build(`<input type="checkbox" id="${id}">`);
   box.addEventListener("change", () => changed(box.checked, false));
   element.append(box);
-  return (value) => { box.checked = value; };
+  return [box, (value) => { box.checked = value; }];
 }
 
 function build(html) {

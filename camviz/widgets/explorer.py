@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import traceback
 from collections.abc import Mapping
 from dataclasses import fields
@@ -16,6 +17,7 @@ from camviz.draw.picture import page_style
 from camviz.views.base import Control, View
 from camviz.widgets.memory import give_back_after_cells, keep_between_pictures
 from camviz.widgets.still import StillWidget, stills_for_boxes
+from camviz.widgets.wish import Wish, number_of
 
 _HERE = files("camviz.widgets")
 _CAPTION = (
@@ -49,7 +51,8 @@ class Explorer(StillWidget):
     what cannot be drawn, and the last good state stays.
 
     The browser asks for one picture at a time and always for its newest wish, so a slow picture never builds a queue.
-    An error in drawing is shown in words above the last good picture.
+    What it asks for is checked: numbers are held within their ranges, whatever moves them. An error in drawing is shown
+    in words above the last good picture.
     """
 
     _esm = (_HERE / "explorer.js").read_text(encoding="utf-8")
@@ -57,22 +60,24 @@ class Explorer(StillWidget):
 
     controls: traitlets.List[Any] = traitlets.List(read_only=True).tag(sync=True)
     frame: traitlets.Dict[Any, Any] = traitlets.Dict(read_only=True).tag(sync=True)
+    _title = traitlets.Unicode().tag(sync=True)
     values = ViewTrait().tag(sync=True)
     view = ViewTrait()
     value = ViewTrait()
 
     def __init__(self, view: View, controls: dict[str, Control]) -> None:
-        self._first = view
-        self._units: dict[str, float] = {}  # of each tile in the page
+        self._first, self._title = view, view.title
+        self._units: dict[str, float] = {}  # picture units that make a CSS pixel, of each tile in the page
         self._controls = controls
         self._ranges = {**view.offered(), **controls}
         self._control_of = {f"{name}_" if hasattr(Explorer, name) else name: name for name in self._ranges}
         self.add_traits(**{trait: ViewTrait().tag(sync=True) for trait in self._control_of})
-        described = [{"name": name, **vars(control)} for name, control in controls.items()]
+        described = [{"name": name, **vars(one), "first": getattr(view, name)} for name, one in controls.items()]
         self.set_trait("controls", described)
         self._show(view, draft=False)
         super().__init__()
         self.on_msg(self._receive)
+        self.observe(lambda _: self.keep_soon(), "view")
         keep_between_pictures()
         give_back_after_cells(self)
         stills_for_boxes()
@@ -126,11 +131,14 @@ class Explorer(StillWidget):
         """The value, a number held within the range of its control; ValueError where there is no such control."""
         if name not in self._ranges:
             raise ValueError(self._unknown(name))
-        control = self._ranges[name]
-        value = value.item() if isinstance(value, np.generic) else value
-        if control.low is None or control.high is None:
-            return value
-        return min(max(control.checked(name, value), control.low), control.high)
+        return self._ranges[name].held(name, value.item() if isinstance(value, np.generic) else value)
+
+    def _within(self, view: View, before: View) -> View:
+        """The view, each control that differs from the view `before` held within its range."""
+        values = {name: (getattr(before, name), getattr(view, name)) for name in self._ranges}
+        moved = {name: (new, self._held(name, new)) for name, (old, new) in values.items() if new != old}
+        beyond = {name: held for name, (new, held) in moved.items() if held != new}
+        return view.but(**beyond) if beyond else view
 
     def _unknown(self, name: str) -> str:
         return f"{type(self.view).__name__} has no control {name!r}; it has {', '.join(self._ranges)}"
@@ -154,26 +162,37 @@ class Explorer(StillWidget):
 
     def _tell(self, error: Exception, answers: int) -> None:
         """Show an error above the last good picture."""
-        told = {"answers": answers, "draft": False, "error": f"{type(error).__name__}: {error}"}
+        told = {"answers": answers, "draft": False, "error": self._in_words(error)}
         self.set_trait("frame", {**self.frame, **told})
         self.log.warning("%s", "".join(traceback.format_exception(error)))
 
-    def _receive(self, _widget: object, message: dict[str, Any], _buffers: object) -> None:
+    def _in_words(self, error: Exception) -> str:
+        """What an error says, the fields of the view by the words that stand beside their controls."""
+        if not isinstance(error, ValueError):
+            return f"{type(error).__name__}: {error}"
+        words = str(error)
+        for name, control in self._ranges.items():
+            as_name = rf"\b{name}\b" if "_" in name else rf"^{name}\b"  # elsewhere "size" may be a word like any other
+            words = re.sub(as_name, control.label, words)
+        return words
+
+    def _receive(self, _widget: object, message: object, _buffers: object) -> None:
         try:
-            self._show(self._wished(message), draft=message["draft"], answers=message["id"])
+            wish = Wish.of(message)
+            self._show(self._wished(wish), draft=wish.draft, answers=number_of(message))
         # The widget's edge: whatever a view raises belongs in front of the reader, and nobody above would show it.
         except Exception as error:
-            self._tell(error, answers=message["id"])
+            self._tell(error, answers=number_of(message))
 
-    def _wished(self, message: dict[str, Any]) -> View:
-        self._units |= message.get("units", {})
-        view = self._first if message.get("reset") else self.view
-        if message.get("values"):
-            view = view.but(**message["values"])
-        for handle, x, y, dx, dy in message.get("drags", ()):
-            view = view.dragged(handle, x, y, dx, dy)
-        for handle, key in message.get("keys", ()):
-            view = view.pressed(handle, key)
+    def _wished(self, wish: Wish) -> View:
+        self._units |= wish.units
+        view = self._first if wish.reset else self.view
+        if wish.values:
+            view = view.but(**{name: self._held(name, value) for name, value in wish.values.items()})
+        for drag in wish.drags:
+            view = self._within(view.dragged(*drag), view)
+        for key in wish.keys:
+            view = self._within(view.pressed(*key), view)
         return view
 
     def still(self) -> dict[str, str]:
@@ -185,6 +204,7 @@ def explore(view: View, *names: str, **ranges: Any) -> Explorer:
     """The view with controls for the fields in `names`, then `ranges`; for all of its fields when none is given.
 
     `ranges` narrows or widens: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words for a choice.
+    The notebook is saved with the picture of the state in which one left it; a cell run again begins with `view`.
     Raises ValueError naming the fields there are when one is unknown.
     """
     declared = view.offered()

@@ -19,6 +19,7 @@ from camviz.views.base import View
 from camviz.views.clinic.catalogue import ALIASES, VIEWS, Case
 from camviz.views.distortion import DistortionView
 from camviz.widgets.explorer import Explorer, explore
+from camviz.widgets.still import display_kept
 
 LOOK, CAMERA = "look at", "of camera"  # what the two choosers are called, and no control of any view
 _LARGEST = 800  # pixels, of the longer side of a photograph
@@ -118,6 +119,7 @@ class LiveInspection:
             return
         self.widget.children = (self._above, explorer)
         if before is not None:
+            explorer.keep_instead_of(before)
             before.close()
 
     def _ipython_display_(self) -> None:
@@ -129,10 +131,13 @@ class LiveInspection:
         display(words, raw=True)
         if self.explorer is None or self.widget is None:
             return
-        still = self.explorer.still()
         if os.environ.get("CAMVIZ_STATIC"):
-            display(still, raw=True)
+            display(self.explorer.still(), raw=True)
             return
-        kept = f'<div data-camviz-still="{self.still_id}">{still["text/html"]}</div>'
-        display({**still, "text/html": kept}, raw=True)
+        display_kept(self._kept, self.explorer)
         display(self.widget._repr_mimebundle_(), raw=True)  # the still is shown already
+
+    def _kept(self) -> dict[str, str]:
+        """The still of the view that is shown now, marked by the widgets that hide it while they live."""
+        still = self.explorer.still() if self.explorer else {"text/html": "", "text/plain": ""}
+        return {**still, "text/html": f'<div data-camviz-still="{self.still_id}">{still["text/html"]}</div>'}

@@ -78,11 +78,14 @@ def chromium() -> Iterator[Browser]:
 
 
 class Notebook:
-    """One notebook open in JupyterLab. `errors` gathers what the page's JavaScript raised."""
+    """One notebook open in JupyterLab; `options` are those of Playwright's `new_page`.
 
-    def __init__(self, browser: Browser, address: str, path: str) -> None:
+    `errors` gathers what the page's JavaScript raised.
+    """
+
+    def __init__(self, browser: Browser, address: str, path: str, **options: Any) -> None:
         self.errors: list[str] = []
-        self.page: Page = browser.new_page(viewport={"width": 1400, "height": 1000})
+        self.page: Page = browser.new_page(**{"viewport": {"width": 1400, "height": 1000}, **options})
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.add_init_script(path=Path(__file__).with_name("hands.js"))
         self.page.goto(address.format(path=path))
