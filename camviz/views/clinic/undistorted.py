@@ -85,8 +85,7 @@ class UndistortedView(View):
             content = placed_image(after, "after", k.width, k.height) + self._straight(after) + _rectangle(after, roi)
             body += after.show(content, title=f"Undistorted, alpha = {self.alpha:g}", note="yellow: without black")
         height = max(before.height, after.height) + 82
-        words = svg.paragraph((20, height - 24), self.description(), 920, "note")
-        return self.composed(height, body + words, attached=attached)
+        return XX
 
     def _taken(self, small: Camera) -> NDArray[np.uint8]:
         if self.image is None:
