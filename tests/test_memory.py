@@ -2,12 +2,15 @@
 
 import subprocess
 import sys
+from dataclasses import fields
 
 import pytest
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.scenes import snapshot, textured_scene
 from camviz.scenes.scene import _kept_rays
+from camviz.views.exposure import ExposureView
+from camviz.widgets import explore
 from camviz.widgets.memory import give_back
 
 PROGRAM = """
@@ -96,3 +99,13 @@ def test_many_objects_in_a_circle_are_given_back_and_a_few_wait():
     """As matplotlib's closed figures are; Python itself would keep both until a quarter of all objects are new."""
     alive = subprocess.run([sys.executable, "-c", CIRCLES], capture_output=True, text=True, check=True).stdout.split()
     assert alive == ["True", "False"]
+
+
+def test_what_a_view_has_worked_out_is_given_back_and_worked_out_again():
+    view = ExposureView()
+    drawn = explore(view).frame["svg"]
+    worked_out = vars(view).keys() - {field.name for field in fields(view)}
+    assert worked_out
+    give_back()
+    assert not vars(view).keys() & worked_out
+    assert view.figure().svg() == drawn

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
+from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -139,6 +140,11 @@ class View:
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed."""
         return replace(self, **changes)
+
+    def forget(self) -> None:
+        """Free what this view has worked out (its cached properties), until it is asked for it again."""
+        for name in [n for n in vars(self) if isinstance(getattr(type(self), n, None), cached_property)]:
+            del vars(self)[name]
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         """The view after the pointer dragged `handle` by (dx, dy) to (x, y), in the picture's units."""

@@ -74,7 +74,7 @@ class Explorer(StillWidget):
         super().__init__()
         self.on_msg(self._receive)
         keep_between_pictures()
-        give_back_after_cells()
+        give_back_after_cells(self)
         stills_for_boxes()
 
     def set(self, **changes: Any) -> Explorer:
@@ -146,6 +146,11 @@ class Explorer(StillWidget):
             for trait, value in followed.items():
                 getattr(type(self), trait).follow(self, value)
             self.set_trait("frame", frame)
+
+    def forget(self) -> None:
+        """Free what the first and the present view have worked out; a hand's next picture is of another view."""
+        self._first.forget()
+        self.view.forget()
 
     def _tell(self, error: Exception, answers: int) -> None:
         """Show an error above the last good picture."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import gc
 import sys
+from typing import Protocol
+from weakref import WeakSet
 
 from IPython import get_ipython
 
@@ -17,6 +19,16 @@ _KEPT = 64 << 20  # bytes
 _MANY = 1  # times that Python has looked through its younger objects, each after some 7,000 new ones
 
 
+class Holder(Protocol):
+    """Who keeps what can be worked out again."""
+
+    def forget(self) -> None:
+        """Free it."""
+
+
+_holders: WeakSet[Holder] = WeakSet()
+
+
 def give_back(*_: object) -> None:
     """Return to the system what pictures and cells needed while they were made, where the C library can.
 
@@ -24,6 +36,8 @@ def give_back(*_: object) -> None:
     objects are new, and keeps some 10 MB of them till then. To look takes 50 ms: cells that made little are spared.
     """
     forget_rays()
+    for holder in _holders:
+        holder.forget()
     if gc.get_count()[2] >= _MANY:
         gc.collect()
     if _trim:
@@ -42,7 +56,8 @@ def keep_between_pictures() -> None:
         _mallopt(_MMAP_THRESHOLD, 1 << 20)
 
 
-def give_back_after_cells() -> None:
-    """`give_back` after every cell of this notebook."""
+def give_back_after_cells(*holders: Holder) -> None:
+    """`give_back` after every cell of this notebook, with what these hold for as long as they live."""
+    _holders.update(holders)
     if (shell := get_ipython()) and give_back not in shell.events.callbacks["post_run_cell"]:
         shell.events.register("post_run_cell", give_back)
