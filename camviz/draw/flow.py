@@ -67,7 +67,8 @@ class Tile:
     def html(self, unit: float = 1.0) -> str:
         """The tile as an element of a page that has `flow.css`; `unit` is how many picture units make a CSS pixel."""
         if self.words:
-            return f'<div class="camviz-tile" data-tile="{escape(self.name)}" style="flex:1 1 100%">{self.sentences}</div>'
+            name = escape(self.name)
+            return f'<div class="camviz-tile" data-tile="{name}" style="flex:1 1 100%">{self.sentences}</div>'
         kind = "camviz-tile camviz-scrolled" if self.cell[2] > SCROLLED else "camviz-tile"
         name = escape(self.name)
         fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
