@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 
-from camviz.draw import labels
+from camviz.draw import labels, svg
 
 WIDTH = 960  # picture units, of every row
 FLOW_WIDTH = "max(800px,138vh)"  # of a picture, so that its main panel and the controls fit a screen together
@@ -20,6 +20,12 @@ Cell = tuple[float, float, float, float]
 """Left, top, width and height, in picture units."""
 
 
+class Sentences(str):
+    """A part of a picture that is words alone, a sentence a line."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True)
 class Tile:
     """A part of a picture that can stand alone: its name, its cell, and its SVG in the picture's units."""
@@ -27,6 +33,16 @@ class Tile:
     name: str
     cell: Cell
     body: str
+    words: str = ""
+    """Sentences, a line each: a page has them as its own text, which wraps; `body` has them for saved pictures."""
+
+    @classmethod
+    def of(cls, name: str, cell: Cell, part: str) -> Tile:
+        """The tile of a part: of SVG, or of `Sentences`."""
+        if not isinstance(part, Sentences):
+            return cls(name, cell, part)
+        x, y, width, _ = cell
+        return cls(name, cell, svg.paragraph((x + 20, y + 18), part, width - 40, "label"), part)
 
     def uncluttered(self, unit: float = 1.0) -> str:
         """The SVG with its words clear of each other, where `unit` picture units make a CSS pixel."""
@@ -50,10 +66,18 @@ class Tile:
 
     def html(self, unit: float = 1.0) -> str:
         """The tile as an element of a page that has `flow.css`; `unit` is how many picture units make a CSS pixel."""
+        if self.words:
+            name = escape(self.name)
+            return f'<div class="camviz-tile" data-tile="{name}" style="flex:1 1 100%">{self.sentences}</div>'
         kind = "camviz-tile camviz-scrolled" if self.cell[2] > SCROLLED else "camviz-tile"
         name = escape(self.name)
         fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
         return f'<div class="{kind}" data-tile="{name}" style="{self.style}">{fold}{self._svg(unit)}</div>'
+
+    @property
+    def sentences(self) -> str:
+        """The words as HTML, a paragraph a line."""
+        return "".join(f'<p style="margin:2px 20px">{escape(line)}</p>' for line in self.words.splitlines())
 
     def document(self, sheet: str) -> str:
         """The tile as an SVG document with a style sheet."""

@@ -127,7 +127,7 @@ class View:
 
         A part that is "" has no tile. `attached` are the photographs that the parts need.
         """
-        tiles = tuple(Tile(name, layout[name], body) for name, body in parts.items() if body)
+        tiles = tuple(Tile.of(name, layout[name], body) for name, body in parts.items() if body)
         words = self.description() if described is None else described
         return Picture(tiles, self.title, words, dict(attached or {}))
 

@@ -11,6 +11,7 @@ import numpy as np
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.board_warp import WarpTest, warp_test
 from camviz.draw import svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import Item, Label, Line, TexturedMesh
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
@@ -22,6 +23,8 @@ from camviz.views.clinic.observations import Observations
 from camviz.views.clinic.residuals import nice
 from camviz.views.clinic.uncertainty import adjusted
 from camviz.views.marks import arrows
+
+_LAYOUT = rows((374, {"mean residuals": 480, "bend": 480}), (66, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -144,8 +147,8 @@ class BoardResidualsView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         space, sheets = self._bent(draft)
-        words = svg.paragraph((20, 386), self._solved(), 920, "label")
-        return self.composed(440, self._means_panel(), space, words, attached=sheets)
+        parts = {"mean residuals": self._means_panel(), "bend": space, "in words": Sentences(self._solved())}
+        return self.tiled(_LAYOUT, parts, sheets)
 
     def _means_panel(self) -> str:
         seen, board = self.observations, self.observations.board

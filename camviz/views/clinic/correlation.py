@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, png
 from camviz.draw.readout import signed
@@ -20,6 +21,7 @@ from camviz.views.clinic.uncertainty import adjusted, determined
 
 _FIGURES = 18  # parameters up to which the cells have room for their numbers
 _STRONG = 0.95
+_LAYOUT = rows((590, {"correlations": 660, "numbers": 300}))
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ class CorrelationView(View):
             )
         legend, bar_picture = bar(panel.x + side + 14, 64, side - 60, "matrix-bar", shades, "r")
         body = panel.show(content, title="Correlations") + legend + self._names(panel, cell)
-        return self.composed(590, body + self._words(680), attached={"matrix": png(shades.rgba(shown)), **bar_picture})
+        parts = {"correlations": body, "numbers": self._words(680)}
+        return self.tiled(_LAYOUT, parts, {"matrix": png(shades.rgba(shown)), **bar_picture})
 
     def _names(self, panel: Panel, cell: float) -> str:
         size = f"font-size:{min(12.0, max(5.0, 0.8 * cell)):.1f}px"

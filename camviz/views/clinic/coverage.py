@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, png
 from camviz.draw.shades import Shades, bar
@@ -19,6 +20,7 @@ from camviz.views.clinic.observations import Observations, ObservedView, short_n
 
 _RINGS = 8
 _MOST_DOTS = 4000
+_LAYOUT = rows((412, {"coverage": 520, "how far out and how held": 440}), (34, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -81,13 +83,14 @@ class CoverageView(ObservedView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         heat, attached = self._map()
-        body = heat + self._radius() + self._tilt()
         n = self.numbers()
         words = (
             f"{100 * n['share']:.0f} % of the cells have a corner; the farthest corner lies "
             f"{100 * n['reach']:.0f} % of the way out."
         )
-        return self.composed(412, body + svg.text((20, 398), words, "label"), attached=attached)
+        held = self._radius() + self._tilt()
+        parts = {"coverage": heat, "how far out and how held": held, "in words": Sentences(words)}
+        return self.tiled(_LAYOUT, parts, attached)
 
     def _map(self) -> Drawn:
         seen, k, counts = self.observations, self.observations.camera.intrinsics, self.counts

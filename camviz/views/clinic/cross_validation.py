@@ -11,7 +11,8 @@ import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.cross_validation import Halves, HeldOut, halves, held_out
-from camviz.draw import plot, svg
+from camviz.draw import plot
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
@@ -23,6 +24,7 @@ from camviz.views.view_bars import names_below
 _GRID = (30, 20)
 _PARTS = ("earlier and later", "every other")
 _BY_CHANCE = 1e-6  # below this probability noise is not the reason
+_LAYOUT = rows((368, {"two halves": 490, "every view": 470}), (72, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -106,9 +108,8 @@ class CrossValidationView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map()
-        body = shown + self._views()
-        body += svg.paragraph((20, 386), "\n".join(self.sentences()), 920, "label")
-        return self.composed(440, body, attached=attached)
+        parts = {"two halves": shown, "every view": self._views(), "in words": Sentences("\n".join(self.sentences()))}
+        return self.tiled(_LAYOUT, parts, attached)
 
     @cached_property
     def _values(self) -> Any:
@@ -133,7 +134,7 @@ class CrossValidationView(View):
         )
         title = {
             "difference": "Two halves of the views: difference",
-            "ratio": "Difference over what noise lets expect",
+            "ratio": "Difference over expected",
         }.get(self.show, "What noise lets expect")
         return panel.show(content, title=title) + legend, attached | bar_picture
 

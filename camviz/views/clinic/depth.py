@@ -11,11 +11,14 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.stereo_depth import DepthUncertainty, depth_uncertainty
 from camviz.cameras import transform
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View, slider
 from camviz.views.clinic.observations import Missing
 from camviz.views.clinic.uncertainty import adjusted, determined
+
+_LAYOUT = rows((376, {"depth error": 680, "in words": 280}))
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,7 @@ class DepthErrorView(View):
             "for all points of a picture, so averaging does not lessen it. Model error is left out."
         )
         body = plot.plotted(panel, content, *names, title=f"{' and '.join(self.names)}, middle of the picture")
-        return self.composed(376, body + svg.paragraph((690, 50), words, 255))
+        return self.tiled(_LAYOUT, {"depth error": body, "in words": svg.paragraph((690, 50), words, 255)})
 
 
 def _metres(value: float) -> str:

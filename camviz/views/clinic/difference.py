@@ -11,6 +11,7 @@ import numpy as np
 from camviz.calibration.difference import Difference, difference
 from camviz.cameras import Camera
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import readout
@@ -22,6 +23,7 @@ from camviz.views.clinic.uncertainty import DISTANCES
 from camviz.views.marks import arrows
 
 LARGE_TURN_DEG, LARGE_SHIFT = 0.5, 0.02  # degrees, and metres per metre of distance
+_LAYOUT = rows((470, {"difference": 680, "numbers": 280}))
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,9 @@ class DifferenceView(View):
         content = colours + self._arrows(panel) + contours(panel, length, shades, " px", strong=1.0)
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
-        body = panel.show(content, title=f"Points {where}", note=f"arrows × {self.scale:g}")
-        body += legend + self._words(panel.x + panel.width + 100)
-        return self.composed(470, body, attached=attached | bar_picture)
+        shown = panel.show(content, title=f"Points {where}", note=f"arrows × {self.scale:g}")
+        parts = {"difference": shown + legend, "numbers": self._words(690)}
+        return self.tiled(_LAYOUT, parts, attached | bar_picture)
 
     def _arrows(self, panel: Panel) -> str:
         found = self.compared(15, 10)

@@ -7,12 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from camviz.draw import plot, svg
+from camviz.draw import plot
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View
 from camviz.views.clinic.observations import Missing
 from camviz.views.view_bars import bars_of, ceiling, figures_on, names_below
+
+_LAYOUT = rows((200, {"errors": 960}), (50, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -52,4 +55,4 @@ class ErrorsView(View):
             content, title=f"RMS error of every view, {self.name}", note=f"dashed: median, {median:.3g} px"
         )
         body = shown + plot.axes(panel, "", "RMS [px]", xticks=ticks)
-        return self.composed(250, body + svg.paragraph((20, 220), self.description(), 920))
+        return self.tiled(_LAYOUT, {"errors": body, "in words": Sentences(self.description())})

@@ -13,6 +13,7 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
@@ -22,6 +23,7 @@ from camviz.views.base import Drawn, View, slider
 from camviz.views.distortion import DistortionView
 
 _WEAK = 0.2  # a denominator below this multiplies what is wrong with the numerator by five
+_LAYOUT = rows((428, {"resolution": 510, "curves": 450}), (92, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -79,13 +81,9 @@ class FoldView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map((24, 18) if draft else (80, 60))
-        body = shown
-        body += DistortionView.of(self.camera).curve_panel(570, 34, 370, 170, equation=False) + self._denominator()
-        y = 434.0
-        for sentence in self.sentences():
-            body += svg.paragraph((20, y), sentence, 920, "label")
-            y += 20
-        return self.composed(520, body, attached=attached)
+        curves = DistortionView.of(self.camera).curve_panel(570, 34, 370, 170, equation=False) + self._denominator()
+        parts = {"resolution": shown, "curves": curves, "in words": Sentences("\n".join(self.sentences()))}
+        return self.tiled(_LAYOUT, parts, attached)
 
     def resolution(self, columns: int, rows: int) -> tuple[Array, Array]:
         """Pixels (rows, columns, 2) from edge to edge, and how many pixels a degree has there (rows, columns).

@@ -13,6 +13,7 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.guidance import Candidate, instruction, next_board_poses
 from camviz.cameras import transform
 from camviz.draw import svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import Face, Item, Line, closed
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -27,6 +28,7 @@ from camviz.views.clinic.uncertainty import adjusted, determined
 
 _OFFERED, _APART = 8, 0.35  # candidates shown, and how unlike each other: corner distance in widths of the picture
 _SIDE = 16  # points along the edge of a square, so that it bends with the lens
+_LAYOUT = rows((382, {"the board to imitate": 480, "its picture": 480}), (50, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,9 @@ class GuidanceView(OrbitView):
     def figure(self, *, draft: bool = False) -> Picture:
         space, attached = self._space(draft)
         shown, pictures = self._imitate()
-        body = space + shown
-        for i, sentence in enumerate(self.sentences()):
-            body += svg.text((20, 402 + 20 * i), sentence, "label")
-        return self.composed(432, body, attached=attached | pictures)
+        words = Sentences("\n".join(self.sentences()))
+        parts = {"the board to imitate": space, "its picture": shown, "in words": words}
+        return self.tiled(_LAYOUT, parts, attached | pictures)
 
     @cached_property
     def _cam_from_board(self) -> RigidTransform:
@@ -114,7 +115,7 @@ class GuidanceView(OrbitView):
         typical = float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
         farthest = max(float(np.linalg.norm(middle)), typical)
         eye = self.from_afar(middle / 2, 1.6 * farthest)
-        panel = space_panel("guidance", 20, 34, 450, 340)
+        panel = space_panel("guidance", 15, 34, 450, 340)
         label = "The boards in space; drag or press the arrow keys to walk around them"
         return self.in_space(panel, items, draft, "Imitate the orange board", label, eye=eye)
 
@@ -122,7 +123,7 @@ class GuidanceView(OrbitView):
         """The picture that the ghost would give, its squares bent as the lens bends them."""
         a, camera = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
         k, board = camera.intrinsics, a.board
-        panel = image_panel("imitate", 490, 34, 450, k.width, k.height, tallest=340)
+        panel = image_panel("imitate", 495, 34, 450, k.width, k.height, tallest=340)
         content, attached = "", {}
         if self.backdrop is not None:
             content = placed_image(panel, "backdrop", k.width, k.height, class_="faint")

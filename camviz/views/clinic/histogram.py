@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import erf, ndtri
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
@@ -17,6 +18,7 @@ from camviz.views.base import choice
 from camviz.views.clinic.observations import Observations, ObservedView
 
 _BINS = 61
+_LAYOUT = rows((330, {"histogram": 485, "quantiles": 265, "numbers": 210}))
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,8 @@ class HistogramView(ObservedView):
         return f"Residuals {which}: " + listed(self.numbers()) + "."
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = self._histogram() + self._quantiles() + self._words()
-        return self.composed(330, body)
+        parts = {"histogram": self._histogram(), "quantiles": self._quantiles(), "numbers": self._words()}
+        return self.tiled(_LAYOUT, parts)
 
     @property
     def _reach(self) -> float:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import Drawn, slider
@@ -16,6 +17,10 @@ from camviz.views.clinic.observations import Observations, ObservedView
 from camviz.views.marks import arrows, crop, cross
 
 _COUNT, _COLUMNS = 12, 6
+_LAYOUT = rows(
+    *((212, {f"corner {first + i + 1}": 160.0 for i in range(_COLUMNS)}) for first in range(0, _COUNT, _COLUMNS)),
+    (34, {"in words": 960}),
+)
 
 
 @dataclass(frozen=True)
@@ -48,14 +53,14 @@ class OutliersView(ObservedView):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = "", dict[str, bytes]()
+        parts, attached = dict[str, str](), dict[str, bytes]()
         images: dict[int, Any] = {}
         for i, (view, corner) in enumerate(self.worst):
             if view not in images:
                 images[view] = self.observations.photographs(view)
-            row, column = divmod(i, _COLUMNS)
-            drawn, crops = self._detail(i, view, corner, images[view], 20 + 155 * column, 34 + 190 * row)
-            body, attached = body + drawn, attached | crops
+            x, y, _, _ = _LAYOUT[f"corner {i + 1}"]
+            parts[f"corner {i + 1}"], crops = self._detail(i, view, corner, images[view], x + 11, y + 30)
+            attached |= crops
         seen = self.observations
         words = (
             f"Green: detected; orange arrow: to the projection; red cross: set aside ({seen.aside.sum()} of "
@@ -63,7 +68,7 @@ class OutliersView(ObservedView):
         )
         if not attached:
             words += " The pictures are not at hand, so the places are bare."
-        return self.composed(440, body + svg.text((20, 424), words, "note"), attached=attached)
+        return self.tiled(_LAYOUT, parts | {"in words": Sentences(words)}, attached)
 
     def _detail(self, i: int, view: int, corner: int, image: Any, x: float, y: float) -> Drawn:
         seen = self.observations
@@ -84,5 +89,6 @@ class OutliersView(ObservedView):
             else svg.dots([start], "paper-dot", 7) + svg.dots([start], "green", 5)
         )
         row, column = divmod(corner, seen.board.columns)
-        below = svg.text((x, y + 154), f"{seen.lengths[view, corner]:.2f} px, row {row + 1}, col. {column + 1}", "note")
-        return panel.show(content, title=seen.picture(view)[-18:]) + below, crops
+        below = svg.text((x, y + 156), f"{seen.lengths[view, corner]:.2f} px", "note")
+        below += svg.text((x, y + 174), f"row {row + 1}, col. {column + 1}", "note")
+        return panel.show(content, title=seen.picture(view)[-14:]) + below, crops

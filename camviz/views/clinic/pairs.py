@@ -11,6 +11,7 @@ import numpy as np
 from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from camviz.files import Calibration
 
 _DISTANCES = np.concatenate([np.geomspace(0.1, 1000, 90), [np.inf]])
+_LAYOUT = rows((178, {"distances": 960}), (384, {"left": 480, "right": 480}), (38, {"in words": 960}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,15 +156,15 @@ class EpipolarPairsView(ViewChooser):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached = self._bars_panel(), dict[str, bytes]()
+        parts, attached = {"distances": self._bars_panel()}, dict[str, bytes]()
         for side, camera in enumerate((self.shared.left, self.shared.right)):
-            shown, pictures = self._side(side, camera)
-            body, attached = body + shown, attached | pictures
+            parts[("left", "right")[side]], pictures = self._side(side, camera)
+            attached |= pictures
         words = (
             "Green: the line on which the other picture puts a corner. Blue arrow: the first row, from the first "
             "corner on."
         )
-        return self.composed(600, body + svg.text((20, 588), words, "note"), attached=attached)
+        return self.tiled(_LAYOUT, parts | {"in words": Sentences(words)}, attached)
 
     @property
     def _bars(self) -> Panel:

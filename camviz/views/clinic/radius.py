@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import true_minus
@@ -21,6 +22,7 @@ from camviz.views.marks import arrows
 _RINGS, _CELLS = 12, (10, 8)
 _FEW = 8  # corners of a ring below which its standard error says little
 _MOST_DOTS = 1500
+_LAYOUT = rows((386, {"picture": 450, "rings": 510}), (50, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -105,14 +107,15 @@ class RadiusView(ObservedView):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = self._picture()
+        plots = ""
         for i, (name, title) in enumerate((("outward", "Outward"), ("around", "Around the principal point"))):
-            body += self._plot(name, title, 1 + i, 34 + 172 * i, 128)
+            plots += self._plot(name, title, 1 + i, 34 + 172 * i, 128)
         advice = (
             "Noise scatters around zero. A ring's mean off zero by more than its pale bars says that the model "
             "is too simple there, or the board not flat."
         )
-        return self.composed(400, body + svg.paragraph((20, 356), advice, 440))
+        parts = {"picture": self._picture(), "rings": plots, "in words": Sentences(advice)}
+        return self.tiled(_LAYOUT, parts)
 
     def _plot(self, name: str, title: str, part: int, y: float, height: float) -> str:
         radius, values = self.polar[0], self.polar[part]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
@@ -118,21 +119,20 @@ class RectifiedView(ViewChooser):
         return " ".join(self.sentences())
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body, attached, bottom = "", {}, 34.0
+        parts, attached, bottom = dict[str, str](), {}, 34.0
         for side, camera in enumerate((self.left, self.right)):
             turned = camera if isinstance(self.pair, str) else (self.pair.left, self.pair.right)[side]
             k = turned.intrinsics
-            panel = image_panel(f"rectified {side}", 20 + 470 * side, 34, 450, k.width, k.height, tallest=380)
+            panel = image_panel(f"rectified {side}", 15 + 480 * side, 34, 450, k.width, k.height, tallest=380)
             name = f"rectified{side}"
             title = f"{('left', 'right')[side]}, {'as taken' if turned is camera else 'rectified'}"
             content = placed_image(panel, name, k.width, k.height) + self._marks(panel, side, turned, camera)
-            body += panel.show(content, title=title)
+            parts[("left", "right")[side]] = panel.show(content, title=title)
             attached[name] = jpeg(self._rectified(side, turned, camera, 240 if draft else _SIDE))
             bottom = max(bottom, panel.y + panel.height)
-        height = bottom + 24 + 20 * len(self.sentences())
-        for i, sentence in enumerate(self.sentences()):
-            body += svg.paragraph((20, bottom + 24 + 20 * i), sentence, 920, "label")
-        return self.composed(height, body, attached=attached)
+        parts["in words"] = Sentences("\n".join(self.sentences()))
+        said = (10 + 20 * len(self.sentences()), {"in words": 960.0})
+        return self.tiled(rows((bottom + 10, {"left": 480, "right": 480}), said), parts, attached)
 
     def _rectified(self, side: int, turned: Camera, camera: Camera, size: int) -> NDArray[np.uint8]:
         source = replace(camera, intrinsics=camera.intrinsics.within(size))

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout
@@ -34,6 +35,9 @@ from camviz.views.view_bars import (
 )
 
 ARROW = 26.0  # picture units that a view's 90th percentile residual is drawn long, by default
+_LAYOUT = rows(
+    (206, {"errors": 960}), (378, {"picture": 480, "boards": 480}), (216, {"the board": 480, "numbers": 300})
+)
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,14 @@ class ResidualsView(ViewChooser, OrbitView):
             self.bars_panel(self._bars, handle=True),
             self.board_panel(space_panel("board", 20, 610, 450, 180)),
         )
-        return self.composed(800, bars, image, space, board, self._numbers_block(), attached=attached | sheets)
+        parts = {
+            "errors": bars,
+            "picture": image,
+            "boards": space,
+            "the board": board,
+            "numbers": self._numbers_block(),
+        }
+        return self.tiled(_LAYOUT, parts, attached | sheets)
 
     @property
     def _bars(self) -> Panel:

@@ -11,7 +11,7 @@ import numpy as np
 
 from camviz.calibration.types import Board
 from camviz.cameras import Camera
-from camviz.draw import svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import Item, Label, Line
 from camviz.draw.picture import Picture
 from camviz.draw.space import OrbitCamera, axes_triad, camera_body, space_panel
@@ -24,6 +24,7 @@ from camviz.views.clinic.observations import Missing
 _BODIES = 12  # cameras up to which each has its frustum and axes; more of them are pyramids
 _BOARDS = 60
 _TOLD = 4  # cameras up to which each one's place is told
+_LAYOUT = rows((470, {"cameras": 960}), (62, {"in words": 960}))
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ class RigView(OrbitView):
         note = {"both": "blue: as written; orange: inverted"}.get(self.reading, self.reading)
         seen: dict[str, Any] = {"eye": self._onlooker, "note": note, "hint": ""}
         space, attached = self.in_space(panel, self._items(), draft, "The cameras in space", label, **seen)
-        return self.composed(512, space + svg.paragraph((20, 486), self.description(), 920), attached=attached)
+        return self.tiled(_LAYOUT, {"cameras": space, "in words": Sentences(self.description())}, attached)
 
     @cached_property
     def _places(self) -> Array:

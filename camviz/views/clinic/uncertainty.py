@@ -13,6 +13,7 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.uncertainty import projection_covariance, worst_deviation
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import readout
@@ -27,6 +28,8 @@ LEFT_OUT = (
     "This is the noise of the corners carried through the solution. It leaves out model error: a lens that the model "
     "cannot describe is off by more than the map says, and cross-validation and the residuals show that."
 )
+_LAYOUT = rows((470, {"uncertainty": 680, "numbers": 280}))
+_RANGE_LAYOUT = rows((380, {"range": 695, "in words": 265}))
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,8 @@ class UncertaintyView(SolvedView):
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
         where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         shown = panel.show(content, title=f"{self.name}: one standard deviation, points {where}")
-        body = shown + legend + self._words(panel.x + panel.width + 100)
-        return self.composed(470, body, attached=attached | bar_picture)
+        parts = {"uncertainty": shown + legend, "numbers": self._words(690)}
+        return self.tiled(_LAYOUT, parts, attached | bar_picture)
 
     def _ellipses(self, panel: Any) -> str:
         """Ellipses of one standard deviation at a few pixels, all enlarged so that the smallest can be seen."""
@@ -207,7 +210,7 @@ class UncertaintyRangeView(SolvedView):
             f"camera’s centre is what is uncertain.\n \n{LEFT_OUT}"
         )
         body = plot.plotted(panel, content, *names, xticks, yticks, title=f"{self.name}: at three pixels")
-        return self.composed(380, body + svg.paragraph((705, 50), words, 240))
+        return self.tiled(_RANGE_LAYOUT, {"range": body, "in words": svg.paragraph((705, 50), words, 240)})
 
 
 @lru_cache(maxsize=24)

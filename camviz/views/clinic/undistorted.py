@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import on_plane
@@ -65,17 +66,17 @@ class UndistortedView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         k = self.camera.intrinsics
-        before = image_panel("before", 20, 34, 450, k.width, k.height, tallest=360)
-        after = image_panel("after", 490, 34, 450, k.width, k.height, tallest=360)
+        before = image_panel("before", 15, 34, 450, k.width, k.height, tallest=360)
+        after = image_panel("after", 495, 34, 450, k.width, k.height, tallest=360)
         small = Camera(k.within(256 if draft else _SIDE), self.camera.lens)
         taken = self._taken(small)
         found, attached = self.target(), {"before": jpeg(taken)}
-        body = before.show(
+        shown = before.show(
             placed_image(before, "before", k.width, k.height) + self._bent(before, found),
             title=f"{self.name}: as taken",
         )
         if isinstance(found, str):
-            body += after.show(svg.paragraph((16, 34), found, after.width - 30, "label"), title="Undistorted")
+            straightened = after.show(svg.paragraph((16, 34), found, after.width - 30, "label"), title="Undistorted")
         else:
             target, roi = found
             straight = distortion.remap(
@@ -83,10 +84,13 @@ class UndistortedView(View):
             )
             attached["after"] = jpeg(straight)
             content = placed_image(after, "after", k.width, k.height) + self._straight(after) + _rectangle(after, roi)
-            body += after.show(content, title=f"Undistorted, alpha = {self.alpha:g}", note="yellow: without black")
-        height = max(before.height, after.height) + 82
-        words = svg.paragraph((20, height - 24), self.description(), 920, "note")
-        return self.composed(height, body + words, attached=attached)
+            straightened = after.show(
+                content, title=f"Undistorted, alpha = {self.alpha:g}", note="yellow: without black"
+            )
+        both = {"as taken": 480.0, "undistorted": 480.0}
+        layout = rows((max(before.height, after.height) + 44, both), (38, {"in words": 960}))
+        parts = {"as taken": shown, "undistorted": straightened, "in words": Sentences(self.description())}
+        return self.tiled(layout, parts, attached)
 
     def _taken(self, small: Camera) -> NDArray[np.uint8]:
         if self.image is None:
