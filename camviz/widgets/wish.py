@@ -37,7 +37,9 @@ class Wish:
         if not isinstance(values, Mapping) or len(values) > _MOST:
             raise ValueError(f"values must be a dict of at most {_MOST} controls, got {short(values)}")
         if not isinstance(units, Mapping) or len(units) > _MOST or not all(map(_is_unit, units.values())):
-            raise ValueError(f"units must be a dict of at most {_MOST} numbers from 1 to {_LARGEST}, got {short(units)}")
+            raise ValueError(
+                f"units must be a dict of at most {_MOST} numbers from 1 to {_LARGEST}, got {short(units)}"
+            )
         drags = tuple(_drag(one) for one in _listed(message, "drags"))
         keys = tuple(_key(one) for one in _listed(message, "keys"))
         return cls(bool(message.get("draft")), bool(message.get("reset")), values, drags, keys, units)
