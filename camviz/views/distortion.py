@@ -6,7 +6,7 @@ A reader's own function can bend a picture beside the right one.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import atan, atan2, cos, degrees, hypot, inf, isfinite, pi, sin, tan
 from typing import Any, ClassVar
@@ -20,7 +20,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows
 from camviz.draw.items import closed
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.space import Item, Line, OrbitCamera, axes_triad, space_panel
@@ -191,7 +191,8 @@ class DistortionView(OrbitView):
         """The first two panels beside the numbers, and the others below them."""
         names = [_TILES[name] for name in panels]
         order = iter([*names[:2], "numbers", *names[2:]])
-        return rows(*((height, {next(order): width for width in widths}) for height, widths in _ROWS[len(panels)]))
+        found = rows(*((height, {next(order): width for width in widths}) for height, widths in _ROWS[len(panels)]))
+        return found | {"numbers": (*found["numbers"][:3], 320)}
 
     def _name(self) -> str:
         if self.lens:
@@ -244,11 +245,7 @@ class DistortionView(OrbitView):
         return panel.show(shown, title=title), {"camera": jpeg(self.image(draft=draft))}
 
     def _image_panel(self, name: str, cell: Cell) -> Panel:
-        """A panel of the image, as large as the cell lets it be and in its middle."""
-        x, y, width, height = cell
-        size = (self.intrinsics.width, self.intrinsics.height)
-        panel = image_panel(name, x, y + 34, width - 20, *size, tallest=height - 44)
-        return replace(panel, x=x + (width - panel.width) / 2)
+        return image_in(cell, name, self.intrinsics.width, self.intrinsics.height)
 
     def _photograph(self, panel: Panel, attached: str) -> str:
         return placed_image(panel, attached, self.intrinsics.width, self.intrinsics.height)
