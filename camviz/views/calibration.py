@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
-from camviz.draw.flow import rows
+from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed, true_minus
@@ -37,12 +37,15 @@ _PIXELS = ("fx", "fy", "cx", "cy")
 _NOTHING = "No board is seen: nothing to estimate from"
 _EVERYTHING = "picture space estimate errors"
 _LAYOUTS = {
-    "picture fit": rows((464, {"picture": 620})) | {"estimate": (620.0, 0.0, 340, 350)},
+    "picture fit": shortened(rows((464, {"picture": 620, "estimate": 340})), estimate=350),
     "picture yours": rows((426, {"picture": 480, "each picture alone": 480})),
-    _EVERYTHING: rows(
-        (382, {"picture": 480, "boards in space": 480}), (318, {"estimate": 310, "estimate ± σ": 310, "errors": 340})
-    )
-    | {"estimate": (0.0, 382.0, 310, 256), "estimate ± σ": (310.0, 382.0, 310, 290)},
+    _EVERYTHING: shortened(
+        rows(
+            (382, {"picture": 480, "boards in space": 480}),
+            (318, {"estimate": 310, "estimate ± σ": 310, "errors": 340}),
+        ),
+        **{"estimate": 256, "estimate ± σ": 290},
+    ),
 }
 _ROW = 22  # units, from one estimate to the next
 _STRIP = Panel("estimates", 356, 428, 254, _ROW * len(INTRINSICS), -1, 1, 0, len(INTRINSICS))

@@ -18,7 +18,7 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import Cell, rows, shortened
 from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -192,7 +192,7 @@ class DistortionView(OrbitView):
         names = [_TILES[name] for name in panels]
         order = iter([*names[:2], "numbers", *names[2:]])
         found = rows(*((height, {next(order): width for width in widths}) for height, widths in _ROWS[len(panels)]))
-        return found | {"numbers": (*found["numbers"][:3], 320)}
+        return shortened(found, numbers=320)
 
     def _name(self) -> str:
         if self.lens:
