@@ -190,7 +190,7 @@ def test_a_function_without_an_answer_leaves_its_picture_empty_and_a_sentence_in
     view = DemosaicingView(panels="picture yours", pattern=pattern, yours=function, show=show)
     figure = view.figure()
     assert "yours" not in figure.photographs
-    words = " ".join(re.findall(r">([^<>]+)</text>", figure.svg()))
+    words = " ".join(re.findall(r">([^<>]+)</t(?:ext|span)>", figure.svg()))
     assert sentence in words
 
 

@@ -34,7 +34,7 @@ from camviz.views.marks import circle
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side
-_KEY = 68  # units right of a picture, for the key of its map
+_KEY = 62  # units right of a picture, for the key of its map
 _BESIDE = (506, {"picture": 550, "loupe": 150, "numbers": 260})
 LAYOUTS = {
     "picture loupe": shortened(rows(_BESIDE), numbers=90),
@@ -299,12 +299,12 @@ class DemosaicingView(View):
         places = _everywhere(self.filters, 0.5)
         content = svg.image("spectrum", 0, 0, panel.width, panel.height) + _rings(panel.place(places), 9)
         axes = plot.axes(panel, "fu [cycles/px]", "fv [cycles/px]", _TICKS, _TICKS)
-        listed = [svg.text((710, 440), "○ seen as colour, and how strongly", "note")]
+        listed = [svg.text((710, 440), "○ seen as colour, how strongly", "note")]
         for i, carrier in enumerate(mosaics.carriers(self.filters)[:6]):
             x, y = 710 + 120 * (i % 2), 459 + 18 * (i // 2)
             listed.append(svg.text((x, y), f"{_place(carrier)}", "tick"))
             listed.append(svg.text((x + 104, y), f"{carrier.strength:.2f}", "tick end"))
-        return panel.show(content, title="Spectrum of the mosaic") + axes + "".join(listed)
+        return panel.show(content, title="Spectrum") + axes + "".join(listed)
 
     def _worth(self, panel: Panel, psnr_db: float, false_colour: float, class_: str) -> str:
         """What a rebuilt picture is worth, below it."""
