@@ -321,7 +321,7 @@ class DepthOfFieldView(View):
             drawn += "".join(upright(panel, float(end), "orange") for end in ends if np.isfinite(end))
             entries, problems = [*entries, ("orange", "your limits")], [*problems, problem]
         words = "\n".join(filter(None, problems))
-        drawn += legend(panel, entries, "bottom left") if entries else ""
+        drawn += legend(panel, entries, "top right") if entries else ""
         return drawn + (svg.paragraph((12, 22), words, panel.width - 24) if words else "")
 
     def _numbers(self) -> str:
