@@ -193,7 +193,7 @@ def test_a_function_without_an_answer_leaves_its_picture_empty_and_a_sentence_in
 
 
 def test_a_view_opens_with_the_panels_that_are_asked_for():
-    few, some, all_of_them = (DemosaicingView(panels=one).figure() for one in LAYOUTS[:3])
+    few, some, all_of_them = (DemosaicingView(panels=one).figure() for one in list(LAYOUTS)[:3])
     assert "Spectrum" not in few.svg()
     assert "PSNR" not in few.svg()
     assert "PSNR" in some.svg()

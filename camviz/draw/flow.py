@@ -108,3 +108,8 @@ def rows(*rows: tuple[float, Mapping[str, float]]) -> dict[str, Cell]:
             left += width
         top += height
     return cells
+
+
+def shortened(cells: Mapping[str, Cell], **heights: float) -> dict[str, Cell]:
+    """The cells, those named no taller than what stands in them: below each other, they leave no gap."""
+    return {name: (x, y, width, heights.get(name, height)) for name, (x, y, width, height) in cells.items()}

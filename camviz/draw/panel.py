@@ -1,6 +1,6 @@
 """Panels: rectangles of a picture with coordinates of their own."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.draw import svg
+from camviz.draw.flow import Cell
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,13 @@ def image_panel(
     aspect = (right - left) / (bottom - top)
     width = min(width, tallest * aspect)
     return Panel(name, x, y, width, width / aspect, left, right, top, bottom)
+
+
+def image_in(cell: Cell, name: str, image_width: int, image_height: int) -> Panel:
+    """A panel of an image in the middle of a tile, as large as the tile lets it be below a title."""
+    x, y, width, height = cell
+    panel = image_panel(name, x, y + 34, width - 20, image_width, image_height, tallest=height - 44)
+    return replace(panel, x=x + (width - panel.width) / 2)
 
 
 def placed_image(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: Any) -> str:

@@ -14,7 +14,8 @@ import numpy as np
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.flow import rows, shortened
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed, true_minus
 from camviz.draw.space import Item, Label, OrbitCamera, camera_body, space_panel
@@ -28,13 +29,27 @@ from camviz.views.one_board import FromEach, from_each, panel_of_each
 
 _MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 _CELLS = (16, 12)  # of the coverage map
-_STRIP = Panel("estimates", 322, 428, 290, 198, -1, 1, 0, len(INTRINSICS))
+_LONGEST = 225  # units, of a bar
 _REACH = 300.0  # pixels at the ends of the strip
 _LOW, _HIGH = 0.05, 50.0  # pixels at the ends of the bars
 _NORMAL = 0.07  # metres, the length of the handle that tilts a board
 _PIXELS = ("fx", "fy", "cx", "cy")
+_NOTHING = "No board is seen: nothing to estimate from"
 _EVERYTHING = "picture space estimate errors"
-_HEIGHTS = {"picture fit": 400, "picture yours": 430, _EVERYTHING: 660}  # of the picture, by the panels it has
+_LAYOUTS = {
+    "picture fit": shortened(rows((464, {"picture": 620, "estimate": 340})), estimate=350),
+    "picture yours": rows((426, {"picture": 480, "each picture alone": 480})),
+    _EVERYTHING: shortened(
+        rows(
+            (382, {"picture": 480, "boards in space": 480}),
+            (318, {"estimate": 310, "estimate ± σ": 310, "errors": 340}),
+        ),
+        **{"estimate": 256, "estimate ± σ": 290},
+    ),
+}
+_ROW = 22  # units, from one estimate to the next
+_STRIP = Panel("estimates", 356, 428, 254, _ROW * len(INTRINSICS), -1, 1, 0, len(INTRINSICS))
+_ERRORS = 630  # where they begin
 
 
 @dataclass(frozen=True)
@@ -47,7 +62,7 @@ class CalibrationView(OrbitView, BoardPictures):
     """
 
     title: ClassVar[str] = "Calibration"
-    layouts = _HEIGHTS
+    layouts = _LAYOUTS
 
     panels: str = _EVERYTHING
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
@@ -99,22 +114,25 @@ class CalibrationView(OrbitView, BoardPictures):
     def figure(self, *, draft: bool = False) -> Picture:
         view = self.but(coarse=True) if draft else self
         attached = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
-        height = _HEIGHTS[self.panels]
-        body = view._image()
+        parts = {"picture": view._image()}
         if self.panels == "picture fit":
-            body += view._fit()
+            parts["estimate"] = view._fit()
         elif self.panels == "picture yours":
-            body += panel_of_each(view.each, view._known, self.index, (540, 34, 400, 290), self.yours is not None)
+            place = (552, 34, 398, 286)
+            parts["each picture alone"] = panel_of_each(
+                view.each, view._known, self.index, place, self.yours is not None
+            )
         else:
-            space, photographs = view._space(draft)
-            body, attached = body + space + view._estimates() + view._errors(), attached | photographs
-        return self.composed(height, body, attached=attached, described=view.description())
+            parts["boards in space"], photographs = view._space(draft)
+            parts |= {"estimate": view._estimates(), "estimate ± σ": view._strip(), "errors": view._errors()}
+            attached = attached | photographs
+        return self.tiled(_LAYOUTS[self.panels], parts, attached, view.description())
 
     # What the camera saw ---------------------------------------------------------------------------------------------
 
     @cached_property
     def _image_panel(self) -> Panel:
-        return image_panel("image", 20, 34, 450, self.width, self.height, tallest=338)
+        return image_in(_LAYOUTS[self.panels]["picture"], "image", self.width, self.height)
 
     def _image(self) -> str:
         panel = self._image_panel
@@ -188,11 +206,13 @@ class CalibrationView(OrbitView, BoardPictures):
     # The boards in space ---------------------------------------------------------------------------------------------
 
     def _space(self, draft: bool) -> Drawn:
-        panel = space_panel("space", 490, 34, 450, 338)
+        panel = space_panel("space", 490, 34, 460, 338)
         far = float(self._poses_shown.translation[:, 2].max())
-        eye = replace(self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.6)
+        eye = replace(
+            self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.75
+        )
         label = "The boards in space; drag or press the arrow keys to walk around, plus and minus to go nearer"
-        note = "dashed: where the estimate has them" if self.truth else ""
+        note = "dashed: as estimated" if self.truth else ""
         return self.in_space(panel, self._items(), draft, "The boards in space", label, eye=eye, note=note, hint="")
 
     @property
@@ -228,7 +248,7 @@ class CalibrationView(OrbitView, BoardPictures):
 
     def _fit(self) -> str:
         """The estimated numbers against the truth, and the error of the fit: what a report of a calibration says."""
-        x = (510, 640, 750)
+        x = (640, 780, 890)
         heads = ("", "true" if self.truth else "", "estimate")
         parts = [svg.text((x[0], 26), "The estimate" + (", against the truth" if self.truth else ""), "title")]
         parts += [svg.text((at, 54), words, "note end") for at, words in zip(x, heads, strict=True)]
@@ -239,7 +259,7 @@ class CalibrationView(OrbitView, BoardPictures):
             parts.append(svg.text((x[0], y), name, "number"))
             parts += [svg.text((at, y), one, "number end") for at, one in zip(x[1:], words, strict=True)]
         if self.adjustment is None:
-            return "".join(parts) + svg.text((x[0], 80), "No board is seen: nothing to estimate from", "note")
+            return "".join(parts) + svg.paragraph((x[0], 80), _NOTHING, 300, "label")
         return "".join(parts) + self._bar(
             x[0], 80 + 24 * len(FREE[self.free]) + 20, "RMS error of all its corners", self.adjustment.rms, "fill-blue"
         )
@@ -248,17 +268,17 @@ class CalibrationView(OrbitView, BoardPictures):
         """An error in pixels as a bar, with its name above it and its number at its end."""
         return (
             svg.text((x, y + 10), words, "note halo")
-            + svg.rectangle(x, y + 16, 230 * _share(value), 14, class_, rx=2)
-            + svg.text((x + 6 + 230 * _share(value), y + 28), f"{_digits(value)} px", "number halo")
+            + svg.rectangle(x, y + 16, _LONGEST * _share(value), 14, class_, rx=2)
+            + svg.text((x + 6 + _LONGEST * _share(value), y + 28), f"{_digits(value)} px", "number halo")
         )
 
     def _estimates(self) -> str:
-        x = (20, 128, 218, 300)
+        x = (10, 120, 212, 300)
         heads = ("", "true" if self.truth else "", "estimate", "± σ")
-        parts = [svg.text((20, 402), "The estimate" + (", against the truth" if self.truth else ""), "title")]
+        parts = [svg.text((10, 402), "The estimate" + (", against the truth" if self.truth else ""), "title")]
         parts += [svg.text((at, 420), words, "note end") for at, words in zip(x, heads, strict=True)]
         for row, name in enumerate(INTRINSICS):
-            y = _STRIP.y + 22 * row + 15
+            y = _STRIP.y + _ROW * row + 15
             free = name in FREE[self.free]
             value, sigma = self.estimates.get(name, (np.nan, np.nan))
             class_ = "number" if free else "number fill-muted"
@@ -269,7 +289,7 @@ class CalibrationView(OrbitView, BoardPictures):
                 _spread(name, sigma) if free else "held",
             )
             parts += [svg.text((at, y), one, f"{class_} end") for at, one in zip(x[1:], words, strict=True)]
-        return "".join(parts) + self._strip()
+        return "".join(parts)
 
     def _strip(self) -> str:
         """Every estimate's distance from the truth with ± σ and ± 2σ, in pixels on a scale that is linear near 0."""
@@ -284,9 +304,13 @@ class CalibrationView(OrbitView, BoardPictures):
             svg.text((_STRIP.x + x, below + 15), signed(m, 0) if m else "0", "tick middle")
             for x, m in zip(xs, marks, strict=True)
         ]
-        words = f"{'from the truth' if self.truth else 'σ'}, px; k and p: at the image’s corner"
-        name = svg.text((_STRIP.x + 145, below + 31), words, "note middle")
-        return _STRIP.show("".join(lines + dots)) + "".join(ticks) + name
+        names = [
+            svg.text((_STRIP.x - 10, _STRIP.y + _ROW * row + 15), name, "label end")
+            for row, name in enumerate(INTRINSICS)
+        ]
+        note = svg.text((_STRIP.x + _STRIP.width, below + 36), "k and p: at the image’s corner", "note end")
+        title = svg.text((320, 402), "Estimate less truth ± σ, px" if self.truth else "σ and 2σ, px", "title")
+        return title + _STRIP.show("".join(lines + dots)) + "".join(names + ticks) + note
 
     def _dot(self, name: str, row: int) -> str:
         value, sigma = self.estimates.get(name, (np.nan, np.nan))
@@ -320,39 +344,39 @@ class CalibrationView(OrbitView, BoardPictures):
 
     def _errors(self) -> str:
         if self.adjustment is None:
-            return svg.text((650, 402), "No board is seen: nothing to estimate from", "title")
+            return svg.paragraph((_ERRORS, 402), _NOTHING, 320, "label")
         bars = [("on the boards it was fitted to", self.adjustment.rms, "fill-blue")]
         bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
-        parts = [svg.text((650, 402), "Two kinds of error", "title")]
-        parts += [self._bar(650, 416 + 44 * i, *bar) for i, bar in enumerate(bars)]
+        parts = [svg.text((_ERRORS, 402), "Two kinds of error", "title")]
+        parts += [self._bar(_ERRORS, 412 + 48 * i, *bar) for i, bar in enumerate(bars)]
         return self._noise_mark() + "".join(parts) + self._per_board() + self._facts()
 
     def _noise_mark(self) -> str:
         """What the noise alone would leave: √2 times its standard deviation in u and v."""
         if self.seen is not None or self.noise < _LOW:
             return ""
-        x = 650 + 230 * _share(np.sqrt(2) * self.noise)
-        return svg.segments([(x, 430), (x, 474)], [(x, 448), (x, 492)], "ink") + svg.text(
-            (x, 507), "noise alone", "tick middle"
+        x = _ERRORS + _LONGEST * _share(np.sqrt(2) * self.noise)
+        return svg.segments([(x, 426), (x, 474)], [(x, 444), (x, 492)], "ink") + svg.text(
+            (x, 508), "noise alone", "tick middle"
         )
 
     def _per_board(self) -> str:
         errors = self.per_board
         top = max(np.nanmax(errors, initial=0), 1e-9)
-        step = min(26.0, 280 / len(errors))
-        parts = [svg.text((650, 528), "RMS of each board", "note")]
+        step = min(26.0, 320 / len(errors))
+        parts = [svg.text((_ERRORS, 534), "RMS of each board", "note")]
         for i, error in enumerate(errors):
-            x, picked = 650 + step * i, i == self.index
+            x, picked = _ERRORS + step * i, i == self.index
             if np.isfinite(error):
-                height = 44 * error / top
+                height = 42 * error / top
                 class_ = "fill-orange" if picked else "fill-blue" if self.used[i] else "fill-muted"
-                parts.append(svg.rectangle(x, 582 - height, 0.72 * step, height, class_))
+                parts.append(svg.rectangle(x, 586 - height, 0.72 * step, height, class_))
             parts.append(
-                svg.text((x + 0.36 * step, 596), str(i + 1), "tick middle orange" if picked else "tick middle")
+                svg.text((x + 0.36 * step, 602), str(i + 1), "tick middle orange" if picked else "tick middle")
             )
         chosen = errors[self.index]
         if np.isfinite(chosen):
-            parts.append(svg.text((940, 528), f"board {self.index + 1}: {_digits(chosen)} px", "note end"))
+            parts.append(svg.text((950, 534), f"board {self.index + 1}: {_digits(chosen)} px", "note end"))
         return "".join(parts)
 
     def levers(self) -> list[str]:
@@ -363,12 +387,13 @@ class CalibrationView(OrbitView, BoardPictures):
 
     def _lever(self, camera: Camera, poses: RigidTransform) -> str:
         f, z = camera.intrinsics.fx, transform(poses[self.index], middle_of(self.board))[2]
-        return f"fx/Z = {_number('fx', f)}/{z:.3f} m = {f / z:.0f} px/m"
+        return f"{_number('fx', f)} / {z:.3f} m = {f / z:.0f}"
 
     def _facts(self) -> str:
-        lines = [svg.text((650, 622 + 17 * i), words, "number") for i, words in enumerate(self.levers())]
-        words = f"correlation of fx with Z of board {self.index + 1}: {signed(self.correlation, 4)}"
-        return "".join(lines) + svg.text((650, 656), words if self.used[self.index] else "", "note")
+        lines = [svg.text((_ERRORS, 640 + 19 * i), words, "number") for i, words in enumerate(self.levers())]
+        words = f"correlation of fx with Z: {signed(self.correlation, 4)}"
+        title = svg.text((_ERRORS, 622), f"fx / Z of board {self.index + 1}, px/m", "note")
+        return title + "".join(lines) + svg.text((_ERRORS, 680), words if self.used[self.index] else "", "note")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 

@@ -19,20 +19,33 @@ from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.flow import rows, shortened
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views import swatches
-from camviz.views.base import Control, Drawn, View, answered, choice, slider, switch, without
+from camviz.views.base import Control, View, answered, choice, one_of, slider, switch, without
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
-LAYOUTS = {"chart photograph": 326, "spectra chart photograph steps": 640, "chart photograph yours": 626}
-"""What is drawn, and how tall it is."""
+_CHART = (334, {"chart": 410, "photograph": 330, "numbers": 220})
+_STEPS = ("counted (raw)", "× gains", "× matrix", "what the eye sees")
+LAYOUTS = {
+    "chart photograph": shortened(rows(_CHART), numbers=220, photograph=300),
+    "spectra chart photograph steps": shortened(
+        rows(_CHART, (220, {"light": 320, "surface": 320, "sensor": 320}), (74, dict.fromkeys(_STEPS, 240))),
+        photograph=300,
+    ),
+    "chart photograph yours": shortened(
+        rows(_CHART, (300, {"your chart": 410, "your photograph": 330, "your numbers": 220})),
+        **{"numbers": 220, "photograph": 300, "your numbers": 80},
+    ),
+}
+"""What is drawn, and where."""
 PARTS = ("develop", "gains", "matrix")
 _DRAFT, _FINE = 208, 416  # pixels on the photograph's longer side
-_CHART, _PHOTOGRAPH, _COLUMN = 20, 430, 780  # where they begin, from left to right
+_COLUMN = 750  # where the numbers begin
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,7 @@ class ColourView(View):
     """
 
     title: ClassVar[str] = "White balance and colour"
+    layouts = LAYOUTS
 
     light: str = choice("Planckian", "daylight", *LAMPS, help="what shines: a glowing body, the sky, or a lamp")
     kelvin: float = slider(
@@ -78,9 +92,7 @@ class ColourView(View):
         super().__post_init__()
         if isinstance(self.patch, bool) or self.patch not in range(24):
             raise ValueError(f"patch must be a whole number 0 … 23, got {self.patch!r}")
-        for name, known in (("panels", LAYOUTS), ("part", PARTS)):
-            if getattr(self, name) not in known:
-                raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, got {getattr(self, name)!r}")
+        one_of("part", self.part, PARTS)
 
     def offered(self) -> dict[str, Control]:
         """Daylight begins at 4000 K."""
@@ -178,19 +190,22 @@ class ColourView(View):
             matrix, problem = tried(self.yours, (balanced, target), matrix)
         return developed(raw, gains, matrix, encoded=self.gamma != "at the end"), problem
 
-    def _your_row(self, draft: bool) -> Drawn:
+    def _your_row(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
         """The chart and the photograph by the reader's function, below those above."""
         rgb, problem = self.your_chart
-        panel = replace(self._chart_panel, name="your chart", y=348)
+        panel = replace(self._chart_panel, name="your chart", y=_CHART[0] + 34)
         if problem:
-            return without(panel, problem, "With your function", (16, 30)), {}
+            return {"your chart": without(panel, problem, "With your function", (16, 30))}, {}
         shown = swatches.chart(panel, rgb, self.shot.true_chart, self._off(rgb), self.patch)
         surfaces = self._surfaces(_DRAFT if draft else _FINE)
         image = to_display(self.your_way(surfaces @ self.shot.raw_from_srgb.T)[0])
-        body = panel.show(shown, title="With your function") + self._photograph_panel(image, "your photograph", 348)
         figure = {"mean ΔE2000, yours": f"{self._off(rgb).mean():.2f}"}
-        body += readout(figure, (_COLUMN, 366), (0, 0), (0, 18))
-        return body, {"your photograph": jpeg(image)}
+        parts = {
+            "your chart": panel.show(shown, title="With your function"),
+            "your photograph": self._photograph_panel(image, "your photograph"),
+            "your numbers": readout(figure, (_COLUMN, panel.y + 14), (0, 0), (0, 18)),
+        }
+        return parts, {"your photograph": jpeg(image)}
 
     def _off(self, rgb: np.ndarray) -> np.ndarray:
         """ΔE2000 (24,) of a chart; no number where there is no colour."""
@@ -235,29 +250,18 @@ class ColourView(View):
     # The picture ------------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        image, height = self.image(draft=draft), LAYOUTS[self.panels]
+        image = self.image(draft=draft)
+        parts = {"chart": self._chart(), "photograph": self._photograph_panel(image), "numbers": self._numbers_column()}
         photographs = {"photograph": jpeg(image)}
-        body = []
-        if "spectra" in self.panels:
-            body += [self._light_panel(), self._surface_panel(), self._sensor_panel()]
-        body += [
-            self._chart_panel.show(
-                swatches.chart(self._chart_panel, self.chart, self.shot.true_chart, self.errors, self.patch),
-                title="The chart, and ΔE2000 of each patch",
-                hint="click a patch",
-                drag="chart",
-                label="Choose a patch of the chart: click it or press the arrow keys",
-            ),
-            self._photograph_panel(image),
-            self._numbers_column(),
-        ]
-        if "yours" in self.panels:
+        if self._has("spectra"):
+            parts |= {"light": self._light_panel(), "surface": self._surface_panel(), "sensor": self._sensor_panel()}
+        if self._has("yours"):
             below, attached = self._your_row(draft)
-            body.append(below)
+            parts |= below
             photographs |= attached
-        if "steps" in self.panels:
-            body.append(self._steps())
-        return self.composed(height, *body, attached=photographs)
+        if self._has("steps"):
+            parts |= self._steps()
+        return self.tiled(LAYOUTS[self.panels], parts, photographs)
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The photograph as developed, uint8 sRGB."""
@@ -268,14 +272,14 @@ class ColourView(View):
         return np.clip(encoded + 0.5, 0, 255).astype(np.uint8)
 
     def _light_panel(self) -> str:
-        panel = _spectrum_panel("light", 56, 108)
+        panel = _spectrum_panel("light", 60, 108)
         lines = plot.grid(panel) + plot.curve(panel, spectra.WAVELENGTHS_NM, self.power, "ink")
         strip = swatches.rainbow(panel, self.power)
         note = self.light if self.light in LAMPS else ""
         return plot.axes(panel, "wavelength in nm", "power") + panel.show(strip + lines, title="The light", note=note)
 
     def _surface_panel(self) -> str:
-        panel = _spectrum_panel("surface", 376, 1.05)
+        panel = _spectrum_panel("surface", 380, 1.05)
         curves = zip(self.reflectances, ("blue", "orange dashed"), strict=False)
         lines = [plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in curves]
         note = "dashed: its metamer" if self.metamer else spectra.patch_names()[self.patch]
@@ -285,7 +289,7 @@ class ColourView(View):
 
     def _sensor_panel(self) -> str:
         tall = 1.9 if self.camera == "CIE observer" else 1.1
-        panel = _spectrum_panel("sensor", 696, tall)
+        panel = _spectrum_panel("sensor", 700, tall)
         lines = [
             plot.curve(panel, spectra.WAVELENGTHS_NM, channel, class_)
             for channel, class_ in zip(self.shot.sensitivity.T, ("red thick", "green dashed", "blue"), strict=True)
@@ -297,23 +301,30 @@ class ColourView(View):
 
     @property
     def _chart_panel(self) -> Panel:
-        return Panel("chart", _CHART, self._top, 390, 262, 0, 6, 0, 4)
+        return Panel("chart", 10, 34, 390, 252, 0, 6, 0, 4)
 
-    @property
-    def _top(self) -> float:
-        """Where the chart begins: below the spectra, where there are any."""
-        return 262 if "spectra" in self.panels else 34
+    def _chart(self) -> str:
+        panel = self._chart_panel
+        shown = panel.show(
+            swatches.chart(panel, self.chart, self.shot.true_chart, self.errors, self.patch),
+            title="The chart",
+            hint="click a patch",
+            drag="chart",
+            label="Choose a patch of the chart: click it or press the arrow keys",
+        )
+        key = "Upper left: the camera; lower right: the truth.\nNumber: ΔE2000"
+        return shown + svg.paragraph((panel.x, panel.y + panel.height + 18), key, panel.width)
 
-    def _photograph_panel(self, image: np.ndarray, name: str = "photograph", top: float | None = None) -> str:
+    def _photograph_panel(self, image: np.ndarray, name: str = "photograph") -> str:
         height, width = image.shape[:2]
-        panel = image_panel(name, _PHOTOGRAPH, self._top if top is None else top, 330, width, height, tallest=262)
+        panel = image_in(LAYOUTS[self.panels][name], name, width, height)
         return panel.show(placed_image(panel, name, width, height), title="Developed in the same way")
 
     def _numbers_column(self) -> str:
-        figures = readout(self._told(), (_COLUMN, self._top + 14), (0, 42), (0, 16), style="font-size:12px")
-        return svg.text((_COLUMN, self._top - 8), "In numbers", "title") + figures
+        figures = readout(self._told(), (_COLUMN, 52), (0, 46), (0, 18))
+        return svg.text((_COLUMN, 26), "In numbers", "title") + figures
 
-    def _steps(self) -> str:
+    def _steps(self) -> dict[str, str]:
         """The chosen patch on its way through: a colour and its numbers for each step."""
         raw = self.shot.raw(self.reflectances)
         seen = to_srgb(balance.seen(self.power, self.reflectances))
@@ -321,8 +332,8 @@ class ColourView(View):
             balanced = raw * self.gains
         else:
             balanced = developed(raw, self.gains, np.eye(3), encoded=True)
-        steps = {"counted (raw)": raw, "× gains": balanced, "× matrix": self.develop(raw), "what the eye sees": seen}
-        return swatches.steps(20, 556, steps)
+        steps = dict(zip(_STEPS, (raw, balanced, self.develop(raw), seen), strict=True))
+        return swatches.steps(LAYOUTS[self.panels], steps)
 
     # The hand ---------------------------------------------------------------------------------------------------------
 
@@ -341,7 +352,7 @@ class ColourView(View):
 
 
 def _spectrum_panel(name: str, x: float, top: float) -> Panel:
-    return plot.plot_panel(name, x, 34, 244, 142, (380, 780), (0, top))
+    return plot.plot_panel(name, x, 368, 250, 136, (380, 780), (0, top))
 
 
 @lru_cache(maxsize=2)  # a draft and a fine one

@@ -19,6 +19,7 @@ from camviz import mosaics
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, true_minus
@@ -33,13 +34,14 @@ from camviz.views.marks import circle
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side
-_MAIN, _PAIRED = 472, 402  # widths of the large picture, alone and beside another, in picture units
-_RIGHT = 490  # where the other begins
-_LOUPES = {  # where the three small pictures stand, (x, y), and how wide they are
-    "spectrum": (((560, 34), (691, 34), (822, 34)), 118),
-    "": (((560, 34), (758, 34), (560, 256)), 182),
+_KEY = 62  # units right of a picture, for the key of its map
+_BESIDE = (506, {"picture": 550, "loupe": 150, "numbers": 260})
+LAYOUTS = {
+    "picture loupe": shortened(rows(_BESIDE), numbers=90),
+    "picture loupe figures": shortened(rows(_BESIDE), numbers=190),
+    "picture loupe spectrum figures": rows(_BESIDE),
+    "picture yours": rows((494, {"picture": 480, "with your green": 480})),
 }
-LAYOUTS = ("picture loupe", "picture loupe figures", "picture loupe spectrum figures", "picture yours")
 _WORST = 60.0  # of the map of errors, in units of CIELAB
 _TICKS = [(-0.5, "−½"), (0.0, "0"), (0.5, "½")]
 
@@ -192,37 +194,43 @@ class DemosaicingView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
-        height = 480 if "yours" in self.panels else 552
-        body = [self._large_panel(photographs, draft)]
+        parts = {"picture": self._large_panel(photographs, draft)}
         if "yours" in self.panels:
-            body.append(self._your_panel(photographs, draft))
+            parts["with your green"] = self._your_panel(photographs, draft)
         else:
-            body.append(self._loupe_panels(photographs))
-        if "spectrum" in self.panels:
-            body.append(self._spectrum_panel(photographs))
-        body.append(self._words())
-        return self.composed(height, *body, attached=photographs)
+            parts |= {
+                "loupe": self._loupe_panels(photographs),
+                "numbers": readout(self._told(), (710, 26), (0, 37), (0, 17)),
+            }
+            if self._has("spectrum"):
+                parts["numbers"] += self._spectrum_panel(photographs)
+        return self.tiled(LAYOUTS[self.panels], parts, photographs)
 
     @cached_property
     def _panel(self) -> Panel:
         height, width = self.truth.shape[:2]
-        widest = _PAIRED if "yours" in self.panels else _MAIN
-        return image_panel("picture", 20, 34, widest, width, height, tallest=widest)
+        widest = LAYOUTS[self.panels]["picture"][2] - 20 - _KEY
+        return image_panel("picture", 10, 34, widest, width, height, tallest=widest)
 
     def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
         height, width = self.truth.shape[:2]
         if "yours" in self.panels:
             marks, heading = self._predicted(), dict[str, Any]()
+            below = self._worth(self._panel, self.measures.psnr_db, self.measures.false_colour, "label")
         else:
-            marks = self._predicted() + self._frame()
+            marks, below = self._predicted() + self._frame(), ""
             label = "The picture; drag or press the arrow keys to move the loupe"
             heading = {"hint": "drag the loupe", "drag": "loupe", "label": label}
         if self.show == "false colour":
-            return self._map_of_errors(self._panel, self.measures.colour_error, photographs, draft, marks, **heading)
+            return below + self._map_of_errors(
+                self._panel, self.measures.colour_error, photographs, draft, marks, **heading
+            )
         pixels = to_display(mosaics.in_colour(self.measured, self.filters)) if self.show == "mosaic" else self.rebuilt
         title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
         photographs["picture"] = jpeg(pixels, 90)
-        return self._panel.show(placed_image(self._panel, "picture", width, height) + marks, title=title, **heading)
+        return below + self._panel.show(
+            placed_image(self._panel, "picture", width, height) + marks, title=title, **heading
+        )
 
     def _map_of_errors(
         self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: str, **heading: Any
@@ -235,16 +243,20 @@ class DemosaicingView(View):
 
     def _your_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
         """The picture by the reader's green, or what is in the way of it."""
-        panel, (pixels, problem) = replace(self._panel, name="yours", x=_RIGHT), self.your_picture
+        panel, (pixels, problem) = replace(self._panel, name="yours", x=490), self.your_picture
         height, width = self.truth.shape[:2]
         if pixels is None:
             return without(panel, problem, "With your green", (16, 30))
+        worth = mosaics.psnr(pixels, self.truth), mosaics.false_colour(pixels, self.truth)
+        below = self._worth(panel, *worth, "orange")
         if self.show == "false colour":
             error = mosaics.colour_error(pixels, self.truth)
             title = "What colour is false in yours"
-            return self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
+            return below + self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
         photographs["yours"] = jpeg(pixels, 90)
-        return panel.show(placed_image(panel, "yours", width, height) + self._predicted(), title="With your green")
+        return below + panel.show(
+            placed_image(panel, "yours", width, height) + self._predicted(), title="With your green"
+        )
 
     def _rebuilt_by(self) -> str:
         return self.used if self.used == self.algorithm else f"{self.used} ({self.algorithm} is for Bayer's patterns)"
@@ -273,46 +285,31 @@ class DemosaicingView(View):
             "rebuilt": self.rebuilt[window],
             "truth": self.truth[window],
         }
-        places, wide = _LOUPES["spectrum" if "spectrum" in self.panels else ""]
         body = ""
-        for (name, pixels), (x, y) in zip(seen.items(), places, strict=True):
-            panel = Panel(f"loupe {name}", x, y, wide, wide, 0, 1, 0, 1)
+        for i, (name, pixels) in enumerate(seen.items()):
+            panel = Panel(f"loupe {name}", 560, 34 + 162 * i, 130, 130, 0, 1, 0, 1)
             photographs[panel.name] = png(np.ascontiguousarray(pixels))
-            content = svg.image(panel.name, 0, 0, wide, wide, style="image-rendering:pixelated")
+            content = svg.image(panel.name, 0, 0, 130, 130, style="image-rendering:pixelated")
             body += panel.show(content, title=name)
         return body
 
     def _spectrum_panel(self, photographs: dict[str, bytes]) -> str:
-        panel = plot.plot_panel("spectrum", 604, 200, 196, 196, (-0.5, 0.5), (0.5, -0.5))
+        panel = plot.plot_panel("spectrum", 772, 232, 148, 148, (-0.5, 0.5), (0.5, -0.5))
         photographs["spectrum"] = jpeg(_spectrum(self.source, self.filters, self.spots_px))
         places = _everywhere(self.filters, 0.5)
         content = svg.image("spectrum", 0, 0, panel.width, panel.height) + _rings(panel.place(places), 9)
         axes = plot.axes(panel, "fu [cycles/px]", "fv [cycles/px]", _TICKS, _TICKS)
-        listed = [svg.text((818, 212), "taken for colour", "note")]
-        for i, carrier in enumerate(mosaics.carriers(self.filters)[:7]):
-            listed.append(svg.text((818, 234 + 19 * i), f"○ {_place(carrier)}", "tick"))
-            listed.append(svg.text((938, 234 + 19 * i), f"{carrier.strength:.2f}", "tick end"))
-        return panel.show(content, title="Spectrum of the mosaic") + axes + "".join(listed)
+        listed = [svg.text((710, 440), "○ seen as colour, how strongly", "note")]
+        for i, carrier in enumerate(mosaics.carriers(self.filters)[:6]):
+            x, y = 710 + 120 * (i % 2), 459 + 18 * (i // 2)
+            listed.append(svg.text((x, y), f"{_place(carrier)}", "tick"))
+            listed.append(svg.text((x + 104, y), f"{carrier.strength:.2f}", "tick end"))
+        return panel.show(content, title="Spectrum") + axes + "".join(listed)
 
-    def _words(self) -> str:
-        if "yours" in self.panels:
-            return self._two_lines_of_figures()
-        if self._has("spectrum"):
-            return readout(self._told(), (560, 454), (0, 21), (94, 0))
-        return readout(self._told(), (758, 270), (0, 44), (0, 19))
-
-    def _two_lines_of_figures(self) -> str:
-        """What the algorithm's picture and the reader's are worth, each below its picture."""
-        pixels, below = self.your_picture[0], self._panel.y + self._panel.height + 24
-        words = [svg.text((self._panel.x, below), self._worth(self.measures.psnr_db, self.measures.false_colour))]
-        if pixels is not None:
-            worth = self._worth(mosaics.psnr(pixels, self.truth), mosaics.false_colour(pixels, self.truth))
-            words.append(svg.text((_RIGHT, below), worth, "orange"))
-        return "".join(words)
-
-    @staticmethod
-    def _worth(psnr_db: float, false_colour: float) -> str:
-        return f"PSNR {psnr_db:.2f} dB, false colour ΔC = {false_colour:.1f} on average"
+    def _worth(self, panel: Panel, psnr_db: float, false_colour: float, class_: str) -> str:
+        """What a rebuilt picture is worth, below it."""
+        words = f"PSNR {psnr_db:.2f} dB, false colour ΔC = {false_colour:.1f} on average"
+        return svg.paragraph((panel.x, panel.y + panel.height + 24), words, 460, class_)
 
     # What can be dragged ---------------------------------------------------------------------------------------------
 

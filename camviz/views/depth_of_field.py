@@ -15,7 +15,8 @@ import numpy as np
 from camviz import optics
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.flow import Cell, rows
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, band, curve, legend, logarithmic, logarithmic_grid, logs, plot_panel, upright
 from camviz.draw.readout import listed, readout
@@ -31,7 +32,13 @@ GLOBE_Z = 3.3  # of the globe in the world, towards which the camera looks along
 STAND = (0.58, 0.45)  # x and y of the camera
 GLOBE_M = 0.54  # the globe's diameter
 LIGHT_N = 4.0  # the f-number for which a fixed exposure is right
-_HEIGHTS = {"rays photograph blur": 636, "rays photograph": 432, "photograph blur": 470}
+_LAYOUTS = {
+    "rays photograph blur": rows(
+        (308, {"rays": 580, "photograph": 380}), (380, {"blur": 420, "at the sensor": 280, "numbers": 260})
+    ),
+    "rays photograph": rows((308, {"rays": 580, "photograph": 380}), (190, {"at the sensor": 620, "numbers": 340})),
+    "photograph blur": rows((334, {"blur": 400, "photograph": 320, "numbers": 240})),
+}
 _DEPTHS, _BLURS = (0.5, 40.0), (0.002, 20.0)  # the plot's range: m and mm
 _SHAPES = {"disc": ("disc", 6), "hexagon": ("polygon", 6), "ring": ("ring", 6), "heart": ("heart", 6)}
 
@@ -53,7 +60,7 @@ class DepthOfFieldView(View):
     """
 
     title: ClassVar[str] = "Lens and depth of field"
-    layouts = _HEIGHTS
+    layouts = _LAYOUTS
 
     focal_mm: float = slider(50.0, 20.0, 100.0, 1.0, label="focal length f", unit="mm")
     f_number: float = slider(2.0, 1.4, 22.0, 0.1, label="f-number N", help="focal length / diameter of the aperture")
@@ -201,30 +208,33 @@ class DepthOfFieldView(View):
     # What it looks like ----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        height = _HEIGHTS[self.panels]
-        body = [self._photograph_panel(), self._numbers()]
+        parts = {"photograph": self._photograph_panel(), "numbers": self._numbers()}
         if "rays" in self.panels:
-            body += [self._ray_panel(), self._loupe_panel(), self._aperture_panel()]
+            parts |= {"rays": self._ray_panel(), "at the sensor": self._loupe_panel() + self._aperture_panel()}
         if "blur" in self.panels:
-            body.append(self._blur_panel())
+            parts["blur"] = self._blur_panel()
         photographs = {"lens": _photographed(self, DRAFT, True) if draft else _photographed(self, FINE, False)}
-        return self.composed(height, *body, attached=photographs)
+        layout = _LAYOUTS[self.panels]
+        return self.tiled(layout, {name: parts[name] for name in layout}, photographs)
+
+    def _cell(self, name: str) -> Cell:
+        return _LAYOUTS[self.panels][name]
 
     @cached_property
     def _rays(self) -> Panel:
-        return lens_diagram.diagram_panel(20, 34, 560, 196)
+        return lens_diagram.diagram_panel(10, 34, 560, 264)
 
     def _ray_panel(self) -> str:
         content = lens_diagram.rays(self._rays, self.lens, 1000 * self.distance_m)
         label = "Rays through the lens; drag or press the arrow keys to move the object"
-        hint = "left edge: infinity · drag to move the object"
-        return self._rays.show(
-            content, title="Thin lens, to scale behind the lens", hint=hint, drag="object", label=label
-        )
+        content += svg.text((8, self._rays.height - 10), "← infinity", "note halo")
+        hint, title = "drag the object", "Thin lens, to scale behind the lens"
+        return self._rays.show(content, title=title, hint=hint, drag="object", label=label)
 
     @cached_property
     def _loupe(self) -> Panel:
-        return lens_diagram.loupe_panel(20, 268, 386, 140, self.lens.image_mm)
+        x, y, width, _ = self._cell("at the sensor")
+        return lens_diagram.loupe_panel(x + 10, y + 34, 260 if width < 400 else 386, 140, self.lens.image_mm)
 
     def _loupe_panel(self) -> str:
         depths = [(1000 * self.distance_m, "blue", "globe"), (np.inf, "orange", "far away")]
@@ -234,20 +244,23 @@ class DepthOfFieldView(View):
         return self._loupe.show(content, title="At the sensor", note=note, drag="sensor", label=label)
 
     def _aperture_panel(self) -> str:
-        panel = Panel("aperture", 440, 268, 140, 140, -1.1, 1.1, -1.1, 1.1)
+        x, y, width, _ = self._cell("at the sensor")
+        x, y, width = (x + 10, y + 214, 260) if width < 400 else (x + 410, y + 34, 200)
+        across = 1.1 * width / 140
+        panel = Panel("aperture", x, y, width, 140, -across, across, -1.1, 1.1)
         points, passes = self.lens.points(DRAFT)
         content = lens_diagram.opening(panel, self.lens.aperture, points, passes)
         return panel.show(content, title="Points of the lens")
 
     def _photograph_panel(self) -> str:
-        panel = image_panel("lens", 600, 34, 340, 320, 240)
+        panel = image_in(self._cell("photograph"), "lens", 320, 240)
         note = f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
         return panel.show(placed_image(panel, "lens", 320, 240), title="The photograph, traced", note=note)
 
     @cached_property
     def _plot(self) -> Panel:
-        top, height = (446, 140) if "rays" in self.panels else (34, 380)
-        return plot_panel("blur", 74, top, 506, height, logs(_DEPTHS), logs(_BLURS))
+        x, y, width, height = self._cell("blur")
+        return plot_panel("blur", x + 70, y + 34, width - 82, height - 84, logs(_DEPTHS), logs(_BLURS))
 
     def _blur_panel(self) -> str:
         panel, (near, far) = self._plot, self.limits_m
@@ -272,7 +285,7 @@ class DepthOfFieldView(View):
         )
         label = "Blur against distance; drag or press the arrow keys to change the focus"
         shown = panel.show(content, title="Blur against distance", hint="drag to focus", drag="focus", label=label)
-        return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks) + shown
+        return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks, aside=56) + shown
 
     def _levels(self, panel: Panel) -> tuple[str, str]:
         """The lines of the blur that is allowed and of the Airy disc, and their names, at opposite ends.
@@ -308,14 +321,16 @@ class DepthOfFieldView(View):
             drawn += "".join(upright(panel, float(end), "orange") for end in ends if np.isfinite(end))
             entries, problems = [*entries, ("orange", "your limits")], [*problems, problem]
         words = "\n".join(filter(None, problems))
-        drawn += legend(panel, entries, "bottom left") if entries else ""
+        drawn += legend(panel, entries, "top right") if entries else ""
         return drawn + (svg.paragraph((12, 22), words, panel.width - 24) if words else "")
 
     def _numbers(self) -> str:
-        rows = svg.text((606, 326), "This lens", "title") + readout(self._told(), (606, 352), (0, 23), (130, 0))
-        if self.panels != "rays photograph blur":
-            return rows
-        return rows + readout({"lens equation, 1/f = 1/s + 1/v, in mm:": self.equation()}, (606, 574), (0, 0), (0, 22))
+        x, y, _, _ = self._cell("numbers")
+        figures, step = self._told(), 42
+        if self.panels == "rays photograph blur":
+            step = 34
+            figures |= {"1/f = 1/s + 1/v, in mm": self.equation()}
+        return svg.text((x + 10, y + 26), "This lens", "title") + readout(figures, (x + 10, y + 48), (0, step), (0, 16))
 
     # What it does when touched ---------------------------------------------------------------------------------------
 

@@ -18,8 +18,9 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
+from camviz.draw.flow import Cell, rows, shortened
 from camviz.draw.items import closed
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.space import Item, Line, OrbitCamera, axes_triad, space_panel
@@ -33,13 +34,19 @@ from camviz.views.base import Drawn, OrbitView, answered, choice, slider, switch
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
 _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
-_SLOTS = {  # where panels stand, (x, y, width, tallest), by how many there are
-    1: ((20, 34, 680, 510),),
-    2: ((20, 34, 380, 300), (420, 34, 380, 300)),
-    4: ((20, 34, 380, 300), (420, 34, 380, 300), (20, 370, 470, 180), (545, 370, 255, 180)),
+_BRIGHT = "stroke:#f2c94c"  # on a photograph, in every theme
+_TILES = {  # of the panels
+    "picture": "the picture",
+    "field": "displacements",
+    "yours": "with your function",
+    "curve": "radial curve",
+    "rays": "rays in space",
 }
-_HEIGHTS = {1: 564, 2: 354, 4: 602}
-_COLUMN = 822  # where the numbers stand
+_ROWS: dict[int, tuple[tuple[float, tuple[float, ...]], ...]] = {  # heights and widths by how many panels there are
+    1: ((480, (620, 340)),),
+    2: ((320, (380, 380, 200)),),
+    4: ((320, (380, 380, 200)), (270, (560, 400))),
+}
 
 
 @dataclass(frozen=True)
@@ -78,7 +85,7 @@ class DistortionView(OrbitView):
     def __post_init__(self) -> None:
         super().__post_init__()
         wanted = self.panels.split()
-        if len(wanted) not in _SLOTS or not set(wanted) <= {"picture", "field", "yours", "curve", "rays"}:
+        if len(wanted) not in _ROWS or not set(wanted) <= set(_TILES):
             raise ValueError(f"panels must be one, two or four of picture, field, yours, curve, rays, got {wanted}")
 
     @classmethod
@@ -171,14 +178,21 @@ class DistortionView(OrbitView):
             "curve": self._curve_with_axes,
             "rays": self._frustum_panel,
         }
-        height = _HEIGHTS[len(names)]
-        body, photographs = [], dict[str, bytes]()
-        for name, slot in zip(names, _SLOTS[len(names)], strict=True):
-            content, attached = draw[name](*slot, draft=draft)
-            body.append(content)
+        layout = self._layout(names)
+        parts, photographs = dict[str, str](), dict[str, bytes]()
+        for name in names:
+            tile = _TILES[name]
+            parts[tile], attached = draw[name](layout[tile], draft=draft)
             photographs |= attached
-        body.append(self._numbers_column(names))
-        return self.composed(height, *body, attached=photographs)
+        parts["numbers"] = self._numbers_column(layout["numbers"], names)
+        return self.tiled(layout, {tile: parts[tile] for tile in layout}, photographs)
+
+    def _layout(self, panels: list[str]) -> dict[str, Cell]:
+        """The first two panels beside the numbers, and the others below them."""
+        names = [_TILES[name] for name in panels]
+        order = iter([*names[:2], "numbers", *names[2:]])
+        found = rows(*((height, {next(order): width for width in widths}) for height, widths in _ROWS[len(panels)]))
+        return shortened(found, numbers=320)
 
     def _name(self) -> str:
         if self.lens:
@@ -221,17 +235,17 @@ class DistortionView(OrbitView):
             return self.camera.lens.project(on_plane(xy))
         return self.camera.lens.distort(xy)
 
-    def _picture_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
-        panel = self._image_panel("picture", x, y, width, tallest)
+    def _picture_panel(self, cell: Cell, *, draft: bool) -> Drawn:
+        panel = self._image_panel("picture", cell)
         straight = _grid_lines(self.intrinsics, 33 if draft else 65)
         lines = self._bend(straight) if self.show == "distorted" else straight
-        drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "yellow thin")
+        drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "thin", style=_BRIGHT)
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
         shown = self._photograph(panel, "camera") + drawn + self._fold_circle(panel, bent=self.show == "distorted")
         return panel.show(shown, title=title), {"camera": jpeg(self.image(draft=draft))}
 
-    def _image_panel(self, name: str, x: float, y: float, width: float, tallest: float) -> Panel:
-        return image_panel(name, x, y, width, self.intrinsics.width, self.intrinsics.height, tallest=tallest)
+    def _image_panel(self, name: str, cell: Cell) -> Panel:
+        return image_in(cell, name, self.intrinsics.width, self.intrinsics.height)
 
     def _photograph(self, panel: Panel, attached: str) -> str:
         return placed_image(panel, attached, self.intrinsics.width, self.intrinsics.height)
@@ -242,9 +256,9 @@ class DistortionView(OrbitView):
         """Where the reader's function puts ideal points (..., 2), and what is wrong with it."""
         return answered(self.yours, (xy, self.k1, self.k2, self.k3), xy)
 
-    def _your_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
+    def _your_panel(self, cell: Cell, *, draft: bool) -> Drawn:
         """The same picture by the reader's function: its grid over the photograph, or the photograph straightened."""
-        panel = self._image_panel("yours", x, y, width, tallest)
+        panel = self._image_panel("yours", cell)
         lines, problem = self._your_bend(_grid_lines(self.intrinsics, 33 if draft else 65))
         if problem:
             return without(panel, problem, "With your function"), {}
@@ -276,8 +290,8 @@ class DistortionView(OrbitView):
     def _distorted(self, uv: np.ndarray) -> np.ndarray:
         return self.intrinsics.to_pixels(self._bend(self.intrinsics.from_pixels(uv)))
 
-    def _field_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
-        panel = self._image_panel("field", x, y, width, tallest)
+    def _field_panel(self, cell: Cell, *, draft: bool) -> Drawn:
+        panel = self._image_panel("field", cell)
         starts = _pixel_grid(self.intrinsics, 13).reshape(-1, 2)
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
@@ -287,7 +301,7 @@ class DistortionView(OrbitView):
             + self._contours(panel, 33 if draft else 65)
             + self._fold_circle(panel, bent=False)
         )
-        return panel.show(content, title="Where each point goes", note="contours: shift in px"), {}
+        return panel.show(content, title="Each point goes to its dot", note="contours: px"), {}
 
     def _contours(self, panel: Panel, samples: int) -> str:
         uv = _pixel_grid(self.intrinsics, samples)
@@ -309,8 +323,9 @@ class DistortionView(OrbitView):
 
     # The radial curve ------------------------------------------------------------------------------------------------
 
-    def _curve_with_axes(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
-        return self.curve_panel(x + 50, y, width - 50, min(tallest, 240)), {}
+    def _curve_with_axes(self, cell: Cell, *, draft: bool) -> Drawn:
+        x, y, width, height = cell
+        return self.curve_panel(x + 62, y + 34, width - 76, height - 84), {}
 
     def curve_panel(self, x: float, y: float, width: float, height: float, *, equation: bool = True) -> str:
         """The radial curve g(r), where it folds and where the picture ends; `x` and `y` are its plot's corner."""
@@ -359,8 +374,9 @@ class DistortionView(OrbitView):
 
     # The frustum -----------------------------------------------------------------------------------------------------
 
-    def _frustum_panel(self, x: float, y: float, width: float, tallest: float, *, draft: bool) -> Drawn:
-        panel = space_panel("frustum", x, y, width, tallest)
+    def _frustum_panel(self, cell: Cell, *, draft: bool) -> Drawn:
+        x, y, width, height = cell
+        panel = space_panel("frustum", x + 10, y + 34, width - 20, height - 44)
         label = "The rays of the image in space; drag or press the arrow keys to walk around"
         return self.in_space(panel, self._bent_frustum(), draft, "Its rays in space", label, drag="orbit")
 
@@ -380,18 +396,17 @@ class DistortionView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers_column(self, panels: list[str]) -> str:
+    def _numbers_column(self, cell: Cell, panels: list[str]) -> str:
         """The coefficients and key figures: all of them beside four panels, else those that the panels speak of."""
-        coefficients = self._coefficients()
+        coefficients = self._coefficients()  # the lens's own, where one is given
         if len(panels) < 4:
             coefficients = {name: value for name, value in coefficients.items() if value or name == "k1"}
-        rows = [svg.text((_COLUMN, 26), "This lens", "title")]
-        for i, (name, value) in enumerate(coefficients.items()):  # the lens's own, where one is given
-            class_ = "number" if value else "number fill-muted"
-            rows.append(svg.text((_COLUMN, 50 + 18 * i), true_minus(f"{name} {value:+.4f}"), class_))
-        top = 80 + 18 * len(coefficients)
-        rows.append(readout(self._told(), (_COLUMN, top), (0, 40), (0, 17)))
-        return "".join(rows)
+        (x, y), half = cell[:2], (len(coefficients) + 1) // 2
+        drawn = [svg.text((x + 10, y + 26), "This lens", "title")]
+        for i, (name, value) in enumerate(coefficients.items()):
+            at = (x + 10 + 96 * (i // half), y + 50 + 18 * (i % half))
+            drawn.append(svg.text(at, true_minus(f"{name} {value:+.4f}"), "number" if value else "number fill-muted"))
+        return "".join(drawn) + readout(self._told(), (x + 10, y + 64 + 18 * half), (0, 36), (0, 16))
 
 
 def _grid_lines(intrinsics: Intrinsics, samples: int) -> np.ndarray:

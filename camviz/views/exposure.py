@@ -15,6 +15,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds, signed
@@ -33,6 +34,9 @@ FOCAL_MM, SENSOR_MM = 35.0, (36.0, 24.0)
 RIM_MM, RIM_DISTANCE_MM = 32.0, 20.0  # of the barrel, in front of the aperture
 SUBJECTS = {"garden": (0.0, 1.0), "snow": (0.72, 0.22), "coal": (0.015, 0.05)}  # reflectance: offset, and of the garden
 _WIDTH, _HEIGHT = 600, 400
+_LAYOUT = rows(
+    (324, {"picture": 440, "towards the corner": 300, "numbers": 220}), (226, {"histogram": 520, "stops": 440})
+)
 _STOPS = (-9.0, 1.0)  # of the histogram, below and above white
 
 
@@ -157,22 +161,25 @@ class ExposureView(View):
     # What it looks like -----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        height = 560 if self.yours else 540
         recorded = self.recorded(draft=draft)
-        corners, problem = self._corner_panel()
-        above = self._picture_panel(), self._histogram_panel(recorded), self._stops_panel()
-        words = svg.text((20, 552), problem, "note"), self._numbers_column()
-        return self.composed(height, *above, corners, *words, attached={"camera": jpeg(to_display(recorded))})
+        parts = {
+            "picture": self._picture_panel(),
+            "towards the corner": self._corner_panel(),
+            "numbers": self._numbers_column(),
+            "histogram": self._histogram_panel(recorded),
+            "stops": self._stops_panel(),
+        }
+        return self.tiled(_LAYOUT, parts, {"camera": jpeg(to_display(recorded))})
 
     def _picture_panel(self) -> str:
-        panel = image_panel("picture", 20, 34, 420, _WIDTH, _HEIGHT)
+        panel = image_panel("picture", 10, 34, 420, _WIDTH, _HEIGHT)
         shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
         note = f"f/{self.f_number:.3g}, {seconds(2.0**self.shutter_stops)}, ISO {100 * 2**self.iso:.0f}"
         return panel.show(shown, title="The picture", note=note)
 
     def _histogram_panel(self, recorded: np.ndarray) -> str:
         """How many pixels are how many stops below white."""
-        panel = plot.plot_panel("histogram", 66, 362, 374, 120, _STOPS, (0, 1.1))
+        panel = plot.plot_panel("histogram", 66, 358, 444, 144, _STOPS, (0, 1.1))
         with np.errstate(divide="ignore", invalid="ignore"):
             stops = np.log2(np.maximum(recorded.mean(axis=-1), 2.0**-9)).ravel()
         counts, borders = np.histogram(stops, np.linspace(-9.1, 1, 80))
@@ -194,7 +201,7 @@ class ExposureView(View):
             "ISO gain": (self.iso, "fill-purple"),
         }
         whole = sum(value for value, _ in parts.values())
-        panel = plot.plot_panel("stops", 540, 34, 220, 150, (-14, 20), (0, 5))
+        panel = plot.plot_panel("stops", 632, 358, 318, 144, (-14, 20), (0, 5))
         rows = [*((name, *one) for name, one in parts.items()), ("together", whole, "fill-muted")]
         drawn = [
             svg.polygon(panel.place([(0, 4.2 - i), (value, 4.2 - i), (value, 4.8 - i), (0, 4.8 - i)]), class_)
@@ -211,26 +218,27 @@ class ExposureView(View):
         shown = panel.show(plot.grid(panel, ticks, []) + "".join(drawn), title="Stops that add up")
         return shown + plot.axes(panel, "stops from the sunny 16 rule", "", ticks, names) + "".join(values)
 
-    def _corner_panel(self) -> tuple[str, str]:
-        """The light towards the corner, by each cause; and what is to be said of the reader's function."""
-        panel = plot.plot_panel("corners", 540, 262, 220, 220, (0, _CORNER_MM), (0, 1.08))
+    def _corner_panel(self) -> str:
+        """The light towards the corner, by each cause and by the reader's function, or what is to be said of that."""
+        panel = plot.plot_panel("corners", 502, 34, 226, 240, (0, _CORNER_MM), (0, 1.08))
         r = np.linspace(0, _CORNER_MM, 60)
         curves = plot.curve(panel, r, self.falloff(r, cos4=True, rim=False), "blue dashed")
         curves += plot.curve(panel, r, self.falloff(r, cos4=False, rim=True), "purple dashed")
         curves += plot.curve(panel, r, self.falloff(r), "ink thick")
-        points, problem = "", ""
+        points = ""
         if self.yours is not None:
             values, problem = tried(self.yours, (r[::3], FOCAL_MM), r[::3])
             places = panel.place(np.stack([r[::3], np.clip(values, -1, 3)], axis=-1))
             points = svg.line(places, "orange") + svg.dots(places, "orange", 6)
+            points += svg.paragraph((10, 20), problem, panel.width - 20, "note halo") if problem else ""
         entries = [("ink thick", "now"), ("blue dashed", "cos⁴"), ("purple dashed", "rim")]
         entries += [("orange thick", "yours")] if self.yours else []
         content = curves + points + plot.legend(panel, entries, "bottom left")
         names = "height on the sensor (mm)", "light, 1 on the axis"
-        return plot.plotted(panel, content, *names, title="Light towards the corner"), problem
+        return plot.plotted(panel, content, *names, title="Light towards the corner")
 
     def _numbers_column(self) -> str:
-        return svg.text((790, 26), "This exposure", "title") + readout(self.numbers(), (790, 54), (0, 44), (0, 17))
+        return svg.text((750, 26), "This exposure", "title") + readout(self.numbers(), (750, 48), (0, 31), (0, 15))
 
 
 _CORNER_MM = float(np.hypot(*SENSOR_MM)) / 2

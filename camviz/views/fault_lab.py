@@ -16,7 +16,8 @@ from camviz.clinic.laboratory import BOARD, VIEWS, Experiment, experiment, lab_f
 from camviz.clinic.registry import Finding
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
-from camviz.draw.panel import Panel, image_panel
+from camviz.draw.flow import rows
+from camviz.draw.panel import Panel, image_in
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, true_minus
 from camviz.views.base import choice, slider, switch
@@ -24,11 +25,16 @@ from camviz.views.marks import arrows
 from camviz.views.view_bars import LABEL, ViewChooser
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
-_MOST = 4  # findings that have room
+_MOST = 3  # findings that have room
 _FAR = 4.0  # standard deviations
 _LONGEST = 90.0  # picture units of an arrow
 _EVERYTHING = "bars picture estimates findings"
-_HEIGHTS = {"bars picture": 424, _EVERYTHING: 684}  # of the picture, by the panels it has
+_ERRORS = (366, {"residuals": 440, "bars": 300, "numbers": 220})
+_LAYOUTS = {
+    "bars picture": rows(_ERRORS),
+    _EVERYTHING: rows(_ERRORS, (272, {"estimates": 330, **{f"finding {i + 1}": 210 for i in range(_MOST)}})),
+}
+_FINDINGS = (330, 210)  # where they begin, and how wide each is
 _VERDICTS = ("0, nothing is off", "1, a corner is off", "2, a row or a column is off", "3, a whole view is off")
 
 
@@ -46,7 +52,7 @@ class FaultLabView(ViewChooser):
     """
 
     title: ClassVar[str] = "Fault lab"
-    layouts = _HEIGHTS
+    layouts = _LAYOUTS
 
     fault: str = choice(*lab_faults(), help="what is wrong")
     strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
@@ -100,12 +106,13 @@ class FaultLabView(ViewChooser):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        height = _HEIGHTS[self.panels]
-        body = self._headline() + self._bars_panel() + self._image_panel()
+        parts = {"residuals": self._image_panel(), "bars": self._bars_panel(), "numbers": self._headline()}
         if self.panels == _EVERYTHING:
-            body += self._estimates_panel() + self._findings(draft)
+            findings = self._findings(draft)
+            parts |= {"estimates": self._estimates_panel()}
+            parts |= {f"finding {i + 1}": body for i, body in enumerate(findings)}
         words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
-        return self.composed(height, body, described=words)
+        return self.tiled(_LAYOUTS[self.panels], parts, described=words)
 
     def _headline(self) -> str:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
@@ -113,14 +120,14 @@ class FaultLabView(ViewChooser):
         parts = []
         shown = 3 if self.panels == _EVERYTHING else 1
         for i, (name, value) in enumerate(list(self.numbers().items())[:shown]):
-            x = 20 + 316 * i
-            parts.append(svg.text((x, 22), name, "title"))
-            parts.append(svg.text((x, 52), value, f"label{' red' if i == 2 and self._astray else ''}",
+            y = 26 + 72 * i
+            parts.append(svg.text((750, y), name, "title"))
+            parts.append(svg.text((750, y + 29), value, f"label{' red' if i == 2 and self._astray else ''}",
                                   style="font-size:26px;font-weight:600"))  # fmt: skip
-            parts.append(svg.text((x + 8 + 8 * len(name), 22), told[name], "note"))
+            parts.append(svg.text((750, y + 48), told[name], "note"))
         words = f"In this calibration, {self.experiment.words}." if self.strength else "A healthy calibration."
-        parts.append(svg.text((20, 78), words if self.told else "What is wrong here?", "label"))
-        return "".join(parts) + self._your_verdict()
+        words = words if self.told else "What is wrong here?"
+        return "".join(parts) + svg.paragraph((750, 32 + 72 * shown), words, 200, "label") + self._your_verdict()
 
     def _your_verdict(self) -> str:
         """What the reader's triage says of all residuals together."""
@@ -129,11 +136,10 @@ class FaultLabView(ViewChooser):
         residuals = self.experiment.residuals.reshape(VIEWS, BOARD.rows, BOARD.columns, 2)
         answer, problem = tried(self.verdict, (residuals,), 0.0)
         if problem:
-            return svg.paragraph((490, 22), problem, 450)
+            return svg.paragraph((750, 322), problem, 200)
         known = answer in range(len(_VERDICTS))
         words = _VERDICTS[int(answer)] if known else f"{answer:g}, which is none of 0 to {len(_VERDICTS) - 1}"
-        large = {"style": "font-size:20px;font-weight:600"}
-        return svg.text((490, 22), "Your verdict on all views", "title") + svg.text((490, 50), words, "orange", **large)
+        return svg.text((750, 322), "Your verdict", "title") + svg.paragraph((750, 342), words, 200, "orange")
 
     @property
     def _astray(self) -> bool:
@@ -143,8 +149,7 @@ class FaultLabView(ViewChooser):
     @property
     def _bars(self) -> Panel:
         tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
-        height = 152 if self.panels == _EVERYTHING else 250
-        return plot.plot_panel("bars", 66, 116, 394, height, (0.5, VIEWS + 0.5), (0, tallest))
+        return plot.plot_panel("bars", 498, 34, 232, 288, (0.5, VIEWS + 0.5), (0, tallest))
 
     def _bars_panel(self) -> str:
         panel, errors = self._bars, self.experiment.errors
@@ -173,8 +178,7 @@ class FaultLabView(ViewChooser):
     def _image_panel(self) -> str:
         made, i = self.experiment, self.index
         k = made.camera.intrinsics
-        x, y, width, tallest = (20, 322, 440, 340) if self.panels == _EVERYTHING else (500, 116, 440, 290)
-        panel = image_panel("picture", x, y, width, k.width, k.height, tallest=tallest)
+        panel = image_in(_LAYOUTS[self.panels]["residuals"], "picture", k.width, k.height)
         seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
         starts = panel.place(seen)
         along = panel.place(seen - scale * residuals) - starts
@@ -197,7 +201,7 @@ class FaultLabView(ViewChooser):
         estimates = self.experiment.estimates
         values = np.array(list(estimates.values()))
         reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + values[:, 1])), 3.0)
-        panel = Panel("estimates", 530, 116, 250, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
+        panel = Panel("estimates", 46, 400, 150, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
         content = svg.line(panel.place([(0, 0), (0, panel.bottom)]), "ink")
         beside = ""
         for i, (name, (error, sigma)) in enumerate(estimates.items()):
@@ -210,39 +214,45 @@ class FaultLabView(ViewChooser):
             words = f"{_signed(error, sigma)} px"
             beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
         shown = panel.show(content, title="Estimate ± 1σ, less the truth")
-        ticks = [(float(t), true_minus(f"{t:g}")) for t in plot.ticks(-reach, reach, 5)]
+        ticks = [(float(t), true_minus(f"{t:g}")) for t in plot.ticks(-reach, reach, 3)]
         below = "".join(
             svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
             for px, (_, words) in zip(panel.place([(t, 0) for t, _ in ticks])[:, 0], ticks, strict=True)
         )
-        note = "in pixels (k1, k2: at the image’s corner); red: more than 4σ off"
-        return shown + beside + below + svg.text((490, panel.y + panel.height + 36), note, "note")
+        note = "In pixels; k1 and k2 at the corner. Red: more than 4σ off."
+        return shown + beside + below + svg.paragraph((10, panel.y + panel.height + 38), note, 310)
 
-    def _findings(self, draft: bool) -> str:
-        x, y = 490.0, 346.0
+    def _findings(self, draft: bool) -> list[str]:
+        """What the clinic finds, a tile for each, the worst first."""
+        (left, width), y = _FINDINGS, _ERRORS[0] + 26
+        x, room = left + 10, width - 20
         head = svg.text((x, y), "What the clinic finds", "title")
         if not self.told:
-            return head + svg.paragraph((x, y + 30), "Hidden. Make your diagnosis, then switch them on.", 450, "label")
+            return [
+                head + svg.paragraph((x, y + 30), "Hidden. Make your diagnosis, then switch them on.", room, "label")
+            ]
         if draft:
-            return head + svg.text((x, y + 34), "measuring …", "label", style="font-size:20px")
+            return [head + svg.text((x, y + 34), "measuring …", "label", style="font-size:20px")]
         inspection = self.experiment.inspection
         if not inspection.findings:
-            words = f"{len(inspection.checked)} checks were made: {', '.join(inspection.checked)}."
-            return (head + svg.text((x, y + 36), "Nothing found.", "green", style="font-size:22px;font-weight:600")
-                    + svg.paragraph((x, y + 62), words, 450))  # fmt: skip
-        body, y = "", y + 26
-        listed = grouped(inspection.findings)
-        for finding, count in listed[:_MOST]:
-            times = f" × {count}" if count > 1 else ""
-            colour = _COLOURS[finding.severity]
-            body += svg.rectangle(x, y - 14, 4, 58, f"fill-{colour}")
-            body += svg.text((x + 14, y), f"{finding.id}{times}", colour, style="font-size:17px;font-weight:600")
-            body += svg.text((x + 448, y), finding.severity, f"note end {colour}")
-            body += svg.paragraph((x + 14, y + 18), _short(finding.sentence), 436, "label")
-            y += 78
-        if len(listed) > _MOST:
-            body += svg.text((x, y), f"and {len(listed) - _MOST} more", "note")
-        return head + body
+            words = f"{len(inspection.checked)} checks were made."
+            return [head + svg.text((x, y + 36), "Nothing found.", "green", style="font-size:22px;font-weight:600")
+                    + svg.paragraph((x, y + 62), words, room)]  # fmt: skip
+        found = grouped(inspection.findings)
+        tiles = [self._finding(x + width * i, y + 28, *one) for i, one in enumerate(found[:_MOST])]
+        if len(found) > _MOST:
+            more = f"and {len(found) - _MOST} more"
+            tiles[-1] += svg.text((x + width * (_MOST - 1), y), more, "note")
+        return [head + tiles[0], *tiles[1:]]
+
+    def _finding(self, x: float, y: float, finding: Finding, count: int) -> str:
+        times, colour = f" × {count}" if count > 1 else "", _COLOURS[finding.severity]
+        return (
+            svg.rectangle(x, y - 14, 4, 214, f"fill-{colour}")
+            + svg.text((x + 12, y), f"{finding.id}{times}", colour, style="font-size:17px;font-weight:600")
+            + svg.text((x + 12, y + 20), finding.severity, f"note {colour}")
+            + svg.paragraph((x + 12, y + 42), _short(finding.sentence), 182, "label")
+        )
 
 
 def grouped(findings: tuple[Finding, ...]) -> list[tuple[Finding, int]]:
@@ -261,5 +271,5 @@ def _signed(error: float, sigma: float) -> str:
 
 
 def _short(sentence: str, letters: int = 176) -> str:
-    """A sentence that fits three lines, cut between words where it does not."""
+    """A sentence that fits its tile, cut between words where it does not."""
     return sentence if len(sentence) <= letters else sentence[:letters].rsplit(" ", 1)[0] + " …"

@@ -128,7 +128,9 @@ def loupe(panel: Panel, lens: ThinLensCamera, depths: list[tuple[float, str, str
     names = ""
     for (depth, class_, name), y in zip(depths, (18, panel.height - 10), strict=True):
         v = float(optics.image_distance_mm(lens.focal_mm, depth))
-        names += _name(panel, np.array([panel.place((v, 0))[0], y]), name, class_)
+        x = float(np.clip(panel.place((v, 0))[0], 74, panel.width - 74))  # its name stands beside it, off the sensor
+        side = "" if x > middle[0, 0] + 4 else "end"
+        names += svg.text((x + (-8 if side else 8), y), name, f"{class_} halo {side}")
     return svg.line(axis, "muted dashed thin") + svg.line(middle, "red") + cones + names
 
 

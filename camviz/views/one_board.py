@@ -78,9 +78,9 @@ def panel_of_each(
     content += plot.legend(panel, entries, "bottom left")
     if each.problem:
         content += svg.paragraph((14, 40), each.problem, panel.width - 28, "note halo")
-    axes = plot.axes(panel, "board; fx on the left, fy on the right", "focal length, px", xticks=numbered)
+    axes = plot.axes(panel, "board; fx on the left, fy on the right", "focal length, px", xticks=numbered, aside=50)
     shown = panel.show(content, title="From each picture alone")
-    return axes + shown + _written(each, picked, yours, x, y + height + 58)
+    return axes + shown + _written(each, picked, yours, x - 62, y + height + 62)
 
 
 def _marks(panel: Panel, values: Array, colour: str, diameter: float) -> str:
@@ -101,8 +101,8 @@ def _marks(panel: Panel, values: Array, colour: str, diameter: float) -> str:
 def _written(each: FromEach, picked: int, yours: bool, x: float, y: float) -> str:
     rows = [("number", f"board {picked + 1} alone: {_pair(each.right[picked])}")]
     if yours:
-        rows.append(("number orange", f"by your function: {_pair(each.yours[picked])}"))
-    return "".join(svg.text((x, y + 18 * i), words, class_) for i, (class_, words) in enumerate(rows))
+        rows.append(("number orange", f"yours: {_pair(each.yours[picked])}"))
+    return "".join(svg.text((x, y + 27 * i), words, class_) for i, (class_, words) in enumerate(rows))
 
 
 def _pair(values: Array) -> str:

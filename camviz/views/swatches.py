@@ -10,6 +10,7 @@ import numpy as np
 from camviz.colour.spaces import to_srgb
 from camviz.colour.spectra import WAVELENGTHS_NM, observer
 from camviz.draw import svg
+from camviz.draw.flow import Cell
 from camviz.draw.panel import Panel
 from camviz.scenes.light import to_display
 
@@ -38,22 +39,20 @@ def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarra
     )
 
 
-def steps(x: float, y: float, colours: Mapping[str, np.ndarray]) -> str:
-    """A swatch for each step, linear sRGB (1 or 2, 3), two side by side, with its name and its numbers."""
-    parts = []
-    for i, (name, rgb) in enumerate(colours.items()):
-        left = x + 234 * i
-        for k, fill in enumerate(hexadecimal(rgb)):
-            width = 60 / len(rgb)
+def steps(layout: Mapping[str, Cell], colours: Mapping[str, np.ndarray]) -> dict[str, str]:
+    """A tile for each step, linear sRGB (1 or 2, 3): one or two swatches with its name and its numbers."""
+    tiles = {}
+    for name, rgb in colours.items():
+        left, y = layout[name][0] + 10, layout[name][1] + 4
+        parts = [svg.text((left + 70, y + 13), name, "label")]
+        width = 60 / len(rgb)
+        for k, (fill, colour) in enumerate(zip(hexadecimal(rgb), rgb, strict=True)):
             parts.append(svg.rectangle(left + k * width, y, width, 60, "patch", style=f"fill:{fill}"))
-        parts.append(svg.rectangle(left, y, 60, 60, "frame"))
-        parts.append(svg.text((left + 70, y + 13), name, "label"))
-        for k, colour in enumerate(rgb):
             words = " ".join(f"{value:.3f}" for value in colour).replace("-", "−")
-            parts.append(
-                svg.text((left + 70, y + 35 + 19 * k), words, f"number {('blue', 'orange')[k] if len(rgb) > 1 else ''}")
-            )
-    return "".join(parts)
+            class_ = ("blue", "orange")[k] if len(rgb) > 1 else ""
+            parts.append(svg.text((left + 70, y + 35 + 19 * k), words, f"number {class_}"))
+        tiles[name] = "".join(parts) + svg.rectangle(left, y, 60, 60, "frame")
+    return tiles
 
 
 def rainbow(panel: Panel, power: np.ndarray) -> str:
