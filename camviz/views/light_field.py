@@ -328,7 +328,7 @@ class LightFieldView(View):
         x, y = self.column, self.row
         corners = [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5), (x - 0.5, y - 0.5)]
         return panel.show(
-            seen + rims + on_photograph([panel.place(corners)], "yellow"), title="The sensor, at the mark"
+            seen + rims + on_photograph([panel.place(corners)], "yellow"), title="Sensor at the mark"
         )
 
     # Slope and depth -------------------------------------------------------------------------------------------------
