@@ -327,9 +327,7 @@ class LightFieldView(View):
         rims = svg.path([panel.place(line) for line in upright + level], "grid")
         x, y = self.column, self.row
         corners = [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5), (x - 0.5, y - 0.5)]
-        return panel.show(
-            seen + rims + on_photograph([panel.place(corners)], "yellow"), title="Sensor at the mark"
-        )
+        return panel.show(seen + rims + on_photograph([panel.place(corners)], "yellow"), title="Sensor at the mark")
 
     # Slope and depth -------------------------------------------------------------------------------------------------
 
