@@ -59,7 +59,7 @@ def test_a_dragged_window_follows_the_pointer(projection):
     before = view.camera.project(view.window.unproject(middle))
     moved = view.dragged("window", 0, 0, 30, -20)
     after = moved.camera.project(moved.window.unproject(middle))
-    np.testing.assert_allclose(after - before, np.array([30, -20]) * 480 / 320, atol=0.05)
+    np.testing.assert_allclose(after - before, np.array([30, -20]) / view._panel.scale, atol=0.05)
 
 
 def test_a_window_is_not_dragged_out_of_the_picture():

@@ -86,7 +86,7 @@ def test_every_control_changes_the_picture_at_both_ends(name):
 
 def test_dragging_the_window_turns_it_and_the_doughnut_points_it():
     view = OmnidirectionalView()
-    turned = view.dragged("window", 700, 100, 33, 0)
+    turned = view.dragged("window", 700, 100, 41, 0)
     assert turned.yaw_deg == pytest.approx(view.yaw_deg - 6.4)
     box = view._doughnut_box
     target = np.array([1.0, 0.1, 1.0]) / np.linalg.norm([1.0, 0.1, 1.0])

@@ -15,6 +15,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
+from camviz.draw.flow import Cell, rows
 from camviz.draw.items import Dots, Item, Line, axes_triad, closed
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -55,20 +56,13 @@ _TOP = 3.4  # focal lengths shown by the curves
 _INFINITE = 1e6  # focal lengths: tan 90° as rounded numbers have it
 _TABLED = np.radians([30.0, 60.0, 90.0])
 _FAR = 5 * SIDE  # pixels: what a reader's function puts farther out is not drawn
-_SLOTS = {  # where panels stand, (x, y, width, height), by which there are; then the figure's height
-    "picture curves": ({"picture": (20, 34, 330, 330), "curves": (425, 34, 320, 290)}, 390),
-    "picture window": ({"picture": (20, 34, 330, 330), "window": (375, 34, 375, 281)}, 390),
-    "picture window curves rays": (
-        {"picture": (20, 34, 320, 320), "window": (365, 34, 360, 270), "curves": (70, 400, 400, 160),
-         "rays": (500, 370, 250, 220)},
-        610,
-    ),
-    "picture window curves yours": (
-        {"picture": (20, 34, 320, 320), "window": (365, 34, 360, 270), "curves": (70, 400, 270, 190),
-         "yours": (365, 344, 360, 270)},
-        650,
-    ),
-}  # fmt: skip
+_ABOVE = (354, {"picture": 330, "window": 430, "numbers": 200})
+_LAYOUTS = {
+    "picture curves": rows((390, {"picture": 365, "curves": 405, "numbers": 190})),
+    "picture window": rows(_ABOVE),
+    "picture window curves rays": rows(_ABOVE, (246, {"curves": 460, "rays": 300, "radii": 200})),
+    "picture window curves yours": rows(_ABOVE, (354, {"curves": 330, "yours": 430, "radii": 200})),
+}
 _TOLD = {  # the figures that few panels speak of
     "picture curves": ("across the picture", "a ray at 90° lands at", "pixels a degree, 0°", "pixels a degree, 80°"),
     "picture window": ("across the picture", "window's middle"),
@@ -84,7 +78,7 @@ class FisheyeView(OrbitView):
     """
 
     title: ClassVar[str] = "Fisheye"
-    layouts = _SLOTS
+    layouts = _LAYOUTS
 
     projection: str = choice(*LENSES, help="how the angle θ of a ray becomes a distance r from the picture's middle")
     f: float = slider(
@@ -155,25 +149,32 @@ class FisheyeView(OrbitView):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        slots, height = _SLOTS[self.panels]
         image, taken = _photographed(self.camera, garden.DRAFT if draft else garden.FINE)
         photographs = {"fisheye": taken}
-        body = [self._picture_panel()]
+        parts = {"picture": self._picture_panel(), "numbers": self._numbers()}
         if self._has("window"):
             photographs["window"] = jpeg(self._cut(image, draft))
-            body.append(self._window_panel())
+            parts["window"] = self._window_panel()
         if self._has("curves"):
-            body.append(self._curves_panel(*slots["curves"]))
+            parts["curves"] = self._curves_panel()
         if self._has("rays"):
-            dome, attached = self._dome_panel(*slots["rays"], draft=draft)
+            parts["rays"], attached = self._dome_panel(draft)
             photographs |= attached
-            body.append(dome)
         if self._has("yours"):
-            yours, attached = self._your_panel(*slots["yours"], image, draft=draft)
+            parts["yours"], attached = self._your_panel(image, draft)
             photographs |= attached
-            body.append(yours)
-        body.append(self._numbers_column())
-        return self.composed(height, *body, attached=photographs)
+        if "radii" in self._layout:
+            parts["radii"] = self._radii()
+        return self.tiled(self._layout, {name: parts[name] for name in self._layout}, photographs)
+
+    @property
+    def _layout(self) -> dict[str, Cell]:
+        return _LAYOUTS[self.panels]
+
+    def _image_panel(self, name: str, cell: str, width: int, height: int) -> Panel:
+        """A panel in the aspect of an image, as wide as a cell of the layout lets it be."""
+        x, y, across, _ = self._layout[cell]
+        return image_panel(name, x + 10, y + 34, across - 20, width, height)
 
     def _cut(self, image: np.ndarray, draft: bool) -> np.ndarray:
         """The window's picture, cut out of the fisheye's `image`, which is as small as a draft is."""
@@ -186,8 +187,7 @@ class FisheyeView(OrbitView):
 
     @cached_property
     def _panel(self) -> Panel:
-        x, y, width, _ = _SLOTS[self.panels][0]["picture"]
-        return image_panel("fisheye", x, y, width, SIDE, SIDE)
+        return self._image_panel("fisheye", "picture", SIDE, SIDE)
 
     def _picture_panel(self) -> str:
         panel = self._panel
@@ -204,13 +204,14 @@ class FisheyeView(OrbitView):
         return panel.show(content, title=title, hint="drag the window", drag="window", label=label)
 
     def _window_panel(self) -> str:
-        x, y, width, _ = _SLOTS[self.panels][0]["window"]
-        panel = image_panel("cut", x, y, width, 320, 240)
+        panel = self._image_panel("cut", "window", 320, 240)
         note = f"perspective, {self.hfov_deg:.0f}° wide"
         return panel.show(placed_image(panel, "window", 320, 240), title="The window cut out of it", note=note)
 
-    def _curves_panel(self, x: float, y: float, width: float, height: float) -> str:
-        panel = plot.plot_panel("curves", x, y, width, height, (0, 180), (-1.8 if self.yours else 0, _TOP))
+    def _curves_panel(self) -> str:
+        x, y, width, height = self._layout["curves"]
+        around = x + 60, y + 34, width - 70, height - 82
+        panel = plot.plot_panel("curves", *around, (0, 180), (-1.8 if self.yours else 0, _TOP))
         edge = SIDE / 2 / self.f
         drawn = plot.grid(panel) + plot.upright(panel, 90, "muted dashed")
         drawn += svg.line(panel.place([(0, edge), (180, edge)]), "green dashed") if edge < _TOP else ""
@@ -261,9 +262,9 @@ class FisheyeView(OrbitView):
         uv, _ = self._your_pixels(_meridian(theta, 0.0))
         return (uv[..., 0] - self.camera.intrinsics.cx) / self.f
 
-    def _your_panel(self, x: float, y: float, width: float, height: float, image: np.ndarray, *, draft: bool) -> Drawn:
+    def _your_panel(self, image: np.ndarray, draft: bool) -> Drawn:
         """The window once more, every pixel of it looked up where the reader's function says."""
-        panel = image_panel("yours", x, y, width, 320, 240)
+        panel = self._image_panel("yours", "yours", 320, 240)
         seen = self._seen(draft)
         uv, problem = self._your_pixels(seen.rays())
         if problem:
@@ -288,8 +289,9 @@ class FisheyeView(OrbitView):
 
     # The dome --------------------------------------------------------------------------------------------------------
 
-    def _dome_panel(self, x: float, y: float, width: float, height: float, *, draft: bool) -> Drawn:
-        panel = space_panel("dome", x, y, width, height)
+    def _dome_panel(self, draft: bool) -> Drawn:
+        x, y, width, height = self._layout["rays"]
+        panel = space_panel("dome", x + 10, y + 34, width - 20, height - 44)
         label = "The rays in space; drag or press the arrow keys to walk around"
         return self.in_space(panel, self._rays(), draft, "Its rays", label)
 
@@ -312,23 +314,24 @@ class FisheyeView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers_column(self) -> str:
-        x = 775
-        rows = [svg.text((x, 26), "This lens", "title"), svg.text((x, 50), EQUATIONS[self.projection], "label")]
-        rows.append(svg.text((x, 70), f"f = {self.f:g} px", "label"))
-        rows.append(readout(self._told(), (x, 104), (0, 42), (0, 17)))
-        if self.panels in _TOLD:
-            return "".join(rows)
-        rows.append(svg.text((x, 394), "r / f at 30°, 60°, 90°", "title"))
+    def _numbers(self) -> str:
+        x = self._layout["numbers"][0] + 10
+        law = svg.text((x, 50), EQUATIONS[self.projection]) + svg.text((x, 70), f"f = {self.f:g} px")
+        return svg.text((x, 26), "This lens", "title") + law + readout(self._told(), (x, 104), (0, 42), (0, 17))
+
+    def _radii(self) -> str:
+        """r/f at a few angles, by every projection or by the right one and the reader's."""
+        x, y = self._layout["radii"][0] + 10, self._layout["radii"][1] + 26
         radii = {name: self.radius(_TABLED, name) for name in ([self.projection] if self.yours else LENSES)}
         radii |= {"yours": self._your_radius(_TABLED)} if self.yours else {}
+        drawn = [svg.text((x, y), "r / f at 30°, 60°, 90°", "title")]
         for i, (name, values) in enumerate(radii.items()):
             strong = "" if name in (self.projection, "yours") else " half"
             colour = _COLOURS.get(name, "orange")
-            rows.append(svg.text((x, 420 + 36 * i), name, f"{colour}{strong}"))
             class_ = f"number {colour * (name == 'yours')}{strong}"
-            rows.append(svg.text((x, 436 + 36 * i), self._tabled(name, values), class_))
-        return "".join(rows)
+            drawn.append(svg.text((x, y + 26 + 40 * i), name, f"{colour}{strong}"))
+            drawn.append(svg.text((x, y + 43 + 40 * i), self._tabled(name, values), class_))
+        return "".join(drawn)
 
     def _tabled(self, name: str, values: Array) -> str:
         missing = "    –" if name == "yours" else "    ∞"

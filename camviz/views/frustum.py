@@ -16,6 +16,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.course.yours import tried
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.matrix import matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture
@@ -42,6 +43,11 @@ from camviz.views.base import Drawn, OrbitView, choice, slider, switch
 from camviz.views.marks import border_arrow, clipped
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
+_LAYOUT = rows(
+    (344, {"world": 540, "picture": 420}),
+    (110, {"rotation": 220, "position": 280, "intrinsics": 205, "one point": 255}),
+    (64, {"your centre": 300}),
+)
 
 
 def _metres(default: float, help: str) -> Any:
@@ -162,11 +168,11 @@ class FrustumView(OrbitView):
     def figure(self, *, draft: bool = False) -> Picture:
         image, taken = garden.drafted(self.camera) if draft else garden.taken(self.camera, garden.FINE)
         world, photographs = self._world_panel(image, draft)
-        body = world + self._picture_panel() + self._numbers_panel()
-        return self.composed(580, body, attached=photographs | {"camera": taken})
+        parts = {"world": world, "picture": self._picture_panel()} | self._numbers()
+        return self.tiled(_LAYOUT, parts, photographs | {"camera": taken})
 
     def _world_panel(self, image: np.ndarray, draft: bool) -> Drawn:
-        panel = space_panel("world", 20, 34, 540, 400)
+        panel = space_panel("world", 10, 34, 520, 300)
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else None
         renderer = chosen_renderer(draft=draft)
@@ -174,7 +180,7 @@ class FrustumView(OrbitView):
         content, photographs = draw_space(
             panel, items, self.eye, draft=draft, renderer=renderer, frame=frame, scenery=scenery
         )
-        title = "The world, seen with the camera standing still" if from_camera else "The camera in its world"
+        title = "The world around the camera" if from_camera else "The camera in its world"
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
         content += self._whereabouts(panel, np.zeros(3) if from_camera else self.camera.centre)
         return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs
@@ -203,7 +209,7 @@ class FrustumView(OrbitView):
 
     def _picture_panel(self) -> str:
         k = self.camera.intrinsics
-        panel = image_panel("picture", 580, 34, 360, k.width, k.height, tallest=270)
+        panel = image_panel("picture", 550, 34, 400, k.width, k.height, tallest=300)
         content = placed_image(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
         label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
         return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)
@@ -224,27 +230,27 @@ class FrustumView(OrbitView):
         uv = self._your_camera.project(board_corners())
         return svg.dots(panel.place(np.where(self.camera.intrinsics.contains(uv)[:, None], uv, np.nan)), "orange", 3.5)
 
-    def _numbers_panel(self) -> str:
+    def _numbers(self) -> dict[str, str]:
+        """The tiles of numbers, by name."""
         n, from_sliders, shown = self.numbers(), " ← x, y, z", self.panels.split()
         centre = "C = −Rᵀt [m]" if "chain" in shown else "C [m]"
-        parts = [
-            matrix((20, 486), "R, its rows are the camera's axes in the world", n["R"], 3),
-            matrix((320, 486), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3),
-            matrix((450, 486), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3),
-        ]
-        if "K" in shown:
-            parts.append(matrix((580, 360), "K, intrinsics [px]", n["K"], 1))
-        if "chain" in shown:
-            parts.append(self._chain())
-        return "".join([*parts, self._your_numbers()])
+        t = matrix((230, 362), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3)
+        C = matrix((345, 362), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3)
+        return {
+            "rotation": matrix((10, 362), "R: the camera’s axes are its rows", n["R"], 3),
+            "position": t + C,
+            "intrinsics": matrix((510, 362), "K, intrinsics [px]", n["K"], 1) if "K" in shown else "",
+            "one point": self._chain() if "chain" in shown else "",
+            "your centre": self._your_numbers(),
+        }
 
     def _your_numbers(self) -> str:
         """The reader's centre and its distance from the right one, or why there is none."""
         if self.yours is None:
             return ""
-        (centre, problem), x, y = self.your_centre, 580, 324
+        (centre, problem), x, y = self.your_centre, 10, 474
         if problem:
-            return svg.paragraph((x, y), problem, 360)
+            return svg.paragraph((x, y), problem, 280)
         away = float(np.linalg.norm(centre - self.camera.centre))
         where = svg.text((x, y), f"your C: {vector(centre, 2)} m", "label orange")
         return where + svg.text((x, y + 18), f"{away:.2f} m from the camera", "label orange")
@@ -254,12 +260,12 @@ class FrustumView(OrbitView):
         point = board_corners()[0]
         seen_at = self.camera.project(point)
         pixel = f"{vector(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
-        rows = [
+        steps = [
             ("X, first corner of the board [m]", vector(point, 2)),
             ("R X + t, in the camera's frame [m]", vector(transform(self.camera.cam_from_world, point), 2)),
             ("through lens and K", pixel),
         ]
-        return readout(rows, (640, 484), (0, 33), (0, 16), "number")
+        return readout(steps, (715, 360), (0, 34), (0, 16), "number")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 

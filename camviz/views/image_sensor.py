@@ -16,6 +16,7 @@ from scipy import constants
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, bars, between, curve, grid, legend, logarithmic, plot_panel
@@ -39,6 +40,9 @@ _MODELS: dict[str, PublishedSensor] = {
     "CMV4000: 60 % at 550 nm": CMV4000,
 }
 _MOST_E = 100_000.0
+_LAYOUT = rows(
+    (374, {"photograph": 460, "quantum efficiency": 500}), (240, {"electrons": 420, "sensor": 270, "picture": 270})
+)
 
 
 @dataclass(frozen=True)
@@ -147,19 +151,19 @@ class ImageSensorView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         width = SMALL if draft else LARGE
         picture = self.shot(width).picture
-        panel = image_panel("picture", 590, 34, 350, width, width * 3 // 4)
+        panel = image_panel("picture", 10, 34, 440, width, width * 3 // 4)
         shown = panel.show(placed_image(panel, "picture", width, width * 3 // 4), title="What becomes of it")
-        body = self._spectra() + self._electrons() + shown + self._numbers()
-        return self.composed(590, body, attached={"picture": jpeg(picture, 92)})
+        parts = {"photograph": shown, "quantum efficiency": self._spectra(), "electrons": self._electrons()}
+        return self.tiled(_LAYOUT, parts | self._blocks(), {"picture": jpeg(picture, 92)})
 
     def _spectra(self) -> str:
-        panel = plot_panel("efficiency", 70, 34, 480, 210, (380, 780), (0, 100))
+        panel = plot_panel("efficiency", 524, 34, 426, 290, (380, 780), (0, 100))
         unfiltered = 100 * np.asarray(self.sensor.efficiency(WAVELENGTHS_NM))
         per_photon = sensitivities("Nikon D5100") / WAVELENGTHS_NM[:, None]
         passed = per_photon / per_photon.max(axis=0)
         spectrum = illuminant(self.light)
         known = "thick" if self.model == "KAF-0400: a curve" else "thick dashed"
-        lines = [(f"ink {known}", "without filter"), *((c, f"{name} filter") for name, c in CHANNELS)]
+        lines = [(f"ink {known}", "no filter"), *((c, name) for name, c in CHANNELS), ("muted thick", "light")]
         content = (
             between(panel, WAVELENGTHS_NM, np.zeros(len(spectrum)), 96 * spectrum / spectrum.max(), "fill-muted")
             + grid(panel)
@@ -168,7 +172,7 @@ class ImageSensorView(View):
             + svg.dots([panel.place((self.sensor.measured_at_nm, 100 * float(self.sensor.efficiency())))], "ink", 8)
             + legend(panel, lines, "bottom right")
         )
-        return axes(panel, "wavelength [nm]; grey: the light's spectrum", "electrons per 100 photons") + panel.show(
+        return axes(panel, "wavelength [nm]", "electrons per 100 photons") + panel.show(
             content, title="Quantum efficiency", note=_MODELS[self.model].camera
         )
 
@@ -180,7 +184,7 @@ class ImageSensorView(View):
         if self.green:
             freed |= {"muted": self.green_e, "orange": self.your_e[0]}
             names += ["555 nm", "yours"]
-        panel = plot_panel("electrons", 70, 330, 480, 200, (0.4, len(names) + 1.9), (low, high))
+        panel = plot_panel("electrons", 66, 408, 344, 156, (0.4, len(names) + 1.9), (low, high))
         yticks = logarithmic(low, high)
         xticks = [(i + 1.0, name) for i, name in enumerate(names)]
         content = grid(panel, xticks=[], yticks=yticks)
@@ -195,7 +199,7 @@ class ImageSensorView(View):
         floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
         content += self._level(panel, self.full_well, f"full well {self.full_well:,.0f} e⁻", "orange", -6)
         content += self._level(panel, floor_e, f"threshold {floor_e:.1f} e⁻", "purple", -6)
-        return axes(panel, "pixels of a white wall", "electrons", xticks, yticks) + panel.show(
+        return axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54) + panel.show(
             content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux"
         )
 
@@ -204,7 +208,7 @@ class ImageSensorView(View):
         if not self.green:
             return ""
         electrons, problem = self.your_e
-        words = svg.paragraph((326, 60), problem, 148, "note halo") if problem else ""
+        words = svg.paragraph((panel.width - 154, 60), problem, 148, "note halo") if problem else ""
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
             if np.isfinite(one):
                 below = panel.place((bar - 1 + i, np.log10(np.clip(min(one, self.full_well), 4, 1e6)))) + (0, 18)
@@ -216,10 +220,15 @@ class ImageSensorView(View):
         line = svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
         return line + svg.text((panel.width - 6, y + above), words, f"{class_} halo end")
 
-    def _numbers(self) -> str:
-        figures = readout(self.numbers(), (590, 362), (0, 24), (166, 0))
-        source = svg.paragraph((590, 548), _MODELS[self.model].source, 350)
-        return svg.text((590, 336), "This sensor", "title") + figures + source
+    def _blocks(self) -> dict[str, str]:
+        """The numbers in two tiles: those of the sensor, with where they are from, and those of what it takes."""
+        figures, step, below = self.numbers(), (0, 38), (0, 17)
+        sensor = {name: figures.pop(name) for name in ("efficiency with fill factor", "full well", "converter")}
+        source = svg.paragraph((430, 540), _MODELS[self.model].source, 250)
+        return {
+            "sensor": svg.text((430, 400), "This sensor", "title") + readout(sensor, (430, 424), step, below) + source,
+            "picture": svg.text((700, 400), "Its picture", "title") + readout(figures, (700, 424), step, below),
+        }
 
 
 @lru_cache(maxsize=2)

@@ -15,6 +15,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import svg
+from camviz.draw.flow import Cell, rows
 from camviz.draw.items import closed
 from camviz.draw.matrix import intrinsic_matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -33,7 +34,12 @@ _NEAREST, _FARTHEST = 1.5, 12.0  # metres between camera and globe
 _FOCAL: dict[str, Any] = {"low": 150.0, "high": 2000.0, "step": 1.0, "unit": "px"}
 _LEAN_DRAWN = 3  # times
 _YOURS_M = 2.8  # as deep as a reader's rays are drawn, twice as deep as the camera's own pyramid
-_HEIGHTS = {"picture space": 440, "picture space matrices": 604}
+_LAYOUTS = {
+    "picture space": rows((314, {"picture": 380, "rays": 340, "numbers": 240})),
+    "picture space matrices": rows(
+        (374, {"picture": 460, "rays": 500}), (222, {"K": 265, "other matrix": 230, "pixels": 185, "numbers": 280})
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,7 @@ class IntrinsicsView(OrbitView):
     """
 
     title: ClassVar[str] = "Intrinsics"
-    layouts = _HEIGHTS
+    layouts = _LAYOUTS
 
     fx: float = slider(450.0, **_FOCAL, help="focal length in widths of a pixel")
     fy: float = slider(450.0, **_FOCAL, help="focal length in heights of a pixel")
@@ -207,15 +213,16 @@ class IntrinsicsView(OrbitView):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        picture = self.image(draft=draft)
         space, photographs = self._space_panel(draft)
-        height = _HEIGHTS[self.panels]
-        body = self._picture_panel() + space
+        parts = {"picture": self._picture_panel(), "rays": space}
         if "matrices" in self.panels:
-            body += self._matrices(20, 414) + self._lattice_panel() + self._numbers_column(724, 398)
-        else:
-            body += self._numbers_row(20, 398)
-        return self.composed(height, body, attached={**photographs, "camera": jpeg(picture)})
+            parts |= self._matrices() | {"pixels": self._lattice_panel()}
+        parts["numbers"] = self._numbers_column()
+        return self.tiled(self._layout, parts, photographs | {"camera": jpeg(self.image(draft=draft))})
+
+    @property
+    def _layout(self) -> dict[str, Cell]:
+        return _LAYOUTS[self.panels]
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The picture (height, width, 3); a crop is shown within the whole, so it shows the picture as taken."""
@@ -227,7 +234,8 @@ class IntrinsicsView(OrbitView):
     @cached_property
     def _picture(self) -> Panel:
         """In the pixels of the picture as taken."""
-        return image_panel("picture", 20, 34, 440, self.width, self.height, tallest=330)
+        _, _, across, high = self._layout["picture"]
+        return image_panel("picture", 10, 34, across - 20, self.width, self.height, tallest=high - 44)
 
     def _picture_panel(self) -> str:
         panel, K = self._picture, self.intrinsics
@@ -261,9 +269,9 @@ class IntrinsicsView(OrbitView):
         at = self._as_taken((K.cx, K.cy))
         ends = at - np.diag((12, 12)), at + np.diag((12, 12))
         cross = svg.segments(*ends, "white", style="stroke:#fff;stroke-width:6px") + svg.segments(*ends, "orange thick")
-        side, dx = ("end", -14) if at[0] > 170 else ("", 14)
+        side, dx = ("end", -8) if at[0] > self._picture.width - 80 else ("", 8)
         inside = np.clip(at + (dx, 22), (8, 36), np.array([self._picture.width, self._picture.height]) - (8, 30))
-        name = _tag(inside, f"(cx, cy) = ({K.cx:.2f}, {K.cy:.2f})", side)
+        name = _tag(inside, "(cx, cy)", side)
         hand = svg.element("circle", cx=at[0], cy=at[1], r=16, fill_opacity=0, class_="card")
         label = f"Principal point at column {K.cx:.1f}, row {K.cy:.1f}; arrow keys move it"
         handle = {"data_drag": "principal", "tabindex": 0, "role": "group", "aria_label": label}
@@ -294,7 +302,8 @@ class IntrinsicsView(OrbitView):
     # The rays --------------------------------------------------------------------------------------------------------
 
     def _space_panel(self, draft: bool) -> Drawn:
-        panel = space_panel("space", 480, 34, 460, 330)
+        x, _, across, high = self._layout["rays"]
+        panel = space_panel("space", x + 10, 34, across - 20, high - 44)
         items = [*self._frustum(), *self._line_of_sight()]
         span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
         target = (0.0, 0.2, float(BALLOON[2] - 0.49 * span))
@@ -320,15 +329,16 @@ class IntrinsicsView(OrbitView):
         """The rays of the picture's corners and border by the reader's function, as long as right ones to one depth,
         which are blue, and what is wrong with it."""
         assert self.yours is not None
+        _, _, across, high = self._layout["rays"]
         uv = self.intrinsics.border(4)
         right = self.camera.unproject(uv)
         rays, problem = tried(self.yours, (uv, self.intrinsics.K), right)
-        name = svg.text((14, 322), "orange: your rays of the corners and the border", "orange halo")
+        name = svg.text((14, high - 52), "orange: your rays of corners and border", "orange halo")
         length = _YOURS_M / right[:, 2:]
         rim = self.camera.centre + length * right
         frame: list[Item] = [Line(closed(rim), "blue", 3.4)]
         if problem:
-            return frame, svg.paragraph((14, 24), problem, 430)
+            return frame, svg.paragraph((14, 24), problem, across - 48)
         ends = self.camera.centre + length * rays
         spokes = [Line(np.array([self.camera.centre, ends[i]]), "orange", 1.8) for i in range(0, len(uv), len(uv) // 4)]
         return [*frame, *spokes, Line(closed(ends), "orange", 1.8)], name
@@ -345,24 +355,24 @@ class IntrinsicsView(OrbitView):
 
     # The matrices ----------------------------------------------------------------------------------------------------
 
-    def _matrices(self, x: float, y: float) -> str:
-        before, after = self.taken.K, self.intrinsics.K
-        left = intrinsic_matrix(x, y, "K, as taken" if self.operation != "as taken" else "K", before)
+    def _matrices(self) -> dict[str, str]:
+        before, after, K = self.taken.K, self.intrinsics.K, self.intrinsics
+        left = intrinsic_matrix(10, 422, "K, as taken" if self.operation != "as taken" else "K", before)
         if self.operation == "as taken":
-            right = intrinsic_matrix(x + 248, y, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
+            right = intrinsic_matrix(275, 422, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
         else:
             changed = ~np.isclose(before, after, rtol=0, atol=1e-9)
-            right = intrinsic_matrix(x + 248, y, f"K, {self.operation}", after, changed)
-        K = self.intrinsics
+            right = intrinsic_matrix(275, 422, f"K, {self.operation}", after, changed)
         u = f"u = {K.fx:.2f} x {_signed(K.skew)} y {_signed(K.cx)}"
         v = f"v = {K.fy:.2f} y {_signed(K.cy)}"
-        lines = [(128, u, "number"), (147, f"{v}     with x = X/Z, y = Y/Z", "number"), (173, self.rule(), "label")]
-        return left + right + "".join(svg.text((x, y + dy), words, class_) for dy, words, class_ in lines)
+        lines = svg.text((10, 520), u, "number") + svg.text((10, 540), v, "number")
+        lines += svg.text((10, 560), "with x = X/Z, y = Y/Z", "note")
+        return {"K": left + lines, "other matrix": right + svg.paragraph((275, 520), self.rule(), 210)}
 
     def _lattice_panel(self) -> str:
         """A few pixels as they lie on the sensor, their lean drawn larger than it is."""
         K = replace(self.intrinsics, skew=_LEAN_DRAWN * self.intrinsics.skew)
-        panel = Panel("lattice", 520, 400, 180, 180, -90, 90, -90, 90)
+        panel = Panel("lattice", 505, 408, 165, 165, -90, 90, -90, 90)
         scale = 30 * np.sqrt(K.fx * K.fy)
 
         def place(uv: Any) -> Array:
@@ -384,14 +394,12 @@ class IntrinsicsView(OrbitView):
         note = f"lean drawn {_LEAN_DRAWN} ×" if K.skew else ""
         return panel.show(content, title="Its pixels", note=note)
 
-    def _numbers_column(self, x: float, y: float) -> str:
-        return readout(self.numbers(), (x, y), (0, 40), (0, 17))
-
-    def _numbers_row(self, x: float, y: float) -> str:
-        """The figures that need no K, side by side under the pictures."""
-        figures = self.numbers()
-        shown = {name: figures[name] for name in ("field of view", "camera to globe", "red balloon")}
-        return readout(shown, (x, y), (230, 0), (0, 19))
+    def _numbers_column(self) -> str:
+        """All figures, or those that need no K."""
+        x, y, figures = self._layout["numbers"][0] + 10, self._layout["numbers"][1] + 26, self.numbers()
+        if "matrices" not in self.panels:
+            figures = {name: figures[name] for name in ("field of view", "camera to globe", "red balloon")}
+        return readout(figures, (x, y), (0, 40), (0, 17))
 
     # The hands -------------------------------------------------------------------------------------------------------
 
@@ -415,11 +423,9 @@ class IntrinsicsView(OrbitView):
 
 
 def _tag(at: Any, words: str, anchor: str = "") -> str:
-    """Words on a photograph: white on a dark ground, whatever the theme."""
-    wide = 5.9 * len(words) + 10
-    left = at[0] + 4 - wide if anchor == "end" else at[0] - (wide / 2 if anchor else 4)
-    ground = svg.rectangle(left, at[1] - 12.5, wide, 17, "tag", rx=4, style="fill:#10151c;fill-opacity:.72")
-    return ground + svg.text(at, words, f"tick {anchor}", style="fill:#fff")
+    """Words on a photograph: white with a dark edge, whatever the theme."""
+    edge = "fill:#fff;stroke:#10151c;stroke-width:4px;stroke-linejoin:round;paint-order:stroke"
+    return svg.text(at, words, f"label {anchor}", style=edge)
 
 
 def _signed(value: float) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from camviz import optics
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, readout
@@ -19,8 +20,10 @@ from camviz.views.base import View, choice, slider
 _LENSES = {"triplet": (optics.COOKE_TRIPLET, 5.0), "telephoto": (optics.TELEPHOTO, 5.6)}
 _BEFORE = 0.35  # of the focal length, that is drawn before the first surface
 _EDGE = 1.12  # how much wider the glass is than the light
-_WIDE, _TALL = 920, 290  # of the section, in picture units
+_WIDE, _TALL = 600, 290  # of the section, in picture units
+_LAYOUT = rows((_TALL + 44, {"section": 620, "numbers": 340}))
 _HIGHEST_MM = 15.0  # image
+_LINES = "Blue: through the glass. Dashed: to the plane H, and on from H', as by one thin lens."
 
 
 @dataclass(frozen=True)
@@ -73,8 +76,8 @@ class LensElementsView(View):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = self._section() + self._numbers()
-        return self.composed(_TALL + 152, body)
+        numbers = readout(self.numbers(), (630, 52), (0, 42), (0, 17)) + svg.paragraph((630, 272), _LINES, 310)
+        return self.tiled(_LAYOUT, {"section": self._section(), "numbers": numbers})
 
     @cached_property
     def _panel(self) -> Panel:
@@ -83,7 +86,7 @@ class LensElementsView(View):
         end = lens.length_mm + lens.back_focal_mm
         left, right = min(-_BEFORE * lens.focal_mm, lens.front_principal_mm - 0.06 * end), 1.06 * end
         half = max((right - left) * _TALL / _WIDE / 2, 1.1 * _HIGHEST_MM)
-        return Panel("section", 20, 34, _WIDE, _TALL, right - 2 * half * _WIDE / _TALL, right, half, -half)
+        return Panel("section", 10, 34, _WIDE, _TALL, right - 2 * half * _WIDE / _TALL, right, half, -half)
 
     def _section(self) -> str:
         panel, lens = self._panel, self.prescription
@@ -104,8 +107,7 @@ class LensElementsView(View):
             + self._plane(planes[1], "H'", 1 if planes[1] > planes[0] else -1)
             + svg.line(panel.place([(end, 16.0), (end, -16.0)]), "red thick")
         )
-        note = "to scale · blue: through the glass · dashed: to H, and on from H', as by one thin lens"
-        return panel.show(content, title=lens.name, note=note)
+        return panel.show(content, title=lens.name, note="to scale")
 
     def _bent(self, ray: Array) -> float:
         """Height at which the ray's two ends, prolonged, are at the second principal plane."""
@@ -129,13 +131,6 @@ class LensElementsView(View):
                 front = _arc(places[i], radius, reach)
                 outlines.append(np.concatenate([front, _arc(places[i + 1], lens.surfaces[i + 1][0], reach)[::-1]]))
         return outlines
-
-    def _numbers(self) -> str:
-        figures, top = list(self.numbers().items()), _TALL + 66
-        left, right = (
-            readout(part, (x, top), (0, 26), (170, 0)) for part, x in ((figures[:3], 20), (figures[3:], 490))
-        )
-        return left + right
 
 
 def _behind(z_mm: float) -> str:

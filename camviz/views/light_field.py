@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, signed
@@ -29,20 +30,18 @@ from camviz.views.marks import on_photograph, ring
 PITCH = 0.002  # metres between microlenses, of the camera that would record the garden's field
 _LOW, _HIGH = garden_field.SLOPES
 _ALL = "picture slice rays views sensor depth"
-_SLOTS: dict[str, tuple[dict[str, tuple[float, float, float, float]], int]] = {  # panels' places; the figure's height
-    "picture views": ({"picture": (20, 34, 440, 330), "views": (500, 34, 440, 330)}, 400),
-    "picture slice": ({"picture": (20, 34, 440, 330), "slice": (500, 34, 440, 198)}, 384),
-    _ALL: (
-        {"picture": (20, 34, 420, 315), "slice": (20, 388, 420, 99), "rays": (500, 34, 440, 170),
-         "views": (500, 240, 212, 159), "sensor": (728, 240, 212, 159), "depth": (556, 440, 384, 126)},
-        618,
+_LAYOUTS = {  # by the panels there are
+    "picture views": rows((390, {"picture": 480, "views": 480}), (68, {"numbers": 300})),
+    "picture slice": rows((390, {"picture": 480, "slice": 480}), (92, {"numbers": 300})),
+    _ALL: rows(
+        (390, {"picture": 480, "views": 480}),
+        (214, {"slice": 480, "rays": 480}),
+        (220, {"depth": 400, "sensor": 200, "numbers": 180, "light field": 180}),
     ),
-    "picture slice depth yours": (
-        {"picture": (20, 34, 420, 315), "yours": (500, 34, 420, 315), "slice": (20, 392, 420, 144),
-         "depth": (556, 392, 384, 144)},
-        610,
+    "picture slice depth yours": rows(
+        (390, {"picture": 480, "yours": 480}), (230, {"slice": 480, "depth": 480}), (92, {"numbers": 300})
     ),
-}  # fmt: skip
+}
 _TOLD = {  # the figures that few panels speak of
     "picture views": ("focused at", "views summed"),
     "picture slice": ("focused at", "slope at the mark", "in truth"),
@@ -65,7 +64,7 @@ class LightFieldView(View):
     """
 
     title: ClassVar[str] = "Light field"
-    layouts = _SLOTS
+    layouts = _LAYOUTS
 
     slope: float = slider(0.0, _LOW, _HIGH, 0.02, unit="px", help="how far a sharp point moves from view to view")
     aperture: str = choice("full", "half", "ring", "pinhole", help="which views are summed")
@@ -168,8 +167,16 @@ class LightFieldView(View):
         figures = self.numbers()
         return {name: figures[name] for name in _TOLD.get(self.panels, figures) if name in figures}
 
+    @property
+    def _layout(self) -> dict[str, Cell]:
+        return _LAYOUTS[self.panels]
+
     def _slot(self, name: str) -> tuple[float, float, float, float]:
-        return _SLOTS[self.panels][0][name]
+        """Where the panel of a cell stands: left, top, width and height."""
+        x, y, width, height = self._layout[name]
+        return (
+            (x + 60, y + 34, width - 70, height - 84) if name == "depth" else (x + 10, y + 34, width - 20, height - 44)
+        )
 
     def description(self) -> str:
         figures = listed(self._told())
@@ -185,27 +192,25 @@ class LightFieldView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         attached: dict[str, bytes] = {}
-        height = _SLOTS[self.panels][1]
-        body = [self._picture_panel(attached)]
+        parts = {"picture": self._picture_panel(attached)} | self._numbers()
         if self._has("slice"):
             attached["slice"] = png(_bytes(self.light_field.views[self.v, :, self._slice_row]))
-            body.append(self._slice_panel())
+            parts["slice"] = self._slice_panel()
         if self._has("rays"):
             x, y, _, _ = self._slot("rays")
             given = (self.slope_here, self.slope, self.mask[self.v], self.u, self.opening)
-            body.append(microlens_diagram.drawn(x, y, *given))
+            parts["rays"] = microlens_diagram.drawn(x + 10, y, *given)
         if self._has("views"):
             attached["views"] = garden_field.all_views(self.light_field)
-            body.append(self._views_panel())
+            parts["views"] = self._views_panel()
         if self._has("sensor"):
             attached["sensor"] = png(self._under_the_microlenses())
-            body.append(self._sensor_panel())
+            parts["sensor"] = self._sensor_panel()
         if self._has("depth"):
-            body.append(self._depth_panel())
+            parts["depth"] = self._depth_panel()
         if self._has("yours"):
-            body.append(self._your_panel(attached))
-        body.append(self._numbers_block())
-        return self.composed(height, *body, attached=attached)
+            parts["yours"] = self._your_panel(attached)
+        return self.tiled(self._layout, {name: parts[name] for name in self._layout}, attached)
 
     # The picture and its slice ---------------------------------------------------------------------------------------
 
@@ -213,7 +218,8 @@ class LightFieldView(View):
     def _image_panel(self) -> Panel:
         height, width = self.views.shape[2:4]
         x, y, across, tallest = self._slot("picture")
-        return image_panel("picture", x, y, across, width, height, tallest=tallest)
+        key = 60 if self.show == "slopes" else 0  # the room it takes
+        return image_panel("picture", x, y, across - key, width, height, tallest=tallest)
 
     def _picture_panel(self, attached: dict[str, bytes]) -> str:
         panel, (height, width) = self._image_panel, self.views.shape[2:4]
@@ -303,17 +309,25 @@ class LightFieldView(View):
 
     def _sensor_panel(self) -> str:
         down, across = self._window()
-        place = self._slot("sensor")
-        panel = Panel("sensor", *place, across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5)
+        x, y, width, _ = self._slot("sensor")
+        panel = Panel(
+            "sensor",
+            x,
+            y,
+            width,
+            0.75 * width,
+            across.start - 0.5,
+            across.stop - 0.5,
+            down.start - 0.5,
+            down.stop - 0.5,
+        )
         seen = svg.image("sensor", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
         upright = [[(x - 0.5, panel.top), (x - 0.5, panel.bottom)] for x in range(across.start, across.stop)]
         level = [[(panel.left, y - 0.5), (panel.right, y - 0.5)] for y in range(down.start, down.stop)]
         rims = svg.path([panel.place(line) for line in upright + level], "grid")
         x, y = self.column, self.row
         corners = [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5), (x - 0.5, y - 0.5)]
-        return panel.show(
-            seen + rims + on_photograph([panel.place(corners)], "yellow"), title="The sensor, at the mark"
-        )
+        return panel.show(seen + rims + on_photograph([panel.place(corners)], "yellow"), title="Sensor at the mark")
 
     # Slope and depth -------------------------------------------------------------------------------------------------
 
@@ -354,27 +368,26 @@ class LightFieldView(View):
             return f"d = {field.baseline * field.focal_length:.1f} px·m / z"
         return f"d = {field.baseline * field.focal_length:.1f} px·m (1/z − 1/{field.focus_distance:.4g} m)"
 
-    def _numbers_block(self) -> str:
-        left, top = {"picture views": (20, 388), "picture slice": (500, 274)}.get(self.panels, (20, 515))
-        if self.panels in _TOLD:
-            left, top = (20, 588) if self._has("yours") else (left, top)
-            step = (0, 24) if self.panels == "picture slice" else (300, 0)
-            return self._words(self._told(), left, top, step)
-        parts = [svg.text((left, top), "This picture", "title")]
-        figures = self.numbers()
-        figures = {name: figures[name] for name in sorted(figures, key="a view blurs".__eq__)}
-        for i, (name, value) in enumerate(figures.items()):
-            x, y = left + 255 * (i // 4), top + 23 + 22 * (i % 4)
-            parts += [svg.text((x, y), name, "note"), svg.text((x + (112 if i < 4 else 96), y), value, "label")]
-        return "".join(parts)
-
-    def _words(self, figures: dict[str, str], x: float, y: float, step: tuple[float, float]) -> str:
-        rows = readout(figures, (x, y), step, (118, 0))
+    def _numbers(self) -> dict[str, str]:
+        """The tiles of figures: one of few, or two of all."""
+        figures = self._told()
+        x, y, _, _ = self._layout["numbers"]
+        if self.panels == _ALL:
+            names, far = list(figures), self._layout["light field"][0] + 10
+            first, second = ({name: figures[name] for name in part} for part in (names[:4], names[4:]))
+            column: tuple[Any, ...] = (0, 38), (0, 17)
+            return {
+                "numbers": svg.text((x + 10, y + 26), "This picture", "title")
+                + readout(first, (x + 10, y + 50), *column),
+                "light field": svg.text((far, y + 26), "Its light field", "title")
+                + readout(second, (far, y + 50), *column),
+            }
+        rows = readout(figures, (x + 10, y + 20), (0, 24), (145, 0))
         if self.yours:
             own = f"{signed(self._your_slope, 2)} px" if np.isfinite(self._your_slope) else "–"
-            at = (x + len(figures) * step[0], y)
-            rows += readout({"your slope for this depth": own}, at, (0, 0), (165, 0), "orange")
-        return rows
+            at = (x + 10, y + 20 + 24 * len(figures))
+            rows += readout({"your slope for this depth": own}, at, (0, 0), (210, 0), "orange")
+        return {"numbers": rows}
 
     # The reader's own function ---------------------------------------------------------------------------------------
 

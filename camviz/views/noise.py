@@ -16,6 +16,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
+from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds
@@ -33,7 +34,10 @@ LEVELS = np.geomspace(2.0**-12, 8.0, 32)  # seconds: half a stop apart, and as m
 _WIDTH, _HEIGHT = 640, 480
 _CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
 _EVERYTHING = "picture histogram curve"
-_HEIGHTS = {"picture curve": 506, _EVERYTHING: 606}  # of the picture, by the panels it has
+_LAYOUTS = {  # by the panels there are
+    "picture curve": rows((374, {"picture": 460, "curve": 500}), (200, {"numbers": 250, "lines": 220})),
+    _EVERYTHING: rows((374, {"picture": 460, "curve": 500}), (306, {"histogram": 490, "numbers": 250, "lines": 220})),
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class PhotonTransferView(View):
     """
 
     title: ClassVar[str] = "Photon transfer"
-    layouts = _HEIGHTS
+    layouts = _LAYOUTS
 
     exposure: float = slider(-3.0, -10.0, 3.0, 0.25, unit="stops", help="0 is one second; −1 half of it")
     gain: float = slider(1.0, 1.0, 16.0, 0.5, unit="×", help="more numbers for each electron, as ISO does")
@@ -206,15 +210,15 @@ class PhotonTransferView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         pixels = 1500 if draft else 3000
         dn = self.image(draft=draft)
-        height = _HEIGHTS[self.panels]
-        body = self._picture_panel() + self._transfer_panel(pixels)
+        parts = {"picture": self._picture_panel(), "curve": self._transfer_panel(pixels)}
         if self.panels == _EVERYTHING:
-            body += self._histogram_panel(dn) + self._numbers_column(pixels, 490, 448) + self._legend(764, 454)
-        else:
-            body += self._numbers_column(pixels, 20, 352) + self._legend(250, 366)
-        return self.composed(
-            height, body, attached={"camera": jpeg(self._developed(dn))}, described=self.description(pixels)
-        )
+            parts["histogram"] = self._histogram_panel(dn)
+        parts |= {"numbers": self._numbers_column(pixels), "lines": self._legend()}
+        return self.tiled(self._layout, parts, {"camera": jpeg(self._developed(dn))}, self.description(pixels))
+
+    @property
+    def _layout(self) -> dict[str, Cell]:
+        return _LAYOUTS[self.panels]
 
     def image(self, *, draft: bool) -> np.ndarray:
         """What the camera records of the garden with the card in it, DN (height, width)."""
@@ -229,7 +233,7 @@ class PhotonTransferView(View):
         return to_display((dn - self.sensor.offset_dn) / max(scale, 1e-9))
 
     def _picture_panel(self) -> str:
-        panel = image_panel("picture", 20, 34, 380, _WIDTH, _HEIGHT)
+        panel = image_panel("picture", 10, 34, 440, _WIDTH, _HEIGHT)
         left, top, right, bottom = (s * n for s, n in zip(_CARD, (_WIDTH, _HEIGHT) * 2, strict=True))
         outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
         shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
@@ -242,7 +246,7 @@ class PhotonTransferView(View):
         top = min(2**self.bits, 2 ** int(np.ceil(np.log2(max(float(dn.max()) + 1, 16)))))
         edges = np.linspace(-0.5, top - 0.5, min(top, 128) + 1)
         rows, columns = _card_slices(*dn.shape)
-        panel = plot.plot_panel("histogram", 66, 376, 334, 150, (-0.02 * top, 1.02 * top), (0, 1.08))
+        panel = plot.plot_panel("histogram", 64, 408, 416, 224, (-0.02 * top, 1.02 * top), (0, 1.08))
         shares = []
         for values, class_ in ((dn, "fill-muted half"), (dn[rows, columns], "fill-blue half")):
             counts = np.histogram(values, edges)[0]
@@ -257,7 +261,7 @@ class PhotonTransferView(View):
         """Logarithmic axes that do not move with the gain: an electron at gain 1 is always in the same place."""
         one = 0.97 * 2**self.bits / FULL_WELL_E
         across = (log10(0.6 * one), log10(1.3 * 2**self.bits))
-        return plot.plot_panel("transfer", 490, 34, 450, 340, across, (log10(0.4 * one), log10(0.12 * 2**self.bits)))
+        return plot.plot_panel("transfer", 524, 34, 426, 290, across, (log10(0.4 * one), log10(0.12 * 2**self.bits)))
 
     def _transfer_panel(self, pixels: int) -> str:
         panel = self._plot
@@ -298,15 +302,16 @@ class PhotonTransferView(View):
         """How each kind of noise is drawn; orange is the reader's where there is a function of theirs."""
         return _STYLES if self.yours is None else {**_STYLES, "photons": ("yellow dashed", "½")}
 
-    def _legend(self, x: float, y: float) -> str:
+    def _legend(self) -> str:
         """Beside the numbers: wherever it stood among the curves, some gain would lead one through it."""
+        x, y, _, _ = self._layout["lines"]
         parts = self.parts(np.array([self.card_e]))
         styles = self._styles()
         drawn = [(styles[name], name) for name in styles if name in parts and parts[name].max() > 0]
         named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
         named += [("orange thick", "yours")] if self.yours else []
-        content = plot.legend(self._plot, [("ink", "all together"), *named])
-        return svg.group(content, transform=f"translate({x:g} {y:g})")
+        lines = plot.legend(self._plot, [("ink", "all together"), *named])
+        return svg.text((x + 10, y + 26), "The lines", "title") + svg.element("svg", lines, x=x, y=y + 34)
 
     def _points(self, panel: Panel, pixels: int) -> str:
         """What frames of the card say, and the exposure of the picture."""
@@ -319,8 +324,10 @@ class PhotonTransferView(View):
         here = svg.dots([panel.place((at, log10(max(whole, 1e-9))))], "yellow", 13)
         return plot.upright(panel, at, "yellow dashed") + here + svg.dots(points, "blue", 6)
 
-    def _numbers_column(self, pixels: int, x: float, y: float) -> str:
-        return svg.text((x, y), "On the card", "title") + readout(self._told(pixels), (x, y + 24), (0, 20), (110, 0))
+    def _numbers_column(self, pixels: int) -> str:
+        x, y, _, _ = self._layout["numbers"]
+        figures = readout(self._told(pixels), (x + 10, y + 50), (0, 36), (0, 16))
+        return svg.text((x + 10, y + 26), "On the card", "title") + figures
 
     # The exposure is dragged along the curve --------------------------------------------------------------------------
 

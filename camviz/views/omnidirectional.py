@@ -16,6 +16,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
+from camviz.draw.flow import Cell, rows
 from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -40,21 +41,15 @@ _DRAFT, _FINE = 160, 480  # pixels across the doughnut
 _COUNTED = 400  # pixels across the picture whose focal length is told
 _OF_THE_WINDOW = {"yaw_deg", "pitch_deg", "hfov_deg", "unroll", "model", "eye"}  # the mirror stands still
 _OF_THE_MIRROR = {"rig", "central", "lens", "rim_angle_deg", "missed_mm", "_doughnuts"}
-_SLOTS: dict[str, tuple[dict[str, tuple[float, ...]], int]] = {  # where panels stand, and the figure's height
-    "doughnut window": ({"doughnut": (20, 34, 330), "window": (375, 34, 385)}, 390),
-    "doughnut section": ({"doughnut": (20, 34, 330), "section": (380, 34, 370, 330)}, 390),
-    "space doughnut window section unrolled": (
-        {"space": (20, 34, 280, 270), "doughnut": (320, 34, 270), "window": (610, 34, 330),
-         "section": (20, 340, 280, 250), "unrolled": (320, 340, 440, 250)},
-        614,
-    ),
-    "doughnut window section yours": (
-        {"doughnut": (20, 34, 320), "window": (365, 34, 360), "section": (20, 386, 320, 250),
-         "yours": (365, 344, 360)},
-        656,
-    ),
-}  # fmt: skip
 _ALL = "space doughnut window section unrolled"
+_ABOVE = (354, {"doughnut": 330, "window": 430, "numbers": 200})
+_LAYOUTS = {
+    "doughnut window": rows(_ABOVE),
+    "doughnut section": rows((384, {"doughnut": 360, "section": 400, "numbers": 200})),
+    _ALL: rows((354, {"doughnut": 330, "window": 430, "numbers": 200}),
+               (300, {"unrolled": 440, "section": 250, "space": 270})),
+    "doughnut window section yours": rows(_ABOVE, (354, {"section": 330, "yours": 430})),
+}  # fmt: skip
 _GROUND = 1.2  # metres from the viewpoint down to the grid of the reader's own
 _AWAY = 2.5  # metres to what a window shows, for a function that takes its distance for 1
 
@@ -71,7 +66,7 @@ class OmnidirectionalView(OrbitView):
     """
 
     title: ClassVar[str] = "Omnidirectional camera"
-    layouts = _SLOTS
+    layouts = _LAYOUTS
 
     xi: float = slider(0.92, 0.0, 1.0, 0.01, label="ξ", help="0 is a flat mirror, a pinhole; 1 a paraboloid")
     mirror: str = choice("hyperbolic", "parabolic", "spherical", help="only the first two have a single viewpoint")
@@ -224,36 +219,35 @@ class OmnidirectionalView(OrbitView):
         side = _DRAFT if draft else _FINE
         picture, camera = self.doughnut(side, draft=draft), self.camera(side)
         photographs = {"doughnut": jpeg(picture)}
-        body = [self._doughnut_panel()]
+        parts = {"doughnut": self._doughnut_panel(), "numbers": self._numbers_column()}
         if self._has("space"):
-            space, attached = self._space_panel(picture, draft)
+            parts["space"], attached = self._space_panel(picture, draft)
             photographs |= attached
-            body.append(space)
         if self._has("window"):
             photographs["window"] = jpeg(_resampled(picture, camera, self._seen(draft), draft))
-            body.append(self._window_panel())
+            parts["window"] = self._window_panel()
         if self._has("section"):
-            body.append(self._section_panel())
+            parts["section"] = self._section_panel()
         if self._has("unrolled"):
             photographs["unrolled"] = jpeg(_resampled(picture, camera, self._unrolled(draft), draft))
-            body += [self._unrolled_panel(), svg.text((320, 606), self.equation(), "note")]
+            parts["unrolled"] = self._unrolled_panel()
         if self._has("yours"):
-            yours, attached = self._your_panel(picture, draft)
+            parts["yours"], attached = self._your_panel(picture, draft)
             photographs |= attached
-            body.append(yours)
-        body.append(self._numbers_column())
-        return self.composed(self._height, *body, attached=photographs)
+        return self.tiled(self._layout, {name: parts[name] for name in self._layout}, photographs)
 
     @property
-    def _height(self) -> int:
-        return _SLOTS[self.panels][1]
+    def _layout(self) -> dict[str, Cell]:
+        return _LAYOUTS[self.panels]
 
-    def _slot(self, name: str) -> tuple[float, ...]:
-        return _SLOTS[self.panels][0][name]
+    def _slot(self, name: str) -> Cell:
+        """Where the panel of a cell stands: left, top, width and height."""
+        x, y, width, height = self._layout[name]
+        return x + 10, y + 34, width - 20, height - 44
 
     def _box(self, name: str, width: int, height: int) -> Panel:
-        x, y, across = self._slot(name)[:3]
-        return image_panel(name, x, y, across, width, height)
+        x, y, across, tallest = self._slot(name)
+        return image_panel(name, x, y, across, width, height, tallest=tallest)
 
     def _seen(self, draft: bool) -> Camera:
         return self.window(112 if draft else 320)
@@ -325,7 +319,7 @@ class OmnidirectionalView(OrbitView):
         camera = self._unrolled(False)
         width, height = camera.intrinsics.width, camera.intrinsics.height
         x, y, across, tallest = self._slot("unrolled")
-        panel = image_panel("unrolled", x, y, across, width, height, tallest=tallest)
+        panel = image_panel("unrolled", x, y, across, width, height, tallest=tallest - 46)
         frame = self.window()
         outline = frame.unproject(frame.intrinsics.border(24))
         uv = panel.place(camera.project(closed(outline)))
@@ -333,13 +327,13 @@ class OmnidirectionalView(OrbitView):
         uv[1:][jump] = np.nan  # from one edge of the picture to another
         seen = placed_image(panel, "unrolled", width, height)
         title = "Unrolled: longitude and latitude" if self.unroll == "equirectangular" else "Folded out: a cube map"
-        return panel.show(seen + svg.line(uv, "orange"), title=title)
+        at = panel.x, panel.y + panel.height + 20
+        return panel.show(seen + svg.line(uv, "orange"), title=title) + svg.paragraph(at, self.equation(), panel.width)
 
     def _numbers_column(self) -> str:
-        x, y = 784, 332 if self.panels == _ALL else 26
-        return svg.text((x, y), "This camera" if self._has("section") else "This window", "title") + readout(
-            self._told(), (x, y + 22), (0, 38), (0, 17)
-        )
+        x = self._layout["numbers"][0] + 10
+        title = svg.text((x, 26), "This camera" if self._has("section") else "This window", "title")
+        return title + readout(self._told(), (x, 50), (0, 38), (0, 17))
 
     # The reader's own function ---------------------------------------------------------------------------------------
 
