@@ -38,7 +38,8 @@ _GRID = np.array([[0, 1], [3, 2]])  # of an outline's corners, as a picture hang
 _PANELS = ("box picture blur", "box picture", "picture yours")
 _ABOVE = (330, {"box": 560, "picture on the wall": 400})
 _LAYOUTS = {
-    "box picture blur": rows(_ABOVE, (252, {"blur": 400, "numbers": 290, "similar triangles": 270})),
+    "box picture blur": rows(_ABOVE, (252, {"blur": 400}))
+    | {"numbers": (400, 330, 290, 200), "similar triangles": (690, 330, 270, 136)},
     "box picture": rows(_ABOVE, (136, {"numbers": 290, "similar triangles": 270})),
     "picture yours": rows(
         (376, {"projected rightly": 480, "projected by you": 480}), (172, {"numbers": 290, "similar triangles": 270})
