@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed
@@ -17,7 +18,8 @@ from camviz.sensors.readings import LINEAR
 from camviz.sensors.trust import Figure
 from camviz.views.base import View
 
-_WIDTH, _HEIGHT = 370, 210
+_WIDTH, _HEIGHT = 390, 212
+_LAYOUT = rows((296, {"photon transfer": 480, "response": 480}), (296, {"signal to noise": 480, "darkness": 480}))
 _LEGEND = [("blue", "measured"), ("orange", "dark noise and photons")]
 
 
@@ -31,9 +33,13 @@ class MeasuredNoiseView(View):
     name: str = "this sensor"
 
     def figure(self, *, draft: bool = False) -> Picture:
-        panels = [self.transfer_panel(80, 40), self.response_panel(550, 40), self.snr_panel(80, 340)]
-        body = "".join([*panels, self.dark_panel(550, 340)])
-        return self.composed(612, body)
+        parts = {
+            "photon transfer": self.transfer_panel(80, 34),
+            "response": self.response_panel(560, 34),
+            "signal to noise": self.snr_panel(80, 330),
+            "darkness": self.dark_panel(560, 330),
+        }
+        return self.tiled(_LAYOUT, parts)
 
     def description(self) -> str:
         known = listed(self.numbers())
