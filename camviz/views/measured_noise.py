@@ -80,7 +80,7 @@ class MeasuredNoiseView(View):
         error = found.judged["linearity_error"].value
         note = f"off the line by {100 * error:.2g} % on average" if isfinite(error) else ""
         xlabel = "photons per pixel" if lit else "exposure (ms)"
-        return plot.plotted(panel, marks, xlabel, "signal (DN)", title="Response", note=note)
+        return plot.plotted(panel, marks, xlabel, "signal (DN)", aside=58, title="Response", note=note)
 
     def snr_panel(self, x: float, y: float) -> str:
         """Signal to noise over electrons: measured, the model, and what no sensor exceeds."""
@@ -109,7 +109,7 @@ class MeasuredNoiseView(View):
             slope = found.dark_current_e_per_s * found.gain_dn_per_e / 1000
             ends = np.array([0, panel.right])
             marks += plot.curve(panel, ends, dark.mean() + slope * (ends - exposure.mean()), "orange")
-        return plot.plotted(panel, marks, "exposure (ms)", "mean of dark frames (DN)", title="Darkness")
+        return plot.plotted(panel, marks, "exposure (ms)", "mean of dark frames (DN)", aside=58, title="Darkness")
 
 
 FIGURES: dict[str, tuple[str, float, str]] = {
@@ -172,7 +172,7 @@ def _dots(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
 
 def _shown(panel: Panel, marks: str, title: str, xlabel: str, ylabel: str) -> str:
     ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-    return plot.plotted(panel, marks, xlabel, ylabel, *ticks, title=title)
+    return plot.plotted(panel, marks, xlabel, ylabel, *ticks, aside=58, title=title)
 
 
 def _top(values: np.ndarray) -> float:
