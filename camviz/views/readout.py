@@ -36,7 +36,7 @@ MAINS_HZ = 50.0  # of the lamp, which is bright twice in each period
 _ABOVE = (276, {"scene": 330, "picture": 330, "numbers": 300})
 LAYOUTS = {
     "pictures": rows(_ABOVE),
-    "pictures time": rows(_ABOVE, (272, {"each row’s time": 500})) | {"what happens": (500, 276, 460, 80)},
+    "pictures time": rows(_ABOVE, (272, {"each row’s time": 500})) | {"what happens": (500, 276, 460, 272)},
     "pictures charge time": rows(_ABOVE, (272, {"charge": 330, "each row’s time": 370}))
     | {"what happens": (700, 276, 260, 130)},
 }
@@ -153,6 +153,11 @@ class ReadoutView(View):
         apart = {"between first and last row's exposure": f"{what} moves {self.lean_px:.0f} px"}
         return frame | {"speed": f"{self.speed:g} {unit}"} | apart | read
 
+    @property
+    def _problem(self) -> str:
+        """What is in the way of the reader's row time, where one is asked for."""
+        return self.your_row_s[1] if self.yours is not None and self.subject == "wall under a lamp" else ""
+
     def _your_figure(self) -> dict[str, str]:
         """What the reader's function makes of the stripes."""
         row_s, problem = self.your_row_s
@@ -188,7 +193,8 @@ class ReadoutView(View):
         }
         if "time" in self.panels:
             x = self._layout["what happens"][0] + 12
-            words = svg.paragraph((x, 302), _WORDS[self.readout], 948 - x, "label")
+            said = f"{_WORDS[self.readout]}\n{self._problem}".strip()
+            words = svg.paragraph((x, 302), said, 948 - x, "label")
             parts |= {"each row’s time": self._timing(), "what happens": words}
         return self.tiled(self._layout, parts, {"scene": jpeg(now), "read": jpeg(partial)})
 
@@ -278,12 +284,12 @@ class ReadoutView(View):
         )
 
     def _your_line(self, panel: Panel) -> str:
-        """When each row is read if the reader's row time is right, or what is in the way of that."""
+        """When each row is read if the reader's row time is right."""
         if self.yours is None or self.subject != "wall under a lamp":
             return ""
         row_s, problem = self.your_row_s
         if problem:
-            return svg.paragraph((36, panel.height - 52), problem, 0.36 * panel.width)
+            return ""
         rows = np.linspace(0, ROWS, 13)
         marks = svg.dots(panel.place(np.stack([1e3 * row_s * rows, rows], axis=-1)), "orange", 9)
         return marks + svg.text((panel.width - 8, 54), "dots: read, by your row time", "orange halo end")
