@@ -34,7 +34,7 @@ _WIDTH, _TALLEST = 365, 274
 _MAP_WIDTH, _MAP_TALLEST = 248, 186
 _LAYOUT = rows(
     (314, {"left picture": 385, "right picture": 385, "numbers": 190}),
-    (270, {"disparity map": 320, "second map": 320, "wedge": 320}),
+    (284, {"disparity map": 320, "second map": 320, "wedge": 320}),
 )
 _ROWS = 12  # epipolar lines in a picture's height
 _GARDEN_CAMERA = Camera(Intrinsics.from_fov(480, 360, 62))
@@ -375,7 +375,7 @@ class RectificationView(View):
         depth, problem = self.your_depth(draft=draft)
         marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
         right_map = heat_panel(left, size.width, size.height, *limits, "m", marks[0], title="Depth")
-        words = svg.paragraph((right.x, right.y + right.height + 18), problem or self._at_your_mark(depth), 300,
+        words = svg.paragraph((right.x, right.y + right.height + 18), problem or self._at_your_mark(depth), right.width,
                               "note" if problem else "label orange")  # fmt: skip
         your_map = heat_panel(right, size.width, size.height, *limits, "m", marks[1], title="With your function")
         true = self.stage.depth(self.disparity_map(draft=draft))

@@ -39,7 +39,7 @@ _STAR = (228.0, 120.0, 78.0)  # centre and radius, µm
 _SPOKES = 36
 _MARGIN_UM = 40  # painted around the field, because a Fourier transform joins opposite ends
 _EDGE_UM = 75.0
-_LAYOUT = rows((400, {"picture": 440, "curves": 340, "numbers": 180}))
+_LAYOUT = rows((406, {"picture": 440, "curves": 340, "numbers": 180}))
 _COLOURS = ("red", "green", "blue")
 
 
@@ -159,7 +159,7 @@ class SharpnessView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         curves, problem = self._curves_panel()
         parts = {
-            "picture": self._picture_panel() + svg.paragraph((10, 370), problem, 420),
+            "picture": self._picture_panel() + svg.paragraph((10, 368), problem, 420),
             "curves": curves + self._legend(),
             "numbers": self._numbers_column(),
         }
