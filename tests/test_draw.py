@@ -1,13 +1,16 @@
 """Pictures are text and bytes: well formed, complete in themselves, and honest about points that do not exist."""
 
+from itertools import combinations
 from xml.etree import ElementTree
 
 import cv2
 import numpy as np
 import pytest
+from test_tiles import unit_on_a_telephone
 
 from camviz.draw import plot, svg
 from camviz.draw.gallery import side_by_side
+from camviz.draw.labels import overlap, words_of
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, jpeg, png
 
@@ -100,6 +103,25 @@ def test_photographs_keep_their_colours_on_the_way_through():
 def test_an_image_that_cannot_be_encoded_is_refused_in_words():
     with pytest.raises(ValueError, match=r"uint8 .* got float64 \(2, 2, 3\)"):
         jpeg(np.zeros((2, 2, 3)))
+
+
+def test_a_long_caption_has_room_where_its_letters_are_large():
+    grey = np.zeros((30, 40), np.uint8)
+    caption = "the slice at row 48, every u made 16 pixels tall, and as many again below it"
+    for others in (0, 1, 3, 5):
+        tiles = side_by_side({caption: grey} | {f"{i}": grey for i in range(others)}).tiles
+        for tile in tiles:
+            x, y, width, height = tile.cell
+            for unit in (1.0, unit_on_a_telephone(tile)):
+                (words,) = words_of(tile.body, (x, y, x + width, y + height), unit)
+                assert y + 10 + 0.75 * (width - 20) < words.box[1] < words.box[3] < y + height
+
+
+def test_pictures_side_by_side_stand_in_rows_that_do_not_cover_each_other():
+    tall = {f"{i}": np.zeros((90 if i == 1 else 30, 40), np.uint8) for i in range(7)}
+    boxes = [(x, y, x + width, y + height) for x, y, width, height in (t.cell for t in side_by_side(tall).tiles)]
+    assert [pair for pair in combinations(boxes, 2) if overlap(*pair)] == []
+    assert max(right for _, _, right, _ in boxes) == 960
 
 
 def test_pictures_side_by_side_name_all_captions():

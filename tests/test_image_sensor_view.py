@@ -5,6 +5,7 @@ import html
 import cv2
 import numpy as np
 import pytest
+from test_tiles import problems, unit_on_a_telephone
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.material import module
@@ -205,6 +206,14 @@ def test_the_wall_shows_as_many_stripes_as_the_lamp_is_bright_while_a_frame_is_r
     assert np.diff(peaks).mean() == pytest.approx(len(line) / view.stripes, rel=0.02)
     even = view.but(readout="CCD").picture(*LARGE)
     assert np.ptp(even) == np.ptp(even[0])
+
+
+@pytest.mark.parametrize("panels", ReadoutView.layouts)
+@pytest.mark.parametrize("row_time", [lambda stripes, rows, hertz: stripes / (2 * hertz) / rows, lambda *_: None])
+def test_words_of_the_read_out_stand_free_in_every_set_of_panels(panels, row_time):
+    view = ReadoutView(subject="wall under a lamp", panels=panels, yours=row_time)
+    for tile in view.figure(draft=True).tiles:
+        assert problems(tile, 1.0) + problems(tile, unit_on_a_telephone(tile)) == []
 
 
 def test_the_read_out_opens_with_the_panels_that_are_asked_for():

@@ -5,6 +5,7 @@ import re
 import cv2
 import numpy as np
 import pytest
+from test_tiles import problems, unit_on_a_telephone
 
 from camviz import optics
 from camviz.scenes import to_linear
@@ -88,6 +89,13 @@ def test_a_wrong_projection_is_drawn_and_one_that_stops_is_told_of():
         assert words in figure.body
         assert 'class="orange"' not in figure.body
         assert "nan" not in figure.body
+
+
+@pytest.mark.parametrize("panels", PinholeView.layouts)
+def test_words_stand_free_in_every_set_of_panels(panels):
+    view = PinholeView(panels=panels, yours=by_a_reader)
+    for tile in view.figure(draft=True).tiles:
+        assert problems(tile, 1.0) + problems(tile, unit_on_a_telephone(tile)) == []
 
 
 def test_panels_that_there_are_not_are_refused():

@@ -64,11 +64,13 @@ def plotted(
     ylabel: str,
     xticks: Ticks | None = None,
     yticks: Ticks | None = None,
+    *,
+    aside: float = 40,
     **heading: str,
 ) -> str:
-    """A plot with its grid and axes around what it shows; `heading` is what `Panel.show` takes."""
+    """A plot with its grid and axes around what it shows; `heading` is what `Panel.show` takes, `aside` what `axes`."""
     shown = panel.show(grid(panel, xticks, yticks) + content, **heading)
-    return shown + axes(panel, xlabel, ylabel, xticks, yticks)
+    return shown + axes(panel, xlabel, ylabel, xticks, yticks, aside=aside)
 
 
 def logarithmic_grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import readout, vector
@@ -21,6 +23,7 @@ from camviz.poses import RigidTransform
 from camviz.views.base import Control, Drawn, OrbitView, choice, slider
 from camviz.views.chessboard import outline, rim, squares
 
+_LAYOUT = rows((490, {"poses": 620, "picture": 340}))
 _NINE_BY_SIX = Board(9, 6, 0.025)
 _MOST_NUMBERED = 40  # boards that still leave room for each other's numbers
 
@@ -34,6 +37,8 @@ class BoardPosesView(OrbitView):
     themselves where they are at hand; `hidden` are the indices of poses that are not drawn; `names` are what the
     others are called, their places from 1 on where none are given.
     """
+
+    title: ClassVar[str] = "Camera and board"
 
     camera: Camera = field(compare=False)
     cam_from_board: RigidTransform = field(compare=False, repr=False)
@@ -115,11 +120,10 @@ class BoardPosesView(OrbitView):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        space, attached = self.space(space_panel("poses", 20, 34, 540, 452), draft)
-        body = space + self._image() + self._equation()
+        space, attached = self.space(space_panel("poses", 10, 34, 600, 446), draft)
         if self.photographs:
             attached = attached | {"photograph": jpeg(self.photographs[self.index])}
-        return Picture.whole(body, 960, 500, "Camera and board", self.description(), attached)
+        return self.tiled(_LAYOUT, {"poses": space, "picture": self._image() + self._equation()}, attached)
 
     def space(self, panel: Panel, draft: bool) -> Drawn:
         """The panel with the poses in space, a handle called "eye", and the photographs it needs."""
@@ -185,9 +189,9 @@ class BoardPosesView(OrbitView):
 
     def _image(self) -> str:
         k = self.camera.intrinsics
-        panel = image_panel("picture", 580, 34, 360, k.width, k.height, tallest=270)
+        panel = image_panel("picture", 630, 34, 310, k.width, k.height, tallest=230)
         content = placed_image(panel, "photograph", k.width, k.height) if self.photographs else self._drawn(panel)
-        title = f"Picture {self.index + 1}, and the corners computed"
+        title = f"Picture {self.index + 1}, corners computed"
         return panel.show(content + svg.dots(panel.place(self.pixels()), "red", 5), title=title)
 
     def _drawn(self, panel: Panel) -> str:
@@ -197,13 +201,11 @@ class BoardPosesView(OrbitView):
 
     def _equation(self) -> str:
         n, chosen = self.numbers(), self.chosen
-        rows = [
-            ("rotation vector, axis times angle [rad]", vector(chosen.rotation.as_rotvec(), 3)),
-            ("t, the board's first corner before the camera [m]", vector(chosen.translation, 3)),
-            ("C = −Rᵀt, the camera before the board [m]", vector(self.centres[self.index], 3)),
-            (
-                "from the board's middle; axis against the board's normal",
-                f"{n['distance']:.3f} m; {n['tilt_deg']:.1f}°",
-            ),
+        figures = [
+            ("rotation vector, axis · angle [rad]", vector(chosen.rotation.as_rotvec(), 3)),
+            ("t, the board before the camera [m]", vector(chosen.translation, 3)),
+            ("C = −Rᵀt, in the board’s frame [m]", vector(self.centres[self.index], 3)),
+            ("from the board’s middle", f"{n['distance']:.3f} m"),
+            ("axis against the board’s normal", f"{n['tilt_deg']:.1f}°"),
         ]
-        return readout(rows, (580, 338), (0, 41), (0, 18), "number")
+        return readout(figures, (630, 294), (0, 43), (0, 18.5), "number")

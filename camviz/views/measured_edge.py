@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed
@@ -35,6 +36,9 @@ def written(figures: Mapping[str, float]) -> dict[str, str]:
     return {words: form.format(value) if isfinite(value) else "not known" for (words, form), value in pairs.items()}
 
 
+_LAYOUT = rows((320, {"photograph": 280, "profile": 330, "contrast": 350}))
+
+
 @dataclass(frozen=True)
 class MeasuredEdgeView(View):
     """An edge as photographed, its profile across, and how much of a grating's contrast is left."""
@@ -45,9 +49,9 @@ class MeasuredEdgeView(View):
     name: str = "this edge"
 
     def figure(self, *, draft: bool = False) -> Picture:
-        body = self._photograph() + self._profile() + self._curve()
+        parts = {"photograph": self._photograph(), "profile": self._profile(), "contrast": self._curve()}
         light = self.edge.image / max(float(np.percentile(self.edge.image, 99)), 1e-12)
-        return self.composed(330, body, attached={"edge": jpeg(to_display(light))})
+        return self.tiled(_LAYOUT, parts, {"edge": jpeg(to_display(light))})
 
     def description(self) -> str:
         edge = self.edge
@@ -61,7 +65,7 @@ class MeasuredEdgeView(View):
 
     def _photograph(self) -> str:
         height, width = self.edge.image.shape
-        panel = image_panel("photograph", 20, 40, 240, width, height, tallest=236)
+        panel = image_panel("photograph", 10, 34, 260, width, height, tallest=236)
         v = np.array([-0.5, height - 0.5])
         slope, intercept = self.edge.line
         content = placed_image(panel, "edge", width, height)
@@ -70,7 +74,7 @@ class MeasuredEdgeView(View):
 
     def _profile(self) -> str:
         reach = max(4.0, 2 * self.edge.rise)
-        panel = plot.plot_panel("profile", 330, 40, 250, 236, (-reach, reach), (-0.15, 1.15))
+        panel = plot.plot_panel("profile", 342, 34, 258, 236, (-reach, reach), (-0.15, 1.15))
         places, values = self.edge.edge_spread
         near = np.abs(places) <= reach
         curve, note = plot.curve(panel, places[near], values[near], "blue"), f"10–90 %: {self.edge.rise:.2f} px"
@@ -78,7 +82,7 @@ class MeasuredEdgeView(View):
 
     def _curve(self) -> str:
         edge = self.edge
-        panel = plot.plot_panel("curve", 650, 40, 290, 236, (0, 1), (0, 1.1))
+        panel = plot.plot_panel("curve", 670, 34, 280, 236, (0, 1), (0, 1.1))
         frequency, values = edge.curve
         content = plot.upright(panel, 0.5, "muted dotted") + plot.curve(panel, frequency, values, "blue")
         if isfinite(edge.mtf50):

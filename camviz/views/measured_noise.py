@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed
@@ -17,7 +18,8 @@ from camviz.sensors.readings import LINEAR
 from camviz.sensors.trust import Figure
 from camviz.views.base import View
 
-_WIDTH, _HEIGHT = 370, 210
+_WIDTH, _HEIGHT = 390, 212
+_LAYOUT = rows((296, {"photon transfer": 480, "response": 480}), (296, {"signal to noise": 480, "darkness": 480}))
 _LEGEND = [("blue", "measured"), ("orange", "dark noise and photons")]
 
 
@@ -31,9 +33,13 @@ class MeasuredNoiseView(View):
     name: str = "this sensor"
 
     def figure(self, *, draft: bool = False) -> Picture:
-        panels = [self.transfer_panel(80, 40), self.response_panel(550, 40), self.snr_panel(80, 340)]
-        body = "".join([*panels, self.dark_panel(550, 340)])
-        return self.composed(612, body)
+        parts = {
+            "photon transfer": self.transfer_panel(80, 34),
+            "response": self.response_panel(560, 34),
+            "signal to noise": self.snr_panel(80, 330),
+            "darkness": self.dark_panel(560, 330),
+        }
+        return self.tiled(_LAYOUT, parts)
 
     def description(self) -> str:
         known = listed(self.numbers())
@@ -74,7 +80,7 @@ class MeasuredNoiseView(View):
         error = found.judged["linearity_error"].value
         note = f"off the line by {100 * error:.2g} % on average" if isfinite(error) else ""
         xlabel = "photons per pixel" if lit else "exposure (ms)"
-        return plot.plotted(panel, marks, xlabel, "signal (DN)", title="Response", note=note)
+        return plot.plotted(panel, marks, xlabel, "signal (DN)", aside=58, title="Response", note=note)
 
     def snr_panel(self, x: float, y: float) -> str:
         """Signal to noise over electrons: measured, the model, and what no sensor exceeds."""
@@ -103,7 +109,7 @@ class MeasuredNoiseView(View):
             slope = found.dark_current_e_per_s * found.gain_dn_per_e / 1000
             ends = np.array([0, panel.right])
             marks += plot.curve(panel, ends, dark.mean() + slope * (ends - exposure.mean()), "orange")
-        return plot.plotted(panel, marks, "exposure (ms)", "mean of dark frames (DN)", title="Darkness")
+        return plot.plotted(panel, marks, "exposure (ms)", "mean of dark frames (DN)", aside=58, title="Darkness")
 
 
 FIGURES: dict[str, tuple[str, float, str]] = {
@@ -166,7 +172,7 @@ def _dots(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
 
 def _shown(panel: Panel, marks: str, title: str, xlabel: str, ylabel: str) -> str:
     ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-    return plot.plotted(panel, marks, xlabel, ylabel, *ticks, title=title)
+    return plot.plotted(panel, marks, xlabel, ylabel, *ticks, aside=58, title=title)
 
 
 def _top(values: np.ndarray) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.items import closed
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -35,7 +36,15 @@ TOWER_M = 1.16
 _POINTS_A_LINE = 33
 _GRID = np.array([[0, 1], [3, 2]])  # of an outline's corners, as a picture hangs on them
 _PANELS = ("box picture blur", "box picture", "picture yours")
-_HEIGHTS = dict(zip(_PANELS, (590, 470, 496), strict=True))
+_ABOVE = (330, {"box": 560, "picture on the wall": 400})
+_LAYOUTS = {
+    "box picture blur": rows(_ABOVE, (252, {"blur": 400}))
+    | {"numbers": (400, 330, 290, 200), "similar triangles": (690, 330, 270, 136)},
+    "box picture": rows(_ABOVE, (136, {"numbers": 290, "similar triangles": 270})),
+    "picture yours": rows(
+        (376, {"projected rightly": 480, "projected by you": 480}), (172, {"numbers": 290, "similar triangles": 270})
+    ),
+}
 _HOLES, _BLURS = (0.05, 2.0), (0.1, 4.0)  # the plot's range, mm
 _POINTS = {  # of the tower, from its middle, metres: what the rays start from
     "blue": (0.0, -TOWER_M / 2, 0.0),
@@ -151,17 +160,16 @@ class PinholeView(OrbitView):
         return self.turn_picture or "yours" in self.panels  # pixels count in the upright picture
 
     def figure(self, *, draft: bool = False) -> Picture:
-        upright, height = self.image(320 if draft else PIXELS), _HEIGHTS[self.panels]
+        upright = self.image(320 if draft else PIXELS)
         photographs = {"wall": jpeg(upright if self._upright else upright[::-1, ::-1].copy())}
         if "yours" in self.panels:
-            content = self._both_projections()
+            parts = self._both_projections()
         else:
             box, more = self._box_panel(upright, draft)
             photographs |= more
-            content = box + self._picture_panel() + self._numbers()
-            content += self._blur_panel() if "blur" in self.panels else ""
-        body = content
-        return self.composed(height, body, attached=photographs)
+            parts = {"box": box, "picture on the wall": self._picture_panel()}
+            parts |= {"blur": self._blur_panel() if "blur" in self.panels else ""} | self._numbers()
+        return self.tiled(_LAYOUTS[self.panels], parts, photographs)
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -176,12 +184,12 @@ class PinholeView(OrbitView):
 
     def _picture_panel(self) -> str:
         pixels = self.camera().intrinsics
-        panel = image_panel("wall", 560, 34, 380, pixels.width, pixels.height)
+        panel = image_panel("wall", 570, 34, 380, pixels.width, pixels.height)
         marks = "".join(
             svg.dots([panel.place(self._pixel(point))], f"{colour} ringed", 8) for colour, point in _POINTS.items()
         )
         ends = panel.place([self._pixel(_POINTS["blue"]), self._pixel(_POINTS["orange"])])
-        title = "The picture, turned upright" if self._upright else "The picture on the wall, from behind"
+        title = "The picture, turned upright" if self._upright else "On the wall, from behind"
         content = (
             placed_image(panel, "wall", pixels.width, pixels.height) + svg.line(ends, "yellow dashed thin") + marks
         )
@@ -195,16 +203,17 @@ class PinholeView(OrbitView):
 
     # The reader's own projection -------------------------------------------------------------------------------------
 
-    def _both_projections(self) -> str:
+    def _both_projections(self) -> dict[str, str]:
         """The picture twice, with the garden's outlines over it: as they are projected, and as the reader does it."""
         camera = self.camera()
         outlines = _garden_outlines() - camera.centre  # the box is not turned
         right = Camera(camera.intrinsics).project(outlines)
         yours, problem = self._your_pixels(outlines)
         words = svg.paragraph((14, 30), problem, 412) if problem else ""
-        pictures = self._outlined("right", 20, right, "yellow", "The picture, its outlines projected")
-        pictures += self._outlined("yours", 500, yours, "orange", "The same, projected by your function", words)
-        return pictures + self._pixel_numbers()
+        return {
+            "projected rightly": self._outlined("right", 20, right, "yellow", "The picture, its outlines projected"),
+            "projected by you": self._outlined("yours", 500, yours, "orange", "The same, by your function", words),
+        } | self._pixel_numbers()
 
     def _your_pixels(self, points: np.ndarray) -> tuple[np.ndarray, str]:
         """Where the reader's function puts points (..., 3), and what is wrong with it."""
@@ -217,7 +226,7 @@ class PinholeView(OrbitView):
         picture = "" if words else placed_image(panel, "wall", pixels.width, pixels.height)
         return panel.show(picture + svg.path(panel.place(lines), colour) + words, title=title)
 
-    def _pixel_numbers(self) -> str:
+    def _pixel_numbers(self) -> dict[str, str]:
         """What the function is given, under the pictures."""
         pixels, pitch_um = self.camera().intrinsics, 1000 * WALL_MM[0] / PIXELS
         given = [
@@ -225,14 +234,14 @@ class PinholeView(OrbitView):
             ("principal point", f"cx = {pixels.cx:g} px, cy = {pixels.cy:g} px"),
             ("picture", f"{pixels.width} × {pixels.height} pixels, {WALL_MM[0]:g} × {WALL_MM[1]:g} mm"),
         ]
-        similar = [("crate and globe on the wall, by similar triangles:", self.equation())]
         title = svg.text((20, 398), "What your function is given", "title")
-        return title + readout(given, (20, 424), (0, 21), (120, 0)) + readout(similar, (500, 424), (0, 0), (0, 21))
+        numbers = title + readout(given, (20, 424), (0, 44), (0, 19))
+        return {"numbers": numbers, "similar triangles": self._triangles(310, 398)}
 
     # The box ---------------------------------------------------------------------------------------------------------
 
     def _box_panel(self, upright: np.ndarray, draft: bool) -> Drawn:
-        panel = space_panel("box", 20, 34, 520, 285)
+        panel = space_panel("box", 10, 34, 540, 285)
         behind = ENLARGED * self.depth_mm / 1000
         extent = self.object_m + behind
         aim = (0.0, 0.0, (self.object_m - behind) / 2 - 0.08 * extent)
@@ -273,7 +282,7 @@ class PinholeView(OrbitView):
 
     @cached_property
     def _plot(self) -> Panel:
-        return plot_panel("blur", 74, 368, 466, 164, logs(_HOLES), logs(_BLURS))
+        return plot_panel("blur", 76, 364, 316, 166, logs(_HOLES), logs(_BLURS))
 
     def _blur_panel(self) -> str:
         panel = self._plot
@@ -294,7 +303,7 @@ class PinholeView(OrbitView):
         )
         label = "Blur against the hole's diameter; drag or press the arrow keys to change the hole"
         names = "hole diameter d [mm], logarithmic", "blur [µm]"
-        return axes(panel, *names, _HOLE_TICKS, _BLUR_TICKS, aside=44) + panel.show(
+        return axes(panel, *names, _HOLE_TICKS, _BLUR_TICKS, aside=52) + panel.show(
             content, title="Blur on the wall", hint="drag to change the hole", drag="hole", label=label
         )
 
@@ -321,11 +330,17 @@ class PinholeView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers(self) -> str:
-        left, below = (580, 546) if "blur" in self.panels else (20, 386)  # of the blur's curve, or in its place
-        figures = readout(self.numbers(), (left, 386), (0, 21), (120, 0))
-        similar = [("crate and globe, by similar triangles:", self.equation())]
-        return svg.text((left, 360), "This box", "title") + figures + readout(similar, (580, below), (0, 0), (0, 21))
+    def _numbers(self) -> dict[str, str]:
+        left = 420 if "blur" in self.panels else 10
+        figures = readout(self.numbers(), (left, 380), (0, 22), (122, 0))
+        numbers = svg.text((left, 356), "This box", "title") + figures
+        return {"numbers": numbers, "similar triangles": self._triangles(left + 290, 356)}
+
+    def _triangles(self, x: float, y: float) -> str:
+        """How tall the crate and globe are on the wall, from a place on."""
+        similar = self.equation().replace(" = ", "\n= ").replace("\n", " ", 1)
+        words = svg.paragraph((x, y + 24), f"The crate and globe on the wall:\n{similar}", 250, "label")
+        return svg.text((x, y), "By similar triangles", "title") + words
 
 
 @lru_cache(maxsize=2)

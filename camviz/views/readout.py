@@ -5,7 +5,7 @@ Before a wall in the light of a lamp, a reader's own row time can be drawn besid
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
+from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, grid, plot_panel, upright
@@ -32,8 +33,14 @@ BUCKETS = (16, 12)  # of the brigade drawn, columns and rows
 BLADES = 5
 EXPOSURE_S = 1e-3
 MAINS_HZ = 50.0  # of the lamp, which is bright twice in each period
-LAYOUTS = {"pictures": 292, "pictures time": 590, "pictures charge time": 590}
-"""What is drawn, and how tall it is."""
+_ABOVE = (276, {"scene": 330, "picture": 330, "numbers": 300})
+LAYOUTS = {
+    "pictures": rows(_ABOVE),
+    "pictures time": rows(_ABOVE, (272, {"each row’s time": 500})) | {"what happens": (500, 276, 460, 272)},
+    "pictures charge time": rows(_ABOVE, (272, {"charge": 330, "each row’s time": 370}))
+    | {"what happens": (700, 276, 260, 130)},
+}
+"""What is drawn, and where."""
 _DIM = 0.16  # of what has not been read
 _FOV_DEG = 60.0
 _ROW_TICKS = [(float(row), str(row)) for row in range(0, ROWS + 1, 120)]
@@ -146,6 +153,11 @@ class ReadoutView(View):
         apart = {"between first and last row's exposure": f"{what} moves {self.lean_px:.0f} px"}
         return frame | {"speed": f"{self.speed:g} {unit}"} | apart | read
 
+    @property
+    def _problem(self) -> str:
+        """What is in the way of the reader's row time, where one is asked for."""
+        return self.your_row_s[1] if self.yours is not None and self.subject == "wall under a lamp" else ""
+
     def _your_figure(self) -> dict[str, str]:
         """What the reader's function makes of the stripes."""
         row_s, problem = self.your_row_s
@@ -173,17 +185,22 @@ class ReadoutView(View):
         read = round(size[1] * self.time / 100)
         partial = whole.copy()
         partial[read:] = (_DIM * whole[read:]).astype(np.uint8)
-        height = LAYOUTS[self.panels]
-        body = (
-            self._photo("scene", 20, "The scene at this moment", size, "moves on")
-            + self._photo("read", 350, "The picture, as far as it is read", size)
-            + self._numbers()
-        )
-        if "charge" in self.panels:
-            body += self._buckets(whole)
+        parts = {
+            "scene": self._photo("scene", 10, "The scene at this moment", size, "moves on"),
+            "picture": self._photo("read", 340, "The picture, as far as it is read", size),
+            "numbers": self._numbers(),
+            "charge": self._buckets(whole) if "charge" in self.panels else "",
+        }
         if "time" in self.panels:
-            body += self._timing()
-        return self.composed(height, body, attached={"scene": jpeg(now), "read": jpeg(partial)})
+            x = self._layout["what happens"][0] + 12
+            said = f"{_WORDS[self.readout]}\n{self._problem}".strip()
+            words = svg.paragraph((x, 302), said, 948 - x, "label")
+            parts |= {"each row’s time": self._timing(), "what happens": words}
+        return self.tiled(self._layout, parts, {"scene": jpeg(now), "read": jpeg(partial)})
+
+    @property
+    def _layout(self) -> Mapping[str, Cell]:
+        return LAYOUTS[self.panels]
 
     def _photo(self, name: str, x: float, title: str, size: tuple[int, int], note: str = "") -> str:
         panel = image_panel(name, x, 34, 310, *size)
@@ -198,7 +215,7 @@ class ReadoutView(View):
 
     def _buckets(self, whole: np.ndarray) -> str:
         """The sensor as 16 × 12 buckets, filled after the picture's brightness, at this moment of the read-out."""
-        panel = Panel("buckets", 20, 326, 310, 232, 0, 18.6, 0, 13.92)
+        panel = Panel("buckets", 10, 310, 310, 232, 0, 18.6, 0, 13.92)
         charge = cv2.resize(whole.mean(axis=-1).astype(np.float32), BUCKETS, interpolation=cv2.INTER_AREA) / 255
         draw = self._brigade if self.readout == "CCD" else self._rows
         title = "Bucket brigade: one amplifier" if self.readout == "CCD" else "An amplifier in each pixel"
@@ -233,8 +250,8 @@ class ReadoutView(View):
     @cached_property
     def _clock(self) -> Panel:
         span = 1e3 * (self.frame_s + EXPOSURE_S)
-        left = 400 if "charge" in self.panels else 70
-        return plot_panel("timing", left, 326, 660 - left, 186, (-1e3 * EXPOSURE_S, span), (ROWS, 0))
+        left, _, width, _ = self._layout["each row’s time"]
+        return plot_panel("timing", left + 64, 310, width - 74, 186, (-1e3 * EXPOSURE_S, span), (ROWS, 0))
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> ReadoutView:
         moved = 100 * dx / (1e3 * self.frame_s * self._clock.scale[0])
@@ -267,21 +284,18 @@ class ReadoutView(View):
         )
 
     def _your_line(self, panel: Panel) -> str:
-        """When each row is read if the reader's row time is right, or what is in the way of that."""
+        """When each row is read if the reader's row time is right."""
         if self.yours is None or self.subject != "wall under a lamp":
             return ""
         row_s, problem = self.your_row_s
         if problem:
-            return svg.paragraph((36, panel.height - 52), problem, 0.36 * panel.width)
+            return ""
         rows = np.linspace(0, ROWS, 13)
         marks = svg.dots(panel.place(np.stack([1e3 * row_s * rows, rows], axis=-1)), "orange", 9)
         return marks + svg.text((panel.width - 8, 54), "dots: read, by your row time", "orange halo end")
 
     def _numbers(self) -> str:
-        words = svg.paragraph((690, 340), _WORDS[self.readout], 250, "label") if "time" in self.panels else ""
-        return (
-            svg.text((690, 26), "This read-out", "title") + readout(self._told(), (690, 50), (0, 44), (0, 19)) + words
-        )
+        return svg.text((672, 26), "This read-out", "title") + readout(self._told(), (672, 50), (0, 46), (0, 20))
 
 
 def fan(u: ArrayLike, v: ArrayLike, turns: ArrayLike) -> Array:

@@ -17,6 +17,7 @@ from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.course.yours import tried
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -24,13 +25,17 @@ from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.views import stereo_pair
-from camviz.views.base import Drawn, View, choice, slider, switch
+from camviz.views.base import View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
 
-_WIDTH, _TALLEST = 385, 289
-_MAP_WIDTH, _MAP_TALLEST = 236, 177
+_WIDTH, _TALLEST = 365, 274
+_MAP_WIDTH, _MAP_TALLEST = 248, 186
+_LAYOUT = rows(
+    (314, {"left picture": 385, "right picture": 385, "numbers": 190}),
+    (284, {"disparity map": 320, "second map": 320, "wedge": 320}),
+)
 _ROWS = 12  # epipolar lines in a picture's height
 _GARDEN_CAMERA = Camera(Intrinsics.from_fov(480, 360, 62))
 _GARDEN = Source(
@@ -260,26 +265,30 @@ class RectificationView(View):
         numbers = self.numbers(draft=draft)
         left, right = _photographs(*self._key(draft))
         attached = {"left": left, "right": right}
-        panels = [self._picture_panel(self._left_panel), self._picture_panel(self._right_panel)]
-        maps, more = self._maps_block() if self.yours is None else self._your_maps_block(draft)
+        maps, more = self._heat_maps() if self.yours is None else self._your_maps(draft)
         if self.yours is None:
             more |= dict(zip(("disparity", "second"), _maps(*self._matching(draft), self.show), strict=True))
-        wedge = self._wedge_panel() if "wedge" in self._shown else ""
-        body = "".join([*panels, maps, wedge, readout(numbers, (820, 42), (0, 37), (0, 16))])
-        attached |= {name: data for name, data in more.items() if f"attached:{name}" in maps}
-        return self.composed(590, body, attached=attached, described=self._described(numbers))
+        parts = {
+            "left picture": self._picture_panel(self._left_panel),
+            "right picture": self._picture_panel(self._right_panel),
+            "numbers": readout(numbers, (782, 38), (0, 36.5), (0, 15.5)),
+            **{f"{name} map": drawn for name, drawn in maps.items()},
+            "wedge": self._wedge_panel() if "wedge" in self._shown else "",
+        }
+        attached |= {name: data for name, data in more.items() if name.split()[0] in maps}
+        return self.tiled(_LAYOUT, parts, attached, self._described(numbers))
 
     # The two pictures ------------------------------------------------------------------------------------------------
 
     @property
     def _left_panel(self) -> Panel:
         size = self.stage.left.intrinsics
-        return image_panel("left", 20, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
+        return image_panel("left", 10, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
     @property
     def _right_panel(self) -> Panel:
         size = self.stage.right.intrinsics
-        return image_panel("right", 420, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
+        return image_panel("right", 395, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
     def _picture_panel(self, panel: Panel) -> str:
         now = self.stage.left if panel.name == "left" else self.stage.right
@@ -329,12 +338,13 @@ class RectificationView(View):
     def _map_panels(self) -> tuple[Panel, Panel]:
         size = self.stage.left.intrinsics
         left, right = (
-            image_panel(name, x, 374, _MAP_WIDTH, size.width, size.height, tallest=_MAP_TALLEST)
-            for name, x in (("disparity", 20), ("second", 325))
+            image_panel(name, x, 348, _MAP_WIDTH, size.width, size.height, tallest=_MAP_TALLEST)
+            for name, x in (("disparity", 10), ("second", 330))
         )
         return left, right
 
-    def _maps_block(self) -> Drawn:
+    def _heat_maps(self) -> tuple[dict[str, str], dict[str, bytes]]:
+        """The maps that are shown, by name, and their keys."""
         size = self.stage.left.intrinsics
         left, right = self._map_panels()
         _, title, low, high, unit = self._second
@@ -347,9 +357,9 @@ class RectificationView(View):
             "second": heat_panel(right, size.width, size.height, low, high, unit, marks[1],
                                  title=title, note=formula if self.show == "depth" else note),
         }  # fmt: skip
-        hatched = svg.text((20, left.y + left.height + 18), "hatched: no disparity", "note")
+        maps["disparity"] += svg.text((left.x, left.y + left.height + 18), "hatched: no disparity", "note")
         keys = {"disparity key": heat_key("disparity"), "second key": heat_key(self._second[0])}
-        return "".join(drawn for name, drawn in maps.items() if name in self._shown) + hatched, keys
+        return {name: drawn for name, drawn in maps.items() if name in self._shown}, keys
 
     def your_depth(self, *, draft: bool = False) -> tuple[np.ndarray, str]:
         """What the reader's function makes of the disparity map, and what is wrong with it."""
@@ -359,19 +369,20 @@ class RectificationView(View):
         given = (found.astype(float), now.left.intrinsics.fx, now.pair.baseline, now.doffs)
         return tried(self.yours, given, found.astype(float))
 
-    def _your_maps_block(self, draft: bool) -> Drawn:
+    def _your_maps(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
         """The right depths, and beside them those of the reader's function."""
         size, (left, right), limits = self.stage.left.intrinsics, self._map_panels(), self._limits
         depth, problem = self.your_depth(draft=draft)
         marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
         right_map = heat_panel(left, size.width, size.height, *limits, "m", marks[0], title="Depth")
-        words = svg.paragraph((right.x, right.y + right.height + 18), problem or self._at_your_mark(depth), 300,
+        words = svg.paragraph((right.x, right.y + right.height + 18), problem or self._at_your_mark(depth), right.width,
                               "note" if problem else "label orange")  # fmt: skip
         your_map = heat_panel(right, size.width, size.height, *limits, "m", marks[1], title="With your function")
         true = self.stage.depth(self.disparity_map(draft=draft))
         images = {"disparity": heat_map(_small(true), *limits, "depth")}
         images["second"] = heat_map(_small(depth), *limits, "depth")
-        return right_map + your_map + words, images | dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
+        keys = dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
+        return {"disparity": right_map, "second": your_map + words}, images | keys
 
     def _at_your_mark(self, depth: np.ndarray) -> str:
         at_mark = self._at_mark(depth)
@@ -384,7 +395,7 @@ class RectificationView(View):
     def _wedge_panel(self) -> str:
         farthest = stereo_pair.depth_limits(self.source)[1]
         notes = (self.equation(), self.interval())
-        place = (672, 374, 270, 177)
+        place = (700, 348, 250, 186)
         return wedge_panel(place, self.stage.pair, self.disparity, self.plus_minus, farthest, notes, worth=self.worth)
 
 

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed
@@ -21,6 +22,8 @@ from camviz.views.base import View, slider, switch
 
 _DRAFT, _FINE = 144, 640  # pixels around the panorama
 _UP_DEG = 42.0
+_LAYOUT = rows((258, {"panorama": 960}), (264, {"from above": 270, "the seam ahead": 320}))
+_LAYOUT["parallax"] = (590, 258, 370, 304)
 _COUNTED = 4000  # pixels around the panorama whose parallax is told
 _LOUPE_DEG, _LOUPE_DOWN_DEG = 44.0, 3.0  # across the enlarged part, and of its middle below the horizon
 
@@ -115,9 +118,13 @@ class RingView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         panorama = self.panorama(draft=draft)
         photographs = {"panorama": jpeg(panorama, 90), "loupe": jpeg(self.loupe(draft=draft), 90)}
-        below = self._plan_panel(), self._loupe_panel(), self._plot_panel()
-        words = svg.text((20, 536), self.equation(), "note")
-        return self.composed(544, self._panorama_panel(), *below, words, attached=photographs)
+        parts = {
+            "panorama": self._panorama_panel(),
+            "from above": self._plan_panel(),
+            "the seam ahead": self._loupe_panel(),
+            "parallax": self._plot_panel() + svg.paragraph((604, 506), self.equation(), 346),
+        }
+        return self.tiled(_LAYOUT, parts, photographs)
 
     def _panorama_panel(self) -> str:
         pixels = all_round(_FINE, _UP_DEG)
@@ -147,7 +154,7 @@ class RingView(View):
         return _detail(self.ring, self.stitched_m, self.seam_deg, across)
 
     def _loupe_panel(self) -> str:
-        panel = Panel("loupe", 300, 292, 300, 220, 0, 300, 0, 220)
+        panel = Panel("loupe", 280, 292, 300, 220, 0, 300, 0, 220)
         seam = "".join(svg.segments([(150, y)], [(150, y + 14)], "orange thick") for y in (0, 206))
         there, shift = list(self.numbers().items())[-1]
         words = f"{there.removeprefix('at the seam ahead, ')}: {shift}"
@@ -155,7 +162,7 @@ class RingView(View):
 
     def _plan_panel(self) -> str:
         reach = 1.9
-        panel = Panel("plan", 20, 292, 250, 220, -reach, reach, reach * 0.88 + 0.9, -reach * 0.88 + 0.9)
+        panel = Panel("plan", 10, 292, 250, 220, -reach, reach, reach * 0.88 + 0.9, -reach * 0.88 + 0.9)
         centres = self.ring.centres[:, ::2]
         around = np.linspace(0, 2 * pi, 121)
         circle = np.stack([np.sin(around), np.cos(around)], axis=-1)
@@ -180,7 +187,7 @@ class RingView(View):
         z = np.logspace(low, high, 161)
         px = self.parallax_px(z)
         tall = 120.0
-        panel = plot.plot_panel("parallax", 670, 292, 270, 184, (low, high), (-tall, tall))
+        panel = plot.plot_panel("parallax", 656, 292, 294, 150, (low, high), (-tall, tall))
         xticks = plot.logarithmic(low, high)
         shown = np.log10(self.distance_m) if 0.7 < self.distance_m < 30 else np.nan
         mark = svg.dots([panel.place((shown, float(self.parallax_px(10**shown))))], "red", 9)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
+from camviz.draw.flow import rows
 from camviz.draw.picture import Picture
 from camviz.draw.readout import decimal, vector
 from camviz.draw.space import Dots, Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
@@ -24,6 +25,7 @@ _RINGS = (  # name and colour of the turn, radius of its ring, and the axis at r
     ("pitch", "orange", 0.84, 1),
     ("roll", "blue", 0.68, 0),
 )
+_LAYOUT = rows((466, {"rings": 620, "numbers": 340}))
 _STAND = 1.2  # where the outer ring's pins are held
 _BODY = Intrinsics.from_fov(640, 480, 60)
 
@@ -93,11 +95,10 @@ class RotationView(OrbitView):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        panel = space_panel("rings", 20, 34, 520, 420)
+        panel = space_panel("rings", 10, 34, 600, 422)
         label = "The rings in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
         space, attached = self.in_space(panel, self._items(), draft, "Three rings hold a camera", label)
-        body = space + self._numbers_panel()
-        return self.composed(470, body, attached=attached)
+        return self.tiled(_LAYOUT, {"rings": space, "numbers": self._numbers_panel()}, attached)
 
     def _items(self) -> list[Item]:
         camera = Camera(_BODY, world_from_cam=RigidTransform.from_rotation(self.rotation))
@@ -113,24 +114,24 @@ class RotationView(OrbitView):
 
     def _numbers_panel(self) -> str:
         n = self.numbers()
-        apart = f"{n['lock_deg']:.0f}°" + (", gimbal lock: one freedom is gone" if self.locked else "")
+        apart = f"{n['lock_deg']:.0f}°" + (", gimbal lock" if self.locked else "")
         rows = [
             ("Euler angles: yaw, pitch, roll [°]", _row([self.yaw_deg, self.pitch_deg, self.roll_deg], 1)),
             ("between the axes of yaw and roll", apart),
-            ("rotation vector of the camera's axes, axis times angle [rad]", _row(n["rotation_vector"])),
-            ("its length, the angle of the one turn that does it", f"{n['angle_deg']:.2f}°"),
+            ("rotation vector, axis · angle [rad]", _row(n["rotation_vector"])),
+            ("its length, the one turn’s angle", f"{n['angle_deg']:.2f}°"),
             ("quaternion (x, y, z, w)", _row(n["quaternion"])),
-            ("R, its rows are the camera's axes in the world", _row(n["R"][0])),
+            ("R, its rows the camera’s axes", _row(n["R"][0])),
             ("", _row(n["R"][1])),
             ("", _row(n["R"][2])),
         ]
-        y, words = 52.0, ""
+        y, words = 54.0, ""
         for name, value in rows:
-            words += svg.text((570, y), name, "note")
-            y += 20 if name else 0
-            words += svg.text((570, y), value, "number red" if "lock" in value else "number")
-            y += 34 if name and value is not rows[-3][1] else 20
-        return svg.text((570, 26), "The same, written in every way", "title") + words
+            words += svg.text((634, y), name, "note")
+            y += 21 if name else 0
+            words += svg.text((634, y), value, "number red" if "lock" in value else "number")
+            y += 35 if name and value is not rows[-3][1] else 21
+        return svg.text((634, 26), "The same in every way", "title") + words
 
 
 def _ring(world_from_ring: Rotation, radius: float, across: int) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, png
 from camviz.draw.readout import listed, readout
@@ -38,6 +39,7 @@ _STAR = (228.0, 120.0, 78.0)  # centre and radius, µm
 _SPOKES = 36
 _MARGIN_UM = 40  # painted around the field, because a Fourier transform joins opposite ends
 _EDGE_UM = 75.0
+_LAYOUT = rows((406, {"picture": 440, "curves": 340, "numbers": 180}))
 _COLOURS = ("red", "green", "blue")
 
 
@@ -155,21 +157,23 @@ class SharpnessView(View):
     # What it looks like -----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        height = 412 if self.yours else 392
         curves, problem = self._curves_panel()
-        words = self._legend(), svg.text((20, 402), problem, "note"), self._numbers_column()
-        pixels = png(to_display(self.image(draft=draft)))
-        return self.composed(height, self._picture_panel(), curves, *words, attached={"sensor": pixels})
+        parts = {
+            "picture": self._picture_panel() + svg.paragraph((10, 368), problem, 420),
+            "curves": curves + self._legend(),
+            "numbers": self._numbers_column(),
+        }
+        return self.tiled(_LAYOUT, parts, {"sensor": png(to_display(self.image(draft=draft)))})
 
     def _picture_panel(self) -> str:
-        panel = image_panel("sensor", 20, 34, 400, *FIELD_UM)
+        panel = image_panel("sensor", 10, 34, 420, *FIELD_UM)
         shown = placed_image(panel, "sensor", *FIELD_UM, style="image-rendering:pixelated")
         note = f"{FIELD_UM[0] / 1000:g} × {FIELD_UM[1] / 1000:g} mm of the sensor"
         return panel.show(shown, title="What the pixels record", note=note)
 
     def _curves_panel(self) -> tuple[str, str]:
         """The curves, and what is to be said of the reader's function."""
-        panel = plot.plot_panel("curves", 490, 34, 300, 300, (0, TOP_PER_MM), (0, 1.08))
+        panel = plot.plot_panel("curves", 500, 34, 270, 252, (0, TOP_PER_MM), (0, 1.08))
         f = np.linspace(0, TOP_PER_MM, 131)
         curves = self._colours(panel, f) if self.coloured else self._causes(panel, f)
         yours, problem = self._your_points(panel)
@@ -206,23 +210,21 @@ class SharpnessView(View):
         return svg.line(points, "orange") + svg.dots(points, "orange", 6), problem
 
     def _legend(self) -> str:
-        """Below the picture, where it stands in no curve's way."""
+        """Below the curves, where it stands in no curve's way."""
         entries = [("ink thick", "all together")]
         if self.coloured:
             entries = [("red thick", "red"), ("green thick", "green"), ("blue thick", "blue")]
         elif self.parts:
             entries += [("blue dashed", "diffraction"), ("purple dashed", "defocus"), ("green dashed", "pixel")]
-        rows = [entries, [("muted dotted", "Nyquist"), *([("orange thick", "yours")] if self.yours else [])]]
-        parts = []
-        for y, row in zip((356, 375), rows, strict=True):
-            x = 20.0
-            for class_, words in row:
-                parts.append(svg.line([(x, y), (x + 20, y)], class_) + svg.text((x + 26, y + 4), words, "note"))
-                x += 44 + 6.3 * len(words)
-        return "".join(parts)
+        entries += [("muted dotted", "Nyquist"), *([("orange thick", "yours")] if self.yours else [])]
+        drawn = ""
+        for i, (class_, words) in enumerate(entries):
+            x, y = 480 + 150 * (i % 2), 346 + 20 * (i // 2)
+            drawn += svg.line([(x, y), (x + 20, y)], class_) + svg.text((x + 26, y + 4), words, "note")
+        return drawn
 
     def _numbers_column(self) -> str:
-        return svg.text((814, 26), "This camera", "title") + readout(self.numbers(), (814, 54), (0, 40), (0, 17))
+        return svg.text((790, 26), "This camera", "title") + readout(self.numbers(), (790, 54), (0, 40), (0, 17))
 
 
 @lru_cache(maxsize=2)
