@@ -11,7 +11,7 @@ from camviz.course.questions import quiz_questions
 from camviz.widgets import quiz
 from camviz.widgets.question import QuestionWidget, Sheet
 
-STATE = ("title", "lead", "cards", "summary", "looking_back", "can_export", "exported", "problem")
+STATE = ("title", "lead", "cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem")
 
 
 @pytest.fixture

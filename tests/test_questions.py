@@ -221,7 +221,7 @@ def test_in_a_kernel_the_widget_is_shown_and_the_page_beside_it(monkeypatch):
     monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
     monkeypatch.setattr("IPython.core.getipython.get_ipython", Shell)
     shown = []
-    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, raw: shown.append(bundle))
+    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, **_: shown.append(bundle))
     quiz("05")._ipython_display_()
     kept, live = shown
     assert "application/vnd.jupyter.widget-view+json" in live

@@ -27,6 +27,7 @@ class StillWidget(anywidget.AnyWidget):
     """
 
     still_hidden = traitlets.Unicode().tag(sync=True)
+    _displayed = False
 
     def __init__(self, **traits: Any) -> None:
         super().__init__(**traits)
@@ -38,6 +39,13 @@ class StillWidget(anywidget.AnyWidget):
 
     def _ipython_display_(self) -> None:
         _show_with_stills(self, [("", self)])
+        self._displayed = True
+
+    def renew_still(self) -> None:
+        """Let the notebook keep the present state from now on, where this widget has been displayed alone."""
+        if self._displayed and not os.environ.get("CAMVIZ_STATIC"):
+            bundle = _stills([("", self)])
+            display(bundle, raw=True, update=True, display_id=_display_id(self))
 
 
 def stills_for_boxes() -> None:
@@ -69,14 +77,22 @@ def _held(box: Box, title: str = "") -> Iterator[tuple[str, StillWidget]]:
 
 def _show_with_stills(widget: Widget, held: list[tuple[str, StillWidget]]) -> None:
     """Display the stills of the widgets `held`, by their titles, and then the live `widget` that holds them."""
+    display(_stills(held), raw=True, display_id=_display_id(widget))
+    if not os.environ.get("CAMVIZ_STATIC"):
+        live = {"model_id": widget.model_id, "version_major": 2, "version_minor": 1}
+        display({"application/vnd.jupyter.widget-view+json": live, "text/plain": ""}, raw=True)
+
+
+def _display_id(widget: Widget) -> str:
+    return f"camviz-still-{widget.model_id}"
+
+
+def _stills(held: list[tuple[str, StillWidget]]) -> dict[str, str]:
     static = bool(os.environ.get("CAMVIZ_STATIC"))
     stills = [(title, one.model_id, one.still()) for title, one in held]
     html = "".join(_kept(title, "" if static else model, still["text/html"]) for title, model, still in stills)
     plain = "\n\n".join(still["text/plain"] for _, _, still in stills)
-    display({"text/html": html if static else f"{_STYLE}{html}", "text/plain": plain}, raw=True)
-    if not static:
-        live = {"model_id": widget.model_id, "version_major": 2, "version_minor": 1}
-        display({"application/vnd.jupyter.widget-view+json": live, "text/plain": ""}, raw=True)
+    return {"text/html": html if static else f"{_STYLE}{html}", "text/plain": plain}
 
 
 def _kept(title: str, model: str, still: str) -> str:

@@ -54,7 +54,7 @@ def notebook(browser, tmp_path_factory):
         opened = Notebook(browser, address, "endless.ipynb")
         opened.page.evaluate(RUN, 0)
         opened.page.set_default_timeout(20_000)
-        cell(opened, 0).get_by_text('ready').wait_for(timeout=90_000)
+        cell(opened, 0).get_by_text("ready").wait_for(timeout=90_000)
         yield opened
         opened.close()
 
