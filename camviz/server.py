@@ -37,7 +37,7 @@ def prompt(connection_class: type) -> type:
 
 
 def naming_this_python(get: Any) -> Any:
-    """A contents manager's `get`, but of a notebook that says all about its language with the version that runs here."""
+    """A contents manager's `get`; a notebook that tells its version of Python comes with the one that runs here."""
 
     def named(model: dict[str, Any]) -> dict[str, Any]:
         if model["type"] == "notebook" and model["content"]:
