@@ -104,7 +104,7 @@ def test_an_unknown_control_is_named_beside_those_there_are():
 @pytest.fixture
 def shown(monkeypatch):
     bundles = []
-    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, raw: bundles.append(bundle))
+    monkeypatch.setattr("camviz.widgets.still.display", lambda bundle, **_: bundles.append(bundle))
     return bundles
 
 

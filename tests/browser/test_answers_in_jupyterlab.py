@@ -138,6 +138,10 @@ def test_every_word_can_be_read_and_every_target_hit(browser, address):
         assert radio.evaluate("one => getComputedStyle(one).colorScheme") == scheme
     assert notebook.page.evaluate(SMALL, 24) == []
     assert notebook.page.evaluate(TINY) == []
+    devtools = notebook.page.context.new_cdp_session(notebook.page)
+    devtools.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+    assert notebook.page.evaluate("matchMedia('(pointer: coarse)').matches")
+    assert notebook.page.evaluate(SMALL, 32) == []
     notebook.page.emulate_media(forced_colors="active")
     assert asked(notebook).locator(".camviz-wrong").evaluate("one => getComputedStyle(one).borderLeftWidth") == "4px"
     notebook.close()
