@@ -247,9 +247,9 @@ def test_in_a_picture_its_place_stays_empty_and_it_is_not_called_again():
     assert np.isnan(values).all()
     assert problem.startswith("`endless` had not returned after 10 s, and was stopped, so its part of the picture")
     assert "run the cell in which it stands" in problem
-    values, problem = tried(endless, (np.ones(2),), np.ones(2))
+    values, again = tried(endless, (np.ones(2),), np.ones(2))
     assert np.isnan(values).all()
-    assert problem.startswith("`endless` was stopped, so")
+    assert again == problem
     assert len(calls) == 1
 
 

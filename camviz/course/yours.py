@@ -23,8 +23,8 @@ Function = Callable[..., Any]
 MID_GREY = 128
 """What an empty picture of bytes is filled with."""
 
-_stopped: dict[int, Function] = {}
-"""Functions that did not return, by their id: a slider's next move would otherwise wait for each of them again."""
+_stopped: dict[int, tuple[Function, str]] = {}
+"""Functions that did not return, by their id, and the sentence: the next draft would otherwise wait for them again."""
 
 
 def attempt(function: Function, *arguments: Any, like: Any) -> Any:
@@ -83,15 +83,15 @@ def _answers(
     empty = tuple(np.full(np.shape(one), np.nan) for one in wanted)
     name = f"`{attribute(function, '__name__') or 'your function'}`"
     left_out = "so its part of the picture stays empty."
-    again = "It is not called again until you have run the cell in which it stands."
     if id(function) in _stopped:
-        return empty, f"{name} was stopped, {left_out} {again}"
+        return empty, _stopped[id(function)][1]
     try:
         with contained(StringIO()):
             parts = patience.call(_numbers, function, deepcopy(arguments))
     except (KeyboardInterrupt, TimeIsUp) as stop:
-        _stopped[id(function)] = function
-        return empty, f"{stopped(name, stop)[:-1]}, {left_out} {again}"
+        again = "It is not called again until you have run the cell in which it stands."
+        _stopped[id(function)] = function, f"{stopped(name, stop)[:-1]}, {left_out} {again}"
+        return empty, _stopped[id(function)][1]
     except NotImplementedError:
         return empty, f"{name} is not written yet, {left_out}"
     except BaseException as error:
