@@ -7,11 +7,11 @@ import pytest
 
 from camviz.course import prose
 from camviz.course.answers import AnswerBook, read_answers
-from camviz.course.questions import quiz_questions
+from camviz.course.questions import predict_questions, question, quiz_questions
 from camviz.widgets import quiz
 from camviz.widgets.question import QuestionWidget, Sheet
 
-STATE = ("title", "lead", "cards", "summary", "looking_back", "can_export", "exported", "problem")
+STATE = ("title", "lead", "cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem")
 
 
 @pytest.fixture
@@ -86,6 +86,86 @@ def test_what_was_chosen_before_is_there_again_after_a_restart(book):
         again.commit(number, 0)
     assert "camviz_answers.csv" in again.summary
     assert form("A", "before", book).summary == again.summary
+
+
+def predict(book, name="05.far_rays"):
+    return QuestionWidget(Sheet((question(name),), "Predict"), book)
+
+
+def test_an_answered_question_is_shown_with_its_reply_and_says_that_it_is_old(book):
+    first = predict(book)
+    wrong = (first.sheet.questions[0].answer + 1) % 2
+    first.commit(0, wrong)
+    assert not first.cards[0]["earlier"]
+    (card,) = predict(book).cards
+    assert card == {**first.cards[0], "earlier": True}
+    assert card["reply"] == prose.to_html(first.sheet.questions[0].choices[wrong].reply)
+    again = predict(book)
+    again.commit(0, first.sheet.questions[0].answer)
+    assert [predict(book).tries, again.cards[0]["earlier"]] == [((wrong, first.sheet.questions[0].answer),), False]
+
+
+def test_questions_of_one_lesson_are_kept_apart(book):
+    predict(book).commit(0, 1)
+    others = [one.name for one in predict_questions("05") if one.name != "05.far_rays"]
+    assert [predict(book, name).tries for name in others] == [((),)] * 2
+
+
+def test_the_exit_quiz_is_there_again_with_its_score(book):
+    widget = form("B", "after", book)
+    answer(widget, right("B"))
+    again = form("B", "after", book)
+    assert again.summary == widget.summary == "4 of 4 right at the first try."
+    assert all(card["correct"] and card["earlier"] for card in again.cards)
+
+
+def test_start_again_clears_what_is_seen_and_first_choices_stay_first(book):
+    wrong = (right("B")[0] + 1) % 3
+    widget = form("B", "after", book)
+    assert not widget.can_start_again
+    widget.commit(0, wrong)
+    assert widget.can_start_again
+    widget._receive(widget, {"again": True}, [])
+    for one in (widget, form("B", "after", book)):
+        assert (one.tries, one.can_start_again, one.summary) == (((),) * 4, False, "")
+        assert all(card["chosen"] is None and card["reply"] == "" for card in one.cards)
+    answer(widget, right("B"))
+    assert form("B", "after", book).tries == tuple((choice,) for choice in right("B"))
+    exported = read_answers(book.export("05"))
+    first = [one.correct for one in exported if one.concept == widget.sheet.questions[0].concept]
+    assert first == [False, True]
+    assert [one.attempt for one in exported] == [1, 2, 1, 1, 1]
+
+
+def test_the_choices_before_a_lesson_cannot_be_taken_back(book):
+    widget = form("A", "before", book)
+    widget.commit(0, 1)
+    assert not widget.can_start_again
+    with pytest.raises(ValueError, match="take one choice"):
+        widget.start_again()
+    assert form("A", "before", book).tries[0] == (1,)
+
+
+def test_only_quizzes_are_exported(book):
+    predict(book).commit(0, 1)
+    with pytest.raises(ValueError, match="no answer to lesson 05"):
+        book.export("05")
+    answer(form("A", "before", book), right("A"))
+    assert {one.when for one in read_answers(book.export("05"))} == {"before"}
+
+
+def test_the_still_holds_what_was_chosen_with_its_reply_and_no_other(book):
+    widget = predict(book)
+    one = widget.sheet.questions[0]
+    assert "(your answer)" not in widget.still()["text/html"]
+    widget.commit(0, one.answer)
+    for still in (widget.still()["text/html"], predict(book).still()["text/html"]):
+        assert f"<strong>{prose.inline(one.choices[one.answer].text)}</strong> (your answer)" in still
+        for index, choice in enumerate(one.choices):
+            assert (prose.to_plain(choice.reply)[:30] in prose.to_plain(still)) == (index == one.answer)
+    silent = form("A", "before", book)
+    silent.commit(0, 0)
+    assert not re.search("✓|✗|<details>|Correct", silent.still()["text/html"])
 
 
 def test_one_code_joins_before_and_after_and_says_nothing_of_a_person(book):

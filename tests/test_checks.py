@@ -96,6 +96,19 @@ def test_each_kind_of_wrong_answer_is_named(change, word):
     assert word in answer.message
 
 
+def test_an_answer_of_nothing_but_nan_is_called_that():
+    answer = verdict(lambda points: np.nan * distance(points))
+    assert "NaN" in answer.message
+    assert "same number" not in answer.message
+
+
+def test_the_message_of_an_error_is_cut():
+    def wordy(points):
+        raise ValueError("x" * 10_000_000)
+
+    assert len(verdict(wordy).message) < 1000
+
+
 def test_reversed_and_transposed_answers_are_recognised():
     turn = Exercise("00.turn", lambda m: m, lambda rng: [(rng.normal(size=(3, 3)),)], ("-",) * 3, "-")
     assert "transpose" in verdict(lambda m: m.T, of=turn).message

@@ -1,5 +1,7 @@
 """The garden's quick pictures against traced ones, and the connection that carries them."""
 
+import asyncio
+import sys
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -64,10 +66,34 @@ def test_the_server_sends_pictures_without_waiting_for_the_browsers_acknowledgem
             calls.append(("connect",))
             return "connected"
 
-    app = SimpleNamespace(kernel_websocket_connection_class=Connection, web_app=SimpleNamespace(settings={}))
+    app = SimpleNamespace(
+        kernel_websocket_connection_class=Connection,
+        web_app=SimpleNamespace(settings={}),
+        contents_manager=SimpleNamespace(get=None),
+    )
     server._load_jupyter_server_extension(app)
     assert app.web_app.settings["kernel_websocket_connection_class"]().connect() == "connected"
     assert calls == [("nodelay", True), ("connect",)]
+
+
+def test_the_server_hands_out_notebooks_with_the_python_that_runs_here():
+    """As JupyterLab would otherwise write into each notebook that it opens, and call it unsaved."""
+
+    def at_once(language):
+        return {"type": "notebook", "content": {"metadata": {"language_info": {"name": language, "version": "0"}}}}
+
+    async def later(language):
+        return at_once(language)
+
+    here = {"name": "python", "version": sys.version.split()[0]}
+    for get, model in (
+        (at_once, server.naming_this_python(at_once)("python")),
+        (later, asyncio.run(server.naming_this_python(later)("python"))),
+    ):
+        assert model["content"]["metadata"]["language_info"] == here, get
+    assert server.naming_this_python(at_once)("julia") == at_once("julia")
+    directory = {"type": "directory", "content": []}
+    assert server.naming_this_python(lambda path: directory)("") is directory
 
 
 def test_an_installation_leaves_other_jupyter_servers_alone():

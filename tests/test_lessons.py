@@ -319,6 +319,17 @@ def test_every_lesson_s_solutions_pass_and_its_stubs_do_not(path, monkeypatch):
     assert not any(notebooks.verdicts(notebook, solved=False).values())
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "lessons").rglob("*.ipynb")), ids=lambda path: path.stem)
+def test_jupyterlab_has_nothing_to_add_to_a_notebook_that_it_opens(path):
+    """Its kernel's language and specification, but for the version of Python, which the server extension fills in."""
+    from ipykernel.ipkernel import IPythonKernel
+
+    metadata = notebooks.read(path).metadata
+    kernel = {**IPythonKernel.language_info, "version": metadata.language_info.version}
+    assert metadata.language_info == kernel
+    assert metadata.kernelspec == {"name": "python3", "display_name": "Python 3 (ipykernel)", "language": "python"}
+
+
 @EACH
 def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
     """Mend with: python -m camviz.commands.lessons refresh"""

@@ -89,12 +89,36 @@ def test_the_function_cannot_change_what_the_lesson_goes_on_with():
     assert np.pi > 3.14
 
 
-def test_whoever_stops_a_function_that_never_ends_is_heard():
+def test_whoever_stops_a_function_is_told_so_and_it_is_not_called_again():
+    calls = []
+
     def endless(x):
+        calls.append(x)
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        attempt(endless, 1.0, like=0.0)
+    for _ in range(2):
+        answer, problem = tried(endless, (1.0,), 0.0)
+        assert np.isnan(answer)
+        assert problem.startswith("You stopped `endless` before it returned, so its part")
+    assert len(calls) == 1
+
+
+def test_an_answer_of_nothing_but_nan_is_called_that_unless_it_is_right():
+    answer, problem = tried(lambda x: x * np.nan, (WANTED,), WANTED)
+    assert np.isnan(answer).all()
+    assert "NaN everywhere" in problem
+    assert tried(lambda x: x, (WANTED * np.nan,), WANTED * np.nan)[1] == ""
+
+
+def test_a_thing_that_only_looks_like_a_function_is_told_of_all_the_same():
+    class Thing:
+        def __getattr__(self, name):
+            raise SystemExit
+
+        def __call__(self, x):
+            raise ValueError("no")
+
+    assert "ValueError: no" in tried(Thing(), (1.0,), 0.0)[1]
 
 
 def test_a_function_of_one_case_is_called_for_each_and_complains_once(capsys):

@@ -1,15 +1,16 @@
-"""What a reader chose in a lesson's quizzes, kept beside the notebook under a random code and nothing else.
+"""What a reader chose in a lesson's questions and quizzes, kept beside the notebook under a random code.
 
-`camviz_answers.csv` holds a line for each choice: which lesson, when ("before" or "after"), which form and concept, and
-the letter. It does not say what is right, since it lies open during the lesson; `AnswerBook.export` writes a file that
-does, for a teacher. Neither holds a name, an address, a date or a time.
+`camviz_answers.csv` holds a line for each choice: which lesson, when ("before", "during" or "after"), which form and
+concept (of a question outside a quiz, its id), and the letter; a "-" is where the reader started again. It does not say
+what is right, since it lies open during the lesson; `AnswerBook.export` writes a file that does, for a teacher, of the
+quizzes alone. Neither holds a name, an address, a date or a time.
 """
 
 from __future__ import annotations
 
 import csv
 import secrets
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import TextIO
@@ -17,14 +18,17 @@ from typing import TextIO
 from camviz.course.questions import LETTERS, Question, questions
 
 KEPT_IN = "camviz_answers.csv"
-WHEN = ("before", "after")
+WHEN = ("before", "during", "after")
+AGAIN = "-"
+"""Stands for a choice where the reader started again: what was chosen before that is not shown any more."""
+
 _KEPT = ["participant", "lesson", "when", "form", "concept", "attempt", "choice"]
 _EXPORTED = [*_KEPT, "correct", "misconception"]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One choice at one question; `attempt` counts from 1, and `choice` is a letter.
+    """One choice at one question; `attempt` counts from 1, and `choice` is a letter or AGAIN.
 
     `correct` and the `misconception` behind a wrong choice are known in an exported answer only.
     """
@@ -68,12 +72,21 @@ class AnswerBook:
 
     def keep(self, question: Question, when: str, choice: int) -> Answer:
         """Adds a choice, counted from 0, to the file before anything else is done with it."""
+        return self._add(question, when, LETTERS[choice])
+
+    def start_again(self, questions: Sequence[Question], when: str) -> None:
+        """Lets what was chosen at these questions be seen no more. The file keeps it: first choices stay the first."""
+        for question in questions:
+            if self.chosen(question, when):
+                self._add(question, when, AGAIN)
+
+    def _add(self, question: Question, when: str, letter: str) -> Answer:
         lesson = question.name.partition(".")[0]
         before = self.answers(lesson)
-        attempts = [one for one in before if (one.when, one.concept) == (when, question.concept)]
+        attempts = [one for one in before if (one.when, one.concept) == (when, question.topic) and one.choice != AGAIN]
         participant = before[0].participant if before else secrets.token_hex(4)
-        place = (participant, lesson, when, question.form, question.concept)
-        answer = Answer(*place, len(attempts) + 1, LETTERS[choice])
+        place = (participant, lesson, when, question.form, question.topic)
+        answer = Answer(*place, len(attempts) + (letter != AGAIN), letter)
         text = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
         with self.path.open("a", encoding="utf-8", newline="") as file:
             file.write("\n" if text and not text.endswith("\n") else "")
@@ -81,18 +94,22 @@ class AnswerBook:
         return answer
 
     def chosen(self, question: Question, when: str) -> tuple[int, ...]:
-        """The choices made at a question, in order, counted from 0, without those that it does not have any more."""
+        """The choices made at a question since the reader last started again, in order, counted from 0.
+
+        Those that it does not have any more are left out.
+        """
         lesson = question.name.partition(".")[0]
-        made = [one for one in self.answers(lesson) if (one.when, one.concept) == (when, question.concept)]
-        return tuple(one.index for one in made if one.form == question.form and one.index < len(question.choices))
+        made = [one for one in self.answers(lesson) if (one.when, one.concept) == (when, question.topic)]
+        letters = "".join(one.choice for one in made if one.form == question.form).rpartition(AGAIN)[2]
+        return tuple(index for index in map(LETTERS.index, letters) if index < len(question.choices))
 
     def export(self, lesson: str) -> Path:
         """Writes a lesson's answers, with what is right and what each wrong one means, and returns where.
 
-        The file bears the code, so that another reader's is never overwritten. An answer to what this version of the
-        lesson does not ask is left out. Raises ValueError without any answer.
+        The file bears the code, so that another reader's is never overwritten. Left out is what no quiz asked, and what
+        this version of the lesson does not ask. Raises ValueError without any answer.
         """
-        answers = self.answers(lesson)
+        answers = [one for one in self.answers(lesson) if one.form and one.choice != AGAIN]
         if not answers:
             raise ValueError(f"no answer to lesson {lesson} is kept in {self.path}")
         path = self.folder / f"answers_{lesson}_{answers[0].participant}.csv"
@@ -128,7 +145,7 @@ def _answer(row: list[str], columns: int, where: str) -> Answer:
         raise ValueError(f"{where}: needs {columns} entries, has {len(row)}")
     participant, lesson, when, form, concept, attempt, choice = row[: len(_KEPT)]
     names = participant.isalnum() and lesson.isalnum()  # parts of a file's name
-    if not names or when not in WHEN or not attempt.isdecimal() or len(choice) != 1 or choice not in LETTERS:
+    if not names or when not in WHEN or not attempt.isdecimal() or len(choice) != 1 or choice not in LETTERS + AGAIN:
         raise ValueError(f"{where}: is no answer: {','.join(row)}")
     answer = Answer(participant, lesson, when, form, concept, int(attempt), choice)
     if columns == len(_KEPT):

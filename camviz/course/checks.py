@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from camviz.course import prose
+from camviz.course.patience import Patience, TimeIsUp
 from camviz.course.trials import (
     Arguments,
     Array,
@@ -29,6 +30,7 @@ from camviz.course.trials import (
     run,
     same_outcome,
     signature_complaint,
+    stopped,
 )
 
 __all__ = ["SHAPES", "Arguments", "Array", "Exercise", "Misconception", "Verdict", "judge"]
@@ -81,30 +83,39 @@ class Verdict:
 def judge(exercise: Exercise, function: Any, rng: np.random.Generator | None = None, attempt: int = 1) -> Verdict:
     """What is to be said about a reader's function at the given attempt (1 is the first).
 
-    Cases are drawn from `rng`, by default one seeded by the operating system. Never raises for what the function does.
+    Cases are drawn from `rng`, by default one seeded by the operating system. Never raises for what the function does,
+    and stops it when all its calls together take longer than camviz.course.patience allows.
     """
     rng = np.random.default_rng() if rng is None else rng
+    try:
+        with Patience() as patience:
+            return _judged(exercise, function, rng, attempt, patience)
+    except KeyboardInterrupt as stop:  # between two calls of the function
+        return Verdict(exercise.name, "wrong", stopped("the check", stop))
+
+
+def _judged(exercise: Exercise, function: Any, rng: np.random.Generator, attempt: int, patience: Patience) -> Verdict:
     if not callable(function):
         return _unsolved(exercise)
     complaint = signature_complaint(exercise, function)
     if complaint:
         return Verdict(exercise.name, "wrong", complaint)  # no hint: its mathematics may be right
-    trials = _trials(exercise, function, rng)
+    trials = _trials(exercise, function, rng, patience)
     printed = next((trial.printed for trial in trials if trial.printed), "")
     if trials[-1].interrupted:
         return _wrong(exercise, f"{trials[-1].complaint} Does a loop in it never end?", attempt)
     if _untouched(exercise, trials):
         return replace(_unsolved(exercise), printed=printed)
-    complaint = _complaint(exercise, function, trials, rng)
+    complaint = _complaint(exercise, function, trials, rng, patience)
     verdict = _wrong(exercise, complaint, attempt) if complaint else _correct(exercise)
     return replace(verdict, printed=printed)
 
 
-def _trials(exercise: Exercise, function: Function, rng: np.random.Generator) -> list[Trial]:
-    """A call for each case, until the reader stops one."""
+def _trials(exercise: Exercise, function: Function, rng: np.random.Generator, patience: Patience) -> list[Trial]:
+    """A call for each case, until one has to be stopped."""
     trials: list[Trial] = []
     for arguments in exercise.cases(rng):
-        trials.append(run(exercise, function, arguments))
+        trials.append(run(exercise, function, arguments, patience))
         if trials[-1].interrupted:
             break
     return trials
@@ -148,12 +159,15 @@ def hint(exercise: Exercise, attempt: int) -> str:
     return exercise.hints[min(max(attempt, 1), len(exercise.hints)) - 1]
 
 
-def _complaint(exercise: Exercise, function: Function, trials: Sequence[Trial], rng: np.random.Generator) -> str:
+def _complaint(
+    exercise: Exercise, function: Function, trials: Sequence[Trial], rng: np.random.Generator, patience: Patience
+) -> str:
     """What is wrong, in words, the most telling thing first; empty when nothing is."""
     if all(trial.fits for trial in trials):
-        return next((trial.mutated for trial in trials if trial.mutated), "") or _broken_law(exercise, function, rng)
+        mutated = next((trial.mutated for trial in trials if trial.mutated), "")
+        return mutated or _broken_law(exercise, function, rng, patience)
     wrong = [trial for trial in trials if not trial.fits]
-    known = _misconception(exercise, trials) or _constant(trials)
+    known = _misconception(exercise, trials) or _nothing_but_nan(trials) or _constant(trials)
     broken = next((trial.complaint for trial in wrong if trial.complaint), "")
     if broken:
         return known or _only_for_some(exercise, trials) + broken
@@ -164,16 +178,18 @@ def _complaint(exercise: Exercise, function: Function, trials: Sequence[Trial], 
         or _misplaced_nan(exercise, wrong)
         or _in_some_shapes(exercise, trials, wrong[0])
         or _nearly(exercise, trials)
-        or _fits_only_shown(exercise, function, trials)
+        or _fits_only_shown(exercise, function, trials, patience)
         or _difference(exercise, wrong[0])
     )
 
 
-def _broken_law(exercise: Exercise, function: Function, rng: np.random.Generator) -> str:
+def _broken_law(exercise: Exercise, function: Function, rng: np.random.Generator, patience: Patience) -> str:
     for law in exercise.laws:
         try:
             with contained(io.StringIO()):
-                complaint = law(function, rng)
+                complaint = patience.call(law, function, rng)
+        except (KeyboardInterrupt, TimeIsUp) as stop:
+            return stopped("your function", stop)
         except BaseException as error:
             complaint = explain(error, function)
         if complaint:
@@ -193,6 +209,15 @@ def _misconception(exercise: Exercise, trials: Sequence[Trial]) -> str:
 
 def _does_the_same(exercise: Exercise, function: Function, trials: Sequence[Trial]) -> bool:
     return all(same_outcome(exercise, outcome(exercise, function, trial.arguments), trial) for trial in trials)
+
+
+def _nothing_but_nan(trials: Sequence[Trial]) -> str:
+    answers = [trial.actual for trial in trials if trial.actual]
+    if not answers or not np.isnan(_joined(answers)).all():
+        return ""
+    return (
+        "Every number that your function answers is NaN: somewhere it divides 0 by 0, or takes a root of less than 0."
+    )
 
 
 def _constant(trials: Sequence[Trial]) -> str:
@@ -264,10 +289,10 @@ def _nearly(exercise: Exercise, trials: Sequence[Trial]) -> str:
     return f"Close, but not to {exercise.tolerance:g}: is something rounded, or an iteration stopped too early?"
 
 
-def _fits_only_shown(exercise: Exercise, function: Function, trials: Sequence[Trial]) -> str:
+def _fits_only_shown(exercise: Exercise, function: Function, trials: Sequence[Trial], patience: Patience) -> str:
     if any(trial.fits for trial in trials) or not exercise.shown:
         return ""
-    if all(run(exercise, function, arguments).fits for arguments in exercise.shown):
+    if all(run(exercise, function, arguments, patience).fits for arguments in exercise.shown):
         return "It fits the numbers shown in the lesson, but not others: are some of them written into your function?"
     return ""
 

@@ -56,6 +56,11 @@ class Question:
         return next(i for i, choice in enumerate(self.choices) if choice.correct)
 
     @property
+    def topic(self) -> str:
+        """By what an answer to it is kept: its concept, and without one its id."""
+        return self.concept or self.name.partition(".")[2]
+
+    @property
     def lettered(self) -> list[tuple[str, Choice]]:
         """Each choice with its letter, from "a"."""
         return list(zip(LETTERS, self.choices, strict=False))

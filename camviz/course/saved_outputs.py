@@ -11,6 +11,19 @@ from pathlib import Path
 from camviz.course import glossary
 from camviz.course.notebooks import Cell, Notebook, execute, read, tagged, write
 
+LANGUAGE = {
+    "codemirror_mode": {"name": "ipython", "version": 3},
+    "file_extension": ".py",
+    "mimetype": "text/x-python",
+    "name": "python",
+    "nbconvert_exporter": "python",
+    "pygments_lexer": "ipython3",
+    "version": "3.11.7",
+}
+"""What JupyterLab writes into a notebook that it opens, and then calls unsaved where anything was different.
+
+The version is the kernel's: camviz.server sets it to the reader's."""
+
 _RANDOM_ID = re.compile(r"[0-9a-f]{8}")
 
 
@@ -32,7 +45,7 @@ def tidied(notebook: Notebook) -> Notebook:
     notebook.metadata = type(notebook.metadata)(
         {
             "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
-            "language_info": {"name": "python"},
+            "language_info": LANGUAGE,
             "camviz": {"source": fingerprint(notebook)},
         }
     )

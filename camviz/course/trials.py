@@ -10,6 +10,7 @@ import contextlib
 import inspect
 import io
 import math
+import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator
@@ -22,6 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.course.patience import LIMIT_S, Patience, TimeIsUp
+
 Array = NDArray[np.float64]
 Function = Callable[..., Any]
 Arguments = tuple[Any, ...]
@@ -29,7 +32,10 @@ Arguments = tuple[Any, ...]
 HINTS = 3
 """Every exercise has three: where to look, what to use, and the solution's line with a gap, written ___."""
 
-SHARED: tuple[ModuleType, ...] = (builtins, math, np, np.linalg)
+_LONGEST = 500
+"""Letters of an error's message."""
+
+SHARED: tuple[ModuleType, ...] = (builtins, math, np, np.linalg, np.random)
 """What a reader's function might replace and everybody uses: put back after each call."""
 
 
@@ -145,7 +151,7 @@ class Trial:
     """What came of one call.
 
     `actual` is () unless numbers came back, `stub` says that nothing did, `raised` is the type of what was raised, and
-    `interrupted` that the reader stopped the call.
+    `interrupted` that the reader, or the end of the time there is, stopped the call.
     """
 
     arguments: Arguments
@@ -160,10 +166,16 @@ class Trial:
     fits: bool = False
 
 
-def run(exercise: Exercise, function: Function, arguments: Arguments) -> Trial:
-    """Calls the function with a copy of the arguments, silently, and compares what it returns with the answer."""
+def run(exercise: Exercise, function: Function, arguments: Arguments, patience: Patience | None = None) -> Trial:
+    """Calls the function with a copy of the arguments, silently, and compares what it returns with the answer.
+
+    It may take what time the patience has left; without one, as long as a whole check.
+    """
+    if patience is None:
+        with Patience() as patience:
+            return run(exercise, function, arguments, patience)
     given, output = deepcopy(arguments), _Printed()
-    trial, result = _called(exercise, function, Trial(arguments), given, output)
+    trial, result = _called(exercise, function, Trial(arguments), given, output, patience)
     trial = replace(
         trial,
         expected=exercise.answer(arguments),  # not before the call, where the function could find it
@@ -172,25 +184,35 @@ def run(exercise: Exercise, function: Function, arguments: Arguments) -> Trial:
     )
     if trial.stub or trial.complaint:
         return trial
-    return _compared(exercise, trial, result)
+    return _compared(exercise, trial, result, patience)
 
 
 def _called(
-    exercise: Exercise, function: Function, trial: Trial, given: Arguments, output: _Printed
+    exercise: Exercise, function: Function, trial: Trial, given: Arguments, output: _Printed, patience: Patience
 ) -> tuple[Trial, Any]:
     """The trial so far and what the function returned."""
     try:
         with contained(output):
-            result = function(*given)
+            result = patience.call(function, *given)
     except NotImplementedError:
         return _nothing(exercise, trial), None
-    except KeyboardInterrupt:
-        call = exercise.call(trial.arguments)
-        return replace(trial, interrupted=True, complaint=f"You stopped {call} before it returned."), None
+    except (KeyboardInterrupt, TimeIsUp) as stop:
+        return _interrupted(exercise, trial, stop), None
     except BaseException as error:
         complaint = explain(error, function) + f" It was called as {exercise.call(trial.arguments)}."
         return replace(trial, raised=type(error), complaint=complaint), None
     return (_nothing(exercise, trial) if result is None or result is Ellipsis else trial), result
+
+
+def _interrupted(exercise: Exercise, trial: Trial, stop: BaseException) -> Trial:
+    return replace(trial, interrupted=True, complaint=stopped(exercise.call(trial.arguments), stop))
+
+
+def stopped(call: str, stop: BaseException) -> str:
+    """Why a call did not return: the reader stopped it, or its time was up."""
+    if isinstance(stop, TimeIsUp):
+        return f"{call[0].upper()}{call[1:]} had not returned after {LIMIT_S:g} s, and was stopped."
+    return f"You stopped {call} before it returned."
 
 
 def outcome(exercise: Exercise, function: Function, arguments: Arguments) -> Trial:
@@ -216,16 +238,25 @@ def same_outcome(exercise: Exercise, one: Trial, other: Trial) -> bool:
 def explain(error: BaseException, function: Function) -> str:
     """An exception in words: what happened, and in which line of the function."""
     what = f"Your function stopped with {type(error).__name__}: {_message(error)}."
-    home = getattr(getattr(function, "__code__", None), "co_filename", None)
+    home = getattr(attribute(function, "__code__"), "co_filename", None)
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == home]
     if not frames or not frames[-1].line:
         return what
     return f"{what} It happened in line {frames[-1].lineno}: ``{frames[-1].line}``."
 
 
+def attribute(function: Function, name: str) -> Any:
+    """An attribute of whatever a reader calls a function; None without."""
+    try:
+        return getattr(function, name, None)
+    except BaseException:  # of their own __getattr__
+        return None
+
+
 def _message(error: BaseException) -> str:
     try:
-        return str(error).rstrip(".") or "no message"
+        words = str(error)
+        return f"{words[:_LONGEST]} …" if len(words) > _LONGEST else words.rstrip(".") or "no message"
     except BaseException as another:
         return f"a message that cannot be read ({type(another).__name__})"
 
@@ -280,15 +311,13 @@ def quiet() -> Iterator[None]:
 @contextlib.contextmanager
 def contained(output: io.StringIO) -> Iterator[None]:
     """What is called here prints into `output`, and what it replaces in the modules everybody uses is put back."""
-    before = [(module, dict(vars(module))) for module in SHARED]
+    before = [(module.__dict__, module.__dict__.copy()) for module in SHARED]
     try:
-        with contextlib.redirect_stdout(output), quiet():
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(sys.stderr), quiet():
             yield
     finally:
-        for module, names in before:
-            now = vars(module)
-            for name in [name for name, value in names.items() if now.get(name, module) is not value]:
-                setattr(module, name, names[name])
+        for names, kept in before:  # without a builtin function, for those may be among what was replaced
+            names.update(kept)
 
 
 class _Printed(io.StringIO):
@@ -311,12 +340,13 @@ def _nothing(exercise: Exercise, trial: Trial) -> Trial:
     )
 
 
-def _compared(exercise: Exercise, trial: Trial, result: Any) -> Trial:
+def _compared(exercise: Exercise, trial: Trial, result: Any, patience: Patience) -> Trial:
     try:
-        with contained(_Printed()):
-            shapes = [part.shape for part in as_arrays(result)]
-            actual = exercise.normalised(result)
-    except BaseException:  # whatever the result's own methods raise, LinAlgError of a canonical form among it
+        with contained(_Printed()):  # the result's own methods are a reader's, too
+            shapes, actual = patience.call(lambda: ([p.shape for p in as_arrays(result)], exercise.normalised(result)))
+    except (KeyboardInterrupt, TimeIsUp) as stop:
+        return _interrupted(exercise, trial, stop)
+    except BaseException:  # whatever those methods raise, LinAlgError of a canonical form among it
         what = f"something of type {type(result).__name__} that is not an array of real numbers"
         return replace(trial, complaint=f"{exercise.call(trial.arguments)} returned {what}.")
     complaint = _shape_complaint(exercise, trial, shapes)

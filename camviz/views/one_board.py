@@ -11,6 +11,7 @@ import numpy as np
 from camviz.calibration.types import Board
 from camviz.calibration.zhang import focal_lengths, homography
 from camviz.cameras import Camera
+from camviz.course.patience import Patience
 from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
@@ -43,16 +44,17 @@ def from_each(corners: Array, board: Board, camera: Camera, yours: Function | No
     """
     centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])
     right, own, problem = np.full((len(corners), 2), np.nan), np.full((len(corners), 2), np.nan), ""
-    for i, uv in enumerate(_straightened(corners, camera)):
-        try:
-            H = homography(board.corners[:, :2], uv)
-            right[i] = focal_lengths([H], centre)
-        except ValueError:  # too few corners are seen, or no focal length fits
-            if not np.isfinite(uv).any():
-                continue
-        if yours is not None:
-            own[i], said = tried(yours, (H, centre), centre)
-            problem = problem or said
+    with Patience() as patience:
+        for i, uv in enumerate(_straightened(corners, camera)):
+            try:
+                H = homography(board.corners[:, :2], uv)
+                right[i] = focal_lengths([H], centre)
+            except ValueError:  # too few corners are seen, or no focal length fits
+                if not np.isfinite(uv).any():
+                    continue
+            if yours is not None:
+                own[i], said = tried(yours, (H, centre), centre, patience)
+                problem = problem or said
     return FromEach(right, own, problem)
 
 

@@ -33,10 +33,12 @@ function cardForm(name, number, send) {
   const reply = element("div", "camviz-reply");
   button.type = "submit";
   reply.setAttribute("role", "status"); // read out when it changes
+  reply.id = `${name}-reply`;
+  fieldset.setAttribute("aria-describedby", reply.id); // and when the reader comes back to an answered question
   reply.tabIndex = -1; // takes the focus of a button that has gone
   fieldset.append(text, rows, button);
   form.append(fieldset, reply);
-  let card = null;
+  let card = null, spoken = "";
 
   const closed = () => card.tries > 0 && card.correct === null;
   const selected = () => {
@@ -57,7 +59,9 @@ function cardForm(name, number, send) {
 
   return {
     form,
+    focus: () => rows.querySelector("input").focus(),
     show(next) {
+      if (card?.tries && !next.tries) rows.querySelectorAll("input").forEach((radio) => { radio.checked = false; });
       const first = card === null;
       card = next;
       if (first) {
@@ -68,7 +72,9 @@ function cardForm(name, number, send) {
       }
       const [verdict, colour] = closed() ? ["", " camviz-kept"]
         : card.correct ? ["<strong>✓ Correct.</strong>", " camviz-right"] : ["<strong>✗ Not this one.</strong>", " camviz-wrong"];
-      reply.innerHTML = card.reply ? `${verdict}${card.reply}` : "";
+      const earlier = card.earlier ? `<span class="camviz-earlier">You answered this earlier.</span> ` : "";
+      const said = card.reply ? `${earlier}${verdict}${card.reply}` : "";
+      if (said !== spoken) reply.innerHTML = spoken = said; // what stays the same is not read out again
       reply.className = `camviz-reply${card.reply ? colour : ""}`;
       const hadFocus = document.activeElement === button;
       refresh();
@@ -78,25 +84,33 @@ function cardForm(name, number, send) {
   };
 }
 
-// The button that writes the answers to a file, and what was thought before the lesson; both come with the last answer.
-function lastWords(send) {
+// What comes below the questions: what was thought before the lesson, the button that writes the answers to a file (both
+// with the last answer), and the one that clears them.
+function lastWords(send, cleared) {
   const node = element("div", "camviz-last");
   const back = element("div");
-  const button = keepKeys(element("button", "camviz-commit"));
-  const said = element("div");
-  button.type = "button";
-  button.textContent = "Write my answers to a file, without my name";
-  button.addEventListener("click", () => send({ export: true }));
+  const write = keepKeys(element("button", "camviz-commit"));
+  const again = keepKeys(element("button", "camviz-commit"));
+  const said = element("div", "camviz-said");
+  write.type = again.type = "button";
+  write.textContent = "Write my answers to a file, without my name";
+  write.addEventListener("click", () => send({ export: true }));
+  again.textContent = "Start again";
+  again.addEventListener("click", () => { clearing = true; send({ again: true }); });
   said.setAttribute("role", "status");
-  node.append(back, button, said);
-  let shown = null;
+  node.append(back, write, again, said);
+  let shown = null, clearing = false;
   return {
     node,
-    show(lookingBack, canExport, exported) {
+    show(lookingBack, canExport, canStartAgain, exported) {
       if (lookingBack !== shown) back.innerHTML = shown = lookingBack;
       back.querySelectorAll("summary").forEach(keepKeys);
-      button.hidden = !canExport;
-      said.textContent = exported;
+      write.hidden = !canExport;
+      again.hidden = !canStartAgain;
+      const words = clearing && !canStartAgain ? "Your answers here are cleared." : exported;
+      if (said.textContent !== words) said.textContent = words;
+      if (clearing && !canStartAgain) cleared(); // the button that had the focus is gone
+      if (!canStartAgain) clearing = false;
     },
   };
 }
@@ -112,7 +126,7 @@ function render({ model, el }) {
   );
   const lead = element("div", "camviz-lead");
   lead.textContent = model.get("lead");
-  const last = lastWords((message) => model.send(message));
+  const last = lastWords((message) => model.send(message), () => forms[0].focus());
   const summary = element("div", "camviz-summary");
   summary.setAttribute("role", "status");
   const problem = element("div", "camviz-problem");
@@ -124,11 +138,11 @@ function render({ model, el }) {
 
   const update = () => {
     model.get("cards").forEach((card, number) => forms[number].show(card));
-    summary.textContent = model.get("summary");
-    last.show(model.get("looking_back"), model.get("can_export"), model.get("exported"));
+    if (summary.textContent !== model.get("summary")) summary.textContent = model.get("summary");
+    last.show(model.get("looking_back"), model.get("can_export"), model.get("can_start_again"), model.get("exported"));
     problem.textContent = model.get("problem");
   };
-  const names = ["cards", "summary", "looking_back", "can_export", "exported", "problem"];
+  const names = ["cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem"];
   names.forEach((name) => model.on(`change:${name}`, update));
   update();
   return () => names.forEach((name) => model.off(`change:${name}`, update));

@@ -1,7 +1,8 @@
 """Questions to commit to before seeing: `ask("05.far_rays")`, and the quiz in two forms.
 
 `quiz("05", "A")` stands before a lesson, takes one choice a question and tells nothing. `quiz("05")`, form B, stands at
-its end and replies to each choice. What is chosen in either is kept beside the notebook (camviz.course.answers).
+its end and replies to each choice. What is chosen is kept beside the notebook (camviz.course.answers). It is there
+again when the cell is run again, after a restart and in a notebook that was closed; "Start again" clears it.
 
 Live, the answer stays in the kernel until the reader has committed to a choice. Without a kernel, or with
 CAMVIZ_STATIC=1, the same questions are a page of folded replies; of what is asked before a lesson, without any.
@@ -18,7 +19,7 @@ from typing import Any
 import traitlets
 
 from camviz.course import prose
-from camviz.course.answers import KEPT_IN, WHEN, AnswerBook
+from camviz.course.answers import KEPT_IN, AnswerBook, read_answers
 from camviz.course.questions import Question, question, quiz_questions
 from camviz.widgets.still import StillWidget
 
@@ -34,12 +35,12 @@ KEPT = "Kept. The answers come with the quiz at the end."
 class Sheet:
     """Questions as a page: each choice can be opened to see its reply.
 
-    `when` is "before" or "after" a lesson, or "" for a predict question. What is asked before a lesson has no replies.
+    `when` is "before" or "after" a lesson, or "during" it for a predict question. What is asked before has no replies.
     """
 
     questions: tuple[Question, ...]
     title: str
-    when: str = ""
+    when: str = "during"
 
     @property
     def silent(self) -> bool:
@@ -56,7 +57,13 @@ class Sheet:
 
     def unanswered(self) -> str:
         """The page without any reply, for a reader who has yet to choose."""
-        return self._page(_unanswered, "<p>Run this cell to answer.</p>")
+        return self.so_far(((),) * len(self.questions))
+
+    def so_far(self, tries: tuple[Tries, ...]) -> str:
+        """The page with the last choice made at each question, and its reply."""
+        made = dict(zip((one.name for one in self.questions), tries, strict=True))
+        end = "change your answers" if any(tries) and not self.silent else "answer"
+        return self._page(lambda one: _so_far(one, made[one.name], self.silent), f"<p>Run this cell to {end}.</p>")
 
     def _repr_html_(self) -> str:
         return self.unanswered() if self.silent else self._page(_html)
@@ -69,7 +76,7 @@ class Sheet:
 class QuestionWidget(StillWidget):
     """The live questions. Only what the reader may see is in `cards`; replies come when a choice has been made.
 
-    Quizzes are kept in `book`; one before a lesson shows again what was chosen, and takes no second choice.
+    What is chosen is kept in `book`, and shown again by the next widget; a quiz before a lesson takes no second choice.
     """
 
     _esm = Path(__file__).with_name("question.js")
@@ -80,17 +87,18 @@ class QuestionWidget(StillWidget):
     cards: traitlets.List = traitlets.List().tag(sync=True)
     summary = traitlets.Unicode().tag(sync=True)
     looking_back = traitlets.Unicode().tag(sync=True)
+    can_start_again = traitlets.Bool().tag(sync=True)
     can_export = traitlets.Bool().tag(sync=True)
     exported = traitlets.Unicode().tag(sync=True)
     problem = traitlets.Unicode().tag(sync=True)
 
     def __init__(self, sheet: Sheet, book: AnswerBook | None = None) -> None:
         self.sheet = sheet
-        self.book = book if sheet.questions[0].form else None
+        self.book = book
         self.tries: tuple[Tries, ...] = ((),) * len(sheet.questions)
         super().__init__(title=sheet.title, lead=sheet.lead)
-        if sheet.silent:
-            self._kept(self._recall)
+        self._kept(self._recall)
+        self._earlier = [bool(made) for made in self.tries]
         self._show()
         self.on_msg(self._receive)
 
@@ -103,7 +111,19 @@ class QuestionWidget(StillWidget):
             raise ValueError("this question takes one choice, and has it")
         self._kept(lambda book: book.keep(self.sheet.questions[number], self.sheet.when, choice))
         self.tries = (*before[:number], (*before[number], choice), *before[number + 1 :])
+        self._earlier[number] = False
         self._show()
+        self.keep_now()
+
+    def start_again(self) -> None:
+        """Takes back all choices, but for those before a lesson, which are the first of two measurements."""
+        if self.sheet.silent:
+            raise ValueError("these questions take one choice")
+        self._kept(lambda book: book.start_again(self.sheet.questions, self.sheet.when))
+        self.tries = ((),) * len(self.tries)
+        self._earlier = [False] * len(self.tries)
+        self._show()
+        self.keep_now()
 
     def export(self) -> None:
         """Writes the answers to a file for the teacher, and says where it is and what is in it."""
@@ -113,32 +133,35 @@ class QuestionWidget(StillWidget):
         return repr(self.sheet)
 
     def still(self) -> dict[str, str]:
-        """The questions without their replies, which would give the answers away."""
-        return {"text/plain": repr(self.sheet), "text/html": self.sheet.unanswered()}
+        """The questions with what was chosen, and without any other reply, which would give the answers away."""
+        return {"text/plain": repr(self.sheet), "text/html": self.sheet.so_far(self.tries)}
 
     def _show(self) -> None:
-        self.cards = _cards(self.sheet, self.tries)
+        cards = zip(self.sheet.questions, self.tries, self._earlier, strict=True)
+        self.cards = [_card(one, made, earlier, self.sheet.silent) for one, made, earlier in cards]
+        self.can_start_again = any(self.tries) and not self.sheet.silent
         self.summary = "" if self.sheet.silent else score(self.sheet.questions, self.tries)
         self._kept(self._account)
 
     def _recall(self, book: AnswerBook) -> None:
-        """What was chosen before the kernel was last started."""
-        self.tries = tuple(book.chosen(one, self.sheet.when)[:1] for one in self.sheet.questions)
+        """What was chosen before, in another run of the cell or another kernel."""
+        self.tries = tuple(book.chosen(one, self.sheet.when) for one in self.sheet.questions)
 
     def _account(self, book: AnswerBook) -> None:
         """Once all is kept: where it is or, after the lesson, what was thought before it."""
-        if not all(book.chosen(one, self.sheet.when) for one in self.sheet.questions):
+        complete = all(book.chosen(one, self.sheet.when) for one in self.sheet.questions)
+        if not self.sheet.questions[0].form or (self.sheet.silent and not complete):
             return
         if self.sheet.silent:
             code = book.participant(self._lesson)
             self.summary = f"Kept in {KEPT_IN} beside this notebook, under the random code {code} and without a name."
         else:
-            self.can_export = True
-            self.looking_back = looking_back(book, self._lesson)
+            self.can_export = complete
+            self.looking_back = looking_back(book, self._lesson) if complete else ""
 
     def _export(self, book: AnswerBook) -> None:
         path = book.export(self._lesson)
-        count = len(book.answers(self._lesson))
+        count = len(read_answers(path))
         self.exported = f"Written to {path.name}, beside this notebook: {count} choices, a random code, no name."
 
     @property
@@ -158,6 +181,8 @@ class QuestionWidget(StillWidget):
         try:
             if message == {"export": True}:
                 self.export()
+            elif message == {"again": True}:
+                self.start_again()
             else:
                 self.commit(message["question"], message["choice"])
         except Exception as error:
@@ -176,7 +201,7 @@ def quiz(lesson: str, form: str = "B", when: str = "") -> QuestionWidget | Sheet
     `when`, "before" or "after", asks a form at the other end: half of a class can so answer B first and A last.
     Raises ValueError when the lesson has no such form, and for another `when`.
     """
-    if (when or "after") not in WHEN:
+    if when not in ("", "before", "after"):
         raise ValueError(f'when must be "before" or "after", got {when!r}')
     questions = quiz_questions(lesson, form)
     if not questions:
@@ -218,20 +243,16 @@ def _live() -> bool:
     return getattr(get_ipython(), "kernel", None) is not None
 
 
-def _cards(sheet: Sheet, tries: tuple[Tries, ...]) -> list[dict[str, Any]]:
-    return [_card(one, made, sheet.silent) for one, made in zip(sheet.questions, tries, strict=True)]
-
-
-def _card(one: Question, made: Tries, silent: bool) -> dict[str, Any]:
+def _card(one: Question, made: Tries, earlier: bool, silent: bool) -> dict[str, Any]:
     """What the page may know of a question: its texts, and after a try, unless silent, the reply to the choice made."""
-    shown = {"text": prose.to_html(one.text), "choices": [prose.inline(choice.text) for choice in one.choices]}
+    choices = [prose.inline(choice.text) for choice in one.choices]
+    shown = {"text": prose.to_html(one.text), "choices": choices, "tries": len(made), "earlier": earlier}
     if not made:
-        return {**shown, "tries": 0, "chosen": None, "correct": None, "reply": ""}
+        return {**shown, "chosen": None, "correct": None, "reply": ""}
     if silent:
-        return {**shown, "tries": 1, "chosen": made[0], "correct": None, "reply": prose.to_html(KEPT)}
+        return {**shown, "chosen": made[0], "correct": None, "reply": prose.to_html(KEPT)}
     choice = one.choices[made[-1]]
-    reply = prose.to_html(choice.reply)
-    return {**shown, "tries": len(made), "chosen": made[-1], "correct": choice.correct, "reply": reply}
+    return {**shown, "chosen": made[-1], "correct": choice.correct, "reply": prose.to_html(choice.reply)}
 
 
 def _plain(one: Question) -> str:
@@ -239,9 +260,14 @@ def _plain(one: Question) -> str:
     return "\n".join([prose.to_plain(one.text), *choices])
 
 
-def _unanswered(one: Question) -> str:
-    choices = "".join(f"<li>{prose.inline(choice.text)}</li>" for choice in one.choices)
-    return f"<div>{prose.to_html(one.text)}<ul>{choices}</ul></div>"
+def _so_far(one: Question, made: Tries, silent: bool) -> str:
+    choices = [prose.inline(choice.text) for choice in one.choices]
+    reply = ""
+    if made:
+        choice = one.choices[made[-1]]
+        choices[made[-1]] = f"<strong>{choices[made[-1]]}</strong> (your answer)"
+        reply = f"<blockquote>{prose.to_html(KEPT if silent else _judged(choice.correct, choice.reply))}</blockquote>"
+    return f"<div>{prose.to_html(one.text)}<ul>{''.join(f'<li>{text}</li>' for text in choices)}</ul>{reply}</div>"
 
 
 def _html(one: Question) -> str:

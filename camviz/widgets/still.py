@@ -57,6 +57,11 @@ class StillWidget(anywidget.AnyWidget):
         if self._keep:
             self._resting = loop.call_later(_REST_S, self._keep)
 
+    def keep_now(self) -> None:
+        """Draw the saved still anew."""
+        if self._keep:
+            self._keep()
+
     def keep_instead_of(self, other: StillWidget) -> None:
         """Take the place of another widget, and of its saved still."""
         if other._resting:
