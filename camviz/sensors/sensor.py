@@ -36,7 +36,7 @@ def leak(shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: float,
 
 
 def fill(electrons: ArrayLike, full_well_e: float) -> Floats:
-    """What the wells hold of these electrons: no more than the full well."""
+    """These electrons, at most the full well in each pixel."""
     return np.minimum(electrons, full_well_e, dtype=np.float32)
 
 
