@@ -128,7 +128,7 @@ def held_out(adjustment: Adjustment, *, folds: int | None = None, camera: str | 
             there = asked.using({each: mask & half for each, mask in asked.used.items()}).refined(only_poses=True)
             scored = asked.used[name] & ~half & there.posed[:, None]
             residuals[i, views] = np.where(scored[..., None], there.residuals[name], np.nan)
-            variances[i, views] = np.where(scored[..., None], _foretold_variances(there, solution, name), np.nan)
+            variances[i, views] = np.where(scored[..., None], _predicted_variances(there, solution, name), np.nan)
     return HeldOut(residuals, variances)
 
 
@@ -150,7 +150,7 @@ def board_halves(board: Board) -> list[Mask]:
     return [x <= 0, x >= 0, y <= 0, y >= 0]
 
 
-def _foretold_variances(there: Adjustment, solution: Adjustment, name: str) -> Array:
+def _predicted_variances(there: Adjustment, solution: Adjustment, name: str) -> Array:
     """The variance (views, corners, 2) of a corner's residual where neither pose nor camera have seen it.
 
     Its own noise σ²; the noise of the pose, whose Cᵢ⁻¹ comes from the other half; and an error of the cameras, which

@@ -184,7 +184,7 @@ class Sensor:
         voltage = amplify(signal, self.gain_dn_per_e, self.offset_dn)
         return charge, signal, voltage, quantise(voltage, self.bits)
 
-    # What the model foretells -----------------------------------------------------------------------------------------
+    # What the model predicts ------------------------------------------------------------------------------------------
 
     @property
     def saturation_e(self) -> float:
