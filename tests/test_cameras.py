@@ -44,7 +44,7 @@ def test_cameras_project_as_opencv_does(coefficients):
         extrinsics.rotation.as_rotvec(),
         extrinsics.translation,
         INTRINSICS.K,
-        np.array(coefficients),
+        np.array(coefficients, float),
     )[0].reshape(6, 5, 2)
     np.testing.assert_allclose(camera.project(POINTS), expected, rtol=0, atol=1e-9)
 

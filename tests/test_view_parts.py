@@ -98,7 +98,7 @@ class Bars(ViewChooser):
         return plot.plot_panel("bars", 10, 0, 100, 50, (0.5, 5.5), (0, 2))
 
 
-@pytest.mark.parametrize(("x", "chosen"), [(10, 1), (60, 3), (109, 5), (-99, 1), (999, 5)])
+@pytest.mark.parametrize(("x", "chosen"), [(10, 1), (49, 2), (60, 3), (75, 4), (109, 5), (-99, 1), (999, 5)])
 def test_a_click_chooses_the_bar_that_is_there_and_none_beyond_the_last(x, chosen):
     assert Bars().dragged("bars", x, 20, 0, 0).view == chosen
 
@@ -111,11 +111,11 @@ def test_keys_go_from_bar_to_bar_and_stop_at_the_ends():
 
 
 def test_the_chosen_bar_alone_is_orange_and_a_missing_value_has_none():
-    panel = Bars()._bars
-    drawn = bars_of(panel, np.array([1.0, np.nan, 2.0]), 2)
+    panel, values = Bars()._bars, np.array([1.0, np.nan, 2.0, 1.5])
+    drawn = bars_of(panel, values, 2)
     counts = {class_: path.count("M") for path, class_ in re.findall(r'<path d="([^"]*)" class="([^"]*)"', drawn)}
-    assert counts == {"fill-blue": 1, "fill-orange": 1}
-    assert [words for *_, words in texts(figures_on(panel, np.array([1.0, np.nan, 2.0])))] == ["1.00", "2.00"]
+    assert counts == {"fill-blue": 2, "fill-orange": 1}
+    assert [words for *_, words in texts(figures_on(panel, values))] == ["1.00", "2.00", "1.50"]
 
 
 def test_a_bar_that_would_flatten_the_rest_is_cut_and_keeps_its_number():

@@ -1,6 +1,6 @@
 """Calibration: boards found in pictures (`detect`), and the camera or the pair that saw them (`calibrate`).
 
-The names below are imported when they are first used: the processes that look for boards need none of the rest.
+The names below are imported when they are first used, because the processes that look for boards need few of them.
 """
 
 from importlib import import_module

@@ -27,9 +27,9 @@ class Adjustment(Linearisation):
     def refined(
         self, *, only_poses: bool = False, settled: float = SETTLED, most_steps: int = MOST_STEPS
     ) -> Adjustment:
-        """At the least sum of squares near by, by Levenberg's and Marquardt's method; of the poses alone if so asked.
+        """The problem at the nearest least sum of squares (Levenberg–Marquardt), moving all parameters or only poses.
 
-        It ends after `most_steps`, or when a step promises to take off less than `settled` of the sum. A corner that
+        It ends after `most_steps`, or when a step would lessen the sum by a share of less than `settled`. A corner that
         has an image at the start keeps one: a step that would carry it beyond a fold is shortened.
         """
         here, damping = replace(self, estimated=dict.fromkeys(self.cameras, ())) if only_poses else self, 1e-3
@@ -49,7 +49,7 @@ class Adjustment(Linearisation):
         return replace(here, estimated=self.estimated) if only_poses else here
 
     def _moved(self, shared: Array, twists: Array) -> Adjustment | None:
-        """With its parameters changed; None where a lens does not take them or a corner in use loses its image."""
+        """With changed parameters; None where a lens does not take them or a corner in use loses its image."""
         try:
             cameras = {name: self._moved_camera(name, shared) for name in self.cameras}
         except ValueError:

@@ -44,7 +44,7 @@ class Arrowhead:
         )
 
     def __add__(self, other: Arrowhead) -> Arrowhead:
-        """Both sets of measurements of the same parameters together."""
+        """The normal equations of two sets of measurements of the same parameters."""
         return Arrowhead(
             self.shared + other.shared,
             self.border + other.border,
@@ -54,7 +54,7 @@ class Arrowhead:
         )
 
     def damped(self, damping: float) -> Arrowhead:
-        """With its diagonal made larger by a factor of 1 + damping (Marquardt 1963)."""
+        """The same with its diagonal multiplied by 1 + damping (Marquardt 1963)."""
         shared, blocks = self.shared.copy(), self.blocks.copy()
         np.einsum("ii->i", shared)[...] *= 1 + damping
         np.einsum("vii->vi", blocks)[...] *= 1 + damping
@@ -72,12 +72,12 @@ class Arrowhead:
 
     @cached_property
     def information(self) -> Array:
-        """A - Σ Bᵢ Cᵢ⁻¹ Bᵢᵀ, (s, s): what the views say of the shared parameters, their own being free to follow."""
+        """A - Σ Bᵢ Cᵢ⁻¹ Bᵢᵀ, (s, s): the information on the shared parameters when every view's own are free."""
         return self.shared - np.einsum("vsm,vmt->st", self.border, self.pose_response)
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the shared parameters, (s, s), for σ = 1."""
+        """The covariance of the shared parameters, (s, s), for σ = 1."""
         return inverse(self.information)
 
     def solution(self, *, only_views: bool = False) -> tuple[Array, Array]:
@@ -90,9 +90,9 @@ class Arrowhead:
 
 
 def inverse(matrices: Array) -> Array:
-    """The inverses of symmetric positive matrices (..., n, n), of whatever units their rows are.
+    """The inverses of symmetric positive matrices (..., n, n), whose rows may have different units.
 
-    A direction that is determined to no digit gets the largest variance that rounding lets be told from infinity.
+    A direction that is not determined gets the largest variance that rounding can tell from infinity.
     """
     if not matrices.shape[-1]:
         return matrices

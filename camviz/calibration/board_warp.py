@@ -1,4 +1,4 @@
-"""Whether the board was flat: two sagittas more, and whether they explain more than two numbers of noise would."""
+"""Whether the board was flat: an F-test of two more parameters, its sagittas."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from camviz.lenses.base import Array
 class WarpTest:
     """The solutions with a flat board and with a bent one, and the F-test between them.
 
-    `probability` is that of a statistic as large as this one from a flat board and Gaussian noise.
+    `probability` is how often a flat board and Gaussian noise give a statistic as large as this one.
     """
 
     flat: Adjustment
@@ -42,7 +42,7 @@ class WarpTest:
         return float(1000 * np.ptp(off))
 
     def bowed(self, false_alarms: float = 1e-3) -> bool:
-        """Whether the board is bent: of flat boards this says so of a share `false_alarms`."""
+        """Whether the board is bent; true of a share `false_alarms` of flat boards."""
         return self.probability < false_alarms
 
 

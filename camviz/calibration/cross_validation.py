@@ -1,4 +1,4 @@
-"""Asking a calibration of pictures it has not seen: two halves of the views, and corners held out of every view."""
+"""How well a calibration predicts what it has not seen: two halves of the views, and corners held out of every view."""
 
 from __future__ import annotations
 
@@ -76,11 +76,11 @@ def _probability(one: Adjustment, other: Adjustment, name: str) -> float:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """How well corners are foretold that had no part in the pose of their view, nor their view in the camera.
+    """The residuals of corners that neither the pose of their view nor, with `folds`, the camera was fitted to.
 
-    `residuals` (4, views, corners, 2) are observed less foretold pixels, by the half of the board (right, left, bottom,
-    top) that was held out; NaN for the corners its pose was taken from. `variances` (4, views, corners, 2) are those
-    that the noise of corners, and of the solution that comes from it, should give them.
+    `residuals` (4, views, corners, 2) are observed less predicted pixels, by the half of the board (right, left,
+    bottom, top) that was held out; NaN for the corners its pose was taken from. `variances` (4, views, corners, 2) are
+    those that the noise of corners, and of the solution that comes from it, should give them.
     """
 
     residuals: Array
@@ -88,12 +88,12 @@ class HeldOut:
 
     @property
     def rms(self) -> float:
-        """Of the distances between observed and foretold corners, in pixels."""
+        """The RMS distance between observed and predicted corners, in pixels."""
         return float(np.sqrt(2 * np.nanmean(self.residuals**2)))
 
     @property
     def expected_rms(self) -> float:
-        """What the noise of the corners lets expect."""
+        """The RMS distance in pixels that the noise of the corners would give."""
         return float(np.sqrt(2 * np.nanmean(self.variances)))
 
     @property
@@ -128,12 +128,12 @@ def held_out(adjustment: Adjustment, *, folds: int | None = None, camera: str | 
             there = asked.using({each: mask & half for each, mask in asked.used.items()}).refined(only_poses=True)
             scored = asked.used[name] & ~half & there.posed[:, None]
             residuals[i, views] = np.where(scored[..., None], there.residuals[name], np.nan)
-            variances[i, views] = np.where(scored[..., None], _foretold_variances(there, solution, name), np.nan)
+            variances[i, views] = np.where(scored[..., None], _predicted_variances(there, solution, name), np.nan)
     return HeldOut(residuals, variances)
 
 
 def _folds(adjustment: Adjustment, folds: int | None) -> list[tuple[np.ndarray, Adjustment]]:
-    """Views, and the solution they are asked of."""
+    """Pairs of held-out views and the solution from the others."""
     views = np.arange(adjustment.views)
     if folds is None:
         return [(views, adjustment.refined())]
@@ -150,7 +150,7 @@ def board_halves(board: Board) -> list[Mask]:
     return [x <= 0, x >= 0, y <= 0, y >= 0]
 
 
-def _foretold_variances(there: Adjustment, solution: Adjustment, name: str) -> Array:
+def _predicted_variances(there: Adjustment, solution: Adjustment, name: str) -> Array:
     """The variance (views, corners, 2) of a corner's residual where neither pose nor camera have seen it.
 
     Its own noise σ²; the noise of the pose, whose Cᵢ⁻¹ comes from the other half; and an error of the cameras, which

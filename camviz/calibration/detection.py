@@ -28,7 +28,7 @@ __all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corne
 Progress = Callable[[int, int], object]
 Look = tuple[tuple[int, int] | None, Array | None, str]
 
-LISTEN = 0.1  # seconds after which it is asked whether there was a Ctrl-C
+LISTEN = 0.1  # seconds between two checks for Ctrl-C
 WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictures take
 
 

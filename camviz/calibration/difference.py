@@ -1,4 +1,4 @@
-"""Where two calibrations of one camera disagree, once what merely turns or shifts the camera is taken out."""
+"""Where two calibrations of one camera disagree, apart from a turn or a shift of the whole camera."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Difference:
     """The pixels uv (rows, columns, 2) of one camera, and how far off (rows, columns, 2) the other has the same points.
 
     `second_from_first` is the motion between their frames that the two sets of intrinsics imply. It is not part of the
-    difference; where it is large, one of the two has its intrinsics and its poses make up for each other.
+    difference. Where it is large, errors of the intrinsics of one of the two are made up for by its poses.
     """
 
     uv: Array
@@ -33,7 +33,7 @@ class Difference:
 
     @property
     def length(self) -> Array:
-        """How far, (rows, columns) in pixels; NaN where a camera sees nothing."""
+        """The length of the difference, (rows, columns) in pixels; NaN where a camera sees nothing."""
         return np.linalg.norm(self.shift, axis=-1)
 
     @property
@@ -92,7 +92,7 @@ def _rays(camera: Camera, uv: Array) -> Array:
 def _weights(
     intrinsics: Intrinsics, uv: Array, within: float | None, uncertainties: tuple[Array, Array] | None
 ) -> Array:
-    """What each pixel's rays count in the comparison, (rows, columns)."""
+    """The weight of each pixel's rays in the comparison, (rows, columns)."""
     weights = np.ones(uv.shape[:-1])
     if uncertainties is not None:
         product = np.asarray(uncertainties[0]) * np.asarray(uncertainties[1])

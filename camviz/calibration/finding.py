@@ -32,7 +32,7 @@ SUBPIXEL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.001)
 
 
 def read_gray(path: str | PathLike[str]) -> NDArray[np.uint8] | None:
-    """A picture's brightness (height, width) as the sensor has it, however it is to be held; None if it is no picture.
+    """A picture's brightness (height, width) not turned as its file may ask; None if it is no picture.
 
     More than 8 bits are scaled to the brightest pixel. Raises OSError for a file that cannot be read.
     """
@@ -82,7 +82,7 @@ def _sectors(gray: NDArray[Any], board: Board) -> Array | None:
 
 
 def _classic(gray: NDArray[Any], board: Board, window: int | None = None) -> Array | None:
-    """The window (default: what keeps clear of the neighbouring corners) goes so far to either side of a corner."""
+    """`window` is half the width of the window in pixels; by default it keeps clear of the neighbouring corners."""
     found, corners = cv2.findChessboardCorners(gray, (board.columns, board.rows))
     if not found:
         return None
@@ -96,7 +96,7 @@ def _classic(gray: NDArray[Any], board: Board, window: int | None = None) -> Arr
 
 
 def _black_first(gray: NDArray[Any], corners: Array, board: Board) -> Array:
-    """The corners, from the other end if that is where the black square is."""
+    """The corners, in reverse order if the black square is at the last one."""
     grid = corners.reshape(board.rows, board.columns, 2)
     middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
     if not middles.size:

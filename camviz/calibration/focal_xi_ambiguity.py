@@ -1,6 +1,6 @@
 """How well a board's corners fit a unified sphere of any focal length and ξ: a long valley along f/(1 + ξ).
 
-Near the axis x = X/(Z + ξ D) is X/((1 + ξ) Z), so that a picture's middle tells f/(1 + ξ) and nothing more.
+Near the axis x = X/(Z + ξ D) is X/((1 + ξ) Z), so that the middle of a picture determines only f/(1 + ξ).
 """
 
 from __future__ import annotations

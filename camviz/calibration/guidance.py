@@ -1,4 +1,4 @@
-"""Where to hold the board next: the poses that would take most off the projection uncertainty."""
+"""Where to hold the board next: the poses that would lessen the projection uncertainty most."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ Solution = tuple[Camera, RigidTransform]  # the poses are cam_from_board, one fo
 class Model:
     """A camera model: its lens, the intrinsic parameters that are solved for, and who solves.
 
-    `solve(views, fixed)` may leave parameters that are `fixed` other than they should be.
+    `solve(views, fixed)` need not hold every parameter in `fixed`.
     """
 
     title: str
@@ -142,7 +142,7 @@ def _calibrate_fisheye(lens: type[Any], flags: int, views: Views, fixed: tuple[s
 
 
 def _calibrate_omnidir(lens: type[Any], flags: int, views: Views, fixed: tuple[str, ...]) -> Solution:
-    """cv2.omnidir.calibrate, which begins by itself, heeds no guess, and leaves out views that it cannot begin with."""
+    """cv2.omnidir.calibrate, which takes no initial guess and leaves out views for which it finds none."""
     if not hasattr(cv2, "omnidir"):
         raise CannotCalibrate("the model omni needs OpenCV's contributed modules: pip install opencv-contrib-python")
     flags |= cv2.omnidir.CALIB_FIX_SKEW

@@ -1,10 +1,10 @@
-"""Corners and views that the others contradict, by one rule.
+"""Outliers among corners and views, by one rule.
 
 A corner is an outlier when it lies further from where the solution puts it than √(2 ln(N/0.1)) σ, N being the number of
 corners that were seen: of N corners with nothing but Gaussian noise of σ in each coordinate, one set in ten loses a
 single corner (4.2 σ for 700 corners, 5 σ for 27,000; mrcal's rule is 4 σ for any number). σ is at first the median
 distance of all corners, divided by √(2 ln 2), which outliers hardly move; then that of the corners in use,
-√(Σ r²/(measurements - unknowns)); and never below 0.01 px, better than which no corner is found. A view that keeps
+√(Σ r²/(measurements - unknowns)); and never below 0.01 px, for no corner is found more exactly. A view that keeps
 fewer than half of its corners, or fewer than six, is set aside as a whole, with the pose that suits the better half of
 its corners. Every corner is judged anew after every solution, until nothing changes; one that agrees again is taken
 back.

@@ -1,4 +1,4 @@
-"""The least-squares problem of a calibration: what was measured, what is asked for, and how well the two agree."""
+"""The least-squares problem of a calibration: measurements, parameters and residuals."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ class Problem:
     p → p + ω × p + τ, in radians and metres.
 
     `detections` (views, corners, 2) in pixels are NaN where no corner was seen. Corners `set_aside` (views, corners)
-    have residuals like all others, but no say. Nor has a view of fewer than four corners, or of corners on one line.
+    have residuals, but are not fitted (have no say). Nor is a view of fewer than four corners, or of corners on one
+    line.
     """
 
     board: Board
@@ -195,7 +196,7 @@ class Problem:
         )
 
     def using(self, used: Mapping[str, Mask]) -> Self:
-        """The same problem with a say for no other corners (views, corners) than those, by camera."""
+        """The same problem in which only these corners (views, corners), by camera, have a say."""
         return replace(self, set_aside={name: ~(used[name] & self.used[name]) for name in self.cameras})
 
 
@@ -205,7 +206,7 @@ def moved(poses: RigidTransform, points: Array) -> Array:
 
 
 def assumed_estimated(camera: Camera) -> tuple[str, ...]:
-    """The intrinsics that a calibration has estimated as far as its numbers tell: what was not is still 0."""
+    """The intrinsics that a calibration has probably estimated: those that are not 0."""
     others = [name for name in ("skew", *camera.lens.parameters()) if parameter(camera, name)]
     return ("fx", "fy", "cx", "cy", *others)
 

@@ -1,4 +1,4 @@
-"""What residuals say when they are sorted: by view, by corner, by place in the image and by place on the board."""
+"""Residuals summarised by view, by corner, by place in the image and by place on the board."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def view_rms(residuals: ArrayLike, used: Mask | None = None) -> Array:
 
 
 def robust_sigma(residuals: ArrayLike) -> float:
-    """The standard deviation of one coordinate in pixels, which a third of wild corners does not move far."""
+    """The standard deviation of one coordinate in pixels, from the median, which tolerates a third of outliers."""
     return float(NORMAL * np.nanmedian(np.abs(as_points(residuals, 2, "residuals"))))
 
 
@@ -84,7 +84,7 @@ def board_displacements(adjustment: Adjustment, name: str) -> Array:
     """Where on the board every corner seems to lie, less where it should, (views, corners, 2) metres along x and y.
 
     The residual in pixels, taken back to the board's plane by the projection's derivative there; NaN where a corner
-    has no say. Its mean over the views is what the board does the same in all of them.
+    has no say. Its mean over the views is the board's own deviation.
     """
     by_pose = np.full((adjustment.views, len(adjustment.corners), 2, len(POSE)), np.nan)
     by_pose[adjustment.posed] = adjustment.jacobian(name)[1]
@@ -120,8 +120,8 @@ def correlation(covariance: ArrayLike) -> Array:
 def correlation_with_depth(adjustment: Adjustment, name: str, view: int) -> tuple[tuple[str, ...], Array]:
     """The correlation matrix of camera `name`'s intrinsics and of one board's depth Z, and the names of its rows.
 
-    Z is that of the board's middle along the first camera's axis. Boards that are all parallel show here: the focal
-    lengths and Z then say almost the same.
+    Z is that of the board's middle along the first camera's axis. Where all boards are parallel,
+    the focal lengths and Z are correlated by almost 1.
     """
     middle = transform(adjustment.first_from_board[view], adjustment.corners.mean(axis=0))
     by_twist = twist_jacobian(middle)[2]

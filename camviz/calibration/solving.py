@@ -124,7 +124,7 @@ def _alone(
 def _solved(
     detections: Detections, board: Board, kind: Model, fixed: tuple[str, ...], aside: Mask
 ) -> tuple[Camera, RigidTransform]:
-    """OpenCV's solution from the corners that are not set aside; a view that is has the pose of all its corners."""
+    """OpenCV's solution from the corners in use; the pose of a view that is set aside comes from all its corners."""
     there = seen(detections.corners)
     use = np.asarray((there & ~aside).any(axis=1))
     size = detections.width, detections.height
@@ -148,8 +148,8 @@ def _solved(
 def _paired(alone: Mapping[str, Adjustment], board: Board, estimated: tuple[str, ...], robust: bool) -> Adjustment:
     """Two cameras as a pair: the right one stands where the middle of the views has it.
 
-    Where a view has it quite otherwise, its right corners may have been counted in another order. If it is to be
-    `robust` they are set aside to begin with, for one such view can wreck a solution that begins with it.
+    Where a view disagrees widely, its right corners may have been counted in another order. With `robust` they are
+    set aside at first, for one such view can spoil the solution.
     """
     left, right = alone.values()
     right_from_left = right.first_from_board * left.first_from_board.inv()

@@ -1,4 +1,4 @@
-"""How well a calibrated pair knows how far away things are."""
+"""The uncertainty of depths that a calibrated pair measures."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class DepthUncertainty:
 
     @property
     def total(self) -> Array:
-        """Of two independent causes together."""
+        """The standard deviation (n,) in metres of both causes together, which are independent."""
         return np.hypot(self.from_calibration, self.from_matching)
 
 

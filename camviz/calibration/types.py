@@ -30,7 +30,7 @@ class CalibrationError(ValueError):
 
 @dataclass(frozen=True)
 class Board:
-    """A chessboard: its inner corners by columns and rows, and the side of a square in metres, if the file is.
+    """A chessboard: its inner corners by columns and rows, and the side of a square in metres or the file's unit.
 
     A ChArUco board has markers of `marker_size` metres, out of OpenCV's `dictionary` of that name ("DICT_5X5_100"), in
     its white squares.

@@ -1,6 +1,6 @@
-"""How far off a projected pixel may be because the calibration is only an estimate: noise of corners, carried on.
+"""The uncertainty of a projected pixel: the noise of corners propagated through the calibration.
 
-What is left out: that the lens may not be what the model says. Uncertainty is small, and wrong, for a wrong model.
+The lens is taken to be as the model says: of a wrong model the uncertainty is too small.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def projection_covariance(
     """The covariance (..., 2, 2) in px² of where the point that pixel uv (..., 2) shows would be seen, solved anew.
 
     The point is `distance` metres along the pixel's ray. It keeps its place relative to the boards, which is all that
-    two solutions have in common, and every board has an opinion of where that is: the camera sees the mean of them
+    two solutions have in common. Every board gives it another place, of which the camera sees the mean
     (mrcal's recipe, mrcal.secretsauce.net/uncertainty.html). With the camera's own frame held fixed instead, a shift of
     its principal point would count as an error, though the camera need only be turned to make up for it.
     """

@@ -1,9 +1,9 @@
 """Zhang's closed form: a camera matrix from the homographies of a flat board, and the board's poses.
 
 The board lies in its own plane z = 0 (metres), so that its points (x, y) reach the pixels (u, v) through a homography,
-λ (u, v, 1)ᵀ = H (x, y, 1)ᵀ with H = K [r₁ r₂ t]. That r₁ and r₂ are perpendicular and of one length is all there is to
-know about K. After Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3; the
-homography after Hartley & Zisserman (2004), algorithm 4.2. Lenses that bend are left to a later refinement.
+λ (u, v, 1)ᵀ = H (x, y, 1)ᵀ with H = K [r₁ r₂ t]. K follows from r₁ and r₂ being perpendicular and of one length. After
+Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3; the homography after
+Hartley & Zisserman (2004), algorithm 4.2. Distortion is left to a later refinement.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from camviz.twoview import homography
 
 __all__ = ["board_pose", "camera_matrix", "constraints", "focal_lengths", "homography"]
 
-_UNDECIDED = 1e-10  # of the largest singular value: below this, rounding is all that an equation still says
+_UNDECIDED = 1e-10  # of the largest singular value: below this is rounding
 
 
 def constraints(H: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""Optics: what a hole, a thin lens and a row of real lens elements do to light. Millimetres, nanometres, seconds."""
+"""Optics of pinholes, thin lenses and lenses of real elements. Millimetres, nanometres, seconds."""
 
 from camviz.optics.elements import COOKE_TRIPLET, TELEPHOTO, Prescription, free_space, ideal_lens, refraction
 from camviz.optics.modulation import (

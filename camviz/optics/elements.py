@@ -1,6 +1,6 @@
-"""What is behind the thin lens: real elements, traced with 2 × 2 matrices near the axis.
+"""Lenses of real elements, traced with 2 × 2 matrices near the axis.
 
-A ray is (height y in mm, slope); whatever lies in its way is a matrix [[A, B], [C, D]], and a whole lens is the product
+A ray is (height y in mm, slope); every element is a matrix [[A, B], [C, D]], and a whole lens is the product
 of them, the first one on the right (Hecht, "Optics", 5th ed. 2017, section 6.2.1; Gerrard & Burch 1975).
 """
 

@@ -1,4 +1,4 @@
-"""How much of a grating's contrast a lens and a pixel leave: optical transfer functions, by frequency in cycles per mm.
+"""Optical transfer functions of lens and pixel: the share of a grating's contrast that is left, by cycles per mm.
 
 Stages that follow one another multiply: what the lens leaves, the pixel's area reduces again. Diffraction and defocus
 happen in the same opening and do not; `lens_transfer` has both. Every function broadcasts. After J. W. Goodman,

@@ -1,4 +1,4 @@
-"""What a hole does to light: how it blurs, how much it lets through and how much it sees.
+"""The pinhole: its blur, its exposure and its field of view.
 
 Distances in millimetres from the hole, wavelengths in nanometres, times in seconds. Every function broadcasts.
 """
@@ -65,7 +65,7 @@ def pinhole_spread(
     """Light per mm² (...) at `radius_mm` (...) from the middle of a point's image; over the whole wall it sums to 1.
 
     Fresnel diffraction at a round hole (Born & Wolf 1999, section 8.8.1): a shadow for a wide hole, an Airy disc for a
-    narrow one, and between them whatever the waves make of it. One wavelength, small angles.
+    narrow one, and between them fringes. One wavelength, small angles.
     """
     radius, scale = np.asarray(radius_mm, dtype=float), wavelength_nm * 1e-6 * focal_mm
     zones = fresnel_number(diameter_mm, focal_mm, object_mm, wavelength_nm)
@@ -89,7 +89,7 @@ def pinhole_kernel(
 ) -> Array:
     """The image of a point on pixels `pitch_mm` apart, (n, n) with n odd, summing to 1.
 
-    Beyond a Fresnel number of `many` the fringes are finer than they are worth: there it is the plain shadow.
+    Beyond a Fresnel number of `many`, where the fringes are too fine to see, it is the plain shadow.
     """
     shadow = float(geometric_blur_mm(diameter_mm, focal_mm, object_mm))
     airy = float(diffraction_blur_mm(diameter_mm, focal_mm, wavelength_nm))

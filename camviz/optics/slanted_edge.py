@@ -1,4 +1,4 @@
-"""How sharp a camera is: its modulation transfer function, measured from one straight edge (ISO 12233, annex D).
+"""A camera's modulation transfer function, measured from one straight edge (ISO 12233, annex D).
 
 An edge that leans a few degrees against the rows of pixels is crossed by every row at another fraction of a pixel, so
 that all rows together sample it many times as finely as one. Its derivative across is the line spread function, and
@@ -52,7 +52,7 @@ class SlantedEdge:
         return found
 
     def refuse_what_cannot_be_measured(self) -> None:
-        """Raises ValueError in one sentence: too small, without contrast, or at an angle that does not serve."""
+        """Raises ValueError where the edge is too small, has no contrast or leans too little or too much."""
         rows, columns = self.image.shape
         if rows < FEWEST_ROWS or columns < FEWEST_ROWS:
             raise ValueError(f"image must be at least {FEWEST_ROWS} × {FEWEST_ROWS} pixels, got {columns} × {rows}")

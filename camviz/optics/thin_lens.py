@@ -1,4 +1,4 @@
-"""What a thin lens does: where it makes an image, how large, how sharp and how bright.
+"""The thin lens: the place, size, sharpness and brightness of its image.
 
 All distances in millimetres from the lens, positive: an object at u before it, its image at v behind it. Every function
 broadcasts. Equations after E. Hecht, "Optics" (5th ed. 2017), chapter 5, and S. F. Ray, "Applied Photographic Optics"

@@ -1,4 +1,4 @@
-"""The cube map: six square pictures, 90° each, laid out on one. It is a lens like any other, with gaps in its image."""
+"""The cube map: six square pictures, 90° each, laid out on one. It is a `Lens` with gaps in its image."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def split(cube: NDArray[Any], layout: Layout = Layout.CROSS) -> dict[str, NDArra
 def joined(cube: NDArray[Any], layout: Layout) -> NDArray[Any]:
     """The same layout, each face inside a border of one pixel that shows what its neighbours on the cube show there.
 
-    Interpolating across an edge of the cube then needs no second look.
+    Interpolation can then cross an edge of the cube.
     """
     faces = split(cube, layout)
     side = cube.shape[0] // layout.rows

@@ -1,7 +1,7 @@
 """Catadioptric cameras: a camera that looks into a curved mirror, traced ray by ray.
 
 The frame is that of the viewpoint: its origin is the focus of the mirror, z runs from there towards the camera, which
-looks back along -z. A mirror swaps left and right; image points are given with that undone.
+looks back along -z. Image points are not mirrored: left and right are swapped back.
 """
 
 from __future__ import annotations
@@ -179,9 +179,9 @@ class Catadioptric:
 
 @dataclass(frozen=True)
 class MirrorLens(Fisheye):
-    """What a calibration of a mirror's directions knows: as if all its rays passed through one point.
+    """A mirror as a lens that has the directions of its rays, as if all passed through one point.
 
-    For a central camera that is the truth, and `UnifiedSphere` its formula. Both ways are looked up in a table of
+    For a central camera they do, and `UnifiedSphere` is the formula. Both ways are looked up in a table of
     traced rays, which errs by less than 1e-6 of the rim's image and of a radian.
     """
 
@@ -225,7 +225,7 @@ def direction_error(missed: ArrayLike, distance: ArrayLike) -> Array:
 def photograph(scene: Scene, camera: Catadioptric, pixels: Intrinsics, world_from_viewpoint: RigidTransform) -> Floats:
     """The scene (height, width, 3) in the mirror, linear light, every ray followed from where it leaves the mirror.
 
-    The camera itself, which a mirror shows in the middle, is not there.
+    The camera's own reflection in the middle is left out.
     """
     points, directions = camera.trace(pixels.from_pixels(pixels.grid()))
     turned = np.nan_to_num(directions) @ world_from_viewpoint.as_matrix()[:3, :3].T

@@ -1,4 +1,4 @@
-"""One camera's picture as another camera in the same place would have taken it: every pixel by way of its ray."""
+"""One camera's picture as another camera in the same place would have taken it, by the ray of every pixel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A ring of cameras that look outwards, the panorama stitched from their pictures, and what stitching cannot mend."""
+"""A ring of cameras that look outwards, the panorama stitched from their pictures, and its parallax."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The thin-lens camera: every point of its aperture is a pinhole camera of its own, and the picture is their mean.
 
-Blur, the shapes of highlights and the dimming by a mask are not put in: they come out of the rays.
+Blur, the shapes of highlights and the dimming by a mask follow from the rays alone.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ class Layer:
     """A thing as seen from the middle of the lens, in a box of the picture whose first pixel is (left, top).
 
     `light` (h, w, 4) is linear RGB and coverage 0 or 1, `nearness` (h, w) is 1/depth in 1/m, and `typical` its mean
-    over the thing; both go on a little beyond its outline, where the coverage is 0. What is `opaque` has no outline.
+    over the thing; both go on a little beyond its outline, where the coverage is 0. An `opaque` layer has no outline.
     """
 
     left: int
@@ -160,7 +160,7 @@ def layers(scene: Scene, camera: Camera, margin: int) -> tuple[Layer, ...]:
 
 
 def _uncover(part: Layer, nearer: Layer) -> None:
-    """Where one thing stands on another, part of the farther one is the nearer: there the nearer one is taken away."""
+    """Where one thing stands on another, parts of the farther layer are nearer: there the nearer layer is removed."""
     left, top = max(part.left, nearer.left), max(part.top, nearer.top)
     right, bottom = min(part.right, nearer.right), min(part.bottom, nearer.bottom)
     if left < right and top < bottom:

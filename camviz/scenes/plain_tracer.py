@@ -1,4 +1,4 @@
-"""The tracer as one would write it first: every ray against every surface, the nearest one is seen.
+"""The simplest tracer: every ray against every surface, the nearest one is seen.
 
 `camviz.scenes.render` gives the same picture several times sooner: it cuts the picture into tiles, rules whole tiles
 out, and lets alike surfaces be met together (`camviz.scenes.rays`, `camviz.scenes.batched`).

@@ -1,4 +1,4 @@
-"""Rays by the hundred thousand: kept in small tiles of neighbours, so that whole tiles can be ruled out at once."""
+"""Rays in small tiles of neighbours, so that whole tiles can be ruled out at once."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Rays:
 
 
 def turned(rows: NDArray[Any], vectors: NDArray[Any]) -> NDArray[Any]:
-    """The products rows @ vectors (m, ...) of a matrix's `rows` (m, 3) and vectors (3, ...), without waking threads."""
+    """The products rows @ vectors (m, ...) of a matrix's `rows` (m, 3) and vectors (3, ...), in this thread alone."""
     flat, part = vectors.reshape(3, -1), ALONE // max(rows.size, 1)
     product = np.empty((len(rows), flat.shape[1]), dtype=np.result_type(rows, vectors))
     for start in range(0, flat.shape[1], part):

@@ -30,7 +30,7 @@ NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Surfaces under a sky. List them near to far: what is hidden then costs nothing.
+    """Surfaces under a sky, best listed near to far: then hidden ones cost no time.
 
     The sky is an equirectangular texture infinitely far away, its texels square, its middle towards +z and its first
     row straight up. Where it ends before the nadir, its last row goes on.
@@ -184,7 +184,7 @@ def _blocks(height: int, width: int) -> list[Block]:
 
 
 def _require_rays(origins: Array, directions: Array) -> None:
-    """Of the directions one in TILE is looked at: a wrong scale is seldom wrong once."""
+    """Checks one direction in TILE, for a wrong scale concerns all of them."""
     if not np.isfinite(origins).all():
         raise ValueError("origins must be finite points, got NaN or infinity among them")
     lengths = np.linalg.norm(directions.reshape(-1, 3)[::TILE], axis=-1)

@@ -55,7 +55,7 @@ def terrace_edges() -> tuple[Array, Array, Array]:
 
 
 def things() -> list[Surface]:
-    """What stands on the terrace, and throws its shadow there."""
+    """The surfaces that stand on the terrace and throw shadows on it."""
     return [*_board(), *_still_life(), *_lamps(), *_wall()]
 
 

@@ -1,6 +1,6 @@
-"""A sensor's frames with chance held still: the same draw serves every setting, so that only what is turned changes.
+"""A sensor's frames from one random draw for every setting, so that only what the slider turns changes.
 
-For pictures that follow a slider. `Sensor.expose` draws afresh and counts few electrons exactly; here a normal draw is
+`Sensor.expose` draws afresh and counts few electrons exactly; here a normal draw is
 bent to Poisson's law for all counts, whose mean and variance it keeps.
 """
 

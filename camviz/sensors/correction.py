@@ -1,7 +1,7 @@
 """Putting noise right, and what it costs: averaging, dark frames, flat fields, bracketing and smoothing.
 
-Nothing here is free. Averaging costs time, a dark frame and a flat field cost noise, bracketing costs motion and
-smoothing costs detail; `NoiseModel` foretells the first three in electrons.
+Averaging costs time, a dark frame and a flat field cost noise, bracketing costs motion and
+smoothing costs detail; `NoiseModel` predicts the first three in electrons.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class NoiseModel:
 
     @classmethod
     def measured(cls, found: Measurement) -> NoiseModel:
-        """The model that a measurement found; what it could not know is taken as none."""
+        """The model that a measurement found; noise that it could not measure is taken as 0."""
         saturation = found.levels[found.peak].bright.mean if found.saturated else np.inf
         patterns = np.nan_to_num([found.prnu, found.dsnu_e]).tolist()
         noise = found.dark_noise_dn / found.gain_dn_per_e
@@ -65,7 +65,7 @@ class NoiseModel:
         return (np.asarray(dn, dtype=float) - self.black_dn) / self.gain_dn_per_e
 
     def temporal_variance(self, electrons: ArrayLike) -> Array:
-        """σ² = σ_d² + μ_e, electrons², of a pixel with that mean: what changes from frame to frame."""
+        """σ² = σ_d² + μ_e, electrons², of a pixel with that mean: the noise that changes from frame to frame."""
         return self.dark_noise_e**2 + np.maximum(np.asarray(electrons, dtype=float), 0)
 
     def pattern_variance(self, electrons: ArrayLike) -> Array:
@@ -75,7 +75,7 @@ class NoiseModel:
     # What each remedy leaves ------------------------------------------------------------------------------------------
 
     def noise_averaged(self, electrons: ArrayLike, frames: int = 1) -> Array:
-        """Electrons of noise in the mean of so many frames: time's part falls with their root, the pattern stays."""
+        """Electrons of noise in the mean of so many frames: temporal noise falls with their root, the pattern stays."""
         return np.sqrt(self.temporal_variance(electrons) / frames + self.pattern_variance(electrons))
 
     def noise_less_dark(self, electrons: ArrayLike, darks: int) -> Array:
@@ -164,9 +164,9 @@ def unstabilised(values: ArrayLike, dark_noise_e: float) -> Array:
 def smoothed(frame: ArrayLike, model: NoiseModel, method: str = "non-local", strength: float = 1.0) -> Array:
     """A frame (height, width) in electrons with its noise smoothed, as strongly as the noise model says.
 
-    Where noise is one everywhere one strength suits all: "gaussian" blurs by `strength` pixels, noise and detail alike;
-    "non-local" averages patches that differ by no more than `strength` times what noise would make of equal ones
-    (Buades, Coll and Morel 2005).
+    The frame is stabilised first, so that one strength suits all of it. "gaussian" blurs by `strength` pixels, noise
+    and detail alike; "non-local" averages patches that differ by no more than `strength` times what noise would make of
+    equal ones (Buades, Coll and Morel 2005).
     """
     if method not in ("gaussian", "non-local"):
         raise ValueError(f"method must be 'gaussian' or 'non-local', got {method!r}")

@@ -1,4 +1,4 @@
-"""A figure with how far the truth may be: by chance, and by what rounding and clipping may hide."""
+"""A figure with its standard error, and with bounds for what rounding and clipping may hide."""
 
 from __future__ import annotations
 

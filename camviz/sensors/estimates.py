@@ -437,5 +437,5 @@ def _excess(bright: float, dark: float, signal: float) -> float:
 
 
 def _positive(one: Estimate) -> Estimate:
-    """An estimate of what is above zero in truth."""
+    """An estimate of a figure whose true value is above zero."""
     return replace(one, low=max(one.low, 0.0)) if one.value > 0 else UNKNOWN

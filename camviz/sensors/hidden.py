@@ -1,7 +1,7 @@
-"""What rounding to whole numbers and a clipped black or white level hide, and how much that can be.
+"""How much noise rounding to whole numbers and a clipped black or white level can hide.
 
-A digital number says no more than that the voltage lay within half a step of it, and the smallest and largest ones not
-even that. From the frames alone follows between which values the noise was before (EMVA 1288 release 4.0, sections 4.3
+A digital number tells the voltage to within half a step, and the smallest and largest ones not even that. From the
+frames alone follows between which values the noise was before (EMVA 1288 release 4.0, sections 4.3
 and 6.5, which stops at σ²_y.dark = 0.24 DN²: below it the noise of rounding depends on where between two numbers the
 mean lies).
 """

@@ -1,4 +1,4 @@
-"""What a sensor is, measured from its frames alone: gain, noise, saturation, patterns and dark current.
+"""A sensor's gain, noise, saturation, patterns and dark current, measured from its frames alone.
 
 EMVA Standard 1288, release 4.0 linear. Each level of exposure gives two bright and two dark frames; a stack of bright
 and one of dark frames, where they were taken, give the fixed patterns.
@@ -40,7 +40,7 @@ FIGURES = (
 class Measurement(Readings):
     """The EMVA figures of levels of rising brightness.
 
-    The attributes are the standard's estimates, whatever the frames are worth; NaN where there is none. `judged` holds
+    The attributes are the standard's estimates, trusted or not; NaN where there is none. `judged` holds
     those that can be trusted, bounds for the others, and `why` they are withheld; `figures` the trusted values alone.
     """
 

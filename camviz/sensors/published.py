@@ -1,4 +1,4 @@
-"""Sensors that exist, with the figures that were published of them, and by whom.
+"""Real sensors: their published figures and the sources of these.
 
 No sheet gives every figure that a simulation needs; `assumed` names those that ours had to choose.
 """

@@ -1,4 +1,4 @@
-"""What a photon transfer is made of: levels of rising brightness, and what can be read off them before any fit.
+"""The data of a photon transfer: levels of rising brightness, and what follows from them before any fit.
 
 EMVA Standard 1288, release 4.0 linear.
 """

@@ -1,4 +1,4 @@
-"""How a picture leaves the sensor: bucket brigades (CCD), rows one after the other (CMOS), or all at once.
+"""How charge leaves the sensor: by bucket brigades (CCD), row after row (CMOS), or all at once.
 
 Charges are electrons (height, width); row 0 is the first to be read.
 """
@@ -25,7 +25,7 @@ FORGOTTEN = 1e-7  # the share of a charge below which the trail that it leaves i
 
 @dataclass(frozen=True, eq=False)
 class CcdRegister:
-    """A bucket brigade at work: charge still on the area (height, width), in the register (width,), and read so far."""
+    """A bucket brigade: charge still on the area (height, width), in the register (width,), and read so far."""
 
     area: Array
     register: Array
@@ -139,7 +139,7 @@ def rolling_picture(
     """The picture (height, width, 3), linear light, of a moving camera whose rows are exposed one after the other.
 
     `motion` gives the poses world_from_cam at times (n,) in seconds. Each row is traced at the middle of its exposure,
-    so that the picture is bent and not blurred.
+    so the picture is distorted and not blurred.
     """
     poses = motion(row_times(camera.intrinsics.height, row_s, exposure_s))
     origins, directions = rolling_rays(camera, poses)

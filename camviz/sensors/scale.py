@@ -1,4 +1,4 @@
-"""The scale of a camera's digital numbers, and what a pair or a stack of frames truly says on it.
+"""The scale of a camera's digital numbers, and the statistics of a pair or a stack of frames on it.
 
 The numbers have a step, and ends where the camera clips. Everything that rounding and clipping may hide is in the
 bounds of the estimates.

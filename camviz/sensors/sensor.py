@@ -36,7 +36,7 @@ def leak(shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: float,
 
 
 def fill(electrons: ArrayLike, full_well_e: float) -> Floats:
-    """What the wells hold of these electrons: no more than the full well."""
+    """These electrons, at most the full well in each pixel."""
     return np.minimum(electrons, full_well_e, dtype=np.float32)
 
 
@@ -184,7 +184,7 @@ class Sensor:
         voltage = amplify(signal, self.gain_dn_per_e, self.offset_dn)
         return charge, signal, voltage, quantise(voltage, self.bits)
 
-    # What the model foretells -----------------------------------------------------------------------------------------
+    # What the model predicts ------------------------------------------------------------------------------------------
 
     @property
     def saturation_e(self) -> float:

@@ -1,4 +1,4 @@
-"""What repeated frames of the same light say: noise that changes from frame to frame, and the pattern that stays.
+"""Statistics of repeated frames of the same light: temporal noise and fixed pattern.
 
 A frame is an array (height, width) of digital numbers (DN). Equations: EMVA Standard 1288, release 4.0 linear.
 """
@@ -236,8 +236,8 @@ class Stack:
 def parts_of_difference(bright: Stack, dark: Stack) -> dict[str, Part]:
     """The row, column and pixel parts of the pattern by which the bright stack differs from the dark one, and "whole".
 
-    The dark pattern drops out, and so does what it has in common with the pattern of the gain by chance, which
-    s²_y − s²_y.dark still holds.
+    The dark pattern drops out, and so does its chance covariance with the pattern of the gain, which s²_y − s²_y.dark
+    still holds.
     """
     each = [(one.left_over, one.within_rows / one.count, one.row_means / one.count) for one in (bright, dark)]
     whole, pixel, rows = (sum(both) for both in zip(*each, strict=True))

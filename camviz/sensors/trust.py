@@ -119,12 +119,12 @@ def _share(off: float, value: float, name: str) -> str:
 
 
 def _hides(one: Estimate, name: str) -> bool:
-    """Whether an endless number of such frames would not tell the figure either."""
+    """Whether no number of such frames would tell the figure."""
     return not kept(name, Estimate(one.value, 0.0, one.low, one.high))
 
 
 def _hidden(e: Estimates, name: str) -> str:
-    """What hides a figure, chance apart."""
+    """What hides a figure besides chance."""
     apart = "the levels are too far apart, or the frames too few, to tell where between them saturation lies"
     if name in ("full_well_e", "snr_max_db"):
         return apart

@@ -124,7 +124,7 @@ def recover_pose(E: ArrayLike, rays_left: ArrayLike, rays_right: ArrayLike) -> R
     """right_from_left with |t| = 1: of E's four motions, the one with most points in front of both cameras.
 
     `rays_left` and `rays_right` are corresponding unit rays (n, 3), each in its own camera's frame, through any lens:
-    `camera.lens.unproject(camera.intrinsics.from_pixels(uv))`. Raises ValueError where no motion wins the count.
+    `camera.lens.unproject(camera.intrinsics.from_pixels(uv))`. Raises ValueError where two motions have equally many.
     """
     motions = decompose_essential(E)
     in_front = [(ray_distances(motion, rays_left, rays_right) > 0).all(axis=-1).sum() for motion in motions]

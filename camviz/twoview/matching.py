@@ -93,7 +93,7 @@ def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tole
     """The left disparities (height, width), NaN where the right picture's disagree by more than `tolerance` pixels.
 
     Pixel u of the left row says that its partner is u − d; the partner's own disparity must lead back. It does not for
-    what only one camera sees, nor for most mistakes. Both are positive for points in front of the cameras.
+    points that only one camera sees, nor for most wrong matches. Both are positive for points in front of the cameras.
     """
     found, back = np.asarray(disparity_left, dtype=float), np.asarray(disparity_right, dtype=float)
     u = np.arange(found.shape[-1]) - found
@@ -114,7 +114,7 @@ def _semi_global(left: Any, right: Any, disparities: int, block_size: int, pictu
 
 
 def _strict(matcher: Any) -> Any:
-    """The matcher, told to leave out what is ambiguous, what does not lead back, and small islands."""
+    """The matcher, which leaves out ambiguous matches, those that fail the left-right check, and small islands."""
     matcher.setUniquenessRatio(_UNIQUE)
     matcher.setDisp12MaxDiff(1)
     matcher.setSpeckleWindowSize(_SPECKLE[0])

@@ -9,7 +9,7 @@ from camviz.lenses.base import Array, as_points
 from camviz.twoview.epipolar import to_homogeneous
 from camviz.twoview.estimate import normalising_transform
 
-UNDETERMINED = 1e-10  # of the largest singular value: below this, rounding is all that an equation still says
+UNDETERMINED = 1e-10  # of the largest singular value: below this is rounding
 
 
 def homography(xy: ArrayLike, uv: ArrayLike) -> Array:

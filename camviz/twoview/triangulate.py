@@ -106,6 +106,6 @@ def _least_squares(A: Array, b: Array) -> Array:
     """x (..., n) of least |A x - b|, A (..., m, n); NaN where A or b has one, or leaves a direction undetermined."""
     known = np.asarray(np.isfinite(A).all(axis=(-1, -2)) & np.isfinite(b).all(axis=-1))
     U, s, Vt = np.linalg.svd(np.where(known[..., None, None], A, 0), full_matrices=False)
-    determined = known & (s[..., -1] > 1e-12 * s[..., 0])  # below that, rounding has the say
+    determined = known & (s[..., -1] > 1e-12 * s[..., 0])  # below this is rounding
     s = np.where(determined[..., None], s, np.nan)
     return np.squeeze(np.swapaxes(Vt, -1, -2) @ ((np.swapaxes(U, -1, -2) @ b[..., None]) / s[..., None]), axis=-1)
