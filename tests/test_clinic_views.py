@@ -237,7 +237,8 @@ def test_views_are_called_by_the_numbers_of_their_pictures():
     residuals, coverage = (view(seen).figure().body for view in (ResidualsView, CoverageView))
     assert re.findall(r"label orange[^>]*>(\d+)<", ResidualsView(seen, view=4).figure().body) == ["11"]
     shown = set(re.findall(r'class="tick halo">(\d+)<', coverage))  # but those that would stand over others
-    assert {"11"} < shown <= {"1", "2", "9", "11"}
+    assert len(shown) > 1
+    assert shown <= {"1", "2", "9", "11"}
     assert ">10<" not in residuals
 
 

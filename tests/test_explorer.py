@@ -43,7 +43,7 @@ class Large(Toy):
     """A view that draws every size, and whose size is dragged."""
 
     def figure(self, *, draft: bool = False) -> Picture:
-        return Picture("", 10, 10, "Large", f"size {self.size:g}")
+        return Picture.whole("", 10, 10, "Large", f"size {self.size:g}")
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         return self.but(size=self.size + dx)

@@ -103,9 +103,9 @@ def test_many_objects_in_a_circle_are_given_back_and_a_few_wait():
 
 def test_what_a_view_has_worked_out_is_given_back_and_worked_out_again():
     view = ExposureView()
-    drawn = explore(view).frame["svg"]
+    drawn = explore(view).frame["html"]
     worked_out = vars(view).keys() - {field.name for field in fields(view)}
     assert worked_out
     give_back()
     assert not vars(view).keys() & worked_out
-    assert view.figure().svg() == drawn
+    assert view.figure().flow() == drawn

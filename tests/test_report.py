@@ -105,7 +105,7 @@ def test_photographs_are_embedded_small(tmp_path):
     assert len(text) < 5e6
     assert "is not at hand" not in text
     without = report(inspect(calibration))
-    assert "The picture is not at hand: name its folder, --images FOLDER" in without
+    assert "The picture is not at hand; name its folder: --images FOLDER" in without
     assert text.count("data:image/jpeg") >= 10
 
 

@@ -21,7 +21,8 @@ _WIDTHS = {
 }  # fmt: skip
 _WIDTH = {letter: width for width, letters in _WIDTHS.items() for letter in letters}
 _BOLD, _MONO, _UNKNOWN = 1.12, 0.61, 0.7
-_TOKEN = re.compile(r"<svg ([^>]*)>|</svg>|<text ([^>]*)>([^<]*)</text>")
+_TOKEN = re.compile(r"<svg ([^>]*)>|</svg>|<text ([^>]*)>((?:[^<]|</?tspan)*)</text>")
+_TAG = re.compile(r"<[^>]*>")
 _ATTRIBUTE = re.compile(r'([\w-]+)="([^"]*)"')
 _STYLED_SIZE = re.compile(r"font-size:([\d.]+)px")
 
@@ -83,7 +84,18 @@ def words_of(body: str, tile: Box, unit: float = 1.0) -> list[Words]:
         elif text.strip():
             x, y, seen = frames[-1]
             given = dict(_ATTRIBUTE.findall(attributes))
-            found.append(_words(token.start(), token.end(), given, unescape(text), (x, y), seen, len(frames) > 1, unit))
+            found.append(
+                _words(
+                    token.start(),
+                    token.end(),
+                    given,
+                    unescape(_TAG.sub(" ", text)),
+                    (x, y),
+                    seen,
+                    len(frames) > 1,
+                    unit,
+                )
+            )
     return found
 
 

@@ -109,7 +109,7 @@ class MeasuredNoiseView(View):
             slope = found.dark_current_e_per_s * found.gain_dn_per_e / 1000
             ends = np.array([0, panel.right])
             marks += plot.curve(panel, ends, dark.mean() + slope * (ends - exposure.mean()), "orange")
-        return plot.plotted(panel, marks, "exposure (ms)", "mean of dark frames (DN)", aside=58, title="Darkness")
+        return plot.plotted(panel, marks, "exposure (ms)", "dark mean (DN)", aside=58, title="Darkness")
 
 
 FIGURES: dict[str, tuple[str, float, str]] = {

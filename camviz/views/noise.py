@@ -304,14 +304,16 @@ class PhotonTransferView(View):
 
     def _legend(self) -> str:
         """Beside the numbers: wherever it stood among the curves, some gain would lead one through it."""
-        x, y, _, _ = self._layout["lines"]
+        x, y, width, height = self._layout["lines"]
         parts = self.parts(np.array([self.card_e]))
         styles = self._styles()
         drawn = [(styles[name], name) for name in styles if name in parts and parts[name].max() > 0]
         named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
         named += [("orange thick", "yours")] if self.yours else []
         lines = plot.legend(self._plot, [("ink", "all together"), *named])
-        return svg.text((x + 10, y + 26), "The lines", "title") + svg.element("svg", lines, x=x, y=y + 34)
+        return svg.text((x + 10, y + 26), "The lines", "title") + svg.element(
+            "svg", lines, x=x, y=y + 34, width=width, height=height - 34
+        )
 
     def _points(self, panel: Panel, pixels: int) -> str:
         """What frames of the card say, and the exposure of the picture."""
