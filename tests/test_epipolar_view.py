@@ -201,7 +201,8 @@ def test_the_readers_own_F_draws_the_right_line_or_another_one():
         (lambda *given: None, "returns nothing yet"),
         (lambda *given: np.eye(4), "answers in shape"),
         (lambda *given: 1 / 0, "ZeroDivisionError"),
-        (lambda *given: np.full((3, 3), np.nan), "not all finite"),
+        (lambda *given: np.full((3, 3), np.nan), "answers NaN everywhere"),
+        (lambda *given: np.diag([np.nan, 1, 1]), "not all finite"),
         (lambda *given: np.zeros((3, 3)), "no line"),
     ],
 )

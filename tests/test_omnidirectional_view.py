@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from every_view import words
 
 from camviz.course.exercises import exercises
 from camviz.lenses import UnifiedSphere
@@ -134,6 +135,9 @@ def test_a_wrong_one_cuts_another_and_none_leaves_a_sentence():
         if known.function.__name__ in alike:
             continue
         view = OmnidirectionalView(panels=WITH_YOURS, yours=known.function, xi=0.8, pitch_deg=0)
+        if known.function.__name__ == "eye_in_front":  # a mirror whose eye sees nothing
+            assert "answers NaN everywhere" in words(view.figure(draft=True).body)
+            continue
         apart = np.abs(shown(view, "window", True).astype(int) - shown(view, "yours", True)).max(axis=-1)
         assert np.mean(apart > 30) > 0.02, known.explanation
     picture = OmnidirectionalView(panels=WITH_YOURS, yours=lambda points, xi: None).figure(draft=True)

@@ -223,7 +223,7 @@ def test_a_bare_calibration_shows_a_table_and_a_picture_in_a_notebook(solved, tm
     assert done.returncode == 0, done.stderr
     early, forms, *lines = done.stdout.strip().splitlines()
     assert early == "False"  # nothing is drawn, or loaded, before it is wanted
-    assert forms == "['text/html', 'text/plain'] 1 1"
+    assert forms == "['text/html', 'text/plain'] 1 2"  # a table, and a picture of two tiles
     assert lines[0].startswith("mine.yaml · written 20")
     assert lines[1].startswith("camera: fx = ")
     assert len(lines) <= 5

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from camviz.draw import plot
+from camviz.draw.flow import rows
 from camviz.draw.panel import Panel
 from camviz.draw.readout import decimal, listed, readout, seconds, signed, vector
 from camviz.draw.space import OrbitCamera, space_panel
@@ -159,7 +160,7 @@ def test_plus_and_the_arrows_up_and_right_lead_onwards():
     ]  # fmt: skip
 
 
-def test_a_composed_picture_stands_on_paper_of_its_size():
-    picture = View().composed(120, "<g/>", attached={"a": b"b"}, described="words")
+def test_a_picture_of_tiles_stands_on_paper_of_their_size():
+    picture = View().tiled(rows((120, {"all": 960})), {"all": "<g/>", "none": ""}, {"a": b"b"}, "words")
     assert picture.body.startswith('<rect x="0" y="0" width="960" height="120" class="paper"/><g/>')
     assert (picture.height, picture.description, picture.photographs) == (120, "words", {"a": b"b"})

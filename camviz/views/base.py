@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.flow import WIDTH, Cell, Tile
+from camviz.draw.flow import Cell, Tile
 from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
@@ -108,13 +108,6 @@ class View:
     def description(self) -> str:
         """The state in words and numbers."""
         return ""
-
-    def composed(
-        self, height: float, *parts: str, attached: Mapping[str, bytes] | None = None, described: str | None = None
-    ) -> Picture:
-        """A picture of the parts, with the photographs attached that they need, under the state's description."""
-        words = self.description() if described is None else described
-        return Picture.whole("".join(parts), WIDTH, height, self.title, words, dict(attached or {}))
 
     def tiled(
         self,

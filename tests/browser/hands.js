@@ -63,6 +63,29 @@ window.hands = {
     return points.reduce((a, b) => (Math.hypot(b[0] - u, b[1] - v) < Math.hypot(a[0] - u, a[1] - v) ? b : a));
   },
 
+  // Words of a picture that are below 12 CSS pixels, cut off by their panel or tile, or over others.
+  unreadable(root) {
+    const found = [], all = [];
+    const seen = (box, edge) => box.left > edge.left - 1 && box.right < edge.right + 1 && box.top > edge.top - 1 && box.bottom < edge.bottom + 1;
+    for (const svg of root.querySelectorAll(".camviz-fitted")) {
+      if (!svg.getClientRects().length) continue;
+      const scale = svg.getBoundingClientRect().width / svg.viewBox.baseVal.width;
+      for (const text of svg.querySelectorAll("text")) {
+        const box = text.getBoundingClientRect(), words = text.textContent.slice(0, 40);
+        const panel = text.closest("svg"), edge = (panel === svg ? svg : panel.firstElementChild).getBoundingClientRect();
+        if (!box.width) continue;
+        if (parseFloat(getComputedStyle(text).fontSize) * scale < 11.95) found.push(`small: ${words}`);
+        if (!seen(box, edge)) found.push(`cut: ${words}`);
+        all.push([words, box]);
+      }
+    }
+    all.forEach(([words, a], i) => all.slice(i + 1).forEach(([others, b]) => {
+      const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left), high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+      if (wide > 1 && high > 2) found.push(`over each other: ${words} | ${others}`);
+    }));
+    return found;
+  },
+
   // Elements whose words have a contrast below 4.5 with the colour behind them, as "words: contrast".
   weak(selector) {
     const channels = (colour) => (colour.match(/[\d.]+/g) ?? []).map(Number);

@@ -395,7 +395,7 @@ def test_the_numbers_under_taken_for_colour(says):
     blue, length = says("Vertical stripes add (1, 0, −1), which has no grey part: their length is 1.41.")
     assert length == np.linalg.norm([1, 0, blue.value])
     assert length == strength(RGGB, 0.5, 0)
-    listed = re.findall(r">○ ([^<]+)</text>.*?>(\d\.\d\d)</text>", DemosaicingView().figure().svg())
+    listed = re.findall(r">(\(.{1,2}, .{1,2}\))</text><text[^>]*>(\d\.\d\d)</text>", DemosaicingView().figure().svg())
     assert listed == [("(½, ½)", "1.63"), ("(½, 0)", "1.41"), ("(0, ½)", "1.41")]
 
 

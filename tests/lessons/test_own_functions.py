@@ -29,7 +29,7 @@ VISIBLE = 5e-4
 _CURVE = re.compile(
     r'<path d="([^"]*)"[^>]*class="[^"]*orange[^"]*"|<path[^>]*class="[^"]*orange[^"]*"[^>]*\bd="([^"]*)"'
 )
-_WORDS = re.compile(r'<text[^>]*class="[^"]*orange[^"]*"[^>]*>([^<]*)')
+_WORDS = re.compile(r'<text[^>]*class="[^"]*orange[^"]*"[^>]*>((?:[^<]|</?tspan)*)</text>')
 _PLACE = re.compile(r"-?\d+(?:\.\d+)?")
 
 

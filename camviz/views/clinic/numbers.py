@@ -10,10 +10,11 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
+from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import closed
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
-from camviz.draw.readout import listed, true_minus
+from camviz.draw.readout import listed, readout, true_minus
 from camviz.views.base import View
 from camviz.views.marks import cross
 
@@ -84,10 +85,8 @@ class NumbersView(View):
         content += cross([middle], "muted", 7) + svg.dots([axis], "orange", 9)
         side = "end" if axis[0] > 0.75 * panel.width else "" if axis[0] < 0.25 * panel.width else "middle"
         content += svg.text(axis + (0, 24 if axis[1] < middle[1] else -12), "principal point", f"orange halo {side}")
-        body = panel.show(content, title=f"{self.name}: its picture", note="cross: the middle")
-        y = 46.0
-        for name, value in self.rows():
-            body += svg.text((380, y), name, "note") + svg.paragraph((550, y), true_minus(value), 400, "label")
-            y += 24
-        height = max(290.0, y + 40)
-        return self.composed(height, body)
+        *told, (_, lens) = [(name, true_minus(value)) for name, value in self.rows()]
+        layout = rows((max(290.0, 30 + 40 * len(told)), {"picture": 380, "numbers": 320}), (40, {"lens": 960}))
+        shown = panel.show(content, title=f"{self.name}: its picture", note="cross: the middle")
+        figures = readout(told, (392, 46), (0, 40), (0, 18))
+        return self.tiled(layout, {"picture": shown, "numbers": figures, "lens": Sentences(lens)})

@@ -1,0 +1,56 @@
+"""What of every picture cannot be read in a real JupyterLab, on screens from a telephone to a desk, in every lesson.
+
+    python benchmarks/readable.py [NN ...] [--width 375 720 800 1440]
+
+Prints each word that is below 12 CSS pixels, cut off by its panel, or over another; 720 is what 1440 leaves at a zoom of
+200 %. Needs Chromium; half a minute a lesson.
+"""
+
+import argparse
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.append(str(HERE.parent / "tests" / "browser"))
+
+from laboratory import ROOT, Notebook, chromium, jupyterlab  # noqa: E402
+
+
+def unreadable(lesson: Notebook, width: int) -> list[str]:
+    """What cannot be read in the lesson's visualizers in a window of that many CSS pixels."""
+    lesson.page.set_viewport_size({"width": width, "height": 900})
+    found = []
+    for number, explorer in enumerate(lesson.page.query_selector_all(".camviz-explorer"), 1):
+        explorer.scroll_into_view_if_needed()
+        lesson.page.wait_for_timeout(400)  # until the tiles have their sizes, and the kernel is asked
+        explorer.evaluate("root => hands.settled(root)")
+        found += [f"visualizer {number}: {one}" for one in explorer.evaluate("root => hands.unreadable(root)")]
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("lessons", nargs="*", help="numbers of lessons; all of them when none is given")
+    parser.add_argument("--width", nargs="*", type=int, default=[375, 720, 800, 1440])
+    given = parser.parse_args()
+    total = 0
+    with tempfile.TemporaryDirectory() as home:
+        shutil.copytree(ROOT / "lessons", Path(home) / "lessons")
+        paths = [path.name for path in sorted((Path(home) / "lessons").glob("*.ipynb"))]
+        with jupyterlab(Path(home) / "lessons", Path(home) / "private") as address, chromium() as browser:
+            for name in [name for name in paths if not given.lessons or name[:2] in given.lessons]:
+                lesson = Notebook(browser, address, name)
+                lesson.run_all()
+                for width in given.width:
+                    found = unreadable(lesson, width)
+                    total += len(found)
+                    print(f"{name}, {width} px: {len(found)}", *found, sep="\n    ", flush=True)
+                lesson.close()
+    print(f"{total} in all")
+    return int(total > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
