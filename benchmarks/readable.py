@@ -2,8 +2,8 @@
 
     python benchmarks/readable.py [NN ...] [--width 375 720 800 1440]
 
-Prints each word that is below 12 CSS pixels, cut off by its panel, or over another; 720 is what 1440 leaves at a zoom of
-200 %. Needs Chromium; half a minute a lesson.
+Prints each word that is below 12 CSS pixels, cut off by its panel, or over another; 720 is what 1440 leaves at a zoom
+of 200 %. Needs Chromium; half a minute a lesson.
 """
 
 import argparse
