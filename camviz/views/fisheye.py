@@ -284,8 +284,10 @@ class FisheyeView(OrbitView):
             "orthographic": (92, 0.72, ""),
         }
         x, y, side = places[name]
-        strong = "" if name == self.projection else "half"
-        return svg.text(panel.place((x, y)), name, f"{_COLOURS[name]} halo {side} {strong}")
+        return svg.text(panel.place((x, y)), name, f"{_COLOURS[name]} halo {side}", style=self._bold(name))
+
+    def _bold(self, name: str) -> str | None:
+        return "font-weight:600" if name == self.projection else None
 
     # The dome --------------------------------------------------------------------------------------------------------
 
@@ -326,10 +328,9 @@ class FisheyeView(OrbitView):
         radii |= {"yours": self._your_radius(_TABLED)} if self.yours else {}
         drawn = [svg.text((x, y), "r / f at 30°, 60°, 90°", "title")]
         for i, (name, values) in enumerate(radii.items()):
-            strong = "" if name in (self.projection, "yours") else " half"
             colour = _COLOURS.get(name, "orange")
-            class_ = f"number {colour * (name == 'yours')}{strong}"
-            drawn.append(svg.text((x, y + 26 + 40 * i), name, f"{colour}{strong}"))
+            class_ = "number orange" if name == "yours" else "number" if name == self.projection else "number fill-muted"
+            drawn.append(svg.text((x, y + 26 + 40 * i), name, colour, style=self._bold(name)))
             drawn.append(svg.text((x, y + 43 + 40 * i), self._tabled(name, values), class_))
         return "".join(drawn)
 
