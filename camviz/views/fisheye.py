@@ -329,9 +329,9 @@ class FisheyeView(OrbitView):
         drawn = [svg.text((x, y), "r / f at 30°, 60°, 90°", "title")]
         for i, (name, values) in enumerate(radii.items()):
             colour = _COLOURS.get(name, "orange")
-            class_ = "number orange" if name == "yours" else "number" if name == self.projection else "number fill-muted"
+            strength = "" if name == self.projection else "orange" if name == "yours" else "fill-muted"
             drawn.append(svg.text((x, y + 26 + 40 * i), name, colour, style=self._bold(name)))
-            drawn.append(svg.text((x, y + 43 + 40 * i), self._tabled(name, values), class_))
+            drawn.append(svg.text((x, y + 43 + 40 * i), self._tabled(name, values), f"number {strength}"))
         return "".join(drawn)
 
     def _tabled(self, name: str, values: Array) -> str:
