@@ -249,8 +249,8 @@ function folding(picture) {
 // Words are larger, in the picture's units, where a tile is shown small: the kernel is told, so that they make room.
 function tellUnits(picture, told, ask) {
   const units = {};
-  for (const tile of picture.querySelectorAll(".camviz-tile")) {
-    const svg = tile.lastElementChild, wide = svg.clientWidth;
+  for (const svg of picture.querySelectorAll(".camviz-fitted")) {
+    const tile = svg.parentElement, wide = svg.clientWidth;
     const unit = wide ? Math.min(20, Math.max(1, svg.viewBox.baseVal.width / wide)) : 1;
     const name = tile.dataset.tile;
     if (Math.abs(unit / (told[name] ?? 1) - 1) > 0.04) units[name] = told[name] = Number(unit.toFixed(2));

@@ -76,7 +76,7 @@ def test_code_moves_both_explorers_and_the_slider(notebook):
 def test_the_stills_are_saved_with_their_tabs_and_hidden_while_the_tab_lives(notebook):
     explorers(notebook)
     kept = "".join(notebook.cells[0]["outputs"][0]["data"]["text/html"])
-    assert kept.count("<img") == 2
+    assert kept.count("<figure") == 2
     assert "<b>one</b>" in kept
     assert "<b>other</b>" in kept
     stills = notebook.page.locator("[data-camviz-still]")
