@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import camviz
-from camviz.files import CalibrationError
+from camviz.files import CalibrationError, formats
 from camviz.files.trees import parse
 
 DATA = Path(__file__).parent / "data"
 FILES = sorted(path for path in DATA.rglob("*") if path.is_file())
 TREES = [path for path in FILES if path.suffix in (".yml", ".yaml", ".json")]
-WORDS = [path for path in FILES if path.suffix in (".txt", ".xml", ".cameramodel")]
+WORDS = [path for path in FILES if path.suffix in (".txt", ".xml", ".cameramodel", ".toml", ".conf", ".ini")]
+EXAMPLES = {name: format.example for name, format in formats().items() if format.example}
 SIZES = {"kitti_calib.txt": (1242, 375)}
 
 
@@ -66,11 +67,16 @@ def test_a_truncated_file_is_read_or_refused(beside, original, data):
 @FUZZ
 @given(data=st.data())
 def test_a_file_with_bytes_overwritten_is_read_or_refused(beside, original, data):
-    content = bytearray(original.read_bytes())
+    attempt(beside(original), overwritten(data, original.read_bytes()))
+
+
+def overwritten(data, content):
+    """With up to four pieces replaced."""
+    content = bytearray(content)
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(content) - 1))
         content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
-    attempt(beside(original), bytes(content))
+    return bytes(content)
 
 
 ODD = st.sampled_from(
@@ -109,11 +115,24 @@ def test_a_file_with_values_of_other_types_is_read_or_refused(beside, original, 
 @given(data=st.data())
 def test_a_file_with_other_words_is_read_or_refused(beside, original, data):
     """Any one word becomes something else, is said twice, or is missing."""
-    text = original.read_text()
+    attempt(beside(original), reworded(data, original.read_bytes()))
+
+
+def reworded(data, content):
+    """With one word replaced, doubled or left out."""
+    text = content.decode("latin-1")
     words = list(re.finditer(r"[-+.\w]+|[^-+.\w\s]", text))
     at = data.draw(st.sampled_from(words))
     word = data.draw(ODD | st.sampled_from(["", f"{at[0]} {at[0]}", "\n", "None", "b'x'", "(", "'", "<a>", "#"]))
-    attempt(beside(original), (text[: at.start()] + word + text[at.end() :]).encode())
+    return (text[: at.start()] + word + text[at.end() :]).encode()
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+@FUZZ
+@given(data=st.data())
+def test_an_example_damaged_is_read_or_refused(anywhere, name, data):
+    """The formats that are only read hold a small file each: some bytes of it, or one of its words, become others."""
+    attempt(anywhere, data.draw(st.sampled_from([overwritten, reworded]))(data, EXAMPLES[name]))
 
 
 def places(tree):

@@ -70,11 +70,17 @@ HOLDS = {
     "kitti-raw": BROWN5,
     "matlab": BROWN5,
     "metashape": {*BROWN5, "fisheye", "equidistant", "lonlat", "cylindrical"},
+    "anipose": {*BROWN5, "brown8", "brown12", "brown14", "fisheye", "equidistant"},
+    "stella": {*BROWN5, "fisheye", "equidistant"},
+    "okvis": {*BROWN5, "brown8", "fisheye", "equidistant"},
+    "opensfm": {*BROWN5, "fisheye", "equidistant"},
+    "camodocal": {"perspective", "brown4", "brown5", "brown8", "fisheye", "equidistant", "mei", "ucm"},
+    "orbslam": {*BROWN5, "fisheye", "equidistant"},
 }
 HOLDS["colmap-bin"] = HOLDS["colmap"]
 POSE = RigidTransform.from_components([0.3, -0.2, 0.1], Rotation.from_rotvec([0.3, -1.2, 0.4]))
 IMU = RigidTransform.from_components([0.05, 0.02, -0.01], Rotation.from_rotvec([-0.2, 0.1, 1.4]))
-WORLDS = ("colmap", "colmap-bin", "mrcal", "nerfstudio", "kitti-raw", "metashape")
+WORLDS = ("anipose", "opensfm", "colmap", "colmap-bin", "mrcal", "nerfstudio", "kitti-raw", "metashape")
 
 
 def calibration(*cameras, imu=None, **fields):
@@ -123,7 +129,7 @@ def test_skew_is_kept_or_refused(tmp_path, name):
             write(made, tmp_path / "out", name)
 
 
-@pytest.mark.parametrize("name", ["opencv", "kalibr", "basalt", *sorted({*WORLDS} - {"mrcal"})])
+@pytest.mark.parametrize("name", ["opencv", "kalibr", "basalt", "orbslam", "okvis", *sorted({*WORLDS} - {"mrcal"})])
 def test_two_cameras_keep_their_places(tmp_path, name):
     made = replace(pair(), world_from_imu=IMU)
     write(made, tmp_path / "out", name)
@@ -364,7 +370,7 @@ def test_convert_takes_one_camera_and_makes_it_the_world(tmp_path):
     ("words", "said"),
     [
         (["opencv_mono.json", "out", "--to", "kalibr"], "no place for k3, k4, k5, k6 of camera"),
-        (["opencv_mono.json", "out", "--to", "exif"], "expected one of basalt, colmap"),
+        (["opencv_mono.json", "out", "--to", "exif"], "expected one of anipose, basalt"),
         (["opencv_mono.json", "out"], "--to"),
         (["kitti_calib.txt", "out", "--to", "colmap"], "--size 640x480"),
         (

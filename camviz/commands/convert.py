@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from camviz.commands.common import (
     OK,
@@ -23,13 +25,21 @@ Writes a calibration for another program. Pixels, lens and poses are carried fro
 before it takes its name: it says the same, or it is not written. A format that has no place for something in the
 cameras is refused with the reason; what it cannot hold beside them (corners, board poses, names) is named and left
 out. The format of IN is told by its content. A COLMAP model is a folder.
+With --fit MODEL the lens is replaced by the one of that model that fits it best over the image, the error is said, and
+above --tolerance it is refused.
 """
 
+if TYPE_CHECKING:
+    from camviz.calibration.lens_fit import LensFit
+    from camviz.calibration.types import Calibration
+
+TOLERANCE = 0.1  # pixels
 EXAMPLES = """\
 examples:
   camviz convert camera.yml camera.cameramodel --to mrcal
   camviz convert - - --to ros < camera.yml > camera.yaml
   camviz convert stereo.yml chain.yaml --to kalibr --size 640x480
+  camviz convert basalt.json camera.yaml --to ros --camera cam0 --fit fisheye --tolerance 0.05
   camviz convert sparse/0 left.yml --to opencv --camera left.jpg --first-as-world
 """
 
@@ -44,6 +54,12 @@ def add(commands: Any) -> None:
     command.add_argument("--camera", metavar="NAME", help="only this one of the cameras")
     command.add_argument(
         "--first-as-world", action="store_true", help="make the first camera's frame the world, as some formats must"
+    )
+    command.add_argument(
+        "--fit", metavar="MODEL", help="write the lens as one of `camviz calibrate --model`, fitted over the image"
+    )
+    command.add_argument(
+        "--tolerance", metavar="PX", type=float, default=TOLERANCE, help=f"largest error of --fit (default {TOLERANCE})"
     )
 
 
@@ -72,11 +88,43 @@ def convert(options: argparse.Namespace) -> int:
             calibration = alone(calibration, options.camera)
         if options.first_as_world:
             calibration = from_first_camera(calibration)
+        fitted = [] if options.fit is None else _fit(calibration, options.fit, options.tolerance)
+        if fitted:
+            cameras = {name: fit.camera for name, fit in fitted}
+            calibration = replace(calibration, cameras=cameras, intrinsics_covariance={}, estimated={})
         left_out = write_calibration(calibration, options.output, options.to)
     except CalibrationError as error:
         raise Refusal(str(error)) from error
     told = narrator(options.output)
+    for name, fit in fitted:
+        told(f"{name}: {_error(fit)}")
     for sentence in (*calibration.notes, *left_out):
         told(sentence)
     told(f"{options.output}: written from {calibration.format}, read back and found the same.")
     return OK
+
+
+def _fit(calibration: Calibration, model: str, tolerance: float) -> list[tuple[str, LensFit]]:
+    """Each camera in another model; CalibrationError where one is further off than the tolerance."""
+    from camviz.calibration.lens_fit import fit_lens
+    from camviz.files import CalibrationError
+
+    fitted = []
+    for name, camera in calibration.cameras.items():
+        try:
+            fit = fit_lens(camera, model)
+        except ValueError as error:
+            raise CalibrationError(f"{name}: {error}") from error
+        if not fit.worst <= tolerance:
+            raise CalibrationError(f"{name}: {_error(fit)}, above the tolerance of {tolerance:g} px (--tolerance)")
+        fitted.append((name, fit))
+    return fitted
+
+
+def _error(fit: LensFit) -> str:
+    lens, (u, v) = type(fit.camera.lens).__name__, fit.worst_at
+    if not isfinite(fit.worst):
+        return f"{lens} has no image of the ray at ({u:.0f}, {v:.0f})"
+    part = f", over {fit.share:.0%} of the image" if fit.share < 1 else ""
+    sizes = f"{fit.median:.2g} px (median) and {fit.worst:.2g} px at most, at ({u:.0f}, {v:.0f})"
+    return f"fitted as {lens}, off by {sizes}{part}"

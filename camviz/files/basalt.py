@@ -6,7 +6,7 @@ from typing import Any
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.files.format import File, Format, chosen, listed
+from camviz.files.format import File, Format, by_imu, chosen, listed
 from camviz.files.models import Model, expressed, models_of
 from camviz.files.output import as_json
 from camviz.files.section import Section, Size, as_size
@@ -24,12 +24,11 @@ def read(file: File) -> Calibration:
         raise whole.error("intrinsics", "as many cameras as in T_imu_cam, at least one", f"{len(lenses)}")
     sizes = whole.matrix("resolution", len(lenses), 2)
     imu_from_cam = [_pose(place) for place in places]
-    world_from_imu = imu_from_cam[0].inv()
     cameras = {}
-    for index, (part, size, pose) in enumerate(zip(lenses, sizes, imu_from_cam, strict=True)):
-        camera = _camera(part, as_size(size[0], size[1], whole.where(f"resolution[{index}]")))
-        cameras[f"cam{index}"] = camera.at(world_from_imu * pose) if index else camera
-    return Calibration(cameras, file.path, "Basalt", world_from_imu=world_from_imu)
+    for index, (part, size) in enumerate(zip(lenses, sizes, strict=True)):
+        cameras[f"cam{index}"] = _camera(part, as_size(size[0], size[1], whole.where(f"resolution[{index}]")))
+    placed, world_from_imu = by_imu(cameras, imu_from_cam)
+    return Calibration(placed, file.path, "Basalt", world_from_imu=world_from_imu)
 
 
 def _pose(section: Section) -> RigidTransform:

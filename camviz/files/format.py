@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from camviz.calibration.types import Calibration, CalibrationError
+from camviz.cameras import Camera
 from camviz.files.models import Model
 from camviz.files.section import Section
 from camviz.files.text import read_bytes, text_of
 from camviz.files.trees import parse, shown
 from camviz.lenses import BrownConrady
+from camviz.poses import RigidTransform
 
 Content = bytes | dict[str, bytes]  # of a file, or of the files of a folder by name
 
 OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+NO_KEYS: Mapping[str, str] = MappingProxyType({})
 _KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}
 
 
@@ -108,6 +113,23 @@ def coefficients_of(section: Section, key: str, model: Model, first: int) -> tup
     if len(values) != len(names):
         model = replace(model, parameters=" ".join([*model.names[:first], *OPENCV_ORDER[: len(values)]]))
     return model, values
+
+
+def parameters_of(section: Section, model: Model, keys: Mapping[str, str] = NO_KEYS) -> list[float]:
+    """A model's parameters, each under its name or the key that `keys` has for it; a missing k or p is 0."""
+    held = [(name, keys.get(name, name)) for name in model.names]
+    optional = re.compile("[kp][1-6]")
+    return [0.0 if optional.fullmatch(name) and key not in section else section.number(key) for name, key in held]
+
+
+def by_imu(
+    cameras: Mapping[str, Camera], imu_from_cam: Sequence[RigidTransform]
+) -> tuple[dict[str, Camera], RigidTransform]:
+    """Cameras in place by where each stands in the IMU's frame; the world is the first camera's, and world_from_imu."""
+    world_from_imu = imu_from_cam[0].inv()
+    (first, camera), *others = cameras.items()
+    placed = {name: each.at(world_from_imu * pose) for (name, each), pose in zip(others, imu_from_cam[1:], strict=True)}
+    return {first: camera} | placed, world_from_imu
 
 
 def listed(models: Iterable[Model]) -> str:

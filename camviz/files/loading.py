@@ -8,10 +8,13 @@ from pathlib import Path
 
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.files.format import File, Format
-from camviz.files.registry import formats, titles
-from camviz.files.section import LARGEST_SIDE, Size, named
+from camviz.files.guessing import looks_like
+from camviz.files.registry import formats
+from camviz.files.section import LARGEST_SIDE, MissingSizeError, Size, named
 from camviz.files.text import refuse_no_file
 from camviz.files.trees import shown
+
+ANY_SIZE = (640, 480)  # to see whether anything but the size is wrong with a file
 
 
 def load(path: str | PathLike[str], *, size: Size | None = None, mend: bool = False) -> Calibration:
@@ -25,18 +28,33 @@ def load(path: str | PathLike[str], *, size: Size | None = None, mend: bool = Fa
     file = File(Path(path), None if size is None else _checked_size(size), [] if mend else None)
     refuse_no_file(file.path)
     with named(file.path):
-        calibration = _plausible(format_of(file).read(file))
+        calibration = _plausible(_read(file))
     return replace(calibration, faults=tuple(file.mended)) if file.mended else calibration
 
 
 def format_of(file: File) -> Format:
-    """The format of a file or folder; CalibrationError where none knows it."""
-    for format in sorted(formats().values(), key=lambda format: format.rank):
-        if format.recognise(file):
-            return format
-    keys = [shown(key) for key in list(file.section.values)[:6]]
-    found = ", ".join(keys + ["…"] * (len(file.section.values) > 6)) or "nothing"
-    raise CalibrationError(f"no camera found: looked for the keys of {titles()}; found {found}")
+    """The format of a file or folder; CalibrationError saying what it looks like where none knows it."""
+    try:
+        for format in sorted(formats().values(), key=lambda format: format.rank):
+            if format.recognise(file):
+                return format
+        keys = [shown(key) for key in list(file.section.values)[:6]]
+        found = ", ".join(keys + ["…"] * (len(file.section.values) > 6)) or "nothing"
+        problem = f"no camera found: looked for the keys of the formats below; found {found}"
+    except CalibrationError as error:
+        problem = str(error)
+    known = ", ".join(formats())
+    raise CalibrationError(f"{problem} (this looks like {looks_like(file.text)}; what is read: {known})")
+
+
+def _read(file: File) -> Calibration:
+    """The calibration of a file; where its size is missing and something else is wrong too, that comes first."""
+    format = format_of(file)
+    try:
+        return format.read(file)
+    except MissingSizeError:
+        format.read(replace(file, size=ANY_SIZE))
+        raise
 
 
 def _plausible(calibration: Calibration) -> Calibration:

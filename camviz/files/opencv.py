@@ -107,13 +107,16 @@ def _lens(section: Section, tag: str) -> Lens:
 
 
 def _is_fisheye(section: Section) -> bool:
+    if section.values.get("distortion_model") == "fisheye":  # as VOXL writes it
+        return True
     key = _find(section, "(is)?fisheye(model)?")
     return key is not None and section.values[key] in (1, True, "1")
 
 
 def _notes(section: Section, tags: list[str]) -> list[str]:
     keys = [key for tag in tags if (key := _find(section, DISTORTION, tag)) and not _find(section, "xi", tag)]
-    four = any(section.array(key).size == 4 for key in keys) and not _find(section, "(is)?fisheye(model)?")
+    said = _find(section, "(is)?fisheye(model)?") or "distortion_model" in section
+    four = any(section.array(key).size == 4 for key in keys) and not said
     return [FOUR_COEFFICIENTS] if four else []
 
 
@@ -247,7 +250,7 @@ FORMAT = Format(
     write=write,
     endings=(".yml", ".xml", ".json"),
     most_cameras=2,
-    models="5, 8, 12, 14 coefficients; `fisheye_model: 1`; `xi` of omnidir",
+    models="5, 8, 12, 14 coefficients; `fisheye_model: 1` or VOXL's `distortion_model: fisheye`; `xi` of omnidir",
     says="X_right = R X_left + T",
     lacks="skew (but for omnidir)",
     rank=80,

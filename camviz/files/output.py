@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import yaml
 
 from camviz.lenses.base import Array
@@ -16,7 +18,7 @@ def as_yaml(tree: dict[str, Any]) -> bytes:
     return yaml.safe_dump(tree, default_flow_style=None, sort_keys=False, width=1000, allow_unicode=True).encode()
 
 
-def as_json(tree: dict[str, Any]) -> bytes:
+def as_json(tree: dict[str, Any] | list[Any]) -> bytes:
     """A tree as JSON."""
     return (json.dumps(tree, indent=2, ensure_ascii=False) + "\n").encode()
 
@@ -29,3 +31,22 @@ def as_rows(pose: RigidTransform) -> list[list[float]]:
 def as_matrix(values: Array) -> dict[str, Any]:
     """A matrix (rows, columns) as ROS and EuRoC write it: rows, cols and all elements in one list."""
     return {"rows": values.shape[0], "cols": values.shape[1], "data": [float(x) for x in values.ravel()]}
+
+
+def as_opencv(tree: Mapping[str, Any]) -> bytes:
+    """OpenCV's YAML under any keys, those with dots too, which cv2.FileStorage does not write.
+
+    Values are numbers, words, arrays (rows, columns) and mappings of numbers.
+    """
+    lines = ["%YAML:1.0", "---"]
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            lines += [f"{key}:", *(f"   {name}: {number!r}" for name, number in value.items())]
+        elif isinstance(value, np.ndarray):
+            rows, columns = value.shape
+            numbers = ", ".join(repr(float(x)) for x in value.ravel())
+            lines += [f"{key}: !!opencv-matrix", f"   rows: {rows}", f"   cols: {columns}", "   dt: d"]
+            lines.append(f"   data: [ {numbers} ]")
+        else:
+            lines.append(f"{key}: {json.dumps(value, ensure_ascii=False)}")
+    return ("\n".join(lines) + "\n").encode()

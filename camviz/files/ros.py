@@ -19,6 +19,12 @@ RECTIFICATION, PROJECTION = ("rectification_matrix", "R", "r"), ("projection_mat
 MODELS = models_of("ros")
 
 
+def is_camera_info(file: File) -> bool:
+    """True where there is a distortion model or a projection matrix, but for VOXL's OpenCV files with M and D."""
+    section = file.section
+    return ("distortion_model" in section and not ("M" in section or "M1" in section)) or "projection_matrix" in section
+
+
 def read(file: File) -> Calibration:
     """One camera at the origin; where P tells of a stereo pair, a note gives the baseline."""
     section = file.section
@@ -54,13 +60,14 @@ def _notes(section: Section) -> tuple[str, ...]:
     if any(name in section for name in RECTIFICATION):
         section.rotation(_key(section, RECTIFICATION))
     if any(name in section for name in PROJECTION):
-        notes += _stereo_note(section, _key(section, PROJECTION))
+        notes += stereo_note(section, _key(section, PROJECTION))
     if any(section.number(key) > 1 for key in ("binning_x", "binning_y") if key in section):
         notes.append("The camera was binned: K is for the full resolution, as ROS defines it.")
     return tuple(notes)
 
 
-def _stereo_note(section: Section, key: str) -> list[str]:
+def stereo_note(section: Section, key: str) -> list[str]:
+    """What the 3×4 matrix P under a key tells of the other camera of a pair; nothing where there is none."""
     P = section.matrix(key, 3, 4)
     if P[0, 3] == 0:
         return []
@@ -108,7 +115,7 @@ FORMAT = Format(
     name="ros",
     title=TITLE,
     file="camera.yaml",
-    recognise=lambda file: "distortion_model" in file.section or "projection_matrix" in file.section,
+    recognise=is_camera_info,
     read=read,
     write=write,
     most_cameras=1,

@@ -25,6 +25,10 @@ Size = tuple[int, int]  # width and height in pixels
 NOT_A_ROTATION, BAD_K, COUNT = "not-a-rotation", "bad-k", "coefficient-count"  # findings of the clinic
 
 
+class MissingSizeError(CalibrationError):
+    """A file without an image size, which the caller has to give."""
+
+
 @dataclass(frozen=True)
 class Section:
     """A mapping of the file and the path of keys that leads to it. All readers raise CalibrationError.
@@ -215,7 +219,7 @@ def agreed_size(held: Size | None, given: Size | None, keys: str) -> Size:
         )
     if size := held or given:
         return size
-    raise CalibrationError(
+    raise MissingSizeError(
         f"the file holds no image size ({keys}): add --size WIDTHxHEIGHT, such as --size 640x480 "
         "(in Python size=(640, 480))"
     )
@@ -227,7 +231,7 @@ def named(where: object) -> Iterator[None]:
     try:
         yield
     except CalibrationError as error:
-        raise CalibrationError(f"{where}: {error}", error.id, error.value) from error.__cause__
+        raise type(error)(f"{where}: {error}", error.id, error.value) from error.__cause__
 
 
 @contextmanager

@@ -25,6 +25,8 @@ _YAML_TAG = "tag:yaml.org,2002:"
 _PLAIN_TAGS = {None, "!", *(_YAML_TAG + name for name in ("map", "seq", "str", "int", "float", "bool", "null"))}
 _OPENCV_TAGS = {_YAML_TAG + name for name in ("opencv-matrix", "opencv-nd-matrix")}
 
+_HEADER = re.compile(r"(?:[ \t\r\n]|#[^\n]*\n)*+(%YAML[^\n]*)")
+_NO_SPACE = re.compile(r"^([ \t]*[A-Za-z_][\w.]*):(?=[-+.\d\[\"])", re.MULTILINE)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}")
 _REAL = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,9})?")
 _SPECIAL = re.compile(r"([-+]?)\.?(nan|inf)", re.IGNORECASE)
@@ -126,8 +128,8 @@ def refuse_many_keys(count: int) -> None:
 
 
 def parse_yaml(text: str) -> Any:
-    """The one document of a YAML or JSON text, with or without OpenCV's `%YAML:1.0` first line."""
-    text = re.sub(r"\A\s*%YAML[^\n]*", "", text)
+    """The one document of a YAML or JSON text, or of OpenCV's dialect, which a line `%YAML:1.0` begins."""
+    text = _plain_yaml(text)
     tree, line = Tree(), 0
     try:
         for event in yaml.parse(text, Loader=_Loader):
@@ -141,6 +143,12 @@ def parse_yaml(text: str) -> Any:
     if len(documents) > 1:
         raise CalibrationError(f"expected one YAML document, got {len(documents)}")
     return documents[0] if documents else None
+
+
+def _plain_yaml(text: str) -> str:
+    """Without OpenCV's header, comments before it too, and with the space after a colon that OpenCV can do without."""
+    header = _HEADER.match(text)
+    return _NO_SPACE.sub(r"\1: ", text[: header.start(1)] + text[header.end(1) :]) if header else text
 
 
 def _grow(tree: Tree, event: yaml.Event) -> None:

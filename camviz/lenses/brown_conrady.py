@@ -54,6 +54,8 @@ class BrownConrady(Lens):
 
     spellings = (
         Spelling("basalt", "pinhole-radtan8", f"{GRID} {RATIONAL}"),
+        Spelling("camodocal", "PINHOLE", f"{GRID} {RADTAN}"),
+        Spelling("camodocal", "PINHOLE_FULL", f"{GRID} {RATIONAL}"),
         Spelling("colmap", "SIMPLE_RADIAL", "f cx cy k1", number=2),
         Spelling("colmap", "RADIAL", "f cx cy k1 k2", number=3),
         Spelling("colmap", "OPENCV", f"{GRID} {RADTAN}", number=4),
@@ -72,8 +74,15 @@ class BrownConrady(Lens):
         Spelling("opencv", "distortion_coefficients", f"{GRID} {RATIONAL}"),
         Spelling("opencv", "distortion_coefficients", f"{GRID} {PRISM}"),
         Spelling("opencv", "distortion_coefficients", f"{GRID} {PRISM} tau_x tau_y"),
+        Spelling("orbslam", "PinHole", f"{GRID} {RADTAN} k3"),
+        Spelling("okvis", "radialtangential", f"{GRID} {RADTAN}"),
+        Spelling("okvis", "radialtangential8", f"{GRID} {RATIONAL}"),
+        Spelling("opensfm", "perspective", "f cx cy k1 k2"),
+        Spelling("opensfm", "brown", f"{GRID} k1 k2 p1 p2 k3"),
         Spelling("ros", "plumb_bob", f"{GRID} {RADTAN} k3"),
         Spelling("ros", "rational_polynomial", f"{GRID} {RATIONAL}"),
+        Spelling("stella", "perspective", f"{GRID} {RADTAN} k3"),
+        Spelling("svo", "pinhole radial-tangential", f"{GRID} {RADTAN}"),
     )
     calibrations = (
         CalibrationModel(

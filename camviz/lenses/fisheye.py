@@ -128,6 +128,7 @@ class FieldOfView(Fisheye):
         Spelling("basalt", "fov", "fx fy cx cy omega"),
         Spelling("colmap", "FOV", "fx fy cx cy omega", number=7),
         Spelling("kalibr", "pinhole fov", "fx fy cx cy omega"),
+        Spelling("svo", "pinhole fisheye", "fx fy cx cy omega"),
     )
     examples = (Example("", (0.93,), 180), Example("weak", (1e-6,), 89), Example("strong", (3.0,), 180))
     invalid = (

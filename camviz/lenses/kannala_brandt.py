@@ -24,6 +24,7 @@ class KannalaBrandt(Fisheye):
 
     spellings = (
         Spelling("basalt", "kb4", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("camodocal", "KANNALA_BRANDT", "fx fy cx cy k1 k2 k3 k4"),
         Spelling("colmap", "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4", number=5),
         Spelling("colmap", "SIMPLE_RADIAL_FISHEYE", "f cx cy k1", number=8),
         Spelling("colmap", "RADIAL_FISHEYE", "f cx cy k1 k2", number=9),
@@ -31,8 +32,14 @@ class KannalaBrandt(Fisheye):
         Spelling("kalibr", "pinhole equidistant", "fx fy cx cy k1 k2 k3 k4"),
         Spelling("metashape", "fisheye", "fx fy cx cy skew k1 k2 k3 k4"),
         Spelling("nerfstudio", "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("okvis", "equidistant", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("opensfm", "fisheye", "f cx cy k1 k2"),
+        Spelling("opensfm", "fisheye_opencv", "fx fy cx cy k1 k2 k3 k4"),
         Spelling("opencv", "cv2.fisheye", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("orbslam", "KannalaBrandt8", "fx fy cx cy k1 k2 k3 k4"),
         Spelling("ros", "equidistant", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("stella", "fisheye", "fx fy cx cy k1 k2 k3 k4"),
+        Spelling("svo", "pinhole equidistant", "fx fy cx cy k1 k2 k3 k4"),
     )
     calibrations = (
         CalibrationModel(

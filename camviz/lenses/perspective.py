@@ -18,6 +18,7 @@ class Perspective(Lens):
         Spelling("colmap", "PINHOLE", "fx fy cx cy", number=1),
         Spelling("kalibr", "pinhole none", "fx fy cx cy"),
         Spelling("kitti", "P", "fx fy cx cy skew"),
+        Spelling("svo", "pinhole none", "fx fy cx cy"),
         Spelling("mrcal", "LENSMODEL_PINHOLE", "fx fy cx cy"),
     )
     examples = (Example("", (), 89),)

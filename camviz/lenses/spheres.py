@@ -29,6 +29,7 @@ class UnifiedSphere(Lens):
     p2: float = 0.0
 
     spellings = (
+        Spelling("camodocal", "MEI", "xi fx fy cx cy k1 k2 p1 p2"),
         Spelling("kalibr", "omni none", "xi fx fy cx cy"),
         Spelling("kalibr", "omni radtan", "xi fx fy cx cy k1 k2 p1 p2"),
         Spelling("opencv", "cv2.omnidir", "fx fy cx cy skew k1 k2 p1 p2 xi"),

@@ -1,0 +1,96 @@
+"""OCamCalib's lens: a polynomial that says how far forward the ray of an image point goes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from camviz.lenses.base import Array, check_parameters, check_range
+from camviz.lenses.declarations import Example, Fold
+from camviz.lenses.fisheye import Fisheye
+from camviz.lenses.roots import first_positive_root, solve_rising
+
+FARTHEST = 1e4  # focal lengths: no sensor reaches out to there
+
+
+@dataclass(frozen=True)
+class Scaramuzza(Fisheye):
+    """The ray of (x, y) is (x, y, 1 + a2 r² + a3 r³ + … + a6 r⁶) with r = |(x, y)| (Scaramuzza et al. 2006, eq. 3).
+
+    The image is then stretched: (x + e y, d x + c y). OCamCalib's polynomial f(ρ) = s0 + s2 ρ² + … of pixels, whose z
+    points backward, is that of focal length -s0 and a_k = -s_k (-s0)^(k-1); its x goes down and its y to the right.
+    """
+
+    a2: float = 0.0
+    a3: float = 0.0
+    a4: float = 0.0
+    a5: float = 0.0
+    a6: float = 0.0
+    c: float = 1.0
+    d: float = 0.0
+    e: float = 0.0
+
+    examples = (
+        Example("fisheye", (-0.35, 0.02, -0.03), 100),
+        Example("stretched", (-0.35, 0.02, -0.03, 0.0, 0.0, 1.001, -0.0008, 0.0003), 100),
+        Example("pinhole", (), 85),
+    )
+    invalid = (((0, 0, 0, 0, 0, 0), "c must be such that c - d e is positive, got 0"),)
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+        check_range("c", self.c, self.c - self.d * self.e > 0, "such that c - d e is positive")
+
+    @cached_property
+    def forward(self) -> Array:
+        """The coefficients of the polynomial, from the constant one on."""
+        return np.array([1.0, 0.0, self.a2, self.a3, self.a4, self.a5, self.a6])
+
+    @cached_property
+    def fold_radius(self) -> float:
+        """Where the angle stops growing with r: the first root of g - r g' = 1 - a2 r² - 2 a3 r³ - …; or infinity."""
+        return first_positive_root(self.forward * (1 - np.arange(7)))
+
+    @property
+    def can_fold(self) -> bool:
+        return True
+
+    @property
+    def fold(self) -> Fold | None:
+        radius = self.fold_radius
+        return Fold(radius, self.max_angle, radius) if radius < inf else None
+
+    @cached_property
+    def max_angle(self) -> float:
+        return float(self.angle(np.array(min(self.fold_radius, FARTHEST))))
+
+    def radial(self, theta: ArrayLike) -> Array:
+        theta = np.asarray(theta, dtype=float)
+        return solve_rising(self.angle, self.slope, theta.ravel(), *self._table).reshape(theta.shape)
+
+    def angle(self, radius: Array) -> Array:
+        return np.arctan2(radius, np.polynomial.polynomial.polyval(radius, self.forward))
+
+    def slope(self, radius: Array) -> Array:
+        """The derivative of `angle`, (g - r g') / (r² + g²)."""
+        ahead = np.polynomial.polynomial.polyval(radius, self.forward)
+        rising = np.polynomial.polynomial.polyval(radius, self.forward * (1 - np.arange(7)))
+        return rising / (radius * radius + ahead * ahead)
+
+    @cached_property
+    def _table(self) -> tuple[Array, Array]:
+        if self.fold_radius < FARTHEST:
+            nodes = self.fold_radius * np.sin(np.linspace(0, np.pi / 2, 513))  # denser towards the fold
+        else:
+            nodes = np.sinh(np.linspace(0, np.arcsinh(FARTHEST), 513))
+        return nodes, np.maximum.accumulate(self.angle(nodes))
+
+    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+        x, y = super().image(x, y, z)
+        return x + self.e * y, self.d * x + self.c * y
+
+    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        area = self.c - self.d * self.e
+        return super().ray((self.c * x - self.e * y) / area, (y - self.d * x) / area)
