@@ -5,12 +5,14 @@ The lens is taken to be as the model says: of a wrong model the uncertainty is t
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ellipe
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.difference import pixel_grid
 from camviz.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz.cameras import rotate
 from camviz.lenses.base import Array, as_points
@@ -35,6 +37,30 @@ def projection_uncertainty(
 ) -> Array:
     """The standard deviation (...,) in pixels of `projection_covariance`, in its worst direction: √λ_max."""
     return worst_deviation(projection_covariance(adjustment, uv, distance, camera))
+
+
+def expected_length(covariance: Array) -> Array:
+    """E‖e‖ (...,) of normal errors e of covariances (..., 2, 2): √(2 λ₁/π) E(1 - λ₂/λ₁), E being Legendre's integral.
+
+    >>> expected_length(np.eye(2)).round(4), expected_length(np.diag([1.0, 0.0])).round(4)
+    (np.float64(1.2533), np.float64(0.7979))
+    """
+    largest = worst_deviation(covariance) ** 2
+    smallest = np.trace(covariance, axis1=-2, axis2=-1) - largest
+    ratio = np.divide(smallest, largest, out=np.ones_like(largest), where=largest > 0)
+    return np.sqrt(2 * largest / np.pi) * ellipe(1 - np.clip(ratio, 0, 1))
+
+
+def largest_expected_error(adjustment: Adjustment, camera: str | None = None) -> float:
+    """The largest expected error, in pixels, of where a far point is seen, over a grid on the picture.
+
+    The Max ERE of AprilCal (Richardson, Strom & Olson 2013, sec. IV): there as a rule for when enough pictures have
+    been taken, at 1 px, and from samples; here from `projection_covariance`. NaN where no pixel of the grid has a ray.
+    """
+    name = next(iter(adjustment.cameras)) if camera is None else camera
+    uv = pixel_grid(adjustment.cameras[name].intrinsics, (12, 9)).reshape(-1, 2)
+    expected = expected_length(projection_covariance(adjustment, uv, camera=name))
+    return float(np.max(expected[np.isfinite(expected)], initial=0)) if np.isfinite(expected).any() else nan
 
 
 def mean_deviation(covariance: Array) -> Array:

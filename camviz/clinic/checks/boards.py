@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from scipy.special import fdtrc
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.cross_validation import held_out
 from camviz.clinic.evidence import Evidence, NotChecked
-from camviz.clinic.fields import smooth_field, warp_columns
-from camviz.clinic.observed import APART, BY_CHANCE, Observed, unexplained
+from camviz.clinic.observed import Observed
 from camviz.clinic.registry import Finding, LabFault, Rng, finding
-from camviz.clinic.virtual import SetUp, single, spread_boards
+from camviz.clinic.virtual import single, spread_boards
 from camviz.lenses.base import Array
 
 COVERED = 0.4  # of the image: the outermost corners are a square inside the board
@@ -24,7 +22,6 @@ SAME_WAY_DEG = 20.0  # between the normals of two boards
 UNCERTAIN = 0.01  # of the focal length
 HELD_OUT = 2.0  # times what noise leads to
 FEWEST_VIEWS = 3
-MOVING = 0.7  # of the noise: what a rolling shutter must explain to be named
 
 
 @finding(
@@ -35,6 +32,7 @@ MOVING = 0.7  # of the noise: what a rolling shutter must explain to be named
     causes=("views that all show the board in the same part of the image, or far away",),
     remedy="Add views with the board close to each border and corner of the image.",
     threshold="They cover less than two fifths of the image.",
+    explains=("fold", "near-pole", "inverse-not-converged"),
 )
 def low_coverage(evidence: Evidence) -> Iterator[Finding]:
     """The check lays the outlines of the board in all views over the image."""
@@ -89,6 +87,7 @@ def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
     causes=("boards that were all held parallel to each other, usually to the image",),
     remedy="Add views with the board tilted by 30° to 45°, to different sides.",
     threshold="No two boards are more than 20° apart, or the focal length is uncertain by more than 1 %.",
+    explains=("aspect", "principal-point", "split-disagreement"),
 )
 def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the normals of the boards in the camera's frame."""
@@ -146,18 +145,15 @@ def all_parallel(rng: Rng, strength: float) -> Evidence:
     symptom="The error is low, and the camera matrix absurd.",
     causes=(
         "an error of the camera that the pose of each board takes up",
-        "a rolling shutter while camera or board moved",
         "numbers of the camera that were changed after the solution",
     ),
     remedy="Solve again with tilted boards at varied distances and a still camera. "
     "Trust held-out corners rather than the error of the fit.",
-    threshold="The errors are twice as large as noise makes them, in the median of the views. "
-    "Or the velocities explain at least 0.7 of the noise, by chance in one set of a million.",
+    threshold="The errors are twice as large as noise makes them, in the median of the views.",
+    explains=("views-differ", "outlier-view", "outlier-line"),
 )
 def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
-    """The check fits each view's pose to one half of its corners and tries it on the other half. It also fits six
-    velocities of the board to every view, as a rolling shutter would show them.
-    """
+    """The check fits each view's pose to one half of its corners and tries it on the other half."""
     for name, observed in evidence.with_corners().items():
         ratio = held_out_ratio(observed)
         if ratio > HELD_OUT:
@@ -166,41 +162,6 @@ def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
                 f"far off as noise explains. The error of the fit is {observed.adjustment.rms:.3g} px."
             )
             yield pose_absorbs_error.found(sentence, ratio, "times", name)
-            continue
-        chance, part = moving_boards(observed)
-        if chance < BY_CHANCE and part > MOVING:
-            sentence = (
-                f"{name}: the board or the camera moved under a rolling shutter. Boards that move while the rows are "
-                f"read out explain {part * observed.best.sigma:.2g} px of the residuals, {part:.1f} times the noise."
-            )
-            yield pose_absorbs_error.found(sentence, part, "times", name)
-
-
-def moving_boards(observed: Observed) -> tuple[float, float]:
-    """The chance of an F-test of six velocities for every view, and what they explain over the noise (RMS).
-
-    A pixel in row v of a rolling shutter is late by v: it moves by (v/height - ½) times ∂pixel/∂pose and the velocity.
-    A bend of the board and a smooth field over the image are given their share before.
-    """
-    best, name = observed.best, observed.name
-    left, by_pose, used = unexplained(best, name, smooth_field(best, name), warp_columns(best, name))
-    late = best.projected(name)[best.posed][..., 1] / best.cameras[name].intrinsics.height - 0.5
-    moving = np.nan_to_num(late[..., None, None] * by_pose)
-    fallen, count = 0.0, 0
-    for residuals, slopes, motion, seen in zip(left, by_pose, moving, used, strict=True):
-        columns = np.concatenate([slopes[seen], motion[seen]], axis=-1).reshape(-1, 12)
-        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        columns[:, 6:] -= columns[:, :6] @ np.linalg.lstsq(columns[:, :6], columns[:, 6:], rcond=None)[0]
-        U, singular, _ = np.linalg.svd(columns[:, 6:], full_matrices=False)
-        kept = U[:, singular > APART]
-        fallen += float(np.sum(np.square(kept.T @ residuals[seen].ravel())))
-        count += kept.shape[1]
-    freedom = best.measurements - best.unknowns - count
-    if freedom < 1 or count == 0:
-        return 1.0, 0.0
-    variance = max(float(np.sum(left[used] ** 2)) - fallen, np.finfo(float).tiny) / freedom
-    part = np.sqrt(max(fallen - count * variance, 0) / best.measurements / variance)
-    return float(fdtrc(count, freedom, max(fallen / count / variance, 0.0))), float(part)
 
 
 def held_out_ratio(observed: Observed) -> float:
@@ -215,29 +176,6 @@ def held_out_ratio(observed: Observed) -> float:
     if known.sum() < FEWEST_VIEWS:
         return 0.0
     return float(np.sqrt(np.median(np.nanmean(squares[known], axis=1))))
-
-
-@pose_absorbs_error.fault(
-    "rolling shutter",
-    "px",
-    (1, 3, 10, 30),
-    promised=30,
-    stage="set-up",
-    lab=LabFault(30, "boards move by {0:.1f} px while a picture is read out"),
-)
-def rolling_shutter(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
-    """The board moves while the image is read out.
-
-    It goes sideways and turns by so many pixels, from the first row of the image to the last.
-    """
-    fx, motions = set_up.camera.intrinsics.fx, []
-    for pose in set_up.cam_from_board:
-        depth = pose.apply(set_up.board.corners)[:, 2].mean()
-        drift, spin = rng.normal(size=3) * [1, 1, 0.3], rng.normal(size=3)
-        drift *= strength * depth / fx / np.linalg.norm(drift)
-        spin *= strength / fx / np.linalg.norm(spin) * 2
-        motions.append([*spin, *drift])
-    return replace(set_up, motion=np.array(motions))
 
 
 @pose_absorbs_error.fault(

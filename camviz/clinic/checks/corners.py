@@ -116,6 +116,7 @@ def blurred_view(rng: Rng, corners: Array, shape: tuple[int, int], strength: flo
     causes=("a line of the board that was taken for its neighbour", "a board half hidden or cut off by the border"),
     remedy="Detect that picture's corners again, or leave the view out, and solve again.",
     threshold="At least half of a line's corners are off by eight standard deviations and by more than 1.5 px.",
+    explains=("outlier-view",),
 )
 def outlier_line(evidence: Evidence) -> Iterator[Finding]:
     """The check compares every row and column of every view with a pose fitted to the rest of that view."""

@@ -11,7 +11,7 @@ import yaml
 from camviz.calibration.types import CalibrationError
 from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence, NotChecked
-from camviz.clinic.registry import Finding, Rng, finding
+from camviz.clinic.registry import WRONG_NUMBERS, Finding, Rng, finding
 from camviz.clinic.virtual import alone, as_file, healthy, healthy_pair, single, spread_boards
 from camviz.files import kalibr, ros
 from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt, Perspective
@@ -64,6 +64,7 @@ def _without_k3(camera: Camera) -> BrownConrady:
     causes=("MATLAB's IntrinsicMatrix, which is the transpose of K", "a matrix that was scaled as a whole"),
     remedy="Transpose K, or divide it by K[2, 2].",
     threshold="K is not upper triangular, its last element is not 1, or a focal length is not positive.",
+    explains=WRONG_NUMBERS,
 )
 def bad_k(evidence: Evidence) -> Iterator[Finding]:
     """The check reads the camera matrix in the file."""
@@ -88,6 +89,7 @@ def transposed(rng: Rng, strength: float) -> Evidence:
     causes=("coefficients of one model under the name of another, such as 8 as plumb_bob",),
     remedy="Write the name that fits the coefficients (8: rational_polynomial), or solve with the model you meant.",
     threshold="The model has another number of coefficients.",
+    explains=WRONG_NUMBERS,
 )
 def coefficient_count(evidence: Evidence) -> Iterator[Finding]:
     """The check reads the coefficients and the name of the model in the file."""
@@ -115,6 +117,16 @@ def mislabelled(rng: Rng, strength: float) -> Evidence:
     remedy="Keep the coefficients that the calibration returns. If the pictures are undistorted already, "
     "say so where the file can (rectified, PINHOLE).",
     threshold="All are zero and, where there are corners, k1 is at least five standard deviations from 0.",
+    explains=(
+        "models-differ",
+        "views-differ",
+        "rolling-shutter",
+        "outlier-view",
+        "outlier-line",
+        "pose-absorbs-error",
+        "model-too-simple",
+        "split-disagreement",
+    ),
 )
 def zero_distortion(evidence: Evidence) -> Iterator[Finding]:
     """The check reads the coefficients of a model that has some. Corners tell whether k1 would fit better."""

@@ -82,6 +82,7 @@ def bare(calibration: Calibration) -> Calibration:
     causes=("left_from_right written for right_from_left", "camera to world written for world to camera"),
     remedy="Invert the transform: R' = Rᵀ, t' = -Rᵀ t.",
     threshold="The inverse fits at least five times better.",
+    explains=("rectified-black", "baseline-sign"),
 )
 def inverted_transform(evidence: Evidence) -> Iterator[Finding]:
     """The check holds the transform and its inverse against the board poses of both cameras, or against the other
@@ -111,6 +112,7 @@ def inverted(rng: Rng, strength: float) -> Evidence:
     causes=("OpenGL's axes (y up, z backward) taken for OpenCV's (y down, z forward)",),
     remedy="Negate the y and z columns of every camera-to-world matrix.",
     threshold="It is so in the majority of the views.",
+    explains=("rectified-black", "baseline-sign"),
 )
 def mirrored_frame(evidence: Evidence) -> Iterator[Finding]:
     """The check looks for boards behind the camera, and compares the poses with the other calibration. In a
@@ -177,6 +179,7 @@ def in_opengl(rng: Rng, strength: float) -> Evidence:
     causes=("corners of one camera that run the other way round: a symmetric board has two orders",),
     remedy="Use a board without symmetry (one side odd, the other even), or ChArUco. Turn the order of those views.",
     threshold="A view is more than 45° from the rest, and agrees with them once its order is turned.",
+    explains=("views-differ", "outlier-view", "outlier-line", "baseline-scale", "rectified-black"),
 )
 def corner_order(evidence: Evidence) -> Iterator[Finding]:
     """The check finds the pair's relative pose from every view, from the corners of each camera alone."""

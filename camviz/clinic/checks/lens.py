@@ -27,6 +27,7 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, Lens, on_plane
 
 WEAKEST = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
+LOST = 0.01  # of the pixels, fewer than which may fold
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
 NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z = 1 worth the name
 
@@ -37,9 +38,10 @@ NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z 
     view="fold-map",
     symptom="The border mirrors or folds back after undistortion.",
     causes=("a distortion polynomial that turns back inside the image", "no corners near the border in the fit"),
-    remedy="Fix k3 to 0 (or take fewer terms) and solve again with more views that reach the border.",
-    threshold="Any such pixel lies on the border. "
-    "For a fisheye that turns back beyond 90° it is a note, because its picture may end before.",
+    remedy="Take fewer terms and solve again with more views that reach the border.",
+    threshold="Any such pixel lies on the border. It is a note where less than 1 % of the pixels are lost, beyond the "
+    "last corner of the board, and for a fisheye beyond 90°, whose picture may end before.",
+    explains=("inverse-not-converged", "rectified-black"),
 )
 def fold(evidence: Evidence) -> Iterator[Finding]:
     """The check looks for pixels at which no ray arrives. The way there from the axis passes a root of g'(r) or of the
@@ -63,8 +65,18 @@ def _fold(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
     if turn is None or not turns:
         yield fold.found(sentence, lost, "", name)
         return
-    severity = "note" if turn.angle >= pi / 2 and not _corners_lost(evidence, name, camera) else fold.severity
-    yield fold.found(sentence, turn.radius, turn.unit, name, severity=severity)
+    corners = evidence.calibration.detections.get(name)
+    seen = corners is not None and not _corners_lost(evidence, name, camera)
+    beyond = turn.angle >= pi / 2 and not _corners_lost(evidence, name, camera)
+    severity = "note" if beyond or seen or lost < LOST else fold.severity
+    remedy = f"{_fewer_terms(lens)}, and solve again with more views that reach the border."
+    yield fold.found(sentence, turn.radius, turn.unit, name, severity=severity, remedy=remedy)
+
+
+def _fewer_terms(lens: Lens) -> str:
+    """What to do without, in the terms of this lens: its last radial one that is not 0."""
+    used = [name for name in lens.parameters() if name.startswith("k") and getattr(lens, name)]
+    return f"Fix {used[-1]} to 0" if len(used) > 1 else "Take a model with other terms"
 
 
 def _where(camera: Camera) -> str:
@@ -115,6 +127,7 @@ def folding(rng: Rng, strength: float) -> Evidence:
     ),
     remedy="Solve again with fewer terms (the standard model), or with corners out to the edge of the image.",
     threshold="D falls below 0.2, where every error of the numerator counts five times, or there is a pole.",
+    explains=("inverse-not-converged", "rectified-black"),
 )
 def near_pole(evidence: Evidence) -> Iterator[Finding]:
     """The check follows the denominator D(r²) = 1 + k4 r² + k5 r⁴ + k6 r⁶ out to the farthest ray that an undistorted
@@ -157,7 +170,7 @@ def close_to_a_pole(rng: Rng, strength: float) -> Evidence:
     severity="note",
     view="undistorted",
     symptom="Undistorted points are wrong at the border.",
-    causes=("cv2.undistortPoints, which stops after 5 iterations unless it is told otherwise",),
+    causes=("cv2.undistortPoints, which stops after a few iterations unless it is told otherwise",),
     remedy="Pass criteria to undistortPoints, such as (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, 100, 1e-9), "
     "and project the result back.",
     threshold="A pixel and its return are 0.5 px apart.",
@@ -173,8 +186,14 @@ def inverse_not_converged(evidence: Evidence) -> Iterator[Finding]:
         error = default_round_trip(camera)
         if not error <= CLOSE_PX:
             off = f"{error:.2g} px" if error < 1000 else "more than 1000 px"
-            sentence = f"{name}: cv2.undistortPoints without criteria leaves points at the border {off} off."
-            yield inverse_not_converged.found(sentence, min(error, 1e6), "px", name)
+            fisheye = _opencv_model(camera.lens) == "cv2.fisheye"
+            called = "cv2.fisheye.undistortPoints" if fisheye else "cv2.undistortPoints"
+            sentence = f"{name}: {called} without criteria leaves points at the border {off} off."
+            said = {
+                "causes": (f"{called}, which stops after a few iterations unless it is told otherwise",),
+                "remedy": inverse_not_converged.remedy.replace("undistortPoints", called, 1),
+            }
+            yield inverse_not_converged.found(sentence, min(error, 1e6), "px", name, **said)
 
 
 def default_round_trip(camera: Camera) -> float:

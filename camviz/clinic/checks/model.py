@@ -21,6 +21,9 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 
 SYSTEMATIC = 0.5  # of the noise: what remains of a real lens under the standard model is a third of it
+VISIBLE_PX = 0.1  # RMS, a pattern smaller than which harms nobody
+CLEAR = 3.0  # σ of the corners, which the pattern must reach somewhere
+BEYOND = 3.0  # times the field's longest arrow: what is farther off has another cause
 BENT = 0.005  # of the board's longer side
 FEWEST_VIEWS = 6  # to be parted in two
 DRIFTING = 0.003  # of the focal length
@@ -39,19 +42,33 @@ STANDARD_ERRORS = 5.0
     symptom="The residuals swirl or point outward.",
     causes=("a lens model with too few terms", "a fisheye solved with a polynomial", "a board that is not flat"),
     remedy="Solve again with a richer model (rational, fisheye), and check that the board is flat.",
-    threshold="The field explains more than noise would in one set of a million, and at least half of the noise.",
+    threshold="The field explains more than noise would in one set of a million. It makes up at least half of the "
+    "noise and 0.1 px (RMS), and somewhere reaches three standard deviations of the corners.",
+    explains=(
+        "views-differ",
+        "rolling-shutter",
+        "outlier-view",
+        "outlier-line",
+        "fold",
+        "near-pole",
+        "inverse-not-converged",
+        "pose-absorbs-error",
+        "split-disagreement",
+    ),
 )
 def model_too_simple(evidence: Evidence) -> Iterator[Finding]:
     """The check fits a smooth field over the image to all residuals. The board's bend takes its share first."""
     for name, observed in evidence.with_corners().items():
         best = observed.best
         field = explained(best, name, smooth_field(best, name), warp_columns(best, name))
-        if field.chance < BY_CHANCE and field.part > SYSTEMATIC:
+        enough = field.pixels > VISIBLE_PX and field.most > CLEAR * best.sigma
+        if field.chance < BY_CHANCE and field.part > SYSTEMATIC and enough:
             sentence = (
-                f"{name}: the lens model is too simple. A smooth pattern over the image makes up "
-                f"{field.part * best.sigma:.2g} px of the residuals ({field.part:.0%} of the noise)."
+                f"{name}: the lens model is too simple. A smooth pattern over the image makes up {field.pixels:.2g} px "
+                f"of the residuals (RMS) and up to {field.most:.2g} px of a single one, where the noise is "
+                f"{field.pixels / field.part:.2g} px."
             )
-            yield model_too_simple.found(sentence, field.part * best.sigma, "px", name)
+            yield model_too_simple.found(sentence, field.pixels, "px", name, reach=BEYOND * field.most)
 
 
 def richer(rng: Rng, set_up: SetUp, strength: float, *, widest: float, views: int) -> SetUp:
@@ -93,6 +110,14 @@ def lens_too_rich(rng: Rng, strength: float) -> Evidence:
     remedy="Mount the board on glass or aluminium, or solve for its warp as well.",
     threshold="Noise would show the bend in one set of a million, "
     "and it is at least half a percent of the board's longer side.",
+    explains=(
+        "views-differ",
+        "outlier-view",
+        "outlier-line",
+        "pose-absorbs-error",
+        "model-too-simple",
+        "split-disagreement",
+    ),
 )
 def board_warp(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the joint solution with and without two parameters for the bend of the board."""
@@ -134,6 +159,7 @@ def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     remedy="Lock focus and zoom, switch stabilisation off, take more views, and solve again.",
     threshold="The focal length changes by 0.3 %, or the cameras differ by at least a pixel (median over the image). "
     "Noise would show it in one set of a million.",
+    explains=("views-differ", "outlier-view", "outlier-line", "pose-absorbs-error"),
 )
 def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
     """The check solves for a focal length that changes evenly over the views. It also compares the cameras from the

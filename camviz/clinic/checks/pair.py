@@ -33,6 +33,7 @@ TURNED_DEG = 35.0
     causes=("a left and a right camera that were swapped",),
     remedy="Swap the cameras, or the roles of the files, and solve again.",
     threshold="t.x is above 0 and the larger part of the baseline.",
+    explains=("rectified-black",),
 )
 def baseline_sign(evidence: Evidence) -> Iterator[Finding]:
     """The check reads t.x of right_from_left. It is negative when the right camera stands on the right."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence
-from camviz.clinic.registry import Finding, Rng, finding
+from camviz.clinic.registry import WRONG_NUMBERS, Finding, Rng, finding
 from camviz.clinic.virtual import alone, changed, healthy
 from camviz.lenses import BrownConrady, Perspective
 
@@ -32,6 +32,7 @@ ALIKE = 0.06  # how well a clean factor must fit both axes
     threshold="Both axes share a ratio of whole numbers up to 4 within 6 %. "
     "Or a factor against the other calibration is beyond 12 %. "
     "Or pictures have another size, corners lie outside the image, or the field of view is above 170°.",
+    explains=(*WRONG_NUMBERS, "principal-point"),
 )
 def wrong_size(evidence: Evidence) -> list[Finding]:
     """The check holds the camera matrix against the image size, the pictures, the corners and the other calibration."""
