@@ -18,6 +18,11 @@ from camviz.clinic.evidence import Evidence
 from camviz.clinic.virtual import SetUp, single
 
 SEVERITIES = ("fault", "warning", "note")  # the worst first
+WRONG_NUMBERS = (
+    *("models-differ", "views-differ", "outlier-view", "outlier-line", "pose-absorbs-error"),
+    *("model-too-simple", "split-disagreement", "fold", "near-pole", "inverse-not-converged"),
+)
+"""What may follow where a file's numbers are not those of its camera."""
 
 Rng = np.random.Generator
 STAGES = ("", "set-up", "corners", "solution")
@@ -28,7 +33,8 @@ class Finding:
     """What is wrong, in one plain sentence, with the number that shows it.
 
     `camera` is the camera's name, None where the finding concerns all of them. `pictures` are the indices of the views
-    that it concerns. `view` names the view that shows it.
+    that it concerns. `view` names the view that shows it. `consequence_of` is the id of the finding that explains it,
+    and `count` is how many findings alike it stands for. What a cause explains is no more than `reach` pixels off.
     """
 
     id: str
@@ -41,6 +47,9 @@ class Finding:
     causes: tuple[str, ...] = ()
     remedy: str = ""
     pictures: tuple[int, ...] = ()
+    consequence_of: str | None = None
+    count: int = 1
+    reach: float | None = None
 
 
 @dataclass(frozen=True)
@@ -117,8 +126,9 @@ class Fault:
 class Kind:
     """What all findings of one id have in common, and the check that makes them.
 
-    `symptom`, `evidence`, `threshold` and `remedy` are sentences, `causes` are phrases. The check takes Evidence and
-    gives findings; it raises NotChecked where the evidence is missing.
+    `symptom`, `evidence`, `threshold` and `remedy` are sentences, `causes` are phrases, the most likely first. What it
+    `explains` are the ids of findings that follow from it in the same camera. The check takes Evidence and gives
+    findings; it raises NotChecked where the evidence is missing.
     """
 
     id: str
@@ -130,6 +140,7 @@ class Kind:
     evidence: str
     threshold: str
     check: Callable[[Evidence], Iterable[Finding]]
+    explains: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.severity not in SEVERITIES:

@@ -20,6 +20,7 @@ from camviz.commands.common import (
     add_command,
     board_of,
     narrator,
+    pixels,
     refuse_exhausted,
     refuse_output,
     write_calibration,
@@ -66,6 +67,7 @@ def add(commands: Any) -> None:
     command.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
     )
+    command.add_argument("--goal", metavar="PX", type=pixels, help="the largest expected error wanted (default: 1 px)")
     command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
 
 
@@ -94,6 +96,8 @@ def calibrate(options: argparse.Namespace) -> int:
     calibration = replace(calibration, source=options.output)
     told = narrator(options.output)
     for sentence in report(calibration):
+        told(sentence)
+    for sentence in worth(calibration, options.goal):
         told(sentence)
     told(f"{options.output}: written.")
     if options.report:
@@ -157,6 +161,14 @@ def report(calibration: Calibration) -> list[str]:
         length = np.sqrt(x * x + y * y + z * z)
         said.append(f"right stands {length:.2f} mm from left: x = {x:.2f}, y = {y:.2f}, z = {z:.2f} mm in its frame.")
     return said
+
+
+def worth(calibration: Calibration, goal: float | None) -> list[str]:
+    """What it is worth to a task, and whether there are enough pictures."""
+    from camviz.clinic.summary import GOOD, Summary
+
+    summary = Summary.of(calibration, goal=goal or GOOD)
+    return [*(each.sentence for each in summary.task), summary.guidance]
 
 
 def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Calibration:

@@ -14,6 +14,7 @@ import camviz
 from camviz.commands import (
     board,
     calibrate,
+    check,
     completion,
     convert,
     doctor,
@@ -40,6 +41,7 @@ examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25
                                              calibrate a camera from pictures of it, into camera.yaml
   camviz inspect camera.yml                  say what is wrong with a calibration, and what to do
+  camviz check camera.yaml new/*.jpg         say whether it still holds, by new pictures of the board
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
   camviz convert cam.yml model --to colmap   write the same camera for another program
@@ -53,12 +55,13 @@ A file called - is stdin, or stdout. Colour is for terminals; NO_COLOR and --col
 
 exit status:
   0    done
-  1    camviz inspect found something
+  1    camviz inspect or camviz check found something
   2    the command or the file it names cannot be used; one sentence on stderr says why
   3    something is missing on this machine; camviz doctor says what, and how to mend it
+  4    camviz check cannot tell from these pictures
   130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
-COMMANDS = (lab, doctor, board, calibrate, inspect, show, convert, reproject, noise, mtf, teacher, completion)
+COMMANDS = (lab, doctor, board, calibrate, inspect, check, show, convert, reproject, noise, mtf, teacher, completion)
 
 
 class Ended(BaseException):

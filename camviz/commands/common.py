@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import math
 import os
 import re
 import shutil
@@ -214,15 +215,24 @@ def numbers(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def millimetres(text: str) -> float:
-    """A length of 0.1 mm to 10 m."""
-    try:
-        length = float(text)
-    except ValueError:
-        length = 0.0
-    if not 0.1 <= length <= 10_000:
-        raise argparse.ArgumentTypeError(f"expected a length in millimetres, from 0.1 to 10000, got {text!r}")
-    return length
+def bounded(what: str, low: float, high: float, unit: str = "") -> Callable[[str], float]:
+    """Reads an option's number within bounds; its unit may stand behind it."""
+
+    def number(text: str) -> float:
+        try:
+            value = float(text.removesuffix(unit))
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"expected {what}, from {low:g} to {high:.0f}, got {text!r}")
+        return value
+
+    return number
+
+
+millimetres = bounded("a length in millimetres", 0.1, 10_000)
+metres = bounded("a distance in metres", 0.01, 10_000, "m")
+pixels = bounded("a number of pixels", 0.01, 100, "px")
 
 
 def add_board(command: argparse.ArgumentParser, required: bool = True, default: bool = True) -> None:
@@ -268,6 +278,14 @@ def board_of(options: argparse.Namespace) -> Board:
     except ValueError as error:
         raise Refusal(f"{error}.") from error
     return board
+
+
+def given_board(options: argparse.Namespace) -> Board | None:
+    """The board of the options; None where they name none."""
+    given = [options.board is not None, options.square_mm is not None]
+    if any(given) != all(given):
+        raise Refusal("a board has both: --board COLUMNSxROWS (inner corners) and --square-mm MM.")
+    return board_of(options) if all(given) else None
 
 
 def size(text: str) -> tuple[int, int]:

@@ -18,8 +18,9 @@ from camviz.commands.common import (
     add_board,
     add_colour,
     add_command,
-    board_of,
+    given_board,
     loaded,
+    metres,
     on_disk,
     refuse_output,
     size,
@@ -71,6 +72,7 @@ def add(commands: Any) -> None:
     add_board(command, required=False, default=False)
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
     command.add_argument("--compare", metavar="OTHER", type=Path, help="another calibration of the same cameras")
+    command.add_argument("--at", metavar="METRES", type=metres, help="a distance at which to tell the error of a place")
     command.add_argument("--json", action="store_true", help="the same for programs")
     add_colour(command)
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with pictures as well")
@@ -83,7 +85,7 @@ def inspect(options: argparse.Namespace) -> int:
         if len(named) > 1:
             raise Refusal("--report writes a page about one calibration: give one FILE.")
         refuse_output(options.report, "page", *(Path(word) for word in options.files))
-    board = _board(options)
+    board = given_board(options)
     compare = loaded(options.compare, options.size) if options.compare else None
     inspections: dict[str, Inspection] = {}
     unreadable = False
@@ -126,13 +128,6 @@ def _is_model(folder: Path) -> bool:
     return True
 
 
-def _board(options: argparse.Namespace) -> Board | None:
-    given = [options.board is not None, options.square_mm is not None]
-    if any(given) != all(given):
-        raise Refusal("a board has both: --board COLUMNSxROWS (inner corners) and --square-mm MM.")
-    return board_of(options) if all(given) else None
-
-
 def _inspected(
     paths: list[Path], board: Board | None, compare: Calibration | None, options: argparse.Namespace
 ) -> Inspection:
@@ -142,12 +137,20 @@ def _inspected(
 
     images = pictures(options.images) if options.images else []
     if PICTURES.fullmatch(paths[0].suffix):
-        return inspect(_calibrated(paths, board), compare=compare, pictures=sizes_of(images), board=board)
+        return inspect(
+            _calibrated(paths, board), compare=compare, pictures=sizes_of(images), board=board, at=options.at
+        )
     add = None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
     with on_disk(paths[0]) as file:
         try:
             return inspect_file(
-                file, size=options.size, compare=compare, pictures=sizes_of(images), board=board, prepare=add
+                file,
+                size=options.size,
+                compare=compare,
+                pictures=sizes_of(images),
+                board=board,
+                at=options.at,
+                prepare=add,
             )
         except CalibrationError as error:
             raise Refusal(str(error)) from error

@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
 def _listing() -> str:
     from camviz.files.registry import titles
 
-    return fill(f"formats: {titles()}", 110, subsequent_indent="  ")
+    return fill(f"formats: {titles()}", 110, subsequent_indent="  ", break_on_hyphens=False)
 
 
 def show(options: argparse.Namespace) -> int:

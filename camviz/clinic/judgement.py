@@ -1,0 +1,86 @@
+"""The words of a check: verdicts, their reasons, and what evidence would settle them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+FEWEST_VIEWS = 3  # two cannot tell how much views differ among each other
+VERDICTS = ("fail", "warn", "inconclusive", "pass")  # the worst first
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict on one camera or pair, why, what evidence would settle it, and the numbers behind it."""
+
+    of: str
+    verdict: str
+    reason: str
+    settle: str = ""
+    facts: tuple[str, ...] = ()
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Check:
+    """What new pictures say of a calibration: `verdict` is the worst of its judgements, one for each camera or pair."""
+
+    limit: float
+    judgements: tuple[Judgement, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def worst(self) -> Judgement:
+        """The judgement that decides."""
+        return min(self.judgements, key=lambda each: VERDICTS.index(each.verdict))
+
+    @property
+    def verdict(self) -> str:
+        """One of "fail", "warn", "inconclusive" and "pass"."""
+        return self.worst.verdict
+
+    def as_text(self) -> str:
+        """For people: each verdict with its reason, what would settle it, and the numbers."""
+        lines = []
+        for each in self.judgements:
+            lines.append(f"{each.verdict}: {each.reason}")
+            lines += [f"    to settle it: {each.settle}"] * bool(each.settle)
+            lines += [f"    {fact}" for fact in each.facts]
+            lines.append("")
+        return "\n".join([*lines, *self.notes])
+
+    def as_tree(self) -> dict[str, Any]:
+        """For programs: verdict, limit_px, judgements and notes, as docs/clinic.md has them."""
+        judgements = [asdict(each) | {"facts": list(each.facts)} for each in self.judgements]
+        return {"verdict": self.verdict, "limit_px": self.limit, "judgements": judgements, "notes": list(self.notes)}
+
+    def as_json(self) -> str:
+        """The same as strict JSON."""
+        return json.dumps(self.as_tree(), indent=2, ensure_ascii=False, allow_nan=False)
+
+    def __str__(self) -> str:
+        return self.as_text()
+
+
+def rated(least: float, most: float, limit: float) -> str:
+    """The verdict on a change that lies between two bounds: it fails where it is surely beyond the limit.
+
+    It is warned of where it is surely beyond half of the limit, and passes where it is surely within it.
+    """
+    if least > limit:
+        return "fail"
+    if least > limit / 2:
+        return "warn"
+    return "pass" if most <= limit else "inconclusive"
+
+
+def px(length: float) -> str:
+    """ "0.12 px", "1.25 px", "110 px"."""
+    return f"{length:.0f} px" if length >= 100 else f"{length:.3g} px" if length >= 1 else f"{length:.2g} px"
+
+
+def listed(names: tuple[str, ...]) -> str:
+    """ "a, b and c"."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

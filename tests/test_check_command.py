@@ -1,0 +1,120 @@
+"""`camviz check` on photographs, and what it answers to those who ask amiss."""
+
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from commandline import refused
+from test_files import sample
+
+from camviz.calibration import calibrate, calibrate_pair, detect
+from camviz.calibration.types import Board
+from camviz.clinic.virtual import detections, single
+from camviz.commands.command import main
+from camviz.files.writing import write
+
+BOARD = Board(9, 6, 0.025)
+
+
+def photographs(side):
+    return sorted(sample("left01.jpg").parent.glob(f"{side}??.jpg"))
+
+
+@pytest.fixture(scope="module")
+def found():
+    """The corners in all photographs of each camera, found once."""
+    return {side: detect(photographs(side), BOARD) for side in ("left", "right")}
+
+
+@pytest.fixture
+def half(found, room):
+    """The left camera, calibrated from every other photograph."""
+    left = found["left"]
+    write(
+        calibrate(replace(left, corners=left.corners[::2], pictures=left.pictures[::2], places=()), BOARD),
+        room / "half.yaml",
+        "opencv",
+    )
+    return "half.yaml"
+
+
+@pytest.fixture
+def virtual(room, monkeypatch):
+    """camera.yaml of a virtual camera; its next pictures show what `see` is given."""
+    before, after = (replace(single(np.random.default_rng(9), views=views), noise=0.08) for views in (20, 25))
+    write(before.solved(before.observed(np.random.default_rng(1))), room / "camera.yaml", "opencv")
+    cv2.imwrite("new.png", np.zeros((8, 8), np.uint8))
+
+    def see(camera):
+        seen = replace(after, cameras=(camera,)).observed(np.random.default_rng(2))[0]
+        monkeypatch.setattr("camviz.calibration.detect", lambda *_, **__: detections(camera, seen), raising=False)
+
+    return after, see
+
+
+def test_every_verdict_has_its_status(virtual, capsys):
+    after, see = virtual
+    grid = after.camera.intrinsics
+    longer = replace(after.camera, intrinsics=replace(grid, fx=1.01 * grid.fx, fy=1.01 * grid.fy))
+    half = replace(after.camera, intrinsics=grid.resized(grid.width // 2, grid.height // 2))
+    for camera, words, status, verdict in (
+        (after.camera, (), 0, "pass"),
+        (longer, (), 1, "fail"),
+        (half, (), 1, "warn"),
+        (after.camera, ("--limit-px", "0.05"), 4, "inconclusive"),
+    ):
+        see(camera)
+        assert main(["check", "camera.yaml", "new.png", *words]) == status
+        assert capsys.readouterr().out.startswith(f"{verdict}: camera: ")
+        assert main(["check", "camera.yaml", "new.png", *words, "--json"]) == status
+        assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["verdict"] == verdict
+
+
+def test_the_other_half_of_the_photographs_does_not_condemn_the_camera_that_took_them(half, capsys):
+    """They leave a corner of the image empty, and the board bends from view to view: it cannot be said."""
+    others = [str(path) for path in photographs("left")[1::2]]
+    assert main(["check", half, *others]) == 4
+    out = capsys.readouterr().out
+    assert "too few corners in the upper left" in out
+    assert "the views differ" in out
+
+
+def test_another_camera_of_the_same_make_fails(half, capsys):
+    """The right camera's principal point is 17 px beside the left one's, its focal length 1 % longer."""
+    assert main(["check", half, *map(str, photographs("right"))]) == 1
+    assert capsys.readouterr().out.startswith("fail: camera: the calibration does not describe this camera")
+
+
+def test_a_pair_whose_pictures_are_exchanged_fails(found, room, capsys):
+    write(calibrate_pair(found["left"], found["right"], BOARD), room / "pair.yaml", "opencv")
+    left, right = ([str(path) for path in photographs(side)[:5]] for side in ("left", "right"))
+    assert main(["check", "pair.yaml", *right, "--right", *left, "--json"]) == 1
+    judged = json.loads(capsys.readouterr().out)["judgements"][-1]
+    assert (judged["of"], judged["verdict"]) == ("left, right", "fail")
+    assert judged["numbers"]["rectified_rows_px"]["rms"] > 20
+    for words, said in (
+        ((), "say with --camera which one"),
+        (("--camera", "middle"), "expected --camera to be one of left, right, got middle"),
+    ):
+        assert said in refused(capsys, room, "check", "pair.yaml", *left, *words)
+
+
+def test_what_cannot_be_used_is_said_in_one_sentence(half, room, capsys):
+    left = str(photographs("left")[0])
+    (room / "bare.yaml").write_text(
+        "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n"
+        "   dt: d\n   data: [530., 0., 320., 0., 530., 240., 0., 0., 1.]\n"
+        "distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [-.3, .1, 0., 0., 0.]\n"
+    )
+    for words, said in (
+        (("gone.yaml", left), "gone.yaml"),
+        (("bare.yaml", left), "say which one the pictures show"),
+        ((half, "gone.jpg"), "gone.jpg: there is no such picture or folder"),
+        ((half, left, "--board", "9x6"), "a board has both"),
+        ((half, left, "--right", left), "--right is for a calibration of one pair, this has the cameras camera"),
+        ((half, left, "--limit-px", "0"), "expected a number of pixels"),
+        ((half, left, "--board", "8x8", "--square-mm", "25"), "8×8 inner corners"),
+    ):
+        assert said in refused(capsys, room, "check", *words)
