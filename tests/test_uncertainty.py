@@ -154,9 +154,10 @@ def test_covariance_is_mrcals_all_over_the_image(corners, mrcals, distance) -> N
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("distance", [inf, 1.0])
 def test_difference_is_mrcals(mrcals, distance, weighted) -> None:
-    """Within 2 %, or 0.005 px where there is next to none, at 99 of 100 pixels.
+    """Our motion fits the rays at least as well as mrcal's, and with mrcal's motion our map is mrcal's to 1e-6 px.
 
-    The cost, of fourth powers, is so flat that mrcal now and then stops before the bottom: then ours is lower.
+    The two maps themselves cannot be compared: the cost, of fourth powers, is so flat that mrcal stops above the
+    bottom, by up to 1 %, and elsewhere in every run.
     """
     models = [(values[:4], values[4:]) for values in mrcals["intrinsics"]]
     first, second = (Camera(Intrinsics(640, 480, *p), BrownConrady.from_coefficients(d)) for p, d in models)
@@ -166,10 +167,9 @@ def test_difference_is_mrcals(mrcals, distance, weighted) -> None:
     motion = RigidTransform.from_components(motion[3], Rotation.from_matrix(motion[:3]))
     costs = [misfit(first, second, it, distance, given) for it in (ours.second_from_first, motion)]
     assert costs[0] < 1.0001 * costs[1]
-    if costs[1] < 1.01 * costs[0]:
-        length = np.linalg.norm(theirs, axis=-1)
-        close = np.abs(ours.length - length) <= np.maximum(0.02 * length, 0.005)
-        assert close[np.isfinite(length)].mean() > 0.99
+    points = first.lens.unproject(first.intrinsics.from_pixels(ours.uv)) * (1 if distance == inf else distance)
+    by_theirs = second.intrinsics.to_pixels(second.lens.project(transform(motion, points))) - ours.uv
+    assert np.nanmax(np.abs(by_theirs - theirs)) < 1e-6
 
 
 def misfit(first, second, second_from_first, distance, uncertainties):
