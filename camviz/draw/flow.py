@@ -14,6 +14,7 @@ from camviz.draw import labels, svg
 
 WIDTH = 960  # picture units, of every row
 FLOW_WIDTH = "max(800px,138vh)"  # of a picture, so that its main panel and the controls fit a screen together
+_PRESENTED = "var(--camviz-scale,1)*"  # how much larger a presentation shows everything
 SCROLLED = 620  # picture units: a wider tile is scrolled sideways on a telephone
 
 Cell = tuple[float, float, float, float]
@@ -49,19 +50,19 @@ class Tile:
         x, y, width, height = self.cell
         return labels.uncluttered(self.body, (x, y, x + width, y + height), max(unit, 1.0))
 
-    @property
-    def style(self) -> str:
+    def style(self, scaled: str = "") -> str:
         """How the tile takes its place among others in a line that wraps, as CSS.
 
         In a wide line the tiles of a row fill it as in the saved picture. A tile goes to the next line rather than
         shrink to less than 0.72 of its size, and grows to half as much again; words alone keep their size more closely.
+        `scaled` is a factor of these sizes, as CSS with its "*".
         """
         width = self.cell[2]
         least, most = (0.72, 1.5) if "data-panel" in self.body else (0.92, 1.15)
         share = 100 * width / WIDTH
         return (
-            f"--w:{width:g};flex:{width:g} 1 max({least * width:g}px,{0.97 * share:.4g}%);min-width:0;"
-            f"max-width:max({most * width:g}px,{share:.4g}%)"
+            f"--w:{width:g};flex:{width:g} 1 max({scaled}{least * width:g}px,{0.97 * share:.4g}%);min-width:0;"
+            f"max-width:max({scaled}{most * width:g}px,{share:.4g}%)"
         )
 
     def html(self, unit: float = 1.0) -> str:
@@ -72,7 +73,7 @@ class Tile:
         kind = "camviz-tile camviz-scrolled" if self.cell[2] > SCROLLED else "camviz-tile"
         name = escape(self.name)
         fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
-        return f'<div class="{kind}" data-tile="{name}" style="{self.style}">{fold}{self._svg(unit)}</div>'
+        return f'<div class="{kind}" data-tile="{name}" style="{self.style(_PRESENTED)}">{fold}{self._svg(unit)}</div>'
 
     @property
     def sentences(self) -> str:

@@ -108,10 +108,13 @@ Item = Line | Face | TexturedMesh | Dots | Label
 
 
 def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") -> list[Item]:
-    """The axes of a frame as arrows `length` metres long: x orange, y green, z blue, each with its letter."""
+    """The axes of a frame as arrows `length` metres long: x orange, y green, z blue, each with its letter.
+
+    A frame with a name, as the world beside a camera, has capital letters.
+    """
     origin, *tips = transform(world_from_frame, np.vstack([np.zeros(3), length * np.eye(3)]))
     items: list[Item] = []
-    for letter, colour, tip in zip("xyz", ("orange", "green", "blue"), tips, strict=True):
+    for letter, colour, tip in zip("XYZ" if name else "xyz", ("orange", "green", "blue"), tips, strict=True):
         items.append(Line(np.array([origin, tip]), colour, 2.4, head=True))
         items.append(Label(origin + 1.12 * (tip - origin), letter, f"label {colour}"))
     return [*items, Label(1.3 * origin - 0.3 * tips[1], name, "note")] if name else items

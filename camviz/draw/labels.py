@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from html import escape, unescape
 from math import inf
 
 SMALLEST = 12  # CSS pixels, of any word at any size of the picture
 SIZES = {"title": 14.0, "note": 12.0, "tick": 12.0, "number": 12.5, "": 13.0}  # picture units, as in style.css
+FIXED = -1  # the rank of words that stay beside what they name
 ASCENT, DESCENT = 0.93, 0.24  # of the size
 LEADING = 1.36  # from line to line of a paragraph, of the size
 _WIDTHS = {
@@ -106,6 +108,7 @@ def overlap(one: Box, other: Box, least: float = 0.5) -> bool:
     )
 
 
+@lru_cache(maxsize=1000)
 def width(words: str, size: float, *, bold: bool = False, mono: bool = False) -> float:
     """How wide words of a size are, in the same units.
 
@@ -143,14 +146,18 @@ def _words(
     lines = _wrapped(text, float(given["data-width"]), size) if "data-width" in given else ()
     long = max(width(line, size, bold=bold, mono=role == "number") for line in lines or (text,))
     before = long if "end" in classes else long / 2 if "middle" in classes else 0.0
-    x, y = at[0] + float(given["x"]), at[1] + float(given["y"])
+    x, y = float(given["x"]), float(given["y"])
+    if "data-from" in given:  # a legend grows as a whole from a corner
+        from_x, from_y = map(float, given["data-from"].split())
+        x, y = from_x + unit * (x - from_x), from_y + unit * (y - from_y)
+    x, y = at[0] + x, at[1] + y
     turned, step = "rotate(-90" in given.get("transform", ""), LEADING * size
     if turned:
         box = (x - ASCENT * size, y - long + before, x + DESCENT * size, y + before)
     else:
         below = y + DESCENT * size + step * max(len(lines) - 1, 0)
         box = (x - before, y - ASCENT * size, x - before + long, below)
-    rank, moves = _manners(role, classes, inside, turned, size)
+    rank, moves = (FIXED, ()) if "data-from" in given else _manners(role, classes, inside, turned, size)
     may_go = rank > 2 and not lines
     return Words(start, end, float(given["x"]), float(given["y"]), box, seen, rank, moves, may_go, lines, step)
 
@@ -189,9 +196,14 @@ def _manners(
 
 def _free(words: Words, taken: list[Box]) -> tuple[float, float] | None:
     """By how much the words move to stand free; (0, 0) where they cannot but matter, None where they go."""
+    if words.rank == FIXED:
+        return 0.0, 0.0
     for dx, dy in ((0.0, 0.0), *words.moves):
         inward = _inward(words, dx, dy)
-        if inward is not None and not any(overlap(_shifted(words.box, *inward), box) for box in taken):
+        if inward is None:
+            continue
+        here = _shifted(words.box, *inward)
+        if not any(overlap(here, box) for box in taken):
             return inward
     return None if words.may_go else _inward(words, 0.0, 0.0) or (0.0, 0.0)
 

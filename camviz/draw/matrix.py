@@ -45,4 +45,4 @@ def _entry(x: float, y: float, row: int, column: int, values: np.ndarray, change
         return svg.text((right, base), true_minus(f"{values[row, column] + 0.0:g}"), "number end fill-muted")
     back = svg.rectangle(right - 58, base - 16, 62, 23, "wash fill-orange", rx=3) if changed else ""
     words = true_minus(f"{values[row, column] + 0.0:.2f}")
-    return back + svg.text((right, base), words, "number end orange" if changed else "number end")
+    return back + svg.text((right, base), words, "number end")

@@ -74,7 +74,8 @@ class Picture:
         `units` says how many picture units make a CSS pixel in the tile of a name, where it is not one.
         """
         tiles = "".join(tile.html((units or {}).get(tile.name, 1.0)) for tile in self.tiles)
-        return f'<div class="camviz-flow" role="group" aria-label="{escape(self.title)}">{tiles}</div>'
+        named = f'aria-label="{escape(self.title)}" aria-description="{escape(self.description)}"'
+        return f'<div class="camviz-flow" role="group" {named}>{tiles}</div>'
 
     def embedded(self) -> str:
         """The flowing tiles with their photographs inside, for a page that has the style sheets."""
@@ -98,15 +99,16 @@ class Picture:
         images = "".join(
             f'<div style="flex:1 1 100%">{tile.sentences}</div>'
             if tile.words
-            else f'<img alt="{escape(words)}" style="{tile.style}" src="data:image/svg+xml;base64,{self._alone(tile)}">'
+            else f'<img alt="{escape(words)}" style="{tile.style()}" src="{self._alone(tile)}">'
             for tile, words in zip(self.tiles, alternatives, strict=True)
         )
         return f'<figure style="margin:0;display:flex;flex-wrap:wrap;max-width:{FLOW_WIDTH}">{images}</figure>'
 
     def _alone(self, tile: Tile) -> str:
-        """A tile as an SVG document in base64; its words grow where it is shown small."""
+        """A tile as the address of an SVG document; its words grow where it is shown small."""
         sheet = f"<style>{page_style()}</style>"
-        return b64encode(self._with_photographs(tile.document(sheet)).encode()).decode()
+        data = b64encode(self._with_photographs(tile.document(sheet)).encode()).decode()
+        return f"data:image/svg+xml;base64,{data}"
 
     def save(self, path: str | Path, *, theme: str = "light", dpi: float = 192) -> None:
         """Write the picture to a file that ends in .svg, .png or .pdf.

@@ -137,15 +137,19 @@ def level(panel: Panel, y: float, class_: str) -> str:
 
 
 def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top left") -> str:
-    """Names of the lines in one corner of the panel: (class, words) pairs, each with a sample of its line."""
+    """Names of the lines in one corner of the panel: (class, words) pairs, each with a sample of its line.
+
+    Where the picture is shown small, the whole legend grows out of its corner (flow.css), and no word leaves its line.
+    """
     x = 10 if "left" in corner else panel.width - 20 - 7 * max(len(words) for _, words in entries) - 20
     y = 18 if "top" in corner else panel.height - 18 * len(entries) + 6
     width, height = 34 + 6.1 * max(len(words) for _, words in entries), 18 * len(entries) + 2
+    from_x, from_y = x - 6 + width * ("right" in corner), y - 15 + height * ("bottom" in corner)
     rows = [svg.rectangle(x - 6, y - 15, width, height, "card", fill_opacity=0.85)]
     for i, (class_, words) in enumerate(entries):
         rows.append(svg.line([(x, y + 18 * i - 4), (x + 20, y + 18 * i - 4)], class_))
-        rows.append(svg.text((x + 27, y + 18 * i), words, "note halo"))
-    return "".join(rows)
+        rows.append(svg.text((x + 27, y + 18 * i), words, "note halo", data_from=f"{from_x:g} {from_y:g}"))
+    return svg.group("".join(rows), class_="legend", style=f"transform-origin:{from_x:g}px {from_y:g}px")
 
 
 def ticks(low: float, high: float, count: float) -> np.ndarray:

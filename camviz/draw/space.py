@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -60,11 +60,13 @@ def _viewport(eye: OrbitCamera, width: int, height: int) -> Viewport:
 
 
 @lru_cache(maxsize=4)
-def scene_items(scene: Scene, renderer: str) -> tuple[Item, ...]:
-    """A scene as a renderer shows it: its textured surfaces for "solid", its outlines, lightly filled, for "wire".
+def scene_items(make: Callable[[], Scene], renderer: str) -> tuple[Item, ...]:
+    """The scene that `make` makes, as "solid" shows it, its textured surfaces, or "wire", its outlines, lightly filled.
 
-    The lawn and what stands far off on it are left out: seen from outside, a scene is a model on a table.
+    The lawn and what stands far off on it are left out: seen from outside, a scene is a model on a table. The items are
+    kept and the scene, which is far larger, is not.
     """
+    scene = make()
     meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
         alike: dict[bytes, list[Mesh]] = {}

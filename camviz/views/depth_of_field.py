@@ -313,16 +313,19 @@ class DepthOfFieldView(View):
         if self.yours:
             blur, problem = tried(self.yours, (*state, 1000 * self.focus_m, 1000 * depth_m), depth_m)
             drawn += curve(panel, np.log10(depth_m), _log10(np.maximum(blur, 1e-6)), "orange dashed")
-            entries, problems = [("blue", "right"), ("orange dashed", "your blur")], [problem]
+            entries += [] if problem else [("blue", "right"), ("orange dashed", "your blur")]
+            problems.append(problem)
         if self.your_limits:
             focus = np.array([1000 * self.focus_m])
             limits, problem = tried(self.your_limits, (*state, focus, self.circle_mm), (focus, focus))
             ends = np.minimum(_log10(np.concatenate(limits) / 1000), panel.right)
             drawn += "".join(upright(panel, float(end), "orange") for end in ends if np.isfinite(end))
-            entries, problems = [*entries, ("orange", "your limits")], [*problems, problem]
-        words = "\n".join(filter(None, problems))
+            entries += [] if problem else [("orange", "your limits")]
+            problems.append(problem)
+        words = "\n".join(filter(None, dict.fromkeys(problems)))
         drawn += legend(panel, entries, "top right") if entries else ""
-        return drawn + (svg.paragraph((12, 22), words, panel.width - 24) if words else "")
+        below = 40 * len(entries)  # the legend, where it is shown largest
+        return drawn + (svg.paragraph((12, 22 + below), words, panel.width - 24, "note halo") if words else "")
 
     def _numbers(self) -> str:
         x, y, _, _ = self._cell("numbers")

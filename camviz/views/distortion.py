@@ -344,7 +344,7 @@ class DistortionView(OrbitView):
             + self._your_curve(panel, r)
             + svg.line(panel.place([(corner, 0), (corner, corner), (0, corner)]), "green dashed")
         )
-        return plot.axes(panel, "r, ideal (tangent of the ray's angle)", "r, distorted") + panel.show(
+        return plot.axes(panel, "r, ideal: the tangent of the angle", "r, distorted") + panel.show(
             lines
             + self._fold_mark(panel, fold)
             + svg.text(panel.place((corner, 0)) + (-6, -8), "image corner", "green end halo"),

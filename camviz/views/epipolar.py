@@ -295,7 +295,7 @@ class EpipolarView(OrbitView, TwoCameras):
 
     def _space_panel(self, images: dict[str, np.ndarray], draft: bool) -> Drawn:
         panel = space_panel("space", 10, 414, 480, 200)
-        scenery = () if self.photographs else scene_items(textured_scene(), "wire")
+        scenery = () if self.photographs else scene_items(textured_scene, "wire")
         scenery += self._bodies(images, draft)
         label = "The two cameras and the epipolar plane in space; drag or press the arrow keys to walk around"
         seen: dict[str, Any] = {"eye": self._onlooker, "scenery": scenery}

@@ -21,7 +21,7 @@ from camviz.draw.panel import Panel, image_in
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, true_minus
 from camviz.views.base import choice, slider, switch
-from camviz.views.marks import arrows
+from camviz.views.marks import arrows, shortened
 from camviz.views.view_bars import LABEL, ViewChooser
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
@@ -30,11 +30,8 @@ _FAR = 4.0  # standard deviations
 _LONGEST = 90.0  # picture units of an arrow
 _EVERYTHING = "bars picture estimates findings"
 _ERRORS = (366, {"residuals": 440, "bars": 300, "numbers": 220})
-_LAYOUTS = {
-    "bars picture": rows(_ERRORS),
-    _EVERYTHING: rows(_ERRORS, (272, {"estimates": 330, **{f"finding {i + 1}": 210 for i in range(_MOST)}})),
-}
-_FINDINGS = (330, 210)  # where they begin, and how wide each is
+_LAYOUTS = {"bars picture": rows(_ERRORS), _EVERYTHING: rows(_ERRORS, (272, {"estimates": 340}))}
+_FINDINGS = (340, 620)  # where they begin, and how wide they are together
 _VERDICTS = ("0, nothing is off", "1, a corner is off", "2, a row or a column is off", "3, a whole view is off")
 
 
@@ -106,13 +103,17 @@ class FaultLabView(ViewChooser):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
+        layout = _LAYOUTS[self.panels]
         parts = {"residuals": self._image_panel(), "bars": self._bars_panel(), "numbers": self._headline()}
         if self.panels == _EVERYTHING:
             findings = self._findings(draft)
-            parts |= {"estimates": self._estimates_panel()}
-            parts |= {f"finding {i + 1}": body for i, body in enumerate(findings)}
+            tiles = {f"finding {i + 1}": body for i, body in enumerate(findings)}
+            parts |= {"estimates": self._estimates_panel()} | tiles
+            layout = rows(
+                _ERRORS, (272, {"estimates": _FINDINGS[0], **dict.fromkeys(tiles, _FINDINGS[1] / len(tiles))})
+            )
         words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
-        return self.tiled(_LAYOUTS[self.panels], parts, described=words)
+        return self.tiled(layout, parts, described=words)
 
     def _headline(self) -> str:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
@@ -181,10 +182,7 @@ class FaultLabView(ViewChooser):
         panel = image_in(_LAYOUTS[self.panels]["residuals"], "picture", k.width, k.height)
         seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
         starts = panel.place(seen)
-        along = panel.place(seen - scale * residuals) - starts
-        length = np.linalg.norm(along, axis=-1)
-        cut = length > _LONGEST
-        ends = starts + along * np.where(cut, _LONGEST / np.maximum(length, 1e-9), 1)[:, None]
+        ends, cut = shortened(starts, panel.place(seen - scale * residuals), _LONGEST)
         grid = panel.place(seen - residuals).reshape(BOARD.rows, BOARD.columns, 2)
         content = svg.path([*grid, *grid.swapaxes(0, 1)], "muted thin")
         content += arrows(starts[~cut], ends[~cut], "orange") + arrows(starts[cut], ends[cut], "red")
@@ -224,8 +222,8 @@ class FaultLabView(ViewChooser):
 
     def _findings(self, draft: bool) -> list[str]:
         """What the clinic finds, a tile for each, the worst first."""
-        (left, width), y = _FINDINGS, _ERRORS[0] + 26
-        x, room = left + 10, width - 20
+        (left, whole), y = _FINDINGS, _ERRORS[0] + 26
+        x, room = left + 10, whole - 20
         head = svg.text((x, y), "What the clinic finds", "title")
         if not self.told:
             return [
@@ -239,19 +237,19 @@ class FaultLabView(ViewChooser):
             return [head + svg.text((x, y + 36), "Nothing found.", "green", style="font-size:22px;font-weight:600")
                     + svg.paragraph((x, y + 62), words, room)]  # fmt: skip
         found = grouped(inspection.findings)
-        tiles = [self._finding(x + width * i, y + 28, *one) for i, one in enumerate(found[:_MOST])]
+        width = whole / min(len(found), _MOST)
+        tiles = [self._finding(x + width * i, y + 28, width, *one) for i, one in enumerate(found[:_MOST])]
         if len(found) > _MOST:
             more = f"and {len(found) - _MOST} more"
             tiles[-1] += svg.text((x + width * (_MOST - 1), y), more, "note")
         return [head + tiles[0], *tiles[1:]]
 
-    def _finding(self, x: float, y: float, finding: Finding, count: int) -> str:
+    def _finding(self, x: float, y: float, width: float, finding: Finding, count: int) -> str:
         times, colour = f" × {count}" if count > 1 else "", _COLOURS[finding.severity]
         return (
-            svg.rectangle(x, y - 14, 4, 214, f"fill-{colour}")
-            + svg.text((x + 12, y), f"{finding.id}{times}", colour, style="font-size:17px;font-weight:600")
-            + svg.text((x + 12, y + 20), finding.severity, f"note {colour}")
-            + svg.paragraph((x + 12, y + 42), _short(finding.sentence), 182, "label")
+            svg.rectangle(x, y - 14, 4, 60 + 154 * _FINDINGS[1] / width / _MOST, f"fill-{colour}")
+            + svg.text((x + 12, y), f"{finding.id}{times}", f"title {colour}")
+            + svg.paragraph((x + 12, y + 30), f"{finding.severity}: {_short(finding.sentence)}", width - 28, "label")
         )
 
 

@@ -176,7 +176,7 @@ class FrustumView(OrbitView):
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else None
         renderer = chosen_renderer(draft=draft)
-        items, scenery = self._items(image), scene_items(textured_scene(), renderer)
+        items, scenery = self._items(image), scene_items(textured_scene, renderer)
         content, photographs = draw_space(
             panel, items, self.eye, draft=draft, renderer=renderer, frame=frame, scenery=scenery
         )

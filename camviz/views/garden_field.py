@@ -24,9 +24,13 @@ STEP = 0.15
 Floats = NDArray[np.float32]
 
 
-@lru_cache(maxsize=2)
 def garden_field(fence: bool = False) -> LightField:
     """9 × 9 views of the garden, 160 × 120 pixels each, as sRGB bytes; with a fence of slats two metres away."""
+    return _garden_field(fence)
+
+
+@lru_cache(maxsize=2)
+def _garden_field(fence: bool) -> LightField:
     return photograph_field(garden(fence), CAMERA, VIEWS, VIEWS, BASELINE, FOCUS_DISTANCE, encoded=True)
 
 
@@ -39,6 +43,12 @@ def _openings(fence: bool) -> Openings:
 def opened_field(fence: bool, width: float) -> LightField:
     """The garden's field through openings of a `width`, 0 … 1 of the distance between the places of the lens."""
     return _openings(fence).opened(width)
+
+
+def forget() -> None:
+    """Free the field through openings, 18 MB made in 40 ms."""
+    opened_field.cache_clear()
+    all_views.cache_clear()  # it may hold that field
 
 
 def garden(fence: bool = False) -> Scene:

@@ -208,7 +208,7 @@ class ImageSensorView(View):
         if not self.green:
             return ""
         electrons, problem = self.your_e
-        words = svg.paragraph((panel.width - 154, 60), problem, 148, "note halo") if problem else ""
+        words = svg.paragraph((14, 46), problem, panel.width - 28, "note halo") if problem else ""
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
             if np.isfinite(one):
                 below = panel.place((bar - 1 + i, np.log10(np.clip(min(one, self.full_well), 4, 1e6)))) + (0, 18)

@@ -308,7 +308,7 @@ class IntrinsicsView(OrbitView):
         span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
         target = (0.0, 0.2, float(BALLOON[2] - 0.49 * span))
         eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
-        scenery = scene_items(balloon_scene(), "wire")
+        scenery = scene_items(balloon_scene, "wire")
         yours, words = self._your_rays() if self.yours else ([], "")
         label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
         seen: dict[str, Any] = {"eye": eye, "scenery": scenery, "over": words, "drag": "orbit"}

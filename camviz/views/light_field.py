@@ -140,6 +140,11 @@ class LightFieldView(View):
         """The slope measured at the mark."""
         return float(self.slopes[self.row, self.column])
 
+    def forget(self) -> None:
+        """Free what this view has worked out, and what all light fields of the garden are made of."""
+        super().forget()
+        garden_field.forget()
+
     def image(self) -> np.ndarray:
         """The picture (height, width, 3), sRGB bytes: sheared, then summed."""
         return to_display(refocus(self.light_field, self.slope, self.mask))
@@ -356,7 +361,11 @@ class LightFieldView(View):
         if (left, right) == self.limits:
             return ""
         x = panel.place([(left, panel.top), (right, panel.top)])[:, 0]
-        words = svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note middle") if self.opening == 1 else ""
+        words = (
+            svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note fill-ink middle")
+            if self.opening == 1
+            else ""
+        )
         return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words
 
     def equation(self) -> str:

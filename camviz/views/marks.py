@@ -54,6 +54,20 @@ def on_photograph(lines: ArrayLike, class_: str) -> str:
     return svg.path(lines, "paper-line") + svg.path(lines, class_)
 
 
+def shortened(starts: ArrayLike, ends: ArrayLike, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    """The ends (n, 2) of arrows of which none is longer than `longest` units, and which (n,) are cut to that.
+
+    >>> ends, cut = shortened([(0, 0), (0, 0)], [(3, 4), (30, 40)], 10)
+    >>> ends.tolist(), cut.tolist()
+    ([[3.0, 4.0], [6.0, 8.0]], [False, True])
+    """
+    starts, ends = np.asarray(starts, dtype=float), np.asarray(ends, dtype=float)
+    length = np.linalg.norm(ends - starts, axis=-1)
+    cut = length > longest
+    share = np.where(cut, longest / np.maximum(length, 1e-9), 1.0)
+    return starts + (ends - starts) * share[:, None], cut
+
+
 def arrows(starts: ArrayLike, ends: ArrayLike, class_: str, head: float = 6) -> str:
     """Arrows between places (n, 2) in the panel, with an edge in the colour of the paper and a head of their size."""
     starts, ends = (np.asarray(places, dtype=float).reshape(-1, 2) for places in (starts, ends))

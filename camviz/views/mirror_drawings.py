@@ -27,7 +27,8 @@ RAY_MM = 75.0
 def mirror_camera(kind: str, xi: float, rim_deg: float, shift_mm: float) -> Catadioptric:
     """The camera of a mirror that shows `rim_deg` from its axis, 40 mm in radius, as far as it can; metres.
 
-    The camera stands in the second focus, `shift_mm` farther away; before a sphere, 150 mm away.
+    The camera stands in the second focus, `shift_mm` farther away; before a sphere, 150 mm away. Raises ValueError
+    where it would stand within the mirror.
     """
     if kind == "spherical":
         whole = Catadioptric(Mirror(0.0, SPHERE_MM / 1000, 0.99 * SPHERE_MM / 1000), SPHERE_AWAY_MM / 1000)
@@ -39,7 +40,13 @@ def mirror_camera(kind: str, xi: float, rim_deg: float, shift_mm: float) -> Cata
     e = eccentricity(max(xi, LEAST_XI)) if kind == "hyperbolic" else 1.0
     edge = min(radians(rim_deg), np.arccos(-1 / e) - radians(MARGIN_DEG))
     p = RIM_MM / 1000 * (1 + e * cos(edge)) / sin(edge)
-    return Catadioptric.central(Mirror(e, p, RIM_MM / 1000)).moved(shift_mm / 1000 if e > 1 else 0.0)
+    central = Catadioptric.central(Mirror(e, p, RIM_MM / 1000))
+    if e <= 1:
+        return central
+    nearest = 1000 * (central.mirror.top - central.distance)
+    if not shift_mm > nearest:
+        raise ValueError(f"shift_mm must be above {nearest:.1f}: there the camera meets this mirror, got {shift_mm:g}")
+    return central.moved(shift_mm / 1000)
 
 
 def viewpoint(camera: Catadioptric) -> float:

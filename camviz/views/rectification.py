@@ -151,6 +151,11 @@ class RectificationView(View):
         seen = size.contains(left) & size.contains(right)
         return float(np.abs(left - right)[seen][:, 1].mean()) if seen.any() else float("nan")
 
+    def forget(self) -> None:
+        """Free what this view has worked out, and the pictures and maps of all pairs."""
+        super().forget()
+        stereo_pair.forget()
+
     # Disparities -----------------------------------------------------------------------------------------------------
 
     def disparity_map(self, *, draft: bool = False) -> np.ndarray:

@@ -20,7 +20,7 @@ _MARGIN = 0.04  # of a patch, in black between the patches
 def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarray, chosen: int) -> str:
     """The chart's 24 patches: linear sRGB above left of each diagonal, the truth below right of it, ΔE on it."""
     estimates, truths = hexadecimal(rgb), hexadecimal(to_srgb(true_xyz))
-    light = to_display(rgb).astype(float) @ (0.3, 0.6, 0.1) > 140
+    light = np.clip(rgb, 0, 1) @ (0.2126, 0.7152, 0.0722) > 0.179  # where black stands out more than white
     parts = [svg.rectangle(0, 0, panel.width, panel.height, "black", style="fill:#111")]
     for i, (estimate, truth) in enumerate(zip(estimates, truths, strict=True)):
         row, column = divmod(i, 6)
@@ -29,7 +29,7 @@ def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarra
         parts.append(svg.rectangle(left, top, right - left, bottom - top, "patch", style=f"fill:{truth}"))
         corner = [(left, top), (right, top), (left, bottom)]
         parts.append(svg.polygon(corner, "patch", style=f"fill:{estimate}"))
-        ink = "#111" if light[i] else "#fff"
+        ink = "#000" if light[i] else "#fff"
         parts.append(svg.text((left + 5, top + 16), f"{errors[i]:.1f}", "tick", style=f"fill:{ink}"))
     row, column = divmod(chosen, 6)
     corners = panel.place([(column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1)])

@@ -63,11 +63,11 @@ class Case(Evidence):
 
     def adjustment(self, *names: str) -> Adjustment:
         """The adjustment of some cameras, or of all, made once. Raises Missing."""
-        return self._once(("adjustment", *names), lambda: adjusted(self.calibration, *names))
+        return self.once(("adjustment", *names), lambda: adjusted(self.calibration, *names))
 
     def observations(self, name: str) -> Observations:
         """What a camera saw. Raises Missing."""
-        return self._once(
+        return self.once(
             ("observations", name), lambda: Observations.of(self.calibration, name, self.photographs(name))
         )
 

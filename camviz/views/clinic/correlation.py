@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import ceil
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,7 +20,8 @@ from camviz.views.base import View, choice
 from camviz.views.clinic.observations import Missing
 from camviz.views.clinic.uncertainty import adjusted, determined
 
-_FIGURES = 18  # parameters up to which the cells have room for their numbers
+_FIGURES = 10  # parameters up to which the cells have room for their numbers, also on a telephone
+_NAME = 15.0  # picture units from one name to the next: of more than 30 parameters every second one is named
 _STRONG = 0.95
 _LAYOUT = rows((590, {"correlations": 660, "numbers": 300}))
 
@@ -95,15 +97,14 @@ class CorrelationView(View):
         content = svg.image("matrix", 0, 0, side, side, style="image-rendering:pixelated")
         if n <= _FIGURES:
             places = panel.place(np.stack(np.meshgrid(np.arange(n) + 0.5, np.arange(n) + 0.5), -1)).reshape(-1, 2)
-            size = min(12.0, 0.36 * cell)
             # The cells' colours are the same in both themes, and so are the words on them.
             lightness = shades.rgba(shown)[..., :3].astype(float).reshape(-1, 3) @ (0.299, 0.587, 0.114)
             content += "".join(
                 svg.text(
-                    place + (0, 0.35 * size),
+                    place + (0, 4),
                     f"{r:.2f}" if self.show == "size only" else signed(r, 2),
-                    "label middle",
-                    style=f"font-size:{size:.1f}px;fill:{'#14181f' if light > 140 else '#ffffff'}",
+                    "tick middle",
+                    style=f"fill:{'#14181f' if light > 140 else '#ffffff'}",
                 )
                 for place, r, light in zip(places, shown.ravel(), lightness, strict=True)
                 if np.isfinite(r)
@@ -114,12 +115,12 @@ class CorrelationView(View):
         return self.tiled(_LAYOUT, parts, {"matrix": png(shades.rgba(shown)), **bar_picture})
 
     def _names(self, panel: Panel, cell: float) -> str:
-        size = f"font-size:{min(12.0, max(5.0, 0.8 * cell)):.1f}px"
         parts = []
-        for i, name in enumerate(self.names):
-            parts.append(svg.text((panel.x - 8, panel.y + (i + 0.5) * cell + 4), name, "tick end", style=size))
+        for i in range(0, len(self.names), ceil(_NAME / cell)):
+            name = self.names[i]
+            parts.append(svg.text((panel.x - 8, panel.y + (i + 0.5) * cell + 4), name, "tick end"))
             x, y = panel.x + (i + 0.5) * cell, panel.y + panel.height + 12
-            parts.append(svg.text((x, y), name, "tick end", style=size, transform=f"rotate(-55 {x:g} {y:g})"))
+            parts.append(svg.text((x, y), name, "tick end", transform=f"rotate(-55 {x:g} {y:g})"))
         return "".join(parts)
 
     def _words(self, x: float) -> str:

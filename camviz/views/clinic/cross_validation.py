@@ -149,7 +149,7 @@ class CrossValidationView(View):
         content += plot.level(panel, self.held.expected_rms, "ink dashed")
         content += plot.legend(
             panel,
-            [("blue thick", "fitted"), ("orange thick", "held out"), ("ink dashed", "held out, expected from noise")],
+            [("blue thick", "fitted"), ("orange thick", "held out"), ("ink dashed", "expected from noise")],
         )
         ticks = names_below(short_names(self.pictures, n), most=20, about=10)
         return panel.show(content, title="Corners of every view") + plot.axes(panel, "view", "RMS [px]", xticks=ticks)

@@ -21,7 +21,7 @@ from camviz.lenses.base import Array
 from camviz.views.base import Drawn, OrbitView, slider
 from camviz.views.board_poses import BoardPosesView
 from camviz.views.clinic.observations import Observations, not_at_hand, short_names
-from camviz.views.marks import arrows, cross
+from camviz.views.marks import arrows, cross, shortened
 from camviz.views.view_bars import (
     LABEL,
     NAMED,
@@ -35,6 +35,7 @@ from camviz.views.view_bars import (
 )
 
 ARROW = 26.0  # picture units that a view's 90th percentile residual is drawn long, by default
+_LONGEST = 40.0  # picture units of an arrow from a corner that was set aside
 _LAYOUT = rows(
     (206, {"errors": 960}), (378, {"picture": 480, "boards": 480}), (216, {"the board": 480, "numbers": 300})
 )
@@ -173,11 +174,10 @@ class ResidualsView(ViewChooser, OrbitView):
         starts, ends = panel.place(seen.detections[i]), panel.place(self.arrow_tips())
         content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange")
         content += svg.dots(starts[seen.used[i]], "paper-dot", 6) + svg.dots(starts[seen.used[i]], "green", 4)
-        content += arrows(starts[seen.aside[i]], ends[seen.aside[i]], "red dotted") + cross(
-            starts[seen.aside[i]], "red"
-        )
+        aside, cut = _set_aside(starts[seen.aside[i]], ends[seen.aside[i]])
         title = f"{seen.picture(i)}: residuals × {self.scale:g}"
-        return panel.show(content + missing, title=title, note="from detected to projected"), attached
+        note = "red: longer than drawn" if cut else "from detected to projected"
+        return panel.show(content + aside + missing, title=title, note=note), attached
 
     def arrow_tips(self) -> Array:
         """Where (corners, 2) the chosen view's arrows end, in pixels: `scale` times the way to the projection."""
@@ -206,9 +206,7 @@ class ResidualsView(ViewChooser, OrbitView):
         content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange") + svg.dots(
             starts[seen.used[i]], "green", 4
         )
-        content += arrows(starts[seen.aside[i]], ends[seen.aside[i]], "red dotted") + cross(
-            starts[seen.aside[i]], "red", 4
-        )
+        content += _set_aside(starts[seen.aside[i]], ends[seen.aside[i]], 4)[0]
         off = np.linalg.norm(seen.on_board[i] - corners, axis=-1)[seen.used[i]]
         note = f"typically {1000 * np.median(off):.2g} mm on the board" if off.size else ""
         return panel.show(content, title=f"The same on the board, × {self.board_scale:.3g}", note=note)
@@ -235,6 +233,12 @@ class ResidualsView(ViewChooser, OrbitView):
         return svg.text((490, 602), f"{self.observations.picture(self.index)}", "title") + readout(
             self.numbers(), (490, 628), (0, 22), (100, 0)
         )
+
+
+def _set_aside(starts: Array, ends: Array, size: float = 5) -> tuple[str, bool]:
+    """Crosses and arrows (n, 2) of corners that were set aside, whose errors know no bounds, and whether any is cut."""
+    ends, cut = shortened(starts, ends, _LONGEST)
+    return arrows(starts, ends, "red dotted") + cross(starts, "red", size), bool(cut.any())
 
 
 def bars_panel(seen: Observations, x: float = 70, y: float = 34, width: float = 870, height: float = 140) -> Panel:

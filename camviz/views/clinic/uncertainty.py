@@ -129,7 +129,9 @@ class UncertaintyView(SolvedView):
         if not known.any():
             return ""
         # Lengths by the logarithm, for they differ a hundredfold; the ratio of the axes is kept.
-        reach = (7 + 9 * np.clip(np.log10(long / np.median(long[known])) + 0.5, 0, 1)) / np.where(long > 0, long, 1)
+        reach = (7 + 9 * np.clip(np.log10(np.where(known, long, 1) / np.median(long[known])) + 0.5, 0, 1)) / np.where(
+            long > 0, long, 1
+        )
         axes = directions * np.sqrt(np.maximum(values, 0))[:, None, :] * reach[:, None, None]
         lines = panel.place(uv)[:, None] + circle(25) @ np.swapaxes(axes, 1, 2)
         return svg.path(lines[known], "paper-line", style="stroke-width:3px") + svg.path(lines[known], "ink thin")
