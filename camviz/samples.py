@@ -104,7 +104,7 @@ def chessboard_pictures(side: str = "left", count: int = 13) -> Pictures:
         raise ValueError(f"side must be 'left' or 'right', got {side!r}")
     names = tuple(name for name in REGISTRY if name.startswith(side) and name.endswith(".jpg"))[:count]
     try:
-        pictures = _Photographs(tuple(sample(name) for name in names))
+        pictures = _Packed(tuple(np.fromfile(sample(name), np.uint8) for name in names))
     except SampleUnavailable as reason:
         return _rendered(names, side, f"{reason} The virtual camera's pictures take their place.")
     credit = "Photographs from OpenCV's samples (samples/data at 4.6.0), Apache-2.0."
@@ -143,13 +143,13 @@ def _fetched(name: str) -> Path:
 
 
 @dataclass(frozen=True)
-class _Photographs(Sequence[NDArray[np.uint8]]):
-    """Photographs that are decoded when they are looked at: all of them at once would take a megabyte each."""
+class _Packed(Sequence[NDArray[np.uint8]]):
+    """Pictures that are decoded when they are looked at: all of them at once would take a megabyte each."""
 
-    paths: tuple[Path, ...]
+    files: tuple[NDArray[np.uint8], ...]  # what JPEG or PNG files hold
 
     def __len__(self) -> int:
-        return len(self.paths)
+        return len(self.files)
 
     @overload
     def __getitem__(self, index: int) -> NDArray[np.uint8]: ...
@@ -157,15 +157,17 @@ class _Photographs(Sequence[NDArray[np.uint8]]):
     def __getitem__(self, index: slice) -> Sequence[NDArray[np.uint8]]: ...
     def __getitem__(self, index: int | slice) -> NDArray[np.uint8] | Sequence[NDArray[np.uint8]]:
         if isinstance(index, slice):
-            return _Photographs(self.paths[index])
+            return _Packed(self.files[index])
         import cv2
 
-        picture: Any = cv2.imread(str(self.paths[index]), cv2.IMREAD_COLOR)
+        picture: Any = cv2.imdecode(self.files[index], cv2.IMREAD_COLOR)
         return np.ascontiguousarray(picture[..., ::-1])
 
 
 def _rendered(names: tuple[str, ...], side: str, sentence: str) -> Pictures:
     """The board of the standard scene from around it, through a lens like that of the photographs."""
+    import cv2
+
     from camviz.cameras import Camera, Intrinsics
     from camviz.lenses import BrownConrady
     from camviz.scenes import render, textured_scene, to_display
@@ -173,8 +175,9 @@ def _rendered(names: tuple[str, ...], side: str, sentence: str) -> Pictures:
 
     camera = Camera(Intrinsics(640, 480, 536, 536, 342, 236), BrownConrady(k1=-0.27, k2=-0.04, k3=0.24))
     poses = [_pose(view, 0.5 if side == "right" else -0.5) for view in range(len(names))]
-    pictures = tuple(to_display(render(textured_scene(), camera.at(pose), supersample=2)) for pose in poses)
-    return Pictures(names, pictures, SQUARE, False, sentence)
+    pictures = (to_display(render(textured_scene(), camera.at(pose), supersample=2)) for pose in poses)
+    packed = _Packed(tuple(cv2.imencode(".png", picture[..., ::-1])[1] for picture in pictures))
+    return Pictures(names, packed, SQUARE, False, sentence)
 
 
 def _pose(view: int, offset: float) -> RigidTransform:

@@ -327,6 +327,15 @@ def test_a_number_from_the_page_is_held_within_the_slider(value, held):
     assert explorer.view.size == held
 
 
+def test_a_control_goes_back_to_where_it_began_even_beyond_its_range():
+    explorer = explore(Large(size=12.0))
+    wish(explorer, values={"size": 3.0})
+    assert wish(explorer, values={"size": 12.0})["error"] == ""
+    assert explorer.view.size == 12.0
+    wish(explorer, values={"size": 12.5})
+    assert explorer.view.size == 10
+
+
 def test_a_drag_and_a_key_are_held_within_the_slider_as_well():
     explorer = explore(Large(), size=(0, 4))
     wish(explorer, drags=[["size", 0, 0, 99999, 0]])
@@ -418,3 +427,12 @@ def test_a_static_page_has_no_still_that_follows(monkeypatch, shown):
 
     asyncio.run(cell())
     assert len(shown) == 1
+
+
+def test_the_scale_of_words_is_asked_for_and_checked(monkeypatch):
+    monkeypatch.setenv("CAMVIZ_SCALE", "2")
+    assert explore(FrustumView())._scale == 2
+    for wrong in ("big", "0", "nan", "9"):
+        monkeypatch.setenv("CAMVIZ_SCALE", wrong)
+        with pytest.raises(ValueError, match=f"CAMVIZ_SCALE must be a number from 1 to 3, got '{wrong}'"):
+            explore(FrustumView())

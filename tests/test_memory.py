@@ -1,7 +1,9 @@
 """Memory that a picture needed goes back to the system."""
 
+import gc
 import subprocess
 import sys
+import weakref
 from dataclasses import fields
 
 import pytest
@@ -9,7 +11,13 @@ import pytest
 from camviz.cameras import Camera, Intrinsics
 from camviz.scenes import snapshot, textured_scene
 from camviz.scenes.scene import _kept_rays
+from camviz.views import garden_field
+from camviz.views.epipolar import EpipolarView
 from camviz.views.exposure import ExposureView
+from camviz.views.frustum import FrustumView
+from camviz.views.light_field import LightFieldView
+from camviz.views.noise import PhotonTransferView
+from camviz.views.omnidirectional import OmnidirectionalView
 from camviz.widgets import explore
 from camviz.widgets.memory import give_back
 
@@ -109,3 +117,22 @@ def test_what_a_view_has_worked_out_is_given_back_and_worked_out_again():
     give_back()
     assert not vars(view).keys() & worked_out
     assert view.figure().flow() == drawn
+
+
+@pytest.mark.parametrize("kind", [EpipolarView, FrustumView, LightFieldView, OmnidirectionalView, PhotonTransferView])
+def test_the_garden_is_given_back_while_its_views_are_shown(kind):
+    shown = explore(kind())
+    garden = weakref.ref(textured_scene())
+    give_back()
+    gc.collect()
+    assert garden() is None
+    assert shown.view.figure().flow() == shown.frame["html"]
+
+
+def test_light_fields_of_the_garden_are_taken_once_and_those_through_openings_given_back():
+    shown = explore(LightFieldView(fence=True, opening=1.0, panels="picture views"))
+    pinholes = garden_field.garden_field(True)
+    give_back()
+    assert garden_field.opened_field.cache_info().currsize == garden_field.all_views.cache_info().currsize == 0
+    assert garden_field.garden_field(fence=True) is pinholes
+    assert shown.view.figure().flow() == shown.frame["html"]

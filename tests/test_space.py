@@ -231,7 +231,7 @@ def test_an_unknown_renderer_is_refused(monkeypatch):
 
 
 def test_the_standard_scene_as_wireframe_is_small():
-    fragment, photographs = wire(scene_items(textured_scene(), "wire"))
+    fragment, photographs = wire(scene_items(textured_scene, "wire"))
     assert 5_000 < len(fragment) < 40_000
     assert not photographs
 

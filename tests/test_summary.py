@@ -1,5 +1,6 @@
 """A calibration at a glance: the verdict in one line, every number with its deviation, and what to do next."""
 
+import json
 import os
 import re
 import subprocess
@@ -15,7 +16,7 @@ from calibrations import bare, pair, sick, single
 import camviz
 from camviz.calibration.detection import Detections
 from camviz.calibration.solving import calibrate
-from camviz.clinic import inspect, kinds
+from camviz.clinic import inspect
 from camviz.clinic.summary import CORNER, GOOD, MIDDLE, RMS, Summary, measured
 from camviz.files.writing import write
 from camviz.lenses import BrownConrady
@@ -27,7 +28,8 @@ from camviz.views.clinic.uncertainty import UncertaintyView
 from camviz.widgets.inspection import CAMERA, LOOK, LiveInspection
 
 SKIPPED = (
-    "5 could not because the file holds one camera, not a pair, and because no lens here has a denominator (k4 k5 k6)"
+    "6 could not because the file holds one camera, not a pair, and because it needs another calibration (--compare) "
+    "(1 more reason below)"
 )
 
 
@@ -52,46 +54,49 @@ def changed(lens=None, **pinhole):
 
 
 def test_a_healthy_calibration_says_that_nothing_is_wrong_by_how_many_checks_and_why_not_by_more(solved):
-    assert inspect(solved).verdict == f"Nothing wrong was found; 20 checks ran, {SKIPPED}."
+    assert inspect(solved).verdict == f"Nothing wrong was found; 24 checks ran, {SKIPPED}."
 
 
 def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
     inspection = inspect(bare())
     reasons = {why for _, why in inspection.skipped}
     assert inspection.verdict.startswith(
-        "Nothing wrong was found; 9 checks ran, 16 could not because the file holds no"
+        "Nothing wrong was found; 11 checks ran, 19 could not because the file holds no"
     )
     assert inspection.verdict.endswith(f"({len(reasons) - 2} more reasons below).")
 
 
 @pytest.mark.parametrize(
-    ("calibration", "verdict", "remedy"),
+    ("calibration", "verdict", "claim"),
     [
         (
             changed(fx=1060.0),
-            "1 warning: camera: fx/fy = 1.992, as if pixels were 49.8 % narrower than high. "
-            "Likely: pictures resized by different factors in width and height.",
-            kinds()["aspect"].remedy,
+            "Most likely pictures resized by different factors in width and height: "
+            "rescale fx and cx by the width's factor, and fy and cy by the height's.",
+            "1 warning: camera: fx/fy = 1.992, as if pixels were 49.8 % narrower than high.",
         ),
         (
             changed(BrownConrady(k1=-0.3, k2=-0.5)),
-            "1 fault, 1 note: the worst, camera: 28% of the pixels have no ray of their own. "
-            "Likely: a distortion polynomial that turns back inside the image.",
-            "Fix k3 to 0 (or take fewer terms) and solve again with more views that reach the border.",
+            "Most likely a distortion polynomial that turns back inside the image: "
+            "fix k2 to 0, and solve again with more views that reach the border.",
+            "1 fault and 1 consequence: the worst, camera: 28% of the pixels have no ray of their own.",
         ),
         (
             sick(),
-            "2 warnings, 1 note: the worst, camera04.jpg: its error is 1.37 px, 9.9 times the median of all 10 views "
-            "(0.138 px). Likely: a wrong detection.",
-            "Look at that picture. Take it again or leave it out, and solve again.",
+            "Most likely a line of the board that was taken for its neighbour: "
+            "detect that picture's corners again, or leave the view out, and solve again.",
+            "1 warning, 1 note and 1 consequence: the worst, camera04.jpg: column 1 of the board is off by 3.82 px, "
+            "6 of its 6 corners by more than 1.5 px.",
         ),
     ],
 )
-def test_a_sick_calibration_says_the_worst_with_its_cause_and_what_to_do(calibration, verdict, remedy):
+def test_a_sick_calibration_says_the_likely_cause_and_what_to_do_and_then_what_shows_it(calibration, verdict, claim):
     inspection = inspect(calibration)
-    assert (inspection.verdict, inspection.next_step) == (verdict, remedy)
+    assert (inspection.verdict, inspection.next_step) == (verdict, "")
+    assert inspection.as_text().startswith(f"{verdict}\n\n")
+    assert json.loads(inspection.as_json())["verdict"] == verdict
     page = report(inspection)
-    assert page.index(escape(verdict)) < page.index(escape(remedy)) < page.index('id="findings"')
+    assert page.index(escape(verdict)) < page.index(escape(claim)) < page.index('id="findings"')
 
 
 def test_every_number_has_the_deviation_of_the_covariance(solved):
@@ -143,11 +148,11 @@ def test_pictures_that_were_skipped_count_as_given_and_rejected_ones_as_not_used
 
 def test_next_is_where_the_board_takes_most_off_and_nothing_once_the_corners_are_known(solved):
     hold = GuidanceView.of(solved).sentences()[0].removeprefix("H").removesuffix(", as in the picture on the right.")
-    assert f": h{hold} (mean uncertainty" in inspect(solved).next_step
+    assert f": h{hold}. Now, where it is worst, a far point" in inspect(solved).next_step
     sharp = single(30, 0.01)
-    assert Summary.of(sharp).uncertainty["camera"][1] < GOOD
+    assert Summary.of(sharp).largest_errors["camera"] < GOOD
     assert Summary.of(sharp).guidance.startswith(
-        "Nothing needs doing: even in its worst corner the picture is known to ±"
+        "There are enough pictures: where it is worst, a far point is expected"
     )
 
 

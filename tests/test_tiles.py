@@ -8,6 +8,7 @@ from every_view import STATES
 from camviz.draw import labels, svg
 from camviz.draw.flow import SCROLLED, WIDTH, Tile, rows
 from camviz.draw.labels import overlap, uncluttered, words_of
+from camviz.draw.plot import legend, plot_panel
 
 TELEPHONE = 259  # CSS pixels that a picture has in JupyterLab on a screen of 375
 DESK = (0.0, 0.0, 400.0, 300.0)
@@ -70,6 +71,16 @@ def test_a_label_at_the_edge_of_a_panel_moves_inside():
     panel = svg.element("svg", svg.text((380, 50), "a long label"), x=0, y=0, width=400, height=300)
     moved = words_of(uncluttered(panel, DESK), DESK)[0]
     assert moved.box[2] == pytest.approx(400)
+
+
+def test_a_legend_grows_as_a_whole_and_another_label_gives_way_to_it():
+    panel = plot_panel("plot", 0, 0, 300, 200, (0, 1), (0, 1))
+    drawn = legend(panel, [("blue", "one"), ("orange", "two")])
+    one, two = words_of(panel.show(drawn), DESK, 2.0)
+    assert (two.box[1] - one.box[1], two.box[3] - two.box[1]) == (36, pytest.approx(2 * 12 * 1.17))
+    moved = uncluttered(panel.show(drawn + svg.text((37, 20), "another")), DESK)
+    assert drawn in moved
+    assert '<text x="37" y="20"' not in moved
 
 
 def test_a_paragraph_has_more_lines_where_its_letters_are_larger():

@@ -7,8 +7,7 @@ a point that moves by d pixels from place to place is blurred over |d| pixels in
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import InitVar, dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -50,8 +49,12 @@ class Openings:
     """
 
     pinholes: LightField
-    scene: Scene
-    camera: Camera
+    scene: InitVar[Scene]
+    camera: InitVar[Camera]
+    _around: tuple[NDArray[np.uint8], NDArray[np.uint8]] = field(init=False, repr=False)
+
+    def __post_init__(self, scene: Scene, camera: Camera) -> None:
+        object.__setattr__(self, "_around", _around(self.pinholes, disparity_of_views(scene, camera, self.pinholes)))
 
     def opened(self, width: float) -> LightField:
         """The field whose views come through openings `width` (0 … 1) of the distance between places, linear light."""
@@ -75,17 +78,16 @@ class Openings:
             light += across
         return replace(self.pinholes, views=views)
 
-    @cached_property
-    def _around(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """The means, as bytes, of the views from four places beside each place, and from four diagonally."""
-        beside, across = (np.empty_like(self.pinholes.views) for _ in range(2))
-        slopes = disparity_of_views(self.scene, self.camera, self.pinholes)
-        for v, u in np.ndindex(slopes.shape[:2]):
-            view = self.pinholes.light(v, u).astype(np.float32)
-            for kept, places in ((beside, _BESIDE), (across, _ACROSS)):
-                light = sum((_seen_from(view, slopes[v, u], *place) for place in places), np.zeros_like(view))
-                kept[v, u] = to_display(light / len(places))
-        return beside, across
+
+def _around(pinholes: LightField, slopes: Floats) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """The means, as bytes, of the views from four places beside each place, and from four diagonally."""
+    beside, across = (np.empty_like(pinholes.views) for _ in range(2))
+    for v, u in np.ndindex(slopes.shape[:2]):
+        view = pinholes.light(v, u).astype(np.float32)
+        for kept, places in ((beside, _BESIDE), (across, _ACROSS)):
+            light = sum((_seen_from(view, slopes[v, u], *place) for place in places), np.zeros_like(view))
+            kept[v, u] = to_display(light / len(places))
+    return beside, across
 
 
 _BESIDE = ((0, -NODE), (0, NODE), (-NODE, 0), (NODE, 0))

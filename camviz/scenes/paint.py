@@ -163,7 +163,9 @@ def sky(width: int = 1024) -> Picture:
     picture = tinted(np.broadcast_to(np.maximum(elevation / 55, 0) ** 0.75, (height, width)), blues)
     puffs = cv2.resize(noise(width, width, 64, seed=21, octaves=6), (width, width // 2), interpolation=cv2.INTER_AREA)
     puffs = puffs[:height]
-    layers = [(np.clip(puffs - 0.7, 0, 0.85) * np.clip((elevation - 5) / 8, 0, 1), (1.0, 0.99, 0.97))]
+    # At the zenith, where the picture is pinched to a point, clouds would run together in a star.
+    open_sky = np.clip((elevation - 5) / 8, 0, 1) * np.clip((84 - elevation) / 24, 0, 1)
+    layers = [(np.clip(puffs - 0.7, 0, 0.85) * open_sky, (1.0, 0.99, 0.97))]
     ridges = noise(128, width, 128, seed=2, octaves=5)[::64]
     for ridge, rise, swing, colour in zip(ridges, (3.6, 1.9), (1.2, 0.7), ((0.62, 0.73, 0.80), HILLS), strict=True):
         layers.append((np.clip((rise + swing * ridge - elevation) / texel + 0.5, 0, 1), colour))

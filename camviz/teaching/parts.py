@@ -50,9 +50,6 @@ def pictures(cell: Cell) -> list[Shown]:
         made = _PICTURE.search("".join(data.get("text/html", "")))
         if made:
             found.append(Shown(made["source"], made["alt"]))
-        elif "image/png" in data:
-            source = "data:image/png;base64," + "".join("".join(data["image/png"]).split())
-            found.append(Shown(source, "A plot made by the lesson."))
     return found
 
 

@@ -7,6 +7,7 @@ const LATE_MS = 6000;   // silence of the kernel after which the reader is told
 const TELL_MS = 1000;   // rest after which a screen reader is told what has changed
 const SWIPE_PX = 8;     // by which a finger shows whether it means the slider or the page
 const STICKY = 0.45;    // of the window's height: larger controls would hide the picture that they change
+const SCALE = "--camviz-scale";   // of words, on the whole page; an event of that name tells of a change
 const MOST_KEYS = 100;  // waiting for a slow picture; the kernel takes no more than twice as many
 const LATE = "No answer yet. The kernel is at work on another cell, or it was restarted: then run this cell again.";
 const AGAIN = "Run this cell again (Shift + Enter).";
@@ -29,10 +30,11 @@ function render({ model, el }) {
   hidesStill.textContent = model.get("still_hidden");
   el.replaceChildren(hidesStill, root);
 
+  const told = {};      // picture units to a CSS pixel, by the name of the tile
   const say = (words) => { error.hidden = !words; error.textContent = words; };
   const ask = asker(model, root, () => say(LATE));
-  const foot = build(`<div class="camviz-foot"><button type="button" data-action="reset">Reset</button><p class="camviz-help" aria-hidden="true"></p></div>`);
-  const [reset, help] = foot.children;
+  const foot = build(`<div class="camviz-foot"><button type="button" data-action="reset">Reset</button><button type="button" data-action="scale" title="for the back row: all pictures on this page with words twice as large">Large words</button><p class="camviz-help" aria-hidden="true"></p></div>`);
+  const [reset, large, help] = foot.children;
   const hint = (words) => { said.textContent = help.textContent = words; };
   const inputs = model.get("controls").map((control) => makeControl(control, (value, draft) => {
     ask({ values: { [control.name]: value } }, draft);
@@ -41,6 +43,7 @@ function render({ model, el }) {
   reset.addEventListener("click", () => ask({ reset: true }, false));
   controls.append(foot);
   showHelp(controls, help);
+  const stopScaling = presentation(large, model.get("_scale"), () => tellUnits(picture, told, ask));
 
   const showValues = () => {
     const values = model.get("values");
@@ -63,7 +66,6 @@ function render({ model, el }) {
     showing = false;
     ask.shown();
   };
-  const told = {};      // by the name of the tile
   const watcher = new ResizeObserver(() => tellUnits(picture, told, ask));
   watcher.observe(picture);
   const refold = folding(picture);
@@ -87,6 +89,7 @@ function render({ model, el }) {
     watcher.disconnect();
     stopHands();
     stopSticking();
+    stopScaling();
     stopWatching();
     ask.stop();
     model.off("change:values", showValues);
@@ -214,15 +217,16 @@ function asker(model, root, late) {
 // for a blob's address is resolved by another process, which takes longer than all the rest of this function.
 async function swap(picture, frame) {
   let html = frame.html;
-  await Promise.all(Object.entries(frame.photographs ?? {}).map(async ([name, data]) => {
+  const loading = Object.entries(frame.photographs ?? {}).map(([name, data]) => {
     const address = dataAddress(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
     html = html.replaceAll(`"attached:${name}"`, `"${address}"`);
-    await loaded(address);
-  }));
+    return loaded(address);
+  });
+  const fresh = build(html);      // while the photographs load
+  keepKeys(fresh);
+  await Promise.all(loading);
   const held = (element) => (picture.contains(element) ? element.dataset.drag : null);
   const focused = held(document.activeElement);
-  const fresh = build(html);
-  keepKeys(fresh);
   if (picture.firstElementChild) patch(picture.firstElementChild, fresh);
   else picture.append(fresh);
   if (focused && held(document.activeElement) !== focused) {
@@ -246,12 +250,24 @@ function folding(picture) {
   return refold;
 }
 
+// The words of all pictures on the page `first` times as large (CAMVIZ_SCALE), and at the button's press twice or once.
+function presentation(button, first, resized) {
+  const page = document.documentElement, scale = () => Number(page.style.getPropertyValue(SCALE)) || 1;
+  const follow = () => { button.setAttribute("aria-pressed", String(scale() > 1)); resized(); };
+  const set = (wanted) => { page.style.setProperty(SCALE, String(wanted)); document.dispatchEvent(new Event(SCALE)); };
+  button.addEventListener("click", () => set(scale() > 1 ? 1 : 2));
+  document.addEventListener(SCALE, follow);
+  if (first > 1 && !page.style.getPropertyValue(SCALE)) set(first);
+  button.setAttribute("aria-pressed", String(scale() > 1));
+  return () => document.removeEventListener(SCALE, follow);
+}
+
 // Words are larger, in the picture's units, where a tile is shown small: the kernel is told, so that they make room.
 function tellUnits(picture, told, ask) {
-  const units = {};
+  const units = {}, scale = Number(document.documentElement.style.getPropertyValue(SCALE)) || 1;
   for (const svg of picture.querySelectorAll(".camviz-fitted")) {
     const tile = svg.parentElement, wide = svg.clientWidth;
-    const unit = wide ? Math.min(20, Math.max(1, svg.viewBox.baseVal.width / wide)) : 1;
+    const unit = wide ? Math.min(20, Math.max(1, (scale * svg.viewBox.baseVal.width) / wide)) : 1;
     const name = tile.dataset.tile;
     if (Math.abs(unit / (told[name] ?? 1) - 1) > 0.04) units[name] = told[name] = Number(unit.toFixed(2));
   }
@@ -356,10 +372,8 @@ function keepKeys(part) {
   for (const element of part.querySelectorAll("input, select, button, [tabindex]")) element.dataset.lmSuppressShortcuts = "true";
 }
 
-let count = 0;
-
 function makeControl(control, changed, hint) {
-  const id = `camviz-${++count}`;
+  const id = `camviz-${Math.random().toString(36).slice(2)}`;      // every visualizer loads this file anew: a count would repeat
   const make = control.choices.length ? makeChoice : control.low === null ? makeSwitch : makeSlider;
   const element = build(`<div class="camviz-control"><label for="${id}"></label></div>`);
   element.dataset.control = control.name;
@@ -401,9 +415,12 @@ function makeSlider(control, id, element, changed, hint) {
   const range = track.firstElementChild;
   track.style.setProperty("--first", String((first - low) / (high - low)));
   number.setAttribute("aria-label", `${label}, as a number`);
-  let shown = low, typing = false;
+  number.setAttribute("aria-invalid", "false");      // what is between two steps may be shown, and what is typed is held
+  let shown = NaN, typing = false;
   const show = (value, force) => {
+    if (value === shown && !force) return;
     range.value = shown = value;
+    range.setAttribute("aria-valuetext", written(control, value) + (control.unit && ` ${control.unit}`));
     if (!typing || force) number.value = written(control, value), (typing = false);
   };
   const commit = () => {
@@ -441,7 +458,7 @@ function makeChoice({ choices }, id, element, changed) {
   select.append(...choices.map((words) => new Option(words, words)));
   select.addEventListener("change", () => changed(select.value, false));
   element.append(select);
-  return [select, (value) => { select.value = value; }];
+  return [select, (value) => { if (select.value !== value) select.value = value; }];
 }
 
 function makeSwitch(_control, id, element, changed) {

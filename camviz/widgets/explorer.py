@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import traceback
 from collections.abc import Mapping
 from dataclasses import fields
 from importlib.resources import files
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -52,7 +54,8 @@ class Explorer(StillWidget):
 
     The browser asks for one picture at a time and always for its newest wish, so a slow picture never builds a queue.
     What it asks for is checked: numbers are held within their ranges, whatever moves them. An error in drawing is shown
-    in words above the last good picture.
+    in words above the last good picture. A button makes words twice as large for the back row; CAMVIZ_SCALE (1 to 3)
+    does so from the start.
     """
 
     _esm = (_HERE / "explorer.js").read_text(encoding="utf-8")
@@ -61,12 +64,13 @@ class Explorer(StillWidget):
     controls: traitlets.List[Any] = traitlets.List(read_only=True).tag(sync=True)
     frame: traitlets.Dict[Any, Any] = traitlets.Dict(read_only=True).tag(sync=True)
     _title = traitlets.Unicode().tag(sync=True)
+    _scale = traitlets.Float().tag(sync=True)
     values = ViewTrait().tag(sync=True)
     view = ViewTrait()
     value = ViewTrait()
 
     def __init__(self, view: View, controls: dict[str, Control]) -> None:
-        self._first, self._title = view, view.title
+        self._first, self._title, self._scale = view, view.title, _scale()
         self._units: dict[str, float] = {}  # picture units that make a CSS pixel, of each tile in the page
         self._controls = controls
         self._ranges = {**view.offered(), **controls}
@@ -188,12 +192,18 @@ class Explorer(StillWidget):
         self._units |= wish.units
         view = self._first if wish.reset else self.view
         if wish.values:
-            view = view.but(**{name: self._held(name, value) for name, value in wish.values.items()})
+            view = view.but(**{name: self._wished_value(name, value) for name, value in wish.values.items()})
         for drag in wish.drags:
             view = self._within(view.dragged(*drag), view)
         for key in wish.keys:
             view = self._within(view.pressed(*key), view)
         return view
+
+    def _wished_value(self, name: str, value: Any) -> Any:
+        """The value, held within its control's range; where the control began it may return to, even from outside."""
+        held = self._held(name, value)
+        first = getattr(self._first, name)
+        return first if value == first else held
 
     def still(self) -> dict[str, str]:
         bundle = self.view.figure()._repr_mimebundle_()
@@ -222,6 +232,18 @@ def _ranged(control: Control, limits: Any) -> Control:
         return Control(control.label, choices=tuple(limits), help=control.help)
     low, high, *step = limits
     return Control(control.label, control.unit, low, high, step[0] if step else control.step, (), control.help)
+
+
+def _scale() -> float:
+    """How many times as large as usual words are: what CAMVIZ_SCALE asks for."""
+    asked = os.environ.get("CAMVIZ_SCALE") or "1"
+    try:
+        scale = float(asked)
+    except ValueError:
+        scale = nan
+    if not 1 <= scale <= 3:
+        raise ValueError(f"CAMVIZ_SCALE must be a number from 1 to 3, got {asked!r}")
+    return scale
 
 
 def _by_hand() -> bool:

@@ -11,6 +11,7 @@ from weakref import WeakSet
 from IPython import get_ipython
 
 from camviz.scenes.scene import forget_rays
+from camviz.views import garden
 
 _c = ctypes.CDLL(None) if sys.platform == "linux" else None
 _trim, _mallopt = getattr(_c, "malloc_trim", None), getattr(_c, "mallopt", None)  # glibc's
@@ -36,6 +37,7 @@ def give_back(*_: object) -> None:
     objects are new, and keeps some 10 MB of them till then. To look takes 50 ms: cells that made little are spared.
     """
     forget_rays()
+    garden.forget()
     for holder in _holders:
         holder.forget()
     if gc.get_count()[2] >= _MANY:

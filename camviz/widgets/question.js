@@ -1,8 +1,6 @@
 // A question to commit to. The kernel sends `cards`; the page sends { question, choice } and shows the reply that comes.
 // A card that has been answered and is neither right nor wrong (`correct` is null) is closed: it takes one choice only.
 
-let views = 0;
-
 function element(tag, className, html) {
   const node = document.createElement(tag);
   if (className) node.className = className;
@@ -116,8 +114,9 @@ function lastWords(send, cleared) {
 }
 
 function render({ model, el }) {
-  const view = ++views;
-  const root = element("section", "camviz-question");
+  const view = Math.random().toString(36).slice(2); // every widget loads this file anew: a count would repeat
+  const root = element("div", "camviz-question");
+  root.setAttribute("role", "group"); // a landmark would need a name of its own
   const title = element("div", "camviz-title");
   title.textContent = model.get("title");
   root.setAttribute("aria-label", model.get("title"));

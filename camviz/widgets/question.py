@@ -69,7 +69,7 @@ class Sheet:
         return self.unanswered() if self.silent else self._page(_html)
 
     def _page(self, show: Callable[[Question], str], end: str = "") -> str:
-        head = f"<h4>{prose.inline(self.title)}</h4>{prose.to_html(self.lead)}"
+        head = f"<p><strong>{prose.inline(self.title)}</strong></p>{prose.to_html(self.lead)}"
         return f"<section>{head}{''.join(map(show, self.questions))}{end}</section>"
 
 

@@ -43,8 +43,12 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture(scope="module", params=LESSONS)
 def lesson(request: pytest.FixtureRequest, browser: Browser, address: str) -> Iterator[Notebook]:
-    """A lesson, opened and run from top to bottom; `lesson.cells` is what came out."""
+    """A lesson, opened and run from top to bottom; `lesson.cells` is what came out.
+
+    `lesson.wrong_at_first` is what axe-core found wrong with the outputs that were saved.
+    """
     notebook = Notebook(browser, address, request.param)
+    notebook.wrong_at_first = notebook.axe()
     notebook.cells = notebook.run_all()
     yield notebook
     notebook.close()

@@ -1,4 +1,4 @@
-"""A real JupyterLab in a real browser, on a copy of the lessons, that reads and writes nothing of the person's own."""
+"""A real JupyterLab or Notebook 7 in a real browser, on a copy of the lessons; nothing of the person's own is used."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.error import URLError
 from urllib.request import urlopen
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from axe_playwright_python.base import AXE_SCRIPT
+from playwright.sync_api import Browser, ElementHandle, Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -25,6 +27,11 @@ FLAGS = [
     *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
 ]
+FRONT_ENDS = {  # module, application, where a notebook opens
+    "JupyterLab": ("jupyterlab", "LabApp", "lab/tree"),
+    "Notebook 7": ("notebook", "JupyterNotebookApp", "notebooks"),
+}
+NOTEBOOKS_OWN = "Cannot read properties of undefined (reading 'schema')"  # of Notebook 7 where it opens any notebook
 QUIET = """{"@jupyterlab/apputils-extension:notification":
   {"checkForUpdates": false, "doNotDisturbMode": true, "fetchNews": "false"}}"""
 RUN_ALL = """async (limit) => {
@@ -39,30 +46,41 @@ RUN_ALL = """async (limit) => {
   const late = async () => { await hands.pause(limit); throw new Error(`still running after ${limit} ms`); };
   return Promise.race([run(), late()]);
 }"""
+AXE = """async (ours) => {
+  const kinds = { resultTypes: ["violations", "incomplete"] };
+  const { violations, incomplete } = await axe.run({ include: [[ours]] }, kinds);
+  const told = ({ id, nodes }) => nodes.map(({ html, target }) => `${id}: ${html.slice(0, 150)} at ${target}`);
+  return [...violations, ...incomplete].flatMap(told);
+}"""
+SCROLLED = "() => document.querySelector('.jp-WindowedPanel-outer').scrollTop"
 # The kernel is idle before the page has drawn its last widget.
 ALL_SHOWN = "(made) => document.querySelectorAll('.camviz-explorer').length >= made"
 
 
 @contextmanager
-def jupyterlab(folder: Path, home: Path, **environment: str) -> Iterator[str]:
-    """The address, up to a path, of a JupyterLab server that serves `folder` and keeps its files in `home`."""
+def jupyter(front_end: str, folder: Path, home: Path, **environment: str) -> Iterator[str]:
+    """The address, up to a path, of a server with that front end; it serves `folder` and keeps its files in `home`."""
+    module, app, place = FRONT_ENDS[front_end]
     (home / "app").mkdir(parents=True, exist_ok=True)
     (home / "app/overrides.json").write_text(QUIET)
     port, token = _free_port(), secrets.token_hex(16)
-    command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--expose-app-in-browser"]
+    command = [sys.executable, "-m", module, "--no-browser", "--allow-root", "--expose-app-in-browser"]
     command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0", f"--ServerApp.root_dir={folder}"]
     command += ["--ServerApp.jpserver_extensions=camviz.server=True"]  # as `camviz lab` does
-    command += [f"--IdentityProvider.token={token}", f"--LabApp.app_settings_dir={home / 'app'}"]
+    command += [f"--IdentityProvider.token={token}", f"--{app}.app_settings_dir={home / 'app'}"]
     command += ["--LabApp.extension_manager=readonly", "--ServerApp.ip=127.0.0.1"]
     log = home / "server.log"
     with log.open("w") as output:
         server = subprocess.Popen(command, env=_private(home) | environment, stdout=output, stderr=output)
     try:
         _wait_for(f"http://127.0.0.1:{port}/api", server, log)
-        yield f"http://127.0.0.1:{port}/lab/tree/{{path}}?token={token}&reset"
+        yield f"http://127.0.0.1:{port}/{place}/{{path}}?token={token}&reset"
     finally:
         server.terminate()
         server.wait(timeout=30)
+
+
+jupyterlab = partial(jupyter, "JupyterLab")
 
 
 @contextmanager
@@ -78,7 +96,7 @@ def chromium() -> Iterator[Browser]:
 
 
 class Notebook:
-    """One notebook open in JupyterLab; `options` are those of Playwright's `new_page`.
+    """One notebook open in JupyterLab or Notebook 7; `options` are those of Playwright's `new_page`.
 
     `errors` gathers what the page's JavaScript raised.
     """
@@ -99,11 +117,58 @@ class Notebook:
             explorer.evaluate("root => hands.settled(root)")
         return cells
 
+    def unreadable(self, width: int) -> list[str]:
+        """What cannot be read in the visualizers, in a window of that many CSS pixels."""
+        found = []
+        for number, explorer in enumerate(self.shown_in(width, 900), 1):
+            seen = explorer.evaluate("root => hands.unreadable(root)")
+            found += [f"{width} px, visualizer {number}: {one}" for one in seen]
+        return found
+
+    def shown_in(self, width: int, height: int) -> Iterator[ElementHandle]:
+        """Every visualizer in a window of that size, in CSS pixels, once it is in sight and has come to rest.
+
+        JupyterLab's side panel, which on a telephone would leave a notebook 50 pixels, is closed there.
+        """
+        self.page.set_viewport_size({"width": width, "height": height})
+        self.page.evaluate(f"jupyterapp.shell.{'collapse' if width < 500 else 'expand'}Left()")
+        for explorer in self.page.query_selector_all(".camviz-explorer"):
+            explorer.scroll_into_view_if_needed()
+            self.page.wait_for_timeout(300)  # until the tiles have their sizes, and the kernel is asked
+            explorer.evaluate("root => hands.settled(root)")
+            yield explorer
+
+    def swipe(self, x: float, y: float, dx: float, dy: float, moves: int = 15) -> float:
+        """Lead a finger over the page in that many moves; by how much the notebook has scrolled."""
+        before = self.page.evaluate(SCROLLED)
+        session = self.page.context.new_cdp_session(self.page)
+
+        def touch(kind: str, *points: tuple[float, float]) -> None:
+            places = [{"x": x, "y": y} for x, y in points]
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+            self.page.wait_for_timeout(16)
+
+        touch("touchStart", (x, y))
+        for i in range(1, moves + 1):
+            touch("touchMove", (x + dx * i / moves, y + dy * i / moves))
+        touch("touchEnd")
+        session.detach()
+        after: float = self.page.evaluate(SCROLLED)
+        return after - before
+
     def theme(self, name: str) -> None:
-        """Change JupyterLab's theme, as its Settings menu does."""
+        """Change the theme, as the Settings menu does."""
         self.page.evaluate("theme => jupyterapp.commands.execute('apputils:change-theme', { theme })", name)
         light = str(name == "JupyterLab Light").lower()
         self.page.wait_for_selector(f"body[data-jp-theme-light='{light}']", state="attached")
+
+    def axe(self) -> list[str]:
+        """What axe-core finds wrong, or cannot decide, in the outputs and texts of cells that are in the page now."""
+        self.page.wait_for_selector(".jp-OutputArea-output", state="attached")
+        if self.page.evaluate("() => !window.axe"):
+            self.page.evaluate(AXE_SCRIPT)
+        found: list[str] = self.page.evaluate(AXE, ".jp-OutputArea-output, .jp-RenderedMarkdown")
+        return found
 
     def close(self) -> None:
         """Close the page and its kernel."""
@@ -140,4 +205,4 @@ def _wait_for(url: str, server: subprocess.Popen[bytes], log: Path) -> None:
             time.sleep(0.2)
         else:
             return
-    raise RuntimeError(f"JupyterLab did not start:\n{log.read_text()[-4000:]}")
+    raise RuntimeError(f"Jupyter did not start:\n{log.read_text()[-4000:]}")

@@ -1,9 +1,9 @@
-"""Answers in a real JupyterLab: there again after another run, a restart, and in a notebook that was closed."""
+"""Answers in a real JupyterLab and Notebook 7: there again after a run, a restart, and in a closed notebook."""
 
 import json
 
 import pytest
-from laboratory import ROOT, Notebook, jupyterlab
+from laboratory import FRONT_ENDS, NOTEBOOKS_OWN, ROOT, Notebook, jupyter
 
 from camviz.course.questions import question
 
@@ -24,6 +24,8 @@ OPENED = """async () => {
   await hands.pause(1000);
   return context.model.dirty;
 }"""
+# The page shows a reply before the notebook has the picture that it will be saved with.
+IN_THE_NOTEBOOK = "words => JSON.stringify(jupyterapp.shell.currentWidget.context.model.toJSON()).includes(words)"
 SMALL = """(least) => [...document.querySelectorAll(
     ".camviz-choice, .camviz-question button, .camviz-question summary")]
   .filter((one) => one.offsetParent && one.getBoundingClientRect().height < least).map((one) => one.textContent)"""
@@ -48,9 +50,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-@pytest.fixture
-def address(folder):
-    with jupyterlab(folder / "lab", folder / "private") as address:
+@pytest.fixture(params=FRONT_ENDS)
+def address(request, folder):
+    with jupyter(request.param, folder / "lab", folder / "private") as address:
         yield address
 
 
@@ -92,7 +94,8 @@ def test_an_answer_is_there_again_until_one_starts_again(browser, address, folde
     assert_answered_earlier(notebook)
 
     commit(asked(notebook).locator("form"), PREDICT.answer)
-    notebook.page.wait_for_function("() => jupyterapp.shell.currentWidget.context.model.dirty")
+    asked(notebook).get_by_text("✓ Correct.").wait_for()
+    notebook.page.wait_for_function(IN_THE_NOTEBOOK, arg="✓ Correct.")
     notebook.page.evaluate("() => jupyterapp.commands.execute('docmanager:save')")
     notebook.close()
 
@@ -113,7 +116,7 @@ def test_an_answer_is_there_again_until_one_starts_again(browser, address, folde
     run(notebook)
     assert asked(notebook).locator("input:checked, .camviz-right").count() == 0
     assert asked(notebook, "Exit quiz").locator(".camviz-right, .camviz-wrong").count() == 1
-    assert notebook.errors == []
+    assert set(notebook.errors) <= {NOTEBOOKS_OWN}
     notebook.close()
 
 

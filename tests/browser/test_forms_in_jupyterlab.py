@@ -4,6 +4,7 @@ import json
 
 import pytest
 from laboratory import Notebook, jupyterlab
+from playwright.sync_api import expect
 
 from camviz.course.answers import KEPT_IN, read_answers
 from camviz.course.questions import quiz_questions
@@ -42,7 +43,10 @@ def notebook(browser, folder):
 
 
 def quiz_of(notebook, title):
-    return notebook.page.locator(f".camviz-question[aria-label='{title}']")
+    """The quiz of that title; a page that draws it anew has two of them for a moment."""
+    found = notebook.page.locator(f".camviz-question[aria-label='{title}']")
+    expect(found).to_have_count(1)
+    return found
 
 
 def choose(form, index):

@@ -29,6 +29,14 @@ def picture(explorer) -> str:
     return explorer.evaluate("root => hands.picture(root)")
 
 
+@pytest.fixture
+def window(lesson):
+    """Whatever size a test gives the lesson's window, the next test has the first one again."""
+    size = lesson.page.viewport_size
+    yield
+    lesson.page.set_viewport_size(size)
+
+
 def test_runs_from_top_to_bottom_and_shows_no_error(lesson) -> None:
     shown = [out for out in outputs(lesson.cells) if out["output_type"] == "error" or out.get("name") == "stderr"]
     assert shown == []
@@ -94,10 +102,13 @@ def test_every_control_changes_the_picture_at_both_ends_and_the_middle(lesson, t
 
 @pytest.mark.parametrize("theme", THEMES)
 def test_words_stand_out_from_what_is_behind_them(lesson, theme) -> None:
-    """Labels of controls and of questions reach a contrast of 4.5 to 1 (WCAG 2.2, 1.4.3)."""
+    """Labels of controls, of questions and in pictures reach a contrast of 4.5 to 1 (WCAG 2.2, 1.4.3)."""
     lesson.theme(THEMES[theme])
     weak = lesson.page.evaluate("selector => hands.weak(selector)", ".camviz-explorer label, .camviz-question label")
     assert weak == []
+    assert [explorer.evaluate("root => hands.weakInPicture(root)") for explorer in explorers(lesson)] == [
+        [] for _ in explorers(lesson)
+    ]
 
 
 def test_handles_follow_the_pointer(lesson) -> None:
@@ -117,6 +128,30 @@ def test_handles_follow_the_pointer(lesson) -> None:
             reset(explorer)
 
 
+@pytest.mark.parametrize("width", [375, 1440])
+def test_every_word_can_be_read_on_a_telephone_and_on_a_desk(lesson, window, width) -> None:
+    """At least 12 CSS pixels, whole, and over no other word; `benchmarks/readable.py` looks at widths between."""
+    assert lesson.unreadable(width) == []
+
+
+def test_the_controls_and_the_main_panel_fit_a_small_laptop_together(lesson, window) -> None:
+    beyond = [one.evaluate("root => hands.beyond(root)") for one in lesson.shown_in(1366, 768)]
+    assert {number: excess for number, excess in enumerate(beyond, 1) if excess > 0} == {}
+
+
+def test_a_finger_drags_every_handle_all_the_way(lesson) -> None:
+    """The page neither scrolls nor takes the finger away: of 15 moves, 15 arrive."""
+    arrived = {}
+    for number, explorer in enumerate(explorers(lesson), 1):
+        for handle in explorer.evaluate("root => hands.handles(root)"):
+            x, y = explorer.evaluate("(root, name) => hands.grip(root, name)", handle)
+            explorer.evaluate("root => hands.countMoves(root)")
+            scrolled = lesson.swipe(x, y, 30, -60)
+            arrived[number, handle] = (lesson.page.evaluate("moves"), scrolled)
+            reset(explorer)
+    assert {handle: one for handle, one in arrived.items() if one != (15, 0)} == {}
+
+
 def test_questions_answer_every_choice(lesson) -> None:
     for form in lesson.page.locator(".camviz-question form").all():
         for choice in form.locator("input[type=radio]").all():
@@ -126,6 +161,15 @@ def test_questions_answer_every_choice(lesson) -> None:
             form.locator("button").click()
             form.locator("button:disabled").wait_for(state="attached")  # the answer is in, the reply has come
             assert len(form.locator("[role=status]").inner_text()) > 20
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_axe_finds_nothing_wrong(lesson, theme) -> None:
+    """With what was saved, and with what is there when it has run: visualizers, stills, replies, tables, plots."""
+    assert lesson.wrong_at_first == []
+    lesson.theme(THEMES[theme])
+    lesson.page.add_style_tag(content="[data-camviz-still] { display: block !important }")
+    assert lesson.axe() == []
 
 
 def test_a_visualizer_obeys_the_keyboard_alone(lesson) -> None:
