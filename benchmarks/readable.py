@@ -18,18 +18,6 @@ sys.path.append(str(HERE.parent / "tests" / "browser"))
 from laboratory import ROOT, Notebook, chromium, jupyterlab  # noqa: E402
 
 
-def unreadable(lesson: Notebook, width: int) -> list[str]:
-    """What cannot be read in the lesson's visualizers in a window of that many CSS pixels."""
-    lesson.page.set_viewport_size({"width": width, "height": 900})
-    found = []
-    for number, explorer in enumerate(lesson.page.query_selector_all(".camviz-explorer"), 1):
-        explorer.scroll_into_view_if_needed()
-        lesson.page.wait_for_timeout(400)  # until the tiles have their sizes, and the kernel is asked
-        explorer.evaluate("root => hands.settled(root)")
-        found += [f"visualizer {number}: {one}" for one in explorer.evaluate("root => hands.unreadable(root)")]
-    return found
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("lessons", nargs="*", help="numbers of lessons; all of them when none is given")
@@ -44,7 +32,7 @@ def main() -> int:
                 lesson = Notebook(browser, address, name)
                 lesson.run_all()
                 for width in given.width:
-                    found = unreadable(lesson, width)
+                    found = lesson.unreadable(width)
                     total += len(found)
                     print(f"{name}, {width} px: {len(found)}", *found, sep="\n    ", flush=True)
                 lesson.close()

@@ -25,12 +25,14 @@ class NotChecked(Exception):  # noqa: N818 - it is an answer, not an error
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A calibration, another one, (width, height) of pictures by their names, and the board as it was measured."""
+    """A calibration, another one, (width, height) of pictures by their names, the board as it was measured, and
+    a distance in metres at which errors matter."""
 
     calibration: Calibration
     compare: Calibration | None = None
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     board: Board | None = None
+    at: float | None = None
     _made: dict[tuple[str, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
@@ -46,9 +48,10 @@ class Evidence:
 
         Raises ValueError where the file holds no board, no corners or no poses of these cameras.
         """
-        return self._once(("adjustment", *names), lambda: Adjustment.of(self.calibration, *names))
+        return self.once(("adjustment", *names), lambda: Adjustment.of(self.calibration, *names))
 
-    def _once(self, key: tuple[str, ...], make: Callable[[], Made]) -> Made:
+    def once(self, key: tuple[str, ...], make: Callable[[], Made]) -> Made:
+        """What is made of this evidence, by its key, made once."""
         if key not in self._made:
             self._made[key] = make()
         return cast(Made, self._made[key])

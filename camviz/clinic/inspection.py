@@ -13,16 +13,20 @@ from typing import Any, Self
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
 from camviz.clinic import words
+from camviz.clinic.apart import Apart, differences
+from camviz.clinic.causes import by_causes
 from camviz.clinic.checks import kinds
 from camviz.clinic.evidence import Evidence, NotChecked
-from camviz.clinic.registry import SEVERITIES, Finding
+from camviz.clinic.registry import Finding
 from camviz.clinic.summary import Summary
 from camviz.files import CalibrationError, load
 
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """What was found in a calibration, the worst first; what was checked; and what could not be, each with the reason.
+    """What was found in a calibration, what was checked, and what could not be, each with the reason.
+
+    The worst cause comes first, and what follows from a cause comes after it: see `camviz.clinic.causes`.
 
     `calibration` is None where the file has a fault that leaves nothing to look at.
     """
@@ -33,6 +37,8 @@ class Inspection:
     skipped: tuple[tuple[str, str], ...] = ()
     compare: Calibration | None = field(default=None, repr=False)
     source: Path | None = None  # of a file that could not be read
+    differences: tuple[Apart, ...] = ()  # by camera, from the calibration that it is compared with
+    at: float | None = None  # metres, a distance at which errors are told
 
     @classmethod
     def of(cls, evidence: Evidence) -> Self:
@@ -45,13 +51,20 @@ class Inspection:
                 checked.append(id)
             except NotChecked as missing:
                 skipped.append((id, str(missing)))
-        findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
-        return cls(evidence.calibration, tuple(findings), tuple(checked), tuple(skipped), evidence.compare)
+        return cls(
+            evidence.calibration,
+            by_causes(findings, kinds()),
+            tuple(checked),
+            tuple(skipped),
+            evidence.compare,
+            differences=tuple(differences(evidence)),
+            at=evidence.at,
+        )
 
     @property
     def healthy(self) -> bool:
         """True where nothing worse than a note was found."""
-        return all(finding.severity == "note" for finding in self.findings)
+        return words.worst_of(self.findings) is None
 
     def as_json(self) -> str:
         """For programs: cameras, findings, checked, skipped, as docs/clinic.md has them."""
@@ -61,7 +74,10 @@ class Inspection:
         """What `as_json` writes, as dicts and lists."""
         cameras = self.calibration.cameras if self.calibration else {}
         return {
+            "verdict": self.verdict,
+            **({"differences": [asdict(each) for each in self.differences]} if self.compare else {}),
             "cameras": [self._camera(name, camera) for name, camera in cameras.items()],
+            "task": [asdict(each) for each in self.summary.task] if self.summary else [],
             "findings": [words.tree(finding) for finding in self.findings],
             "checked": list(self.checked),
             "skipped": [{"id": id, "why": why} for id, why in self.skipped],
@@ -78,25 +94,23 @@ class Inspection:
     @cached_property
     def summary(self) -> Summary | None:
         """The calibration at a glance; None where there is nothing to look at."""
-        return None if self.calibration is None else Summary.of(self.calibration)
+        return None if self.calibration is None else Summary.of(self.calibration, self.at)
 
     @property
     def verdict(self) -> str:
-        """One line: the worst finding with its likely cause, or that nothing wrong was found and by how many checks."""
+        """One sentence: the most likely cause and what to do now; or nothing wrong was found, by how many checks."""
         return words.verdict(self.findings, self.checked, self.skipped)
 
     @property
     def next_step(self) -> str:
-        """What to do: the worst finding's remedy, else where to hold the board next, or why nothing needs doing."""
-        worst = words.worst_of(self.findings)
-        if worst is not None:
-            return worst.remedy
-        return self.summary.guidance if self.summary else ""
+        """Where nothing is wrong: where to hold the board next, or why nothing needs doing. Else nothing."""
+        return self.summary.guidance if self.healthy and self.summary else ""
 
     def as_text(self) -> str:
         """For people: the findings or that there are none, the calibration at a glance, and what was checked."""
         glance = tuple(self.summary.lines()) if self.summary else ()
-        return words.text(self.findings, self.checked, self.skipped, self.next_step, glance)
+        said = words.text(self.findings, self.checked, self.skipped, self.next_step, glance)
+        return "".join(f"{each.sentence}\n" for each in self.differences) + "\n" * bool(self.differences) + said
 
     def __str__(self) -> str:
         return self.as_text()
@@ -108,13 +122,15 @@ def inspect(
     compare: Calibration | None = None,
     pictures: Mapping[str, tuple[int, int]] | None = None,
     board: Board | None = None,
+    at: float | None = None,
 ) -> Inspection:
     """What is wrong with a calibration.
 
     `compare` is another calibration of the same cameras. `pictures` are the sizes (width, height) of pictures by
     their names that the calibration is meant for. `board` is the board as it was measured, where that is known.
+    `at` is a distance in metres at which the error of a place is told.
     """
-    return Inspection.of(Evidence(calibration, compare, pictures or {}, board))
+    return Inspection.of(Evidence(calibration, compare, pictures or {}, board, at))
 
 
 def inspect_file(
@@ -124,6 +140,7 @@ def inspect_file(
     compare: Calibration | None = None,
     pictures: Mapping[str, tuple[int, int]] | None = None,
     board: Board | None = None,
+    at: float | None = None,
     prepare: Callable[[Calibration], Calibration] | None = None,
 ) -> Inspection:
     """What is wrong with a calibration file, also with one that every other command refuses.
@@ -141,4 +158,4 @@ def inspect_file(
         skipped = tuple((id, why) for id in kinds() if id != error.id)
         return Inspection(None, (finding,), (error.id,), skipped, source=Path(path))
     calibration = prepare(calibration) if prepare else calibration
-    return inspect(calibration, compare=compare, pictures=pictures, board=board)
+    return inspect(calibration, compare=compare, pictures=pictures, board=board, at=at)

@@ -85,6 +85,8 @@ class Explained:
     values: Array
     sigmas: Array
     part: float  # RMS of what they explain beyond noise's share, over the scatter
+    pixels: float = 0.0  # the same as RMS distance
+    most: float = 0.0  # pixels, what they explain of a single corner
 
 
 def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> Explained:
@@ -105,15 +107,12 @@ def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> 
     F = fallen / count / variance
     part = float(np.sqrt(max(fallen - count * variance, 0) / adjustment.measurements / variance))
     sigmas = np.sqrt(variance) * np.linalg.norm(into, axis=1) / scale
-    return Explained(count, F, float(fdtrc(count, freedom, max(F, 0.0))), into @ along / scale, sigmas, part)
-
-
-def unexplained(adjustment: Adjustment, name: str, *also: Array) -> tuple[Array, Array, Mask]:
-    """Residuals (v, corners, 2) without what `also` explains, ∂pixel/∂pose (v, corners, 2, 6), and which count."""
-    used = adjustment.used[name][adjustment.posed]
-    residuals = np.zeros((*used.shape, 2))
-    residuals[used] = _projected(adjustment, name, also[-1], also)[0].reshape(-1, 2)
-    return residuals, adjustment.jacobian(name)[1], used
+    chance, most = (
+        float(fdtrc(count, freedom, max(F, 0.0))),
+        np.linalg.norm((axes @ along).reshape(-1, 2), axis=1).max(),
+    )
+    pixels = part * float(np.sqrt(2 * variance))
+    return Explained(count, F, chance, into @ along / scale, sigmas, part, pixels, float(most))
 
 
 def _projected(

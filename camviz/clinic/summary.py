@@ -12,10 +12,11 @@ import numpy as np
 
 from camviz.calibration.guidance import instruction, next_board_poses
 from camviz.calibration.types import Calibration
-from camviz.calibration.uncertainty import projection_uncertainty
+from camviz.calibration.uncertainty import largest_expected_error, projection_uncertainty
 from camviz.clinic.evidence import Evidence
+from camviz.clinic.task import TaskError, task_errors
 
-GOOD = 1.0  # pixels: where every corner of the picture is known this well, no more pictures are asked for
+GOOD = 1.0  # pixels: where the largest expected error is below this, no more pictures are asked for (AprilCal's limit)
 UNKNOWN = "not in the file"
 MOST_CAMERAS = 4
 RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
@@ -27,11 +28,13 @@ class Summary:
     """What an engineer asks of a calibration first, in words and numbers without markup."""
 
     evidence: Evidence
+    at: float | None = None  # metres, a distance at which errors are told too
+    goal: float = GOOD
 
     @classmethod
-    def of(cls, calibration: Calibration) -> Summary:
+    def of(cls, calibration: Calibration, at: float | None = None, goal: float = GOOD) -> Summary:
         """The summary of a calibration by itself."""
-        return cls(Evidence(calibration))
+        return cls(Evidence(calibration), at, goal)
 
     @property
     def calibration(self) -> Calibration:
@@ -94,6 +97,17 @@ class Summary:
             return None
         return (float(middle), float(np.max(corners))) if np.isfinite(middle) else None
 
+    @cached_property
+    def task(self) -> tuple[TaskError, ...]:
+        """What the first cameras, and each pair, are worth to a task."""
+        return task_errors(self.evidence, self.at, self.names)
+
+    @cached_property
+    def largest_errors(self) -> dict[str, float]:
+        """By camera, the largest expected error of a far point in pixels (Max ERE), where the corners determine it."""
+        known = [name for name, sigmas in self.uncertainty.items() if sigmas]
+        return {name: largest_expected_error(self.evidence.adjustment(name), name) for name in known}
+
     def table(self) -> dict[str, dict[str, str]]:
         """By camera: every number with its ± σ, the RMS and the uncertainty of projection, as text."""
         return {name: dict(self._rows(name)) for name in self.names}
@@ -121,27 +135,27 @@ class Summary:
             pinhole = ", ".join(f"{key} = {rows[key]}" for key in ("fx", "fy", "cx", "cy"))
             others = "; ".join(f"{key} {rows[key]}" for key in (RMS, MIDDLE, CORNER) if rows[key] != UNKNOWN)
             yield f"{name}: {pinhole} px{'; ' * bool(others)}{others}."
+        for each in self.task:
+            yield each.sentence
 
     @cached_property
     def guidance(self) -> str:
-        """Where to hold the board next, or why nothing needs doing; of the camera that is known worst."""
-        known = self.uncertainty.items()
-        corners = {name: np.nan_to_num(sigmas[1], nan=np.inf) for name, sigmas in known if sigmas}
-        if not corners:
+        """Whether there are enough pictures, else where to hold the board next; of the camera that is known worst."""
+        if not self.largest_errors:
             return "Nothing needs doing that this file could tell: it lacks the corners, which camviz calibrate keeps."
-        name = max(corners, key=lambda each: corners[each])
-        known_to = _pixels(corners[name])
-        if corners[name] <= GOOD:
-            return f"Nothing needs doing: even in its worst corner the picture is known to {known_to}."
+        name = max(self.largest_errors, key=lambda each: self.largest_errors[each])
+        largest, of = self.largest_errors[name], "" if len(self.names) == 1 else f" of {name}"
+        said = f"where it is worst{of}, a far point is expected to be {largest:.2g} px off (Max ERE)"
+        if largest <= self.goal:
+            return f"There are enough pictures: {said}, within the goal of {self.goal:g} px."
         try:
             best = next_board_poses(self.evidence.adjustment(name), camera=name)[0]
         except (ValueError, np.linalg.LinAlgError):  # no pose shows the whole board
-            return f"Take more pictures with the board near the corners, the worst of which is known to {known_to}."
+            return f"Take more pictures with the board near the corners: {said}, and the goal is {self.goal:g} px."
         hold = instruction(self.evidence.adjustment(name), best, name)
-        of = "" if len(self.names) == 1 else f" of {name}"
         return (
-            f"The worst corner{of} is known to {known_to}; to know it better take one picture more: {hold} (mean "
-            f"uncertainty {best.before:.2g} px → {best.after:.2g} px)."
+            f"Take one picture more: {hold}. Now, {said}, and the goal is {self.goal:g} px; that picture would take "
+            f"the mean uncertainty from {best.before:.2g} px to {best.after:.2g} px."
         )
 
 

@@ -9,7 +9,9 @@ from typing import Any
 
 from camviz.clinic.registry import SEVERITIES, Finding
 
-JSON_KEYS = ("id", "severity", "sentence", "value", "unit", "camera", "view", "causes", "remedy")
+JSON_KEYS = (
+    *("id", "severity", "sentence", "value", "unit", "camera", "view", "causes", "remedy", "consequence_of", "count"),
+)
 MARKS = {"fault": "✗", "warning": "!", "note": "·"}
 
 
@@ -24,21 +26,41 @@ def number(finding: Finding) -> str:
 
 
 def advice(finding: Finding) -> dict[str, str]:
-    """What it comes from and what to do, each under its label."""
+    """What it comes from and what to do, each under its label; of a consequence nothing, for its cause has said it."""
+    if finding.consequence_of:
+        return {}
     causes = f"{'; '.join(finding.causes)}." if finding.causes else ""
     return {label: said for label, said in (("likely", causes), ("remedy", finding.remedy)) if said}
 
 
+def groups(findings: Sequence[Finding]) -> Iterator[tuple[Finding, list[Finding]]]:
+    """Every cause with its consequences, which come after it."""
+    told: list[tuple[Finding, list[Finding]]] = []
+    for finding in findings:
+        if finding.consequence_of and told:
+            told[-1][1].append(finding)
+        else:
+            told.append((finding, []))
+    return iter(told)
+
+
 def verdict(findings: Sequence[Finding], checked: Sequence[str], skipped: Sequence[tuple[str, str]]) -> str:
-    """One line: the worst finding with its likely cause, or that nothing wrong was found and by how many checks."""
-    counts = counted(findings)
+    """One sentence: the most likely cause and what to do now; or nothing wrong was found, by how many checks."""
     worst = worst_of(findings)
     if worst is None:
-        below = f", {counts} below" if findings else ""
+        below = f", {counted(findings)} below" if findings else ""
         return f"Nothing wrong was found{below}; {len(checked)} checks ran{_lacking(skipped)}."
-    cause = f" Likely: {worst.causes[0]}." if worst.causes else ""
-    claim = worst.sentence.split(". ")[0].removesuffix(".")
-    return f"{counts}: {'the worst, ' * (len(findings) > 1)}{claim}.{cause}"
+    do = worst.remedy.split(". ")[0].removesuffix(".")
+    return f"Most likely {worst.causes[0]}: {do[0].lower()}{do[1:]}."
+
+
+def claim(findings: Sequence[Finding]) -> str:
+    """How many findings there are, and what the worst says; empty where nothing is worse than a note."""
+    worst = worst_of(findings)
+    if worst is None:
+        return ""
+    said = worst.sentence.split(". ")[0].removesuffix(".")
+    return f"{counted(findings)}: {'the worst, ' * (len(findings) > 1)}{said}."
 
 
 def worst_of(findings: Sequence[Finding]) -> Finding | None:
@@ -59,11 +81,12 @@ def _lacking(skipped: Sequence[tuple[str, str]]) -> str:
 
 
 def counted(findings: Sequence[Finding]) -> str:
-    """How many findings there are of each severity, such as "1 fault, 2 notes"."""
-    rated = [finding.severity for finding in findings]
+    """How many causes there are of each severity, and their consequences: "1 fault, 2 notes; 3 consequences"."""
+    rated = [finding.severity for finding in findings if not finding.consequence_of]
     counts = {severity: rated.count(severity) for severity in SEVERITIES}
     told = ", ".join(f"{count} {severity}{'s' * (count != 1)}" for severity, count in counts.items() if count)
-    return told
+    follow = len(findings) - len(rated)
+    return told + (f" and {follow} consequence{'s' * (follow != 1)}" if follow else "")
 
 
 def made(checked: Sequence[str], skipped: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -83,16 +106,15 @@ def text(
     then: str = "",
     glance: Sequence[str] = (),
 ) -> str:
-    """The findings, each with its advice below it, a `glance` at the calibration in lines, and what was checked.
-
-    Where nothing is wrong the verdict comes first, with what to do `then`.
+    """The verdict, the findings with their advice and consequences below them, a `glance` at the calibration in lines,
+    and what was checked. Where nothing is wrong the verdict is followed by what to do `then`.
     """
-    lines = []
-    if worst_of(findings) is None:
-        lines += [verdict(findings, checked, skipped), *([f"Next: {then}"] if then else []), ""]
-    for finding in findings:
-        lines.append(f"{heading(finding)} {finding.id}: {finding.sentence}")
-        lines += [*(f"    {label}: {said}" for label, said in advice(finding).items()), ""]
+    lines = [verdict(findings, checked, skipped), *([f"Next: {then}"] if then else []), ""]
+    for cause, consequences in groups(findings):
+        lines.append(f"{heading(cause)} {cause.id}: {cause.sentence}")
+        lines += [f"    {label}: {said}" for label, said in advice(cause).items()]
+        lines += [f"    → {heading(each)} {each.id}: {each.sentence}" for each in consequences]
+        lines.append("")
     return "\n".join([*lines, *glance, *([""] if glance else []), *made(checked, skipped)])
 
 

@@ -114,7 +114,7 @@ def lesson_map(lessons: Iterable[Lesson]) -> str:
         for one in lessons
         if one.number != BEGINNING
     ]
-    return "\n".join(["| | Lesson | The question | Minutes |", "|---|---|---|---|", *rows])
+    return "\n".join(["| No. | Lesson | The question | Minutes |", "|---|---|---|---|", *rows])
 
 
 def with_table(page: str, table: str) -> str:

@@ -15,14 +15,19 @@ import numpy as np
 
 from camviz.course.checks import Exercise, Verdict, hint, judge
 from camviz.course.material import material, module
+from camviz.course.plots import tell_plots
 
 
 class Tutor:
-    """Checks exercises for one notebook and remembers how often each was tried, so that its hints grow stronger."""
+    """Checks exercises for one notebook and remembers how often each was tried, so that its hints grow stronger.
+
+    It is what every lesson begins with: from then on the notebook's plots are shown with words (camviz.course.plots).
+    """
 
     def __init__(self, rng: np.random.Generator | None = None) -> None:
         self._rng = np.random.default_rng() if rng is None else rng
         self._tries: dict[str, int] = {}
+        tell_plots()
 
     def __call__(self, name: str, function: Any) -> Verdict:
         """The verdict on a reader's function for the exercise `name`, such as "05.distort"."""

@@ -16,13 +16,15 @@ _HEALTHY = "#00785a"
 
 
 def verdict_html(inspection: Inspection) -> str:
-    """What is wrong in one line, what to do in another, and the calibration at a glance."""
+    """The likely cause and what to do in one line, what shows it in another, and the calibration at a glance."""
     worst = words.worst_of(inspection.findings)
     colour = _COLOURS[worst.severity] if worst else _HEALTHY
     said = f'<p class="verdict" style="border-left:5px solid {colour};padding-left:.9em">'
     said += f"<strong>{escape(inspection.verdict)}</strong>"
+    said += f"<br>{escape(words.claim(inspection.findings))}" if worst else ""
     said += f"<br><b>Next:</b> {escape(inspection.next_step)}" if inspection.next_step else ""
-    return said + "</p>" + (glance_html(inspection.summary) if inspection.summary else "")
+    compared = "".join(f"<p>{escape(each.sentence)}</p>" for each in inspection.differences)
+    return compared + said + "</p>" + (glance_html(inspection.summary) if inspection.summary else "")
 
 
 def glance_html(summary: Summary) -> str:
@@ -39,31 +41,38 @@ def glance_html(summary: Summary) -> str:
     )
     more = len(summary.evidence.cameras) - len(table)
     few = f"<p>The first {len(table)} of {len(table) + more} cameras.</p>" if more else ""
+    task = "".join(f"<p>{escape(each.sentence)}</p>" for each in summary.task)
     notes = "".join(f'<p class="note">{escape(note)}</p>' for note in summary.calibration.notes)
     return (
         f'<p class="origin">{escape(" · ".join(summary.origin))}</p><div class="scroll" style="overflow-x:auto">'
-        f'<table class="glance"><tr><td></td>{head}</tr>{body}</table></div>{few}<p>{LEGEND}</p>{notes}'
+        f'<table class="glance"><tr><td></td>{head}</tr>{body}</table></div>{few}<p>{LEGEND}</p>{task}{notes}'
     )
 
 
 def findings_html(inspection: Inspection, see: Callable[[Finding], str] | None = None) -> str:
     """The findings and, folded away, what was checked; `see` says as HTML where a finding is shown."""
-    items = "".join(_item(finding, see(finding) if see else _view(finding)) for finding in inspection.findings)
+    where = see or _view
+    items = "".join(
+        _item(cause, where, "".join(_item(each, where) for each in consequences))
+        for cause, consequences in words.groups(inspection.findings)
+    )
     listed = f'<ol class="findings" style="list-style:none;padding:0">{items}</ol>' if items else ""
     checks = "".join(f"<li>{escape(said)}</li>" for said in words.made(inspection.checked, inspection.skipped))
     counted = f"{len(inspection.checked)} checks made, {len(inspection.skipped)} not"
     return f"{listed}<details><summary>{counted}</summary><ul>{checks}</ul></details>"
 
 
-def _item(finding: Finding, where: str) -> str:
+def _item(finding: Finding, where: Callable[[Finding], str], consequences: str = "") -> str:
     number = words.number(finding)
     shown = f' (<data value="{finding.value!r}">{escape(number)}</data>)' if number else ""
     advice = "".join(f"<br><i>{label}</i>: {escape(said)}" for label, said in words.advice(finding).items())
+    below = f'<ol class="consequences" style="list-style:none;margin-top:.5em">{consequences}</ol>'
     colour = _COLOURS[finding.severity]
     return (
         f'<li class="{finding.severity}" style="border-left:5px solid {colour};padding-left:.9em;margin:0 0 1em">'
         f"<strong>{words.heading(finding)}</strong> <code>{escape(finding.id)}</code>: "
-        f"{escape(finding.sentence)}{shown} {where}{advice}</li>"
+        f"{escape(finding.sentence)}{shown} {where(finding)}{advice}"
+        f"{'<br><i>it explains</i>:' + below if consequences else ''}</li>"
     )
 
 
