@@ -4,7 +4,9 @@ import inspect
 import os
 import re
 import textwrap
+from base64 import b64decode
 from pathlib import Path
+from xml.etree import ElementTree
 
 import nbformat
 import pytest
@@ -263,7 +265,7 @@ def test_refreshing_runs_a_lesson_with_static_outputs_twice_alike(tmp_path):
     first = path.read_text(encoding="utf-8")
     notebook = notebooks.read(path)
     assert saved_outputs.is_fresh(notebook)
-    assert notebook.cells[1].outputs[0].text == "1 wire\n"
+    assert notebook.cells[1].outputs[0].text == "1 solid\n"
     assert set(notebook.cells[2].outputs[0].data) == {"text/plain", "text/html"}
     assert '<a id="fold"></a>' in notebook.cells[3].source
     saved_outputs.refresh(path)
@@ -337,3 +339,9 @@ def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
     assert saved_outputs.is_fresh(notebook)
     assert "application/vnd.jupyter.widget-view+json" not in path.read_text(encoding="utf-8")
     assert "pictures take their place" not in path.read_text(encoding="utf-8")  # saved with the real photographs
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    shown = "".join(output.get("data", {}).get("text/html", "") for output in outputs)
+    images = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', shown)
+    assert images
+    for image in images:
+        ElementTree.fromstring(b64decode(image))  # a browser shows nothing of an image that is not well-formed

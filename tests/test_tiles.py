@@ -1,6 +1,9 @@
 """Pictures flow: on a telephone as on a desk, no two words of a view stand over each other and none is cut off."""
 
+import re
+from base64 import b64decode
 from itertools import combinations
+from xml.etree import ElementTree
 
 import pytest
 from every_view import STATES
@@ -58,6 +61,16 @@ def test_the_tiles_of_a_row_fill_it_and_none_covers_another(name):
     assert max(x + width for x, _, width, _ in cells) <= WIDTH
     boxes = [(x, y, x + width, y + height) for x, y, width, height in cells]
     assert [pair for pair in combinations(boxes, 2) if overlap(*pair)] == []
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_every_image_of_a_still_is_a_whole_document(name):
+    """Browsers show nothing of an SVG image that is not well-formed XML, and say nothing."""
+    picture = STATES[name]().figure()
+    images = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', picture.figure())
+    assert len(images) == sum(not tile.words for tile in picture.tiles)
+    for image in images:
+        assert ElementTree.fromstring(b64decode(image)).tag == "{http://www.w3.org/2000/svg}svg"
 
 
 def test_a_tick_gives_way_to_a_title_and_a_label_moves_beside_another():

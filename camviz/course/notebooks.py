@@ -46,7 +46,7 @@ def write(notebook: Notebook, path: Path) -> None:
 
 
 def execute(notebook: Notebook, folder: Path) -> None:
-    """Runs a notebook in `folder`, with static, wireframe outputs, which it then holds.
+    """Runs a notebook in `folder` with static outputs, solid where OpenGL works, which it then holds.
 
     Raises nbclient's CellExecutionError when a cell does, CellTimeoutError or DeadKernelError when one does not end.
     """
@@ -61,7 +61,7 @@ def execute(notebook: Notebook, folder: Path) -> None:
         resources={"metadata": {"path": str(folder)}},
     )
     package = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    client.execute(env={**os.environ, "PYTHONPATH": package, "CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "wire"})
+    client.execute(env={**os.environ, "PYTHONPATH": package, "CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "solid"})
 
 
 # What is in a lesson ------------------------------------------------------------------------------------------------

@@ -28,9 +28,10 @@ _RANDOM_ID = re.compile(r"[0-9a-f]{8}")
 
 
 def refresh(path: Path) -> None:
-    """Runs a lesson with static, wireframe outputs and saves it so that the same lesson gives the same file.
+    """Runs a lesson with static outputs and saves it so that the same lesson gives the same file.
 
-    Raises nbclient's CellExecutionError when a cell does; the file is left alone then.
+    Pictures in space are solid where OpenGL works, wireframes elsewhere. Raises nbclient's CellExecutionError when a
+    cell does; the file is left alone then.
     """
     notebook = read(path)
     for cell in tagged(notebook, "glossary"):

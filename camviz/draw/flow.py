@@ -15,6 +15,7 @@ from camviz.draw import labels, svg
 WIDTH = 960  # picture units, of every row
 FLOW_WIDTH = "max(800px,138vh)"  # of a picture, so that its main panel and the controls fit a screen together
 _PRESENTED = "var(--camviz-scale,1)*"  # how much larger a presentation shows everything
+STILL = 1.2  # picture units that make a CSS pixel in a still, which is drawn once for columns of 650 to 1000 pixels
 SCROLLED = 620  # picture units: a wider tile is scrolled sideways on a telephone
 
 Cell = tuple[float, float, float, float]
@@ -57,13 +58,17 @@ class Tile:
         shrink to less than 0.72 of its size, and grows to half as much again; words alone keep their size more closely.
         `scaled` is a factor of these sizes, as CSS with its "*".
         """
-        width = self.cell[2]
-        least, most = (0.72, 1.5) if "data-panel" in self.body else (0.92, 1.15)
+        width, (least, most) = self.cell[2], self._sizes
         share = 100 * width / WIDTH
         return (
             f"--w:{width:g};flex:{width:g} 1 max({scaled}{least * width:g}px,{0.97 * share:.4g}%);min-width:0;"
             f"max-width:max({scaled}{most * width:g}px,{share:.4g}%)"
         )
+
+    @property
+    def _sizes(self) -> tuple[float, float]:
+        """The least and the greatest size among others, as parts of its own."""
+        return (0.72, 1.5) if "data-panel" in self.body else (0.92, 1.15)
 
     def html(self, unit: float = 1.0) -> str:
         """The tile as an element of a page that has `flow.css`; `unit` is how many picture units make a CSS pixel."""
@@ -75,16 +80,23 @@ class Tile:
         fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
         return f'<div class="{kind}" data-tile="{name}" style="{self.style(_PRESENTED)}">{fold}{self._svg(unit)}</div>'
 
+    def image(self, source: str, words: str) -> str:
+        """The tile as an image among others that flow on a page without a style sheet; `words` say what it shows."""
+        if self.cell[2] <= SCROLLED:
+            return f'<img alt="{escape(words)}" style="{self.style()}" src="{source}">'
+        image = f'<img alt="{escape(words)}" style="width:100%;min-width:560px" src="{source}">'
+        return f'<div style="{self.style()};overflow-x:auto">{image}</div>'
+
     @property
     def sentences(self) -> str:
         """The words as HTML, a paragraph a line."""
         return "".join(f'<p style="margin:2px 20px">{escape(line)}</p>' for line in self.words.splitlines())
 
     def document(self, sheet: str) -> str:
-        """The tile as an SVG document with a style sheet."""
+        """The tile as an SVG document with a style sheet, its words clear of each other in the columns of `STILL`."""
         _, _, width, height = self.cell
         size = f'width="{width:g}" height="{height:g}" style="--w:{width:g};--shown:100vw" '
-        return self._svg(1.0, sheet).replace("<svg ", f"<svg {size}", 1)
+        return self._svg(min(STILL, 1 / self._sizes[0]), sheet).replace("<svg ", f"<svg {size}", 1)
 
     def _svg(self, unit: float, sheet: str = "") -> str:
         box = " ".join(f"{value:g}" for value in self.cell)

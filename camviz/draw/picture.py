@@ -99,7 +99,7 @@ class Picture:
         images = "".join(
             f'<div style="flex:1 1 100%">{tile.sentences}</div>'
             if tile.words
-            else f'<img alt="{escape(words)}" style="{tile.style()}" src="{self._alone(tile)}">'
+            else tile.image(self._alone(tile), words)
             for tile, words in zip(self.tiles, alternatives, strict=True)
         )
         return f'<figure style="margin:0;display:flex;flex-wrap:wrap;max-width:{FLOW_WIDTH}">{images}</figure>'

@@ -73,3 +73,14 @@ def test_cairosvg_chromium_and_the_notebook_agree(page: Page, name: str, tmp_pat
     in_notebook = in_chromium(page, picture.standalone(), picture)
     assert apart(by_cairo, by_chromium) <= MOST
     assert apart(in_notebook, by_chromium) <= MOST
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_every_image_of_a_still_is_drawn(page: Page, name: str):
+    """On a telephone and on a desk; an image that Chromium cannot read is 0 pixels wide."""
+    for width in (375, 1440):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.set_content(figure(name).figure())
+        images = page.locator("img")
+        assert images.count() > 0
+        assert min(images.evaluate_all("images => images.map(image => image.naturalWidth)")) > 100
