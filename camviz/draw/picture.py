@@ -97,9 +97,7 @@ class Picture:
         """An HTML figure whose tiles flow, each an image; the first has the whole alternative text."""
         alternatives = [f"{self.title}. {self.description}", *(tile.name for tile in self.tiles[1:])]
         images = "".join(
-            f'<div style="flex:1 1 100%">{tile.sentences}</div>'
-            if tile.words
-            else tile.image(self._alone(tile), words)
+            f'<div style="flex:1 1 100%">{tile.sentences}</div>' if tile.words else tile.image(self._alone(tile), words)
             for tile, words in zip(self.tiles, alternatives, strict=True)
         )
         return f'<figure style="margin:0;display:flex;flex-wrap:wrap;max-width:{FLOW_WIDTH}">{images}</figure>'
