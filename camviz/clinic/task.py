@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -111,9 +111,12 @@ def _of_pair(adjustment: Adjustment, left: str, right: str) -> TaskError:
 
 
 def length(metres: float) -> str:
-    """A length to two digits, in the unit that suits it.
+    """A length to two digits, in the unit that suits it; "unknown" where it is not finite.
 
-    >>> length(0.00042), length(0.0467), length(0.776), length(12.345)
-    ('0.42 mm', '47 mm', '0.78 m', '12 m')
+    >>> length(0.00042), length(0.0467), length(0.776), length(123.45), length(float("inf"))
+    ('0.42 mm', '47 mm', '0.78 m', '120 m', 'unknown')
     """
-    return f"{metres:.2g} m" if metres >= 0.1 else f"{1000 * metres:.2g} mm"
+    if not isfinite(metres):
+        return "unknown"
+    value, unit = (metres, "m") if metres >= 0.1 else (1000 * metres, "mm")
+    return f"{float(f'{value:.2g}'):g} {unit}"

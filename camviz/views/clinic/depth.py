@@ -10,6 +10,7 @@ import numpy as np
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.stereo_depth import DepthUncertainty, depth_uncertainty
 from camviz.cameras import transform
+from camviz.clinic.task import length
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
 from camviz.draw.picture import Picture
@@ -72,7 +73,7 @@ class DepthErrorView(View):
         depths = np.array([1.0, self.farthest / 2, self.farthest])
         found = self.uncertainty(depths)
         told = "; ".join(
-            f"at {z:g} m ±{_metres(t)} (calibration {_metres(c)}, matching {_metres(m)})"
+            f"at {z:g} m ±{length(t)} (calibration {length(c)}, matching {length(m)})"
             for z, c, m, t in zip(depths, found.from_calibration, found.from_matching, found.total, strict=True)
         )
         return f"Baseline {self.baseline:.4g} m, matching ±{self.matching:g} px: {told}."
@@ -102,9 +103,3 @@ class DepthErrorView(View):
         )
         body = plot.plotted(panel, content, *names, title=f"{' and '.join(self.names)}, middle of the picture")
         return self.tiled(_LAYOUT, {"depth error": body, "in words": svg.paragraph((690, 50), words, 255)})
-
-
-def _metres(value: float) -> str:
-    if not np.isfinite(value):
-        return "unknown"
-    return f"{value:.2g} m" if value >= 0.5 else f"{100 * value:.2g} cm" if value >= 0.01 else f"{1000 * value:.2g} mm"
