@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.calibration.redundancy import Redundancy
 from camviz.cameras import Camera, Rig
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
@@ -101,6 +102,7 @@ class Calibration:
     board_warp: Array | None = None  # (2,) sagittas in metres, see Board.warped
     skipped: tuple[tuple[str, str], ...] = ()  # pictures that were not used, and why
     faults: tuple[CalibrationError, ...] = ()  # what was mended in reading, where `load` was asked to mend
+    redundant: tuple[Redundancy, ...] = ()  # what the file says twice, in its order
 
     def __post_init__(self) -> None:
         if not self.cameras:

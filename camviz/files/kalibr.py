@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
+from camviz.calibration.redundancy import Redundancy, between_transforms, compared
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format, coefficients_of
 from camviz.files.models import Model, expressed, models_of
 from camviz.files.opencv import image_size
 from camviz.files.output import as_rows, as_yaml
+from camviz.files.redundant import rigid
 from camviz.files.section import Section, Size
 from camviz.files.trees import shown
+from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 
+STEP, TO_CAMERA, TO_IMU = "T_cn_cnm1", "T_cam_imu", "T_imu_cam"
+SAME = 0.1  # ° or mm: transforms that are no farther apart are one
 WORDS = ("camera_model", "distortion_model")
 SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
 TITLE = "Kalibr camchain"
@@ -24,18 +32,30 @@ MODELS = models_of("kalibr")  # camera_model and distortion_model; Kalibr's fu f
 def read(file: File) -> Calibration:
     """The cameras of the chain in place: the world is cam0's frame, T_cn_cnm1 is cam_n from cam_(n-1)."""
     chain = _chain(file.section)
+    imus = {name: _cam_from_imu(part) for name, part in chain.items()}
     cameras: dict[str, Camera] = {}
     cam_from_world, notes = RigidTransform.identity(), []
+    redundant: list[Redundancy] = []
     for index, (name, part) in enumerate(chain.items()):
+        redundant += _both_ways(part)
         if index:
-            step = _from_previous(part, chain[f"cam{index - 1}"])
+            before = f"cam{index - 1}"
+            step = _from_previous(part, imus[name], imus[before])
             if step is None:
                 step = RigidTransform.identity()
-                notes.append(f"The file does not say where {name} stands: it is drawn at the place of cam{index - 1}.")
+                notes.append(f"The file does not say where {name} stands: it is drawn at the place of {before}.")
+            elif STEP in part and imus[name] is not None and imus[before] is not None:
+                redundant += _by_the_imu(name, part, before, chain[before])
             cam_from_world = step * cam_from_world
         cameras[name] = _camera(part, file.size).at(cam_from_world.inv())
-    imu = _cam_from_imu(chain["cam0"])
-    return Calibration(cameras, file.path, TITLE, world_from_imu=imu, notes=tuple(notes))
+    return Calibration(
+        cameras,
+        file.path,
+        TITLE,
+        world_from_imu=imus["cam0"],
+        notes=tuple(notes),
+        redundant=tuple(redundant),
+    )
 
 
 def _chain(section: Section) -> dict[str, Section]:
@@ -70,19 +90,58 @@ def _model(part: Section) -> Model:
     return by_name[f"{projection} {distortion}"]
 
 
-def _from_previous(part: Section, previous: Section) -> RigidTransform | None:
+def _from_previous(
+    part: Section, cam_from_imu: RigidTransform | None, before_from_imu: RigidTransform | None
+) -> RigidTransform | None:
     """cam_n from cam_(n-1), said directly or by way of the IMU; None where the file says neither."""
-    if "T_cn_cnm1" in part:
-        return part.transform("T_cn_cnm1")
-    cam, before = _cam_from_imu(part), _cam_from_imu(previous)
-    return None if cam is None or before is None else cam * before.inv()
+    if STEP in part:
+        return part.transform(STEP)
+    if cam_from_imu is None or before_from_imu is None:
+        return None
+    return cam_from_imu * before_from_imu.inv()
 
 
 def _cam_from_imu(part: Section) -> RigidTransform | None:
     """Kalibr's T_cam_imu takes the IMU's points to the camera; OpenVINS writes its inverse, T_imu_cam."""
-    if "T_cam_imu" in part:
-        return part.transform("T_cam_imu")
-    return part.transform("T_imu_cam").inv() if "T_imu_cam" in part else None
+    if TO_CAMERA in part:
+        return part.transform(TO_CAMERA)
+    return part.transform(TO_IMU).inv() if TO_IMU in part else None
+
+
+# What a chain says twice.
+
+
+def _both_ways(part: Section) -> Iterator[Redundancy]:
+    """T_cam_imu beside its inverse T_imu_cam, where a camera has both."""
+    if TO_CAMERA in part and TO_IMU in part and (values := rigid((part, TO_CAMERA), (part, TO_IMU))):
+        yield compared(part.where(TO_CAMERA), TO_IMU, lambda a, b: between_transforms(a, _inverse(b)), *values)
+
+
+def _by_the_imu(name: str, part: Section, before: str, previous: Section) -> Iterator[Redundancy]:
+    """The step from the camera before, beside the way by the IMU."""
+    keys = [TO_CAMERA if TO_CAMERA in each else TO_IMU for each in (part, previous)]
+    values = rigid((part, STEP), (part, keys[0]), (previous, keys[1]))
+    if values is None:
+        return
+
+    def way(cam: Array, other: Array) -> Array:
+        cam_from_imu = cam if keys[0] == TO_CAMERA else _inverse(cam)
+        imu_from_before = _inverse(other) if keys[1] == TO_CAMERA else other
+        return np.asarray(cam_from_imu @ imu_from_before)
+
+    turned = between_transforms(_inverse(values[0]), way(*values[1:]))
+    inverse = np.linalg.norm(turned["°"]) < SAME and np.linalg.norm(turned["mm"]) < SAME
+    yield compared(
+        part.where(STEP),
+        f"{' and '.join(dict.fromkeys(keys))} of {before} and {name}",
+        lambda step, cam, other: between_transforms(step, way(cam, other)),
+        *values,
+        hint="The inverse of the one is the other." if inverse else "",
+    )
+
+
+def _inverse(matrix: Array) -> Array:
+    return np.asarray(np.linalg.inv(matrix), dtype=float)
 
 
 # Writing.
@@ -95,9 +154,9 @@ def write(calibration: Calibration) -> bytes:
     for index, (name, camera) in enumerate(calibration.cameras.items()):
         part = _written(name, camera)
         if calibration.world_from_imu is not None:
-            part["T_cam_imu"] = as_rows(camera.cam_from_world * calibration.world_from_imu)
+            part[TO_CAMERA] = as_rows(camera.cam_from_world * calibration.world_from_imu)
         if before is not None:
-            part["T_cn_cnm1"] = as_rows(camera.cam_from_world * before.world_from_cam)
+            part[STEP] = as_rows(camera.cam_from_world * before.world_from_cam)
         chain[f"cam{index}"], before = part, camera
     return as_yaml(chain)
 

@@ -11,6 +11,7 @@ import numpy as np
 from camviz.calibration.types import Board, Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format
+from camviz.files.opencv_redundancy import redundancies
 from camviz.files.opencv_writing import TITLE, write
 from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
@@ -21,6 +22,8 @@ MATRIX = "cameramatrix|intrinsicmatrix|intrinsics|mtx|k|m"
 DISTORTION = "distortioncoefficients|distortioncoeffs|distcoeffs|distcoeff|distortion|dist|d"
 WIDTH, HEIGHT, SIZE = "(image|img)?width", "(image|img)?height", "(image|img)size|resolution"
 ROTATION, TRANSLATION = "r|rotation|rotationmatrix", "t|translation|translationvector"
+PROJECTION = "p|projection(matrix)?"
+OF_A_PAIR = {"E": "e|essential(matrix)?", "F": "f|fundamental(matrix)?", "Q": "q|disparitytodepth(map|matrix)?"}
 EXTRINSICS, ERRORS, DETECTIONS = "extrinsicparameters", "perviewreprojectionerrors", "imagepoints"
 PICTURES, ASIDE = "picturenames", "setaside"
 ESTIMATED, COVARIANCE = "estimatedparameters", "intrinsicscovariance"
@@ -74,7 +77,19 @@ def _read_pair(file: File, left: str, right: str) -> Calibration:
         "right": _camera(section, right, size).at(right_from_left.inv()),
     }
     recorded = _recorded(section, {"left": left, "right": right}, notes)
-    return Calibration(cameras, file.path, f"{TITLE}, stereo", **recorded)
+    redundant = tuple(redundancies(section, _pair_keys(section, left, right), *cameras.values()))
+    return Calibration(cameras, file.path, f"{TITLE}, stereo", redundant=redundant, **recorded)
+
+
+def _pair_keys(section: Section, left: str, right: str) -> dict[str, str]:
+    """The keys of what OpenCV computes of a pair, by the names that its manual has for them."""
+    spelled = {"R": (ROTATION, ""), "T": (TRANSLATION, "")}
+    spelled |= {name: (spelling, "") for name, spelling in OF_A_PAIR.items()}
+    if not _find(section, TRANSLATION, left):  # else these are poses
+        spelled |= {f"R{number}": (ROTATION, tag) for number, tag in enumerate((left, right), 1)}
+    spelled |= {f"P{number}": (PROJECTION, tag) for number, tag in enumerate((left, right), 1)}
+    found = {name: [key for key in section.values if _tag(key, words) == tag] for name, (words, tag) in spelled.items()}
+    return {name: keys[0] for name, keys in found.items() if keys}
 
 
 def image_size(section: Section, given: Size | None) -> Size:

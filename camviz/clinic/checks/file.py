@@ -45,13 +45,14 @@ def not_a_rotation(evidence: Evidence) -> Iterator[Finding]:
 def edited_rotation(rng: Rng, strength: float) -> Evidence:
     """An element of R is changed."""
     solved = healthy_pair(rng)
-    cameras = {name: replace(camera, lens=_without_k3(camera)) for name, camera in solved.cameras.items()}
+    cameras = {name: replace(camera, lens=without_k3(camera)) for name, camera in solved.cameras.items()}
     tree = yaml.safe_load(kalibr.write(replace(solved, cameras=cameras)))
     tree["cam1"]["T_cn_cnm1"][0][1] += strength
     return as_file(yaml.safe_dump(tree))
 
 
-def _without_k3(camera: Camera) -> BrownConrady:
+def without_k3(camera: Camera) -> BrownConrady:
+    """The lens of a virtual camera as Kalibr's radtan has it."""
     assert isinstance(camera.lens, BrownConrady)
     return replace(camera.lens, k3=0.0)
 
