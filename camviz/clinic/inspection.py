@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -39,6 +39,8 @@ class Inspection:
     source: Path | None = None  # of a file that could not be read
     differences: tuple[Apart, ...] = ()  # by camera, from the calibration that it is compared with
     at: float | None = None  # metres, a distance at which errors are told
+    ignored: tuple[Finding, ...] = ()  # what was found and is left out of `findings`
+    made: tuple[Finding, ...] = field(default=(), repr=False)  # what the checks made, before causes are told
 
     @classmethod
     def of(cls, evidence: Evidence) -> Self:
@@ -59,7 +61,14 @@ class Inspection:
             evidence.compare,
             differences=tuple(differences(evidence)),
             at=evidence.at,
+            made=tuple(findings),
         )
+
+    def ignoring(self, ids: Collection[str]) -> Self:
+        """The same without the findings of these ids, which neither count nor explain others; `ignored` has them."""
+        kept = tuple(each for each in self.made if each.id not in ids)
+        left = by_causes((each for each in self.made if each.id in ids), kinds())
+        return replace(self, findings=by_causes(kept, kinds()), ignored=left)
 
     @property
     def healthy(self) -> bool:
@@ -67,7 +76,7 @@ class Inspection:
         return words.worst_of(self.findings) is None
 
     def as_json(self) -> str:
-        """For programs: cameras, findings, checked, skipped, as docs/clinic.md has them."""
+        """For programs: cameras, findings, checked, skipped, ignored, as docs/clinic.md has them."""
         return json.dumps(self.as_tree(), indent=2, ensure_ascii=False)
 
     def as_tree(self) -> dict[str, Any]:
@@ -81,6 +90,7 @@ class Inspection:
             "findings": [words.tree(finding) for finding in self.findings],
             "checked": list(self.checked),
             "skipped": [{"id": id, "why": why} for id, why in self.skipped],
+            "ignored": [{"id": id, "count": count} for id, count in words.count_of_each(self.ignored).items()],
         }
 
     def _camera(self, name: str, camera: Camera) -> dict[str, Any]:
@@ -99,7 +109,7 @@ class Inspection:
     @property
     def verdict(self) -> str:
         """One sentence: the most likely cause and what to do now; or nothing wrong was found, by how many checks."""
-        return words.verdict(self.findings, self.checked, self.skipped)
+        return words.verdict(self.findings, self.checked, self.skipped, self.ignored)
 
     @property
     def next_step(self) -> str:
@@ -109,7 +119,7 @@ class Inspection:
     def as_text(self) -> str:
         """For people: the findings or that there are none, the calibration at a glance, and what was checked."""
         glance = tuple(self.summary.lines()) if self.summary else ()
-        said = words.text(self.findings, self.checked, self.skipped, self.next_step, glance)
+        said = words.text(self.findings, self.checked, self.skipped, self.next_step, glance, self.ignored)
         return "".join(f"{each.sentence}\n" for each in self.differences) + "\n" * bool(self.differences) + said
 
     def __str__(self) -> str:
@@ -156,6 +166,6 @@ def inspect_file(
         finding = kinds()[error.id].found(f"{str(error).removeprefix(f'{Path(path)}: ')}.", error.value)
         why = "the file could not be read beyond the fault above"
         skipped = tuple((id, why) for id in kinds() if id != error.id)
-        return Inspection(None, (finding,), (error.id,), skipped, source=Path(path))
+        return Inspection(None, (finding,), (error.id,), skipped, source=Path(path), made=(finding,))
     calibration = prepare(calibration) if prepare else calibration
     return inspect(calibration, compare=compare, pictures=pictures, board=board, at=at)

@@ -105,8 +105,13 @@ class Summary:
     @cached_property
     def largest_errors(self) -> dict[str, float]:
         """By camera, the largest expected error of a far point in pixels (Max ERE), where the corners determine it."""
-        known = [name for name, sigmas in self.uncertainty.items() if sigmas]
-        return {name: largest_expected_error(self.evidence.adjustment(name), name) for name in known}
+        found = {name: self.largest_error(name) for name in self.names}
+        return {name: error for name, error in found.items() if error is not None}
+
+    def largest_error(self, name: str) -> float | None:
+        """A camera's largest expected error of a far point in pixels; None where the corners do not determine it."""
+        known = self.uncertainty[name] if name in self.names else self._uncertainty(name)
+        return largest_expected_error(self.evidence.adjustment(name), name) if known else None
 
     def table(self) -> dict[str, dict[str, str]]:
         """By camera: every number with its ± σ, the RMS and the uncertainty of projection, as text."""

@@ -44,12 +44,18 @@ def groups(findings: Sequence[Finding]) -> Iterator[tuple[Finding, list[Finding]
     return iter(told)
 
 
-def verdict(findings: Sequence[Finding], checked: Sequence[str], skipped: Sequence[tuple[str, str]]) -> str:
+def verdict(
+    findings: Sequence[Finding],
+    checked: Sequence[str],
+    skipped: Sequence[tuple[str, str]],
+    ignored: Sequence[Finding] = (),
+) -> str:
     """One sentence: the most likely cause and what to do now; or nothing wrong was found, by how many checks."""
     worst = worst_of(findings)
     if worst is None:
         below = f", {counted(findings)} below" if findings else ""
-        return f"Nothing wrong was found{below}; {len(checked)} checks ran{_lacking(skipped)}."
+        beside = " beside what is ignored" * bool(ignored)
+        return f"Nothing wrong was found{beside}{below}; {len(checked)} checks ran{_lacking(skipped)}."
     do = worst.remedy.split(". ")[0].removesuffix(".")
     return f"Most likely {worst.causes[0]}: {do[0].lower()}{do[1:]}."
 
@@ -89,8 +95,20 @@ def counted(findings: Sequence[Finding]) -> str:
     return told + (f" and {follow} consequence{'s' * (follow != 1)}" if follow else "")
 
 
-def made(checked: Sequence[str], skipped: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """A sentence about the checks that were made, and one for each reason why others were not."""
+def count_of_each(findings: Iterable[Finding]) -> dict[str, int]:
+    """How many findings of each id there are."""
+    counts: Counter[str] = Counter()
+    for each in findings:
+        counts[each.id] += each.count
+    return dict(counts)
+
+
+def made(checked: Sequence[str], skipped: Iterable[tuple[str, str]], ignored: Iterable[Finding] = ()) -> Iterator[str]:
+    """A sentence about what was found and is ignored, one about the checks that were made, and one for each reason why
+    others were not.
+    """
+    if counts := count_of_each(ignored):
+        yield f"Ignored: {', '.join(f'{count} {id}' for id, count in counts.items())}."
     yield f"Checked: {', '.join(checked) or 'nothing'}."
     reasons: dict[str, list[str]] = {}
     for id, why in skipped:
@@ -105,17 +123,18 @@ def text(
     skipped: Sequence[tuple[str, str]],
     then: str = "",
     glance: Sequence[str] = (),
+    ignored: Sequence[Finding] = (),
 ) -> str:
     """The verdict, the findings with their advice and consequences below them, a `glance` at the calibration in lines,
     and what was checked. Where nothing is wrong the verdict is followed by what to do `then`.
     """
-    lines = [verdict(findings, checked, skipped), *([f"Next: {then}"] if then else []), ""]
+    lines = [verdict(findings, checked, skipped, ignored), *([f"Next: {then}"] if then else []), ""]
     for cause, consequences in groups(findings):
         lines.append(f"{heading(cause)} {cause.id}: {cause.sentence}")
         lines += [f"    {label}: {said}" for label, said in advice(cause).items()]
         lines += [f"    → {heading(each)} {each.id}: {each.sentence}" for each in consequences]
         lines.append("")
-    return "\n".join([*lines, *glance, *([""] if glance else []), *made(checked, skipped)])
+    return "\n".join([*lines, *glance, *([""] if glance else []), *made(checked, skipped, ignored)])
 
 
 def tree(finding: Finding) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from camviz.commands.common import (
+    FOUND,
     OK,
     Refusal,
     add_board,
@@ -26,17 +27,20 @@ from camviz.commands.common import (
     write_calibration,
     write_whole,
 )
-from camviz.commands.terminal import tell
+from camviz.commands.gate import EPILOG as GATE
+from camviz.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz.lenses import calibration_models
 
 if TYPE_CHECKING:
+    from camviz.clinic import Inspection
     from camviz.files import Board, Calibration
 
 CALIBRATE = """\
 Finds a chessboard or a ChArUco board in pictures and solves for the camera that took them, or with --right for a pair
 of cameras. IMAGES are files, folders, or patterns such as 'left*.jpg'. Pictures without the board, of another size, or
 that cannot be read are named and skipped. Corners and whole views that contradict the rest are set aside, named, and
-kept in the file. What is written is OpenCV's YAML, with all that a later inspection needs.
+kept in the file. What is written is OpenCV's YAML, with all that a later inspection needs. With --report, or where a
+gate is given, the calibration is inspected as well; findings make it fail only where there is a gate.
 
 The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
 (left07.jpg and right07.jpg), else by their order.
@@ -47,6 +51,14 @@ examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
+  camviz calibrate shots/ --board 9x6 --square-mm 25 --fail-on warning --limit rms-px=0.5 --junit clinic.xml
+"""
+STATUS = """\
+exit status:
+  0  the calibration is written, and passes the gate where there is one
+  1  it is written, and the gate fails it
+  2  it cannot be solved, or the command cannot be used; one sentence on stderr says why
+  3  something is missing on this machine
 """
 FINDERS = ("auto", "sectors", "classic")
 PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
@@ -55,7 +67,7 @@ PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|
 def add(commands: Any) -> None:
     command = add_command(commands, "calibrate", calibrate, "calibrate a camera or a pair from pictures", CALIBRATE)
     models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
-    command.epilog = f"models:\n{models}\n{EXAMPLES}"
+    command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
     command.add_argument("images", metavar="IMAGES", nargs="+", help="pictures, folders of them, or patterns")
     command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
     add_board(command)
@@ -69,11 +81,13 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--goal", metavar="PX", type=pixels, help="the largest expected error wanted (default: 1 px)")
     command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
+    add_gate(command)
 
 
 def calibrate(options: argparse.Namespace) -> int:
-    """Detect, solve and write the calibration, whole or not at all."""
+    """Detect, solve and write the calibration, whole or not at all; inspect it where that is asked for."""
     from camviz.calibration import CannotCalibrate
+    from camviz.clinic import inspect
     from camviz.files import CalibrationError
 
     board = board_of(options)
@@ -82,6 +96,8 @@ def calibrate(options: argparse.Namespace) -> int:
     refuse_output(options.output, "calibration", *left, *right)
     if options.report:
         refuse_output(options.report, "page", options.output, *left, *right)
+    gate = given_gate(options)
+    refuse_junit(options, options.output, *([options.report] if options.report else []), *left, *right)
     try:
         calibration = _pair(left, right, board, options) if right else _single(left, board, options)
     except CannotCalibrate as error:
@@ -100,20 +116,23 @@ def calibrate(options: argparse.Namespace) -> int:
     for sentence in worth(calibration, options.goal):
         told(sentence)
     told(f"{options.output}: written.")
+    decides = gate.asked or options.junit is not None
+    if not (options.report or decides):
+        return OK
+    outcome = gate.judge(inspect(calibration))
+    told("\n".join(["", outcome.inspection.as_text(), *outcome.lines()]))
     if options.report:
         folders = [each[0].parent for each in (left, right) if each]
-        _inspect(calibration, dict(zip(calibration.cameras, folders, strict=True)), options.report)
-    return OK
+        _page(outcome.inspection, dict(zip(calibration.cameras, folders, strict=True)), options.report)
+        told(f"{options.report}: open it in a browser.")
+    write_junit(options, {str(options.output): outcome})
+    return OK if outcome.passed or not decides else FOUND
 
 
-def _inspect(calibration: Calibration, folders: Mapping[str, Path], page: Path) -> None:
-    """Say what an inspection finds, and write its page."""
-    from camviz.clinic import inspect
+def _page(inspection: Inspection, folders: Mapping[str, Path], page: Path) -> None:
     from camviz.report.inspection import write_report
 
-    inspection = inspect(calibration)
     write_whole(page, lambda path: write_report(inspection, path, images=folders))
-    tell(f"\n{inspection.as_text()}\n{page}: open it in a browser.")
 
 
 def pictures(words: Sequence[str]) -> list[Path]:

@@ -26,10 +26,13 @@ from camviz.commands.common import (
     size,
     write_whole,
 )
+from camviz.commands.gate import EPILOG as GATE
+from camviz.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz.commands.terminal import say, tell, tell_json
 
 if TYPE_CHECKING:
     from camviz.clinic import Inspection
+    from camviz.clinic.gate import Outcome
     from camviz.files import Board, Calibration
 
 PAINT = {
@@ -37,6 +40,8 @@ PAINT = {
     r"^\S+ fault\b": "red",
     r"^\S+ warning\b": "yellow",
     r"^\S+ note\b": "blue",
+    "^Gate.*: passed": "green",
+    "^Gate.*: failed": "red",
 }
 
 INSPECT = """\
@@ -53,9 +58,11 @@ examples:
   camviz inspect stereo.yml --size 640x480 --compare factory.yml
   camviz inspect camera.yml --images shots/ --board 9x6 --square-mm 25 --report report.html
   camviz inspect shots/ --board 9x6 --square-mm 25 --json
+  camviz inspect calibration/*.yaml --fail-on fault,low-coverage --ignore aspect --junit clinic.xml
 
+{gate}
 exit status:
-  0  nothing worse than a note was found
+  0  nothing worse than a note was found, or nothing that the gate fails on
   1  something was found
   2  a file cannot be read, or the command cannot be used; one sentence on stderr says why
   3  something is missing on this machine
@@ -64,7 +71,7 @@ exit status:
 
 def add(commands: Any) -> None:
     command = add_command(commands, "inspect", inspect, "say what is wrong with a calibration", INSPECT)
-    command.epilog = EPILOG
+    command.epilog = EPILOG.format(gate=GATE)
     command.add_argument(
         "files", metavar="FILE", nargs="+", help="calibrations (- is stdin), pictures or a folder of them"
     )
@@ -76,6 +83,7 @@ def add(commands: Any) -> None:
     command.add_argument("--json", action="store_true", help="the same for programs")
     add_colour(command)
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with pictures as well")
+    add_gate(command)
 
 
 def inspect(options: argparse.Namespace) -> int:
@@ -85,24 +93,28 @@ def inspect(options: argparse.Namespace) -> int:
         if len(named) > 1:
             raise Refusal("--report writes a page about one calibration: give one FILE.")
         refuse_output(options.report, "page", *(Path(word) for word in options.files))
+    gate = given_gate(options)
+    refuse_junit(options, *(Path(word) for word in options.files), *([options.report] if options.report else []))
     board = given_board(options)
     compare = loaded(options.compare, options.size) if options.compare else None
-    inspections: dict[str, Inspection] = {}
-    unreadable = False
+    outcomes: dict[str, Outcome] = {}
+    unreadable: dict[str, str] = {}
     for name, paths in named:
         try:
-            inspections[name] = _inspected(paths, board, compare, options)
+            outcomes[name] = gate.judge(_inspected(paths, board, compare, options))
         except Refusal as refusal:
+            unreadable[name] = str(refusal)
             if len(named) == 1:
+                write_junit(options, unreadable)
                 raise
             say(str(refusal))
-            unreadable = True
-    _print(inspections, len(named) > 1, options)
+    _print(outcomes, len(named) > 1, options)
     if options.report:
-        _report(next(iter(inspections.values())), options)
+        _report(next(iter(outcomes.values())).inspection, options)
+    write_junit(options, {name: outcomes.get(name) or unreadable[name] for name, _ in named})
     if unreadable:
         return REFUSED
-    return OK if all(inspection.healthy for inspection in inspections.values()) else FOUND
+    return OK if all(outcome.passed for outcome in outcomes.values()) else FOUND
 
 
 def _named(words: list[str]) -> Iterator[tuple[str, list[Path]]]:
@@ -187,13 +199,14 @@ def _with_corners(calibration: Calibration, images: list[Path], board: Board) ->
         raise Refusal(f"{error}.") from error
 
 
-def _print(inspections: dict[str, Inspection], several: bool, options: argparse.Namespace) -> None:
+def _print(outcomes: dict[str, Outcome], several: bool, options: argparse.Namespace) -> None:
     if options.json:
-        trees = [({"file": name} if several else {}) | each.as_tree() for name, each in inspections.items()]
+        trees = [({"file": name} if several else {}) | each.as_tree() for name, each in outcomes.items()]
         tell_json(json.dumps(trees if several else trees[0], indent=2, ensure_ascii=False))
         return
-    for name, inspection in inspections.items():
-        tell(f"{name}\n" * several + inspection.as_text() + "\n" * several, PAINT, options.color)
+    for name, outcome in outcomes.items():
+        said = "\n".join([outcome.inspection.as_text(), *outcome.lines()])
+        tell(f"{name}\n" * several + said + "\n" * several, PAINT, options.color)
 
 
 def _report(inspection: Inspection, options: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""What an OpenCV file of a pair says twice: E, F and the rectification R1 R2 P1 P2 Q all follow from K1, K2, R and T."""
+"""What an OpenCV file of a pair says twice: E, F, R1, R2, P1, P2 and Q follow from K1, K2, R and T."""
 
 from __future__ import annotations
 
@@ -114,9 +114,7 @@ def _depth(held: Held, keys: Keys, *_: Camera) -> Iterator[Redundancy]:
     Q, P1, P2 = held["Q"], held["P1"], held["P2"]
     yield compared(keys["Q"], keys["P1"], lambda Q, P1: {"px": _grid(Q) - P1[[0, 0, 1], [0, 2, 2]]}, Q, P1)
     if Q[3, 2] and np.any(_shift(P2)):
-        yield compared(
-            keys["Q"], keys["P2"], lambda Q, P2: share(1 / abs(Q[3, 2]), np.linalg.norm(_shift(P2))), Q, P2
-        )
+        yield compared(keys["Q"], keys["P2"], lambda Q, P2: share(1 / abs(Q[3, 2]), np.linalg.norm(_shift(P2))), Q, P2)
 
 
 def _grid(Q: Array) -> Array:

@@ -57,8 +57,10 @@ def findings_html(inspection: Inspection, see: Callable[[Finding], str] | None =
         for cause, consequences in words.groups(inspection.findings)
     )
     listed = f'<ol class="findings" style="list-style:none;padding:0">{items}</ol>' if items else ""
-    checks = "".join(f"<li>{escape(said)}</li>" for said in words.made(inspection.checked, inspection.skipped))
+    told = words.made(inspection.checked, inspection.skipped, inspection.ignored)
+    checks = "".join(f"<li>{escape(said)}</li>" for said in told)
     counted = f"{len(inspection.checked)} checks made, {len(inspection.skipped)} not"
+    counted += f", {ignored} findings ignored" if (ignored := sum(each.count for each in inspection.ignored)) else ""
     return f"{listed}<details><summary>{counted}</summary><ul>{checks}</ul></details>"
 
 
