@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from camviz.calibration.redundancy import Redundancy, between_rotations, compared
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format
+from camviz.files.redundant import is_rotation
 from camviz.files.section import Section, Size, agreed_size, explained, named
 from camviz.files.trees import MAX_KEYS, shown
 from camviz.lenses import BrownConrady
-from camviz.poses import RigidTransform
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 
 TITLE = "EasyMocap"
 INTRINSICS, EXTRINSICS = "intri.yml", "extri.yml"
@@ -40,7 +45,8 @@ def read(file: File) -> Calibration:
         return Calibration(cameras, file.path, TITLE, notes=(note,))
     with named(EXTRINSICS):
         placed = {name: camera.at(_pose(other.section, name).inv()) for name, camera in cameras.items()}
-    return Calibration(placed, file.path, TITLE)
+        redundant = tuple(each for name in placed for each in _redundant(other.section, name))
+    return Calibration(placed, file.path, TITLE, redundant=redundant)
 
 
 def _beside(file: File, name: str, key: str) -> File:
@@ -62,6 +68,17 @@ def _camera(section: Section, name: str, given: Size | None) -> Camera:
 def _pose(section: Section, name: str) -> RigidTransform:
     translation = section.vector(f"T_{name}", [3], "x y z")
     return RigidTransform.from_components(translation, section.rotation(f"Rot_{name}"))
+
+
+def _redundant(section: Section, name: str) -> Iterator[Redundancy]:
+    """The rotation vector beside the matrix."""
+    if f"R_{name}" in section and is_rotation(matrix := section.matrix(f"Rot_{name}", 3, 3)):
+        vector = section.vector(f"R_{name}", [3], "a rotation vector")
+        yield compared(f"R_{name}", f"Rot_{name}", _turned_apart, vector, matrix)
+
+
+def _turned_apart(vector: Array, matrix: Array) -> dict[str, Array]:
+    return between_rotations(Rotation.from_rotvec(vector).as_matrix(), matrix)
 
 
 FORMAT = Format(

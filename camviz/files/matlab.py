@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
+from camviz.calibration.redundancy import Redundancy, compared
 from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.format import File, Format
@@ -11,6 +15,7 @@ from camviz.files.models import expressed, models_of
 from camviz.files.output import as_json
 from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
 
 TITLE = "MATLAB cameraParameters"
 FIRST_PIXEL = 1.0
@@ -39,7 +44,8 @@ def read_parameters(section: Section, file: File) -> Calibration:
     notes = []
     if section.values.get("RotationVectors"):
         notes.append("The board poses (RotationVectors, TranslationVectors) are not read.")
-    return Calibration({"camera": Camera(grid, lens)}, file.path, TITLE, notes=tuple(notes))
+    redundant = tuple(_redundant(section))
+    return Calibration({"camera": Camera(grid, lens)}, file.path, TITLE, notes=tuple(notes), redundant=redundant)
 
 
 def _intrinsics(section: Section, size: Size) -> Intrinsics:
@@ -56,6 +62,23 @@ def _intrinsics(section: Section, size: Size) -> Intrinsics:
         fx, fy, cx, cy, skew = K.fx, K.fy, K.cx, K.cy, K.skew
     with explained(section.path or "the intrinsics"):
         return Intrinsics(*size, fx, fy, cx - FIRST_PIXEL, cy - FIRST_PIXEL, skew)
+
+
+def _redundant(section: Section) -> Iterator[Redundancy]:
+    """The camera matrix beside its transpose, and beside the focal lengths and the principal point."""
+    matrices = {key: section.matrix(key, 3, 3) for key in ("IntrinsicMatrix", "K") if key in section}
+    if "IntrinsicMatrix" in matrices:
+        matrices["IntrinsicMatrix"] = matrices["IntrinsicMatrix"].T
+    if len(matrices) == 2:
+        yield compared(section.where("IntrinsicMatrix"), "K", lambda a, b: {"px": (a - b)[:2]}, *matrices.values())
+    if matrices and "FocalLength" in section and "PrincipalPoint" in section:
+        key, matrix = next(iter(matrices.items()))
+        values = [section.vector("FocalLength", [2], "fx fy"), section.vector("PrincipalPoint", [2], "cx cy")]
+        yield compared(section.where(key), "FocalLength and PrincipalPoint", _grid_apart, matrix, *values)
+
+
+def _grid_apart(matrix: Array, focal_lengths: Array, centre: Array) -> dict[str, Array]:
+    return {"px": matrix[[0, 1, 0, 1], [0, 1, 2, 2]] - np.concatenate([focal_lengths, centre])}
 
 
 def write(calibration: Calibration) -> bytes:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from camviz.calibration.redundancy import Redundancy, compared, share
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format, parameters_of
@@ -25,9 +27,10 @@ IMU_FROM_LEFT = ("IMU.T_b_c1", "Tbc")
 
 def read(file: File) -> Calibration:
     """Camera1 and Camera2, or ORB-SLAM2's Camera, or the pair LEFT and RIGHT that it rectifies first."""
-    section = file.section
+    section, redundant = file.section, tuple[Redundancy, ...]()
     if "LEFT.K" in section and "RIGHT.K" in section:
         cameras, notes = _unrectified(section, file.size), []
+        redundant = tuple(_redundant(section))
     else:
         size = agreed_size(section.sides("Camera.width", "Camera.height"), file.size, "Camera.width, Camera.height")
         first = "Camera1" if "Camera1.fx" in section else "Camera"
@@ -38,7 +41,7 @@ def read(file: File) -> Calibration:
             cameras = {"left": cameras["camera"], "right": placed}
     imu_from_left = _pose(section, IMU_FROM_LEFT)
     imu = imu_from_left.inv() if imu_from_left is not None else None
-    return Calibration(cameras, file.path, TITLE, world_from_imu=imu, notes=tuple(notes))
+    return Calibration(cameras, file.path, TITLE, world_from_imu=imu, notes=tuple(notes), redundant=redundant)
 
 
 def _camera(section: Section, prefix: str, size: Size) -> Camera:
@@ -91,6 +94,18 @@ def _unrectified(section: Section, given: Size | None) -> dict[str, Camera]:
     turned = [RigidTransform.from_rotation(section.rotation(f"{name}.R")) for name in ("LEFT", "RIGHT")]
     right_from_left = turned[1].inv() * RigidTransform.from_translation([P[0, 3] / P[0, 0], 0, 0]) * turned[0]
     return cameras | {"right": cameras["right"].at(right_from_left.inv())}
+
+
+def _redundant(section: Section) -> Iterator[Redundancy]:
+    """The rectified camera beside LEFT.P, and Camera.bf beside RIGHT.P, whose P[0, 3] = -bf."""
+    keys = [f"Camera.{name}" for name in ("fx", "fy", "cx", "cy")]
+    if "LEFT.P" in section and all(key in section for key in keys):
+        values = [section.number(key) for key in keys]
+        P = section.matrix("LEFT.P", 3, 4)
+        yield compared("LEFT.P", "Camera.fx …", lambda P, k: {"px": P[[0, 1, 0, 1], [0, 1, 2, 2]] - k}, P, values)
+    shift = section.matrix("RIGHT.P", 3, 4)[0, 3]
+    if shift and "Camera.bf" in section and section.number("Camera.bf"):
+        yield compared("Camera.bf", "RIGHT.P", lambda bf, x: share(bf, -x), section.number("Camera.bf"), shift)
 
 
 def write(calibration: Calibration) -> bytes:

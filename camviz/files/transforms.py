@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import tan
 from typing import Any
 
 import numpy as np
 
+from camviz.calibration.redundancy import Redundancy, compared
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
 from camviz.files.format import File, Format
@@ -15,6 +17,7 @@ from camviz.files.output import as_json, as_rows
 from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
+from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 
 TITLE = "transforms.json"
@@ -36,16 +39,22 @@ def read(file: File) -> Calibration:
     """Every frame as a camera in the file's world; without frames one camera at the origin."""
     section, shared = file.section, None
     cameras: dict[str, Camera] = {}
+    redundant: list[Redundancy] = []
     for name, frame in _frames(section):
         if any(key in frame for key in GRID_KEYS + LENS_KEYS):
             camera = _camera(section.part({**section.values, **frame.values}, frame.path), file.size)
+            redundant += _angles(frame, camera)
         else:
             camera = shared = shared or _camera(section, file.size)
         if name in cameras:
             raise frame.error("file_path", "images of different names", f"{shown(name)} twice")
         cameras[name] = camera.at(frame.transform("transform_matrix") * OPENGL)
     notes = ("The world has no unit of its own: lengths are in the file's.",) if cameras else ()
-    return Calibration(cameras or {"camera": _camera(section, file.size)}, file.path, TITLE, notes=notes)
+    if shared or not cameras:
+        alone = shared or _camera(section, file.size)
+        cameras = cameras or {"camera": alone}
+        redundant = [*_angles(section, alone), *redundant]
+    return Calibration(cameras, file.path, TITLE, notes=notes, redundant=tuple(redundant))
 
 
 def _frames(section: Section) -> list[tuple[str, Section]]:
@@ -73,6 +82,19 @@ def _focal_length(section: Section, key: str, angle: str, side: int, default: fl
     if not 0 < view < np.pi:
         raise section.error(angle, "an angle of view between 0 and π radians", f"{view:g}")
     return side / (2 * tan(view / 2))
+
+
+def _angles(section: Section, camera: Camera) -> Iterator[Redundancy]:
+    """The focal lengths beside the angles of view, from which f = side / (2 tan(angle / 2)) follows too."""
+    grid = camera.intrinsics
+    for key, angle, side in (("fl_x", "camera_angle_x", grid.width), ("fl_y", "camera_angle_y", grid.height)):
+        focal, view = section.values.get(key), section.values.get(angle)
+        if isinstance(focal, (int, float)) and isinstance(view, (int, float)) and 0 < view < np.pi:
+
+            def apart(f: Array, view: Array, side: int = side) -> dict[str, Array]:
+                return {"px": f - side / (2 * np.tan(view / 2))}
+
+            yield compared(section.where(key), f"{angle} and the image size", apart, focal, view)
 
 
 def _lens(section: Section) -> Lens:
