@@ -150,7 +150,7 @@ the same cameras beside the first. How far the two differ is then the first thin
 
 A *fault* makes the calibration wrong. A *warning* makes it doubtful. A *note* is something to know when it is used.
 The exit status of `camviz inspect` is 0 when nothing is worse than a note, 1 when something is, and 2 when a file
-cannot be read.
+cannot be read. [A gate](#a-gate-in-ci) says otherwise where a project wants it.
 
 Findings are told by their causes. What follows from a wrong model, such as outliers and folds, stands under
 `model-too-simple` and has its remedy; `model-too-simple` is then as severe as the worst of it. "Explains" below lists
@@ -159,8 +159,9 @@ cameras, frames or pictures are one, with the `count` of them.
 
 With `--json` the output is `{"verdict": sentence, "cameras": [{name, model, width, height, fx, fy, cx, cy, distortion,
 rms}], "task": [{cameras, sentence, values}], "findings": [{id, severity, sentence, value, unit, camera, view, causes,
-remedy, consequence_of, count}], "checked": [id, …], "skipped": [{id, why}]}`. With `--compare` it also has
-`"differences"`. Of several files it is a list of these, each with its `file`.
+remedy, consequence_of, count}], "checked": [id, …], "skipped": [{id, why}], "ignored": [{id, count}]}`. The command
+adds `"gate": {passed, fail_on, ignore, failed_by, limits: [{name, camera, most, value}]}`. With `--compare` there are
+also `"differences"`. Of several files it is a list of these, each with its `file`.
 
 ## The report in ten seconds
 
@@ -250,6 +251,68 @@ share) and `residual_px` (σ of a coordinate). Its change is `change_px` between
 `F_chance`, `scatter` (the ratio above), `parameters` (calibrated, now, sigma) and `gaps`. Those of a pair are
 `views`, `distance_m`, `rows_px`, `disparity_px`, `depth_error` and `scale` (shares), `scale_sigma` and
 `rectified_rows_px` (rms and median of the corners themselves).
+
+## A gate in CI
+
+`camviz inspect` and `camviz calibrate` take the same four options. A finding that is ignored neither counts nor
+explains others; one line says how many there are. `calibrate` exits with 1 only where one of the four is given, or the
+project has a gate.
+
+| option | in the file | says |
+|---|---|---|
+| `--fail-on ID,…` | `fail-on` | what makes the status 1: ids, or a severity, which means itself and what is worse |
+| `--ignore ID,…` | `ignore` | ids of findings that are left out of verdict and status |
+| `--limit NAME=PX,…` | `[limits]` | `rms-px`, `expected-error-px` (Max ERE): the status is 1 above it |
+| `--junit FILE` | | JUnit XML of every check: passed, failed with the finding's sentence, or skipped and why |
+
+Without `--fail-on` it is `warning`. A limit that the file cannot be held against is said to be not checked, and does
+not fail. Status 2 and 3 (a file that cannot be read, a part that is missing) stay what they are.
+
+The file is `camviz.toml`, or `[tool.camviz]` in `pyproject.toml`. It is looked for in the working directory and above
+it, up to the repository's root; the nearest one counts, and the command line wins over it. A name that means nothing
+is refused, with the one that may have been meant.
+
+```toml
+fail-on = ["fault", "low-coverage"]
+ignore = ["aspect"]
+
+[limits]
+rms-px = 0.5
+expected-error-px = 1
+```
+
+GitLab and Jenkins show the JUnit file as tests (`artifacts: reports: junit`, and the step `junit`). On GitHub an action
+does:
+
+```yaml
+- run: pip install camviz
+- run: camviz inspect calibration/*.yaml --fail-on fault --junit clinic.xml
+- uses: mikepenz/action-junit-report@v5
+  if: always()
+  with:
+    report_paths: clinic.xml
+```
+
+In Python: `camviz.clinic.Gate(fail_on=("fault",), ignore=("aspect",)).judge(camviz.inspect(calibration)).passed`.
+
+## What a file says twice
+
+Programs differ in which of two places they read, so a file that disagrees with itself is two cameras. `contradiction`
+holds against each other:
+
+| file | what | beside |
+|---|---|---|
+| Kalibr camchain | `T_cn_cnm1`; `T_cam_imu` | `T_cam_imu` (or `T_imu_cam`) of both cameras; `T_imu_cam` |
+| OpenCV pair | E; F | R and T; the camera matrices, R and T |
+| | R; P2 | R1 and R2; P1, and R2 and T |
+| | Q | P1 and P2 |
+| ORB-SLAM2 pair | `LEFT.P`; `RIGHT.P` | `Camera.fx` …; `Camera.bf` |
+| transforms.json | `fl_x`, `fl_y` | `camera_angle_x`, `camera_angle_y` and the image size |
+| MATLAB | `K` | `IntrinsicMatrix`, `FocalLength` and `PrincipalPoint` |
+| EasyMocap | `R_` | `Rot_` |
+
+Each number is moved by half a unit of its last printed digit, and what that changes is added up. That is how far
+rounding can put apart two that agree. An exact zero counts as exact.
 
 ## Findings
 """

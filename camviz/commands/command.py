@@ -55,7 +55,7 @@ A file called - is stdin, or stdout. Colour is for terminals; NO_COLOR and --col
 
 exit status:
   0    done
-  1    camviz inspect or camviz check found something
+  1    camviz inspect or camviz check found something, or a project's gate fails what camviz calibrate wrote
   2    the command or the file it names cannot be used; one sentence on stderr says why
   3    something is missing on this machine; camviz doctor says what, and how to mend it
   4    camviz check cannot tell from these pictures
