@@ -5,14 +5,17 @@ from dataclasses import replace
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from calibrations import bare, pair
 from commandline import refused
 
 from camviz.clinic import Finding, Gate, inspect, kinds
 from camviz.clinic.gate import LIMITS, Outcome, UnknownName
+from camviz.clinic.virtual import healthy
 from camviz.commands.command import main
 from camviz.commands.gate import given_gate, project_settings
+from camviz.files import load
 from camviz.files.writing import write
 from camviz.report.findings import findings_html
 from camviz.report.junit import junit
@@ -192,6 +195,35 @@ def test_a_wrong_file_is_refused_and_named(project, capsys, text, said):
     path.write_bytes(text.encode("latin-1"))
     assert (sentence := refused(capsys, project, "inspect", "camera.yaml")).startswith(f"camviz: {path}: ")
     assert said in sentence
+
+
+@pytest.fixture(scope="module")
+def solution():
+    """A virtual camera, solved: what `camviz calibrate` has once the corners are found."""
+    return healthy(np.random.default_rng(5))
+
+
+@pytest.mark.parametrize(
+    ("words", "expected", "said"),
+    [
+        ([], 0, ""),
+        (["--fail-on", "warning"], 0, "Gate (options): passed."),
+        (["--limit", "rms-px=0.001", "--junit", "out.xml"], 1, "Gate (options): failed by rms-px."),
+    ],
+)
+def test_calibrate_writes_first_and_then_the_gate_decides(
+    project, monkeypatch, capsys, solution, words, expected, said
+):
+    monkeypatch.setattr("camviz.commands.calibrate._single", lambda *_: solution)
+    (project / "a.png").touch()
+    assert main(["calibrate", "a.png", "--board", "9x6", "--square-mm", "25", "-o", "out.yaml", *words]) == expected
+    assert len(load(project / "out.yaml").cameras) == 1
+    out = capsys.readouterr().out
+    assert said in out
+    assert ("Gate" in out) == ("options" in said)
+    if "--junit" in words:
+        _, cases = parsed((project / "out.xml").read_text(encoding="utf-8"))
+        assert ("out.yaml", "fold") in cases
 
 
 # JUnit ---------------------------------------------------------------------------------------------------------------
