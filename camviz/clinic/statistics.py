@@ -285,7 +285,7 @@ GitLab and Jenkins show the JUnit file as tests (`artifacts: reports: junit`, an
 does:
 
 ```yaml
-- run: pip install camviz
+- run: pip install git+https://github.com/camviz/camviz
 - run: camviz inspect calibration/*.yaml --fail-on fault --junit clinic.xml
 - uses: mikepenz/action-junit-report@v5
   if: always()
