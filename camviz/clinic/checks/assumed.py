@@ -32,7 +32,7 @@ LATER = "set aside"  # what a solution says in the same notes, which is no readi
     "file's corners fit the reading that was taken.",
     explains=(
         *("fold", "near-pole", "inverse-not-converged", "outlier-view", "outlier-line", "pose-absorbs-error"),
-        *("model-too-simple", "split-disagreement", "views-differ", "models-differ"),
+        *("corners-set-aside", "model-too-simple", "split-disagreement", "views-differ", "models-differ"),
     ),
 )
 def assumed_coefficients(evidence: Evidence) -> Iterator[Finding]:

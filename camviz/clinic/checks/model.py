@@ -49,6 +49,7 @@ STANDARD_ERRORS = 5.0
         "rolling-shutter",
         "outlier-view",
         "outlier-line",
+        "corners-set-aside",
         "fold",
         "near-pole",
         "inverse-not-converged",
@@ -114,6 +115,7 @@ def lens_too_rich(rng: Rng, strength: float) -> Evidence:
         "views-differ",
         "outlier-view",
         "outlier-line",
+        "corners-set-aside",
         "pose-absorbs-error",
         "model-too-simple",
         "split-disagreement",
@@ -159,7 +161,7 @@ def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     remedy="Lock focus and zoom, switch stabilisation off, take more views, and solve again.",
     threshold="The focal length changes by 0.3 %, or the cameras differ by at least a pixel (median over the image). "
     "Noise would show it in one set of a million.",
-    explains=("views-differ", "outlier-view", "outlier-line", "pose-absorbs-error"),
+    explains=("views-differ", "outlier-view", "outlier-line", "corners-set-aside", "pose-absorbs-error"),
 )
 def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
     """The check solves for a focal length that changes evenly over the views. It also compares the cameras from the
