@@ -36,7 +36,7 @@ def wrong_model(seed=3, spoil=None):
     (corners,) = set_up.observed(rng)
     if spoil:
         spoil(corners)
-    solved = set_up.solved((corners,), fixed=("k2", "k3", "p1", "p2"))
+    solved = set_up.solved((corners,), fixed=("k2", "k3", "p1", "p2"), robust=spoil is None)
     return Inspection.of(Evidence(solved))
 
 

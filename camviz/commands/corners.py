@@ -7,22 +7,28 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from camviz.commands.common import Refusal
+from camviz.commands.common import Parser, Refusal
 
 if TYPE_CHECKING:
     from camviz.files.corners import LoadedCorners
 
 
-def add_corners(command: argparse.ArgumentParser) -> None:
-    """The option that names files of corners."""
+def add_corners(command: Parser) -> None:
+    """The option that names files of corners; the help lists what is read."""
+    command.listing = _listing
     command.add_argument(
         "--corners",
         metavar="FILES",
         nargs="+",
         type=Path,
-        help="corners that another program found, in place of those in pictures: mrcal's .vnl, BabelCalib's .orpc and "
-        ".dsc, or CSV",
+        help="corners that another program found, in place of those in pictures; what is read is listed below",
     )
+
+
+def _listing() -> str:
+    from camviz.files.corners import corner_formats
+
+    return "\n".join(["corners:", *(f"  {each.title}" for each in corner_formats().values())])
 
 
 def corners_of(options: argparse.Namespace, paths: Sequence[Path]) -> LoadedCorners:

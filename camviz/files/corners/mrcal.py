@@ -77,7 +77,7 @@ FORMAT = CornerFormat(
     holds="neither board nor image size",
     says="filename x y, and level or weight, which are not used as weights; - or a negative number where no corner was "
     "seen; row by row; first pixel's centre at (0, 0)",
-    source="mrcal 2.4, compute_chessboard_corners; mrgingham's manual",
+    source="mrcal 2.2, compute_chessboard_corners; mrgingham's manual",
     example={
         "corners.vnl": b"# filename x y level\n"
         + b"".join(
