@@ -85,7 +85,7 @@ def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
             sick(),
             "Most likely a board half hidden or cut off by the border: "
             "detect that picture's corners again, or leave the view out, and solve again.",
-            "1 warning, 1 note and 1 consequence: the worst, camera04.jpg: column 1 of the board is off by 3.82 px, "
+            "1 warning, 2 notes and 1 consequence: the worst, camera04.jpg: column 1 of the board is off by 3.87 px, "
             "6 of its 6 corners by more than 1.5 px.",
         ),
     ],

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from camviz.clinic.evidence import Evidence, NotChecked
+from camviz.clinic.judgement import px
 from camviz.clinic.observed import Observed
 from camviz.clinic.registry import Finding, LabFault, Rng, finding
 from camviz.lenses.base import Array
@@ -134,7 +135,7 @@ def outlier_line(evidence: Evidence) -> Iterator[Finding]:
                 sentence = (
                     f"{evidence.picture(observed.name, view)}: {label} of the board is off by {median:.3g} px, "
                     f"{round(off[worst] * len(corners))} of its {len(corners)} corners by more than {limit:.2g} px. "
-                    f"A square is {square:.2g} px wide there."
+                    f"A square is {px(square)} wide there."
                 )
                 like_neighbour = A_SQUARE[0] <= median / square <= A_SQUARE[1]
                 causes = tuple(each for each in outlier_line.causes if like_neighbour or each != NEIGHBOUR)
