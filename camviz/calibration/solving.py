@@ -27,8 +27,8 @@ TRIMMINGS = 10
 ANOTHER_WAY_DEG = 45.0  # from the other views: a symmetric board's other order turns by 180° or 90°
 SHORT = 0.01  # of the sum of squares: half a per cent of the RMS
 STOPPED_SHORT = (
-    "The solution stopped where its lens folds at a corner, short of the least error of this model. Another program may "
-    "reach less. The model probably does not describe this lens."
+    "The solution stopped where its lens folds at a corner, short of the least error of this model. Another program "
+    "may reach less. The model probably does not describe this lens."
 )
 FOLDED = (
     "the lens that fits the views folds inside the image: take views that reach into the corners of the image, "
