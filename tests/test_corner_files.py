@@ -315,6 +315,29 @@ def test_a_command_that_lacks_something_says_what(room, words, said):
     assert (result.status, result.out, result.err.count("\n")) == (2, "", 1)
 
 
+def test_corners_in_a_file_take_the_place_of_those_that_a_calibration_holds(room, virtual, capsys):
+    """Eight views, of which some corners were set aside, are inspected with three views of the same camera."""
+    set_up, corners = virtual
+    spoilt = corners.copy()
+    spoilt[2, :4] += 30
+    camviz.files.write(set_up.solved((spoilt,)), Path("camera.yaml"), "opencv")
+    names = detections(set_up.camera, corners).pictures[:3]
+    written(room, {"corners.vnl": vnl(names, corners)})
+    said = options(set_up)
+    words = ["--board", "x".join(map(str, said["shape"])), "--square-mm", f"{1000 * said['square_size']:g}"]
+    assert main(["inspect", "camera.yaml", "--corners", "corners.vnl", *words]) in (0, 1)
+    out = capsys.readouterr().out
+    assert "3 of 3 pictures used" in out
+    assert "note corners-set-aside" not in out
+    written(room, {"board.dsc": DSC, "view0.orpc": ORPC})
+    result = main_captured(["inspect", "camera.yaml", "--corners", "board.dsc", "view0.orpc"])
+    grid = set_up.camera.intrinsics
+    assert result.err == (
+        "camviz: board.dsc: these corners are of pictures of 640×480 pixels, and the calibration is for "
+        f"{grid.width}×{grid.height}.\n"
+    )
+
+
 def test_corners_are_for_one_camera_alone(room):
     written(room, {"corners.vnl": VNL})
     pair = Path(__file__).parent / "data" / "opencv_stereo.xml"

@@ -31,13 +31,22 @@ def _listing() -> str:
     return "\n".join(["corners:", *(f"  {each.title}" for each in corner_formats().values())])
 
 
-def corners_of(options: argparse.Namespace, paths: Sequence[Path]) -> LoadedCorners:
+def corners_of(
+    options: argparse.Namespace, paths: Sequence[Path], otherwise: tuple[int, int] | None = None
+) -> LoadedCorners:
     """The corners in the files of --corners; pictures tell their size where neither the files nor --size do."""
     from camviz.files import CalibrationError
     from camviz.files.corners import load_corners
 
     side = None if options.square_mm is None else options.square_mm / 1000
     try:
-        return load_corners(options.corners, shape=options.board, square_size=side, size=options.size, pictures=paths)
+        return load_corners(
+            options.corners,
+            shape=options.board,
+            square_size=side,
+            size=options.size,
+            pictures=paths,
+            otherwise=otherwise,
+        )
     except CalibrationError as error:
         raise Refusal(f"{error}.") from error

@@ -175,9 +175,14 @@ def _with_file(calibration: Calibration, images: list[Path], options: argparse.N
     if len(calibration.cameras) != 1:
         raise Refusal(f"--corners is for a calibration of one camera, this has {len(calibration.cameras)}.")
     (camera,) = calibration.cameras.values()
-    if options.size is None and not images:
-        options = argparse.Namespace(**vars(options) | {"size": (camera.intrinsics.width, camera.intrinsics.height)})
-    found = corners_of(options, images)
+    ours = camera.intrinsics.width, camera.intrinsics.height
+    found = corners_of(options, images, None if images else ours)
+    theirs = found.detections.width, found.detections.height
+    if theirs != ours:
+        raise Refusal(
+            f"{options.corners[0]}: these corners are of pictures of {theirs[0]}×{theirs[1]} pixels, and the "
+            f"calibration is for {ours[0]}×{ours[1]}."
+        )
     return replace(with_detections(calibration, found.detections, found.board), notes=calibration.notes + found.notes)
 
 

@@ -39,14 +39,16 @@ def load_corners(
     square_size: float | None = None,
     size: Size | None = None,
     pictures: Sequence[str | PathLike[str]] = (),
+    otherwise: Size | None = None,
 ) -> LoadedCorners:
     """Read the corners of one camera's pictures from one of the files that docs/formats.md lists.
 
     `shape` are the board's inner corners (columns, rows) and `square_size` is in metres; `size` is (width, height) of
     the pictures in pixels. Each is needed where the files do not hold it; what they hold must agree. The size is also
-    taken from `pictures`, or from a picture that the file names and that is there. Pixels count from the centre of the
-    first one, (0, 0). A picture with fewer than six corners, or with corners on one line of the board, is skipped.
-    Raises CalibrationError for everything else: one sentence with the file and, where there is one, the line.
+    taken from `pictures`, or from a picture that the file names and that is there, or else is `otherwise`. Pixels
+    count from the centre of the first one, (0, 0). A picture with fewer than six corners, or with corners on one line
+    of the board, is skipped. Raises CalibrationError for everything else: one sentence with the file and, where there
+    is one, the line.
     """
     files = [CornerFile(path) for path in _files([Path(path) for path in paths])]
     chosen = _format(files)
@@ -57,7 +59,7 @@ def load_corners(
     except CalibrationError as error:
         known = any(str(error).startswith(f"{file.path}: ") for file in files)
         raise error if known else CalibrationError(f"{files[0].path}: {error}") from error
-    return _loaded(found, _size(found, files[0].path, size, [Path(picture) for picture in pictures]))
+    return _loaded(found, _size(found, files[0].path, size, [Path(picture) for picture in pictures], otherwise))
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
@@ -91,7 +93,7 @@ def _format(files: Sequence[CornerFile]) -> CornerFormat:
     return formats[0]
 
 
-def _size(found: Corners, path: Path, given: Size | None, pictures: Sequence[Path]) -> Size:
+def _size(found: Corners, path: Path, given: Size | None, pictures: Sequence[Path], otherwise: Size | None) -> Size:
     """(width, height) of the pictures: the file's, the caller's, or that of a picture; all that is said must agree."""
     if given is not None and not all(1 <= side <= LARGEST_SIDE for side in given):
         raise CalibrationError(f"size: expected (width, height), each from 1 to {LARGEST_SIDE} pixels, got {given}")
@@ -107,6 +109,8 @@ def _size(found: Corners, path: Path, given: Size | None, pictures: Sequence[Pat
         gray = read_gray(each) if each.is_file() else None
         if gray is not None:
             return gray.shape[1], gray.shape[0]
+    if otherwise:
+        return otherwise
     raise CalibrationError(
         f"{path}: it does not hold the size of the pictures, and none of them is at hand: give --size WxH"
     )
