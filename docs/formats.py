@@ -1,15 +1,19 @@
-"""The table of formats in docs/formats.md: `python docs/formats.py` makes it from what the formats declare."""
+"""The tables in docs/formats.md, of calibrations and corners: `python docs/formats.py` makes them from what the formats
+declare."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+from camviz.files.corners import corner_formats
 from camviz.files.format import Format
 from camviz.files.registry import formats
 
 PAGE = Path(__file__).with_suffix(".md")
 HEAD = "| `--to` | file | camera models | conventions of its own | not written |\n|---|---|---|---|---|\n"
+CORNERS = "| corners | hold | conventions of their own | layout by |\n|---|---|---|---|\n"
+_CORNERS = re.compile(r"^\| corners .*\n(?:\|.*\n)*", re.MULTILINE)
 _TABLE = re.compile(r"^\| `--to` .*\n(?:\|.*\n)*", re.MULTILINE)
 
 
@@ -18,11 +22,20 @@ def table() -> str:
     return HEAD + "".join(f"| {' | '.join(_cells(format))} |\n" for format in formats().values())
 
 
+def corner_table() -> str:
+    """The files of corners as rows of Markdown."""
+    rows = [(each.title, each.holds, each.says, each.source) for each in corner_formats().values()]
+    return CORNERS + "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
 def renewed(page: str) -> str:
-    """The text of the page with the table as the formats are now; ValueError for a page without one."""
+    """The text of the page with both tables as the formats are now; ValueError for a page that lacks one."""
     made, count = _TABLE.subn(lambda _: table(), page)
     if count != 1:
         raise ValueError(f"expected one table that begins with | `--to`, found {count}")
+    made, count = _CORNERS.subn(lambda _: corner_table(), made)
+    if count != 1:
+        raise ValueError(f"expected one table that begins with | corners, found {count}")
     return made
 
 

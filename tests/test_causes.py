@@ -36,7 +36,7 @@ def wrong_model(seed=3, spoil=None):
     (corners,) = set_up.observed(rng)
     if spoil:
         spoil(corners)
-    solved = set_up.solved((corners,), fixed=("k2", "k3", "p1", "p2"))
+    solved = set_up.solved((corners,), fixed=("k2", "k3", "p1", "p2"), robust=spoil is None)
     return Inspection.of(Evidence(solved))
 
 
@@ -70,8 +70,11 @@ def test_a_view_that_no_wrong_model_explains_stands_for_itself():
     def spoil(corners):
         corners[4] += np.random.default_rng(0).normal(0, 60, corners[4].shape)
 
-    roots = [each for each in wrong_model(spoil=spoil).findings if not each.consequence_of]
-    assert 4 in {view for each in roots if each.id == "outlier-view" for view in each.pictures}
+    found = wrong_model(spoil=spoil).findings
+    (line,) = [each for each in found if each.pictures == (4,) and not each.consequence_of]
+    (view,) = [each for each in found if each.pictures == (4,) and each.consequence_of]
+    assert (line.id, view.id, view.consequence_of) == ("outlier-line", "outlier-view", "outlier-line")
+    assert found[0].id == "model-too-simple"
 
 
 def test_of_two_that_explain_each_other_the_larger_is_the_cause():

@@ -54,7 +54,7 @@ def changed(lens=None, **pinhole):
 
 
 def test_a_healthy_calibration_says_that_nothing_is_wrong_by_how_many_checks_and_why_not_by_more(solved):
-    assert inspect(solved).verdict == f"Nothing wrong was found; 24 checks ran, {SKIPPED}."
+    assert inspect(solved).verdict == f"Nothing wrong was found, 2 notes below; 25 checks ran, {SKIPPED}."
 
 
 def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
@@ -83,9 +83,9 @@ def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
         ),
         (
             sick(),
-            "Most likely a line of the board that was taken for its neighbour: "
+            "Most likely a board half hidden or cut off by the border: "
             "detect that picture's corners again, or leave the view out, and solve again.",
-            "1 warning, 1 note and 1 consequence: the worst, camera04.jpg: column 1 of the board is off by 3.82 px, "
+            "1 warning, 2 notes and 1 consequence: the worst, camera04.jpg: column 1 of the board is off by 3.87 px, "
             "6 of its 6 corners by more than 1.5 px.",
         ),
     ],

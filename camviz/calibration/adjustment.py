@@ -15,6 +15,7 @@ from camviz.poses import RigidTransform, Rotation
 
 MOST_STEPS = 100
 SETTLED = 1e-12  # of the sum of squares, what a step must still promise to take off
+ALL_BUT_FREE = 1e-9  # a damping that changes no step that is well determined
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,17 @@ class Adjustment(Linearisation):
             else:
                 break
         return replace(here, estimated=self.estimated) if only_poses else here
+
+    @property
+    def promised(self) -> float:
+        """The share of the sum of squares that a full Gauss–Newton step would take off, were the residuals linear.
+
+        At a least sum it is 0. It stays large where `refined` had to stop because a corner would lose its image.
+        """
+        normal = self.normal_equations
+        shared, views = normal.damped(ALL_BUT_FREE).solution()
+        fallen = shared @ normal.shared_gradient + np.sum(views * normal.gradients)
+        return float(fallen / self.sum_of_squares) if self.sum_of_squares > 0 else 0.0
 
     def _moved(self, shared: Array, twists: Array) -> Adjustment | None:
         """With changed parameters; None where a lens does not take them or a corner in use loses its image."""

@@ -25,6 +25,11 @@ FEWEST_VIEWS = 3
 MOST_ROUNDS = 20
 TRIMMINGS = 10
 ANOTHER_WAY_DEG = 45.0  # from the other views: a symmetric board's other order turns by 180° or 90°
+SHORT = 0.01  # of the sum of squares: half a per cent of the RMS
+STOPPED_SHORT = (
+    "The solution stopped where its lens folds at a corner, short of the least error of this model. Another program "
+    "may reach less. The model probably does not describe this lens."
+)
 FOLDED = (
     "the lens that fits the views folds inside the image: take views that reach into the corners of the image, "
     "or a model with fewer parameters"
@@ -43,7 +48,7 @@ def calibrate(
     """
     kind, estimated = _model(model, fixed)
     adjustment = _alone("camera", detections, board, kind, estimated, robust)
-    return _calibration(adjustment, {"camera": detections}, detections.skipped)
+    return _calibration(adjustment, {"camera": detections}, detections.skipped, _stopped_short(adjustment))
 
 
 def calibrate_pair(
@@ -74,6 +79,7 @@ def calibrate_pair(
     alone = {name: _alone(name, shared[name], board, kind, estimated, robust) for name in both}
     pair = _paired(alone, board, estimated if joint else (), robust)
     pair = _robust(pair) if robust else _settled(pair)
+    stopped = _stopped_short(pair)
     if not joint:
         pair = replace(pair, estimated=dict.fromkeys(both, estimated))
     skipped = [picture for detections in both.values() for picture in detections.skipped]
@@ -83,7 +89,7 @@ def calibrate_pair(
             picture for picture, place in zip(both[name].pictures, both[name].places, strict=True) if place in lonely
         ]
         skipped += [(picture, f"its partner of the {other} camera shows no board") for picture in names]
-    return _calibration(pair, shared, tuple(skipped))
+    return _calibration(pair, shared, tuple(skipped), stopped)
 
 
 def _model(name: str, fixed: Sequence[str]) -> tuple[Model, tuple[str, ...]]:
@@ -199,6 +205,13 @@ def _settled(adjustment: Adjustment) -> Adjustment:
     return replace(adjustment, first_from_board=RigidTransform.concatenate(poses))
 
 
+def _stopped_short(adjustment: Adjustment) -> bool:
+    """Whether less squares are in sight and no step leads there, because a corner would lose its image on the way."""
+    if not adjustment.promised > SHORT:
+        return False
+    return adjustment.refined().sum_of_squares > (1 - SHORT) * adjustment.sum_of_squares
+
+
 def _wanted(adjustment: Adjustment) -> list[Mask]:
     """By camera, which corners (views, corners) are seen and not set aside."""
     return [seen(corners) & ~adjustment.set_aside[name] for name, corners in adjustment.detections.items()]
@@ -239,7 +252,7 @@ def _only(detections: Detections, places: Sequence[int]) -> Detections:
 
 
 def _calibration(
-    adjustment: Adjustment, detections: Mapping[str, Detections], skipped: tuple[tuple[str, str], ...]
+    adjustment: Adjustment, detections: Mapping[str, Detections], skipped: tuple[tuple[str, str], ...], stopped: bool
 ) -> Calibration:
     pictures = {name: each.pictures for name, each in detections.items()}
     return Calibration(
@@ -252,7 +265,7 @@ def _calibration(
             name: camera.cam_from_world * adjustment.first_from_board for name, camera in adjustment.cameras.items()
         },
         per_view_errors={name: _per_view_errors(adjustment, name) for name in adjustment.cameras},
-        notes=sentences(adjustment, pictures),
+        notes=(*sentences(adjustment, pictures), *([STOPPED_SHORT] if stopped else [])),
         pictures=pictures,
         set_aside=adjustment.set_aside,
         estimated=adjustment.estimated,

@@ -50,9 +50,14 @@ class Observed:
         return self.adjustment.residuals[self.name]
 
     @cached_property
+    def in_use(self) -> Array:
+        """The residuals (views, corners, 2) of the corners that have a say in the solution, and NaN for all others."""
+        return np.where(self.adjustment.used[self.name][..., None], self.residuals, np.nan)
+
+    @cached_property
     def errors(self) -> Array:
-        """The RMS (views,) of each view's residuals in pixels; NaN for a view without corners."""
-        squares = np.sum(np.square(self.residuals), axis=-1)
+        """The RMS (views,) of each view's residuals in pixels over the corners in use; NaN for a view without any."""
+        squares = np.sum(np.square(self.in_use), axis=-1)
         counts = np.isfinite(squares).sum(axis=1)
         return np.sqrt(np.where(counts > 0, np.nansum(squares, axis=1) / np.maximum(counts, 1), np.nan))
 

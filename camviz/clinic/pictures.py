@@ -36,6 +36,8 @@ def with_detections(calibration: Calibration, detections: Detections, board: Boa
         pictures={name: detections.pictures},
         per_view_errors={},
         skipped=detections.skipped,
+        set_aside={},
+        board_warp=None,
     )
     poses = Adjustment.of(seen, name).refined(only_poses=True).first_from_board
     return replace(seen, cam_from_board={name: poses})

@@ -19,7 +19,7 @@ from camviz.clinic.virtual import SetUp, single
 
 SEVERITIES = ("fault", "warning", "note")  # the worst first
 WRONG_NUMBERS = (
-    *("models-differ", "views-differ", "outlier-view", "outlier-line", "pose-absorbs-error"),
+    *("models-differ", "views-differ", "outlier-view", "outlier-line", "corners-set-aside", "pose-absorbs-error"),
     *("model-too-simple", "split-disagreement", "fold", "near-pole", "inverse-not-converged"),
 )
 """What may follow where a file's numbers are not those of its camera."""
@@ -83,6 +83,7 @@ class Fault:
 
     - "set-up": it takes random numbers, a set-up and a strength, and gives another set-up.
     - "corners": it takes random numbers, corners, their (rows, columns) and a strength, and changes them in place.
+      The solution then sets none of them aside, as most programs set none aside.
     - "solution": it takes an Adjustment and a strength, and gives another Adjustment.
     """
 
@@ -115,7 +116,7 @@ class Fault:
         (corners,) = set_up.observed(rng)
         if self.stage == "corners":
             self.make(rng, corners, (set_up.board.rows, set_up.board.columns), strength)
-        solved = set_up.solved((corners,))
+        solved = set_up.solved((corners,), robust=self.stage != "corners")
         if self.stage == "solution":
             best = self.make(Adjustment.of(solved), strength)
             solved = replace(solved, cameras=best.cameras, cam_from_board={"camera": best.first_from_board})

@@ -145,8 +145,9 @@ stable id, one sentence, the number that shows it, the view that shows it, its l
 
 The clinic does not guess. A check whose evidence the file does not hold is listed as not made, with the reason. The
 command `camviz calibrate` writes files that hold all of it: corners, poses of the board, what was estimated and how
-well. With `--images` and `--board` the corners are looked for in pictures. `--compare` holds a second calibration of
-the same cameras beside the first. How far the two differ is then the first thing that is said.
+well. With `--images` and `--board` the corners are looked for in pictures, and with `--corners` they are read from
+another program's file. `--compare` holds a second calibration of the same cameras beside the first. How far the two
+differ is then the first thing that is said.
 
 A *fault* makes the calibration wrong. A *warning* makes it doubtful. A *note* is something to know when it is used.
 The exit status of `camviz inspect` is 0 when nothing is worse than a note, 1 when something is, and 2 when a file

@@ -78,14 +78,20 @@ class SetUp:
         return tuple(seen + rng.normal(0, self.noise, seen.shape) for seen in self.corners)
 
     def solved(
-        self, observed: tuple[Array, ...], model: str = "standard", *, fixed: tuple[str, ...] = (), square: float = 1.0
+        self,
+        observed: tuple[Array, ...],
+        model: str = "standard",
+        *,
+        fixed: tuple[str, ...] = (),
+        square: float = 1.0,
+        robust: bool = True,
     ) -> Calibration:
         """The calibration of these corners; `square` multiplies what the side of a square is taken for."""
         board = replace(self.board, square_size=self.board.square_size * square)
         found = [detections(camera, corners) for camera, corners in zip(self.cameras, observed, strict=True)]
         if len(found) == 1:
-            return calibrate(found[0], board, model, fixed=fixed)
-        return calibrate_pair(found[0], found[1], board, model, fixed=fixed)
+            return calibrate(found[0], board, model, fixed=fixed, robust=robust)
+        return calibrate_pair(found[0], found[1], board, model, fixed=fixed, robust=robust)
 
 
 def detections(camera: Camera, corners: Array) -> Detections:

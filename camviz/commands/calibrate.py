@@ -19,14 +19,16 @@ from camviz.commands.common import (
     Refusal,
     add_board,
     add_command,
-    board_of,
+    given_board,
     narrator,
     pixels,
     refuse_exhausted,
     refuse_output,
+    size,
     write_calibration,
     write_whole,
 )
+from camviz.commands.corners import add_corners, corners_of
 from camviz.commands.gate import EPILOG as GATE
 from camviz.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz.lenses import calibration_models
@@ -42,6 +44,9 @@ that cannot be read are named and skipped. Corners and whole views that contradi
 kept in the file. What is written is OpenCV's YAML, with all that a later inspection needs. With --report, or where a
 gate is given, the calibration is inspected as well; findings make it fail only where there is a gate.
 
+With --corners nothing is looked for in pictures: the corners come from files of other programs, which docs/formats.md
+lists. --board, --square-mm and --size say what those files do not hold. IMAGES are then for the report alone.
+
 The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
 (left07.jpg and right07.jpg), else by their order.
 """
@@ -49,6 +54,7 @@ MODELS = {name: model.says for name, (_, model) in calibration_models().items()}
 EXAMPLES = """\
 examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
+  camviz calibrate --corners corners.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
   camviz calibrate shots/ --board 9x6 --square-mm 25 --fail-on warning --limit rms-px=0.5 --junit clinic.xml
@@ -68,9 +74,11 @@ def add(commands: Any) -> None:
     command = add_command(commands, "calibrate", calibrate, "calibrate a camera or a pair from pictures", CALIBRATE)
     models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
     command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
-    command.add_argument("images", metavar="IMAGES", nargs="+", help="pictures, folders of them, or patterns")
+    command.add_argument("images", metavar="IMAGES", nargs="*", help="pictures, folders of them, or patterns")
     command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
-    add_board(command)
+    add_board(command, required=False, default=False)
+    add_corners(command)
+    command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILES do not hold it")
     command.add_argument("--model", choices=list(MODELS), default="standard", help="which lens (default: standard)")
     command.add_argument("--fix", metavar="NAMES", default="", help="parameters not to solve for, such as k3 or p1,p2")
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
@@ -90,16 +98,17 @@ def calibrate(options: argparse.Namespace) -> int:
     from camviz.clinic import inspect
     from camviz.files import CalibrationError
 
-    board = board_of(options)
-    left = pictures(options.images)
+    _refuse_words(options)
+    left = pictures(options.images) if options.images else []
     right = pictures(options.right) if options.right else []
-    refuse_output(options.output, "calibration", *left, *right)
+    sources = [*left, *right, *(options.corners or [])]
+    refuse_output(options.output, "calibration", *sources)
     if options.report:
-        refuse_output(options.report, "page", options.output, *left, *right)
+        refuse_output(options.report, "page", options.output, *sources)
     gate = given_gate(options)
-    refuse_junit(options, options.output, *([options.report] if options.report else []), *left, *right)
+    refuse_junit(options, options.output, *([options.report] if options.report else []), *sources)
     try:
-        calibration = _pair(left, right, board, options) if right else _single(left, board, options)
+        calibration = _of_corners(left, options) if options.corners else _of_pictures(left, right, options)
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
     try:
@@ -122,11 +131,40 @@ def calibrate(options: argparse.Namespace) -> int:
     outcome = gate.judge(inspect(calibration))
     told("\n".join(["", outcome.inspection.as_text(), *outcome.lines()]))
     if options.report:
-        folders = [each[0].parent for each in (left, right) if each]
+        folders = [each[0].parent for each in (left or options.corners, right) if each]
         _page(outcome.inspection, dict(zip(calibration.cameras, folders, strict=True)), options.report)
         told(f"{options.report}: open it in a browser.")
     write_junit(options, {str(options.output): outcome})
     return OK if outcome.passed or not decides else FOUND
+
+
+def _refuse_words(options: argparse.Namespace) -> None:
+    """Refuses a command that lacks what it works on, or that says it twice."""
+    needed = {"IMAGES": options.images, "--board": options.board, "--square-mm": options.square_mm}
+    missing = [word for word, given in needed.items() if not given]
+    if missing and not options.corners:
+        raise Refusal(f"the following arguments are required: {', '.join(missing)}; see `camviz calibrate --help`.")
+    if options.corners and options.right:
+        raise Refusal("--corners is for one camera: calibrate each camera of a pair by itself, without --right.")
+    if options.size and not options.corners:
+        raise Refusal("--size is for --corners: pictures have a size of their own.")
+
+
+def _of_corners(paths: list[Path], options: argparse.Namespace) -> Calibration:
+    """The camera of the corners in files."""
+    from camviz.calibration import calibrate
+
+    found = corners_of(options, paths)
+    told = found.detections.skipped
+    calibration = _solved(lambda: calibrate(found.detections, found.board, options.model, **_how(options)), told)
+    return replace(calibration, notes=found.notes + calibration.notes)
+
+
+def _of_pictures(left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
+    """The camera or the pair that took pictures."""
+    board = given_board(options)
+    assert board is not None
+    return _pair(left, right, board, options) if right else _single(left, board, options)
 
 
 def _page(inspection: Inspection, folders: Mapping[str, Path], page: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,7 @@ from camviz.commands.common import (
     size,
     write_whole,
 )
+from camviz.commands.corners import add_corners, corners_of
 from camviz.commands.gate import EPILOG as GATE
 from camviz.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz.commands.terminal import say, tell, tell_json
@@ -57,6 +58,7 @@ examples:
   camviz inspect camera.yml
   camviz inspect stereo.yml --size 640x480 --compare factory.yml
   camviz inspect camera.yml --images shots/ --board 9x6 --square-mm 25 --report report.html
+  camviz inspect camera.yml --corners corners.vnl --board 9x6 --square-mm 25
   camviz inspect shots/ --board 9x6 --square-mm 25 --json
   camviz inspect calibration/*.yaml --fail-on fault,low-coverage --ignore aspect --junit clinic.xml
 
@@ -77,6 +79,7 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--images", metavar="IMAGES", nargs="+", help="pictures that the calibration is for")
     add_board(command, required=False, default=False)
+    add_corners(command)
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
     command.add_argument("--compare", metavar="OTHER", type=Path, help="another calibration of the same cameras")
     command.add_argument("--at", metavar="METRES", type=metres, help="a distance at which to tell the error of a place")
@@ -95,7 +98,7 @@ def inspect(options: argparse.Namespace) -> int:
         refuse_output(options.report, "page", *(Path(word) for word in options.files))
     gate = given_gate(options)
     refuse_junit(options, *(Path(word) for word in options.files), *([options.report] if options.report else []))
-    board = given_board(options)
+    board = None if options.corners else given_board(options)
     compare = loaded(options.compare, options.size) if options.compare else None
     outcomes: dict[str, Outcome] = {}
     unreadable: dict[str, str] = {}
@@ -152,7 +155,7 @@ def _inspected(
         return inspect(
             _calibrated(paths, board), compare=compare, pictures=sizes_of(images), board=board, at=options.at
         )
-    add = None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
+    add = _adding(images, board, options)
     with on_disk(paths[0]) as file:
         try:
             return inspect_file(
@@ -166,6 +169,33 @@ def _inspected(
             )
         except CalibrationError as error:
             raise Refusal(str(error)) from error
+
+
+def _adding(
+    images: list[Path], board: Board | None, options: argparse.Namespace
+) -> Callable[[Calibration], Calibration] | None:
+    """What adds corners to a calibration that holds none: from files, or else from pictures of a known board."""
+    if options.corners:
+        return lambda calibration: _with_file(calibration, images, options)
+    return None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
+
+
+def _with_file(calibration: Calibration, images: list[Path], options: argparse.Namespace) -> Calibration:
+    """The calibration of one camera with the corners of --corners, in place of any that it holds."""
+    from camviz.clinic.pictures import with_detections
+
+    if len(calibration.cameras) != 1:
+        raise Refusal(f"--corners is for a calibration of one camera, this has {len(calibration.cameras)}.")
+    (camera,) = calibration.cameras.values()
+    ours = camera.intrinsics.width, camera.intrinsics.height
+    found = corners_of(options, images, None if images else ours)
+    theirs = found.detections.width, found.detections.height
+    if theirs != ours:
+        raise Refusal(
+            f"{options.corners[0]}: these corners are of pictures of {theirs[0]}×{theirs[1]} pixels, and the "
+            f"calibration is for {ours[0]}×{ours[1]}."
+        )
+    return replace(with_detections(calibration, found.detections, found.board), notes=calibration.notes + found.notes)
 
 
 def _calibrated(paths: list[Path], board: Board | None) -> Calibration:

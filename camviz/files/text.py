@@ -11,6 +11,7 @@ from typing import BinaryIO
 from camviz.calibration.types import CalibrationError
 
 MAX_BYTES = 16 * 2**20
+CALIBRATION = "calibration file"
 HEAD = 2**16  # characters that must tell which format this is
 
 _SIGNATURES = {
@@ -41,26 +42,26 @@ def refuse_no_file(path: Path) -> None:
         raise CalibrationError(f"{str(path)!r} is not a file name") from None
 
 
-def read_bytes(path: Path) -> bytes:
-    """The bytes of a file that is small enough to be a calibration; CalibrationError for anything else."""
-    with open_bounded(path, MAX_BYTES) as file:
-        content = file.read(MAX_BYTES + 1)
-    if len(content) > MAX_BYTES:
-        raise CalibrationError(_too_large(len(content), MAX_BYTES))
+def read_bytes(path: Path, most: int = MAX_BYTES, what: str = CALIBRATION) -> bytes:
+    """The bytes of a file that is small enough to be a calibration, or `what` else; CalibrationError for the rest."""
+    with open_bounded(path, most, what) as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise CalibrationError(_too_large(len(content), most, what))
     return content
 
 
 @contextmanager
-def open_bounded(path: Path, most: int) -> Iterator[BinaryIO]:
+def open_bounded(path: Path, most: int, what: str = CALIBRATION) -> Iterator[BinaryIO]:
     """A file of at most so many bytes, to be read piece by piece; CalibrationError for anything else."""
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
-            raise CalibrationError("expected a calibration file, this is a directory")
+            raise CalibrationError(f"expected a {what}, this is a directory")
         if not stat.S_ISREG(status.st_mode):
-            raise CalibrationError("expected a calibration file, this is not a regular file")
+            raise CalibrationError(f"expected a {what}, this is not a regular file")
         if status.st_size > most:
-            raise CalibrationError(_too_large(status.st_size, most))
+            raise CalibrationError(_too_large(status.st_size, most, what))
         with path.open("rb") as file:
             yield file
     except FileNotFoundError:
@@ -69,21 +70,21 @@ def open_bounded(path: Path, most: int) -> Iterator[BinaryIO]:
         raise CalibrationError(f"cannot be read ({error.strerror})") from error
 
 
-def _too_large(size: int, most: int) -> str:
-    return f"a calibration file has at most {most // 2**20} MB, this one has {size / 2**20:.0f} MB"
+def _too_large(size: int, most: int, what: str) -> str:
+    return f"a {what} has at most {most // 2**20} MB, this one has {size / 2**20:.0f} MB"
 
 
-def text_of(content: bytes) -> str:
+def text_of(content: bytes, what: str = "a calibration", kinds: str = " (YAML, XML, JSON)") -> str:
     """The bytes of a file as text; CalibrationError where they are something else."""
-    for signature, what in _SIGNATURES.items():
+    for signature, found in _SIGNATURES.items():
         if content.startswith(signature):
-            raise CalibrationError(f"expected a calibration as text (YAML, XML, JSON), this is {what}")
+            raise CalibrationError(f"expected {what} as text{kinds}, this is {found}")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise CalibrationError(f"expected text in UTF-8, byte {error.start} is not") from None
     if not text.strip():
-        raise CalibrationError("expected a calibration, the file is empty")
+        raise CalibrationError(f"expected {what}, the file is empty")
     if "\0" in text:
         raise CalibrationError("expected text, this is binary data")
     return text

@@ -8,6 +8,7 @@ import numpy as np
 import yaml
 
 from camviz.calibration.difference import pixel_grid
+from camviz.calibration.solving import STOPPED_SHORT
 from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence
 from camviz.clinic.registry import Finding, Rng, finding
@@ -17,7 +18,7 @@ from camviz.lenses import BrownConrady, KannalaBrandt
 
 HARMLESS_PX = 1.0
 GRID = (60, 40)
-LATER = "set aside"  # what a solution says in the same notes, which is no reading
+LATER = ("set aside", STOPPED_SHORT)  # what a solution says in the same notes, which is no reading
 
 
 @finding(
@@ -32,7 +33,7 @@ LATER = "set aside"  # what a solution says in the same notes, which is no readi
     "file's corners fit the reading that was taken.",
     explains=(
         *("fold", "near-pole", "inverse-not-converged", "outlier-view", "outlier-line", "pose-absorbs-error"),
-        *("model-too-simple", "split-disagreement", "views-differ", "models-differ"),
+        *("corners-set-aside", "model-too-simple", "split-disagreement", "views-differ", "models-differ"),
     ),
 )
 def assumed_coefficients(evidence: Evidence) -> Iterator[Finding]:
@@ -87,7 +88,7 @@ def four(rng: Rng, strength: float) -> Evidence:
 def assumed_reading(evidence: Evidence) -> Iterator[Finding]:
     """The check repeats what the reader of the format has noted."""
     for note in evidence.calibration.notes:
-        if note != FOUR_COEFFICIENTS and LATER not in note:
+        if note != FOUR_COEFFICIENTS and not any(said in note for said in LATER):
             yield assumed_reading.found(note)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from camviz.clinic.evidence import Evidence, NotChecked
+from camviz.clinic.judgement import px
 from camviz.clinic.observed import Observed
 from camviz.clinic.registry import Finding, LabFault, Rng, finding
 from camviz.lenses.base import Array
@@ -17,6 +18,8 @@ ONCE_IN = 1e-4  # for all views together: how often the error of a view with few
 FAR_CORNER = 10.0  # times the typical length of a residual
 FAR_LINE = 8.0  # the same for half a line of corners, to which the pose has to be extended
 VISIBLE_PX = 1.5  # less than this is no wrong detection
+A_SQUARE = (0.6, 1.5)  # of a square's width: how far off a line is that was taken for its neighbour
+NEIGHBOUR = "a line of the board that was taken for its neighbour"
 
 
 @finding(
@@ -37,7 +40,7 @@ def outlier_view(evidence: Evidence) -> Iterator[Finding]:
     for name in evidence.calibration.cameras:
         observed, errors = evidence.observed.get(name), known.get(name)
         if observed is not None:
-            counts = np.isfinite(observed.residuals).all(axis=-1).sum(axis=1)
+            counts = np.isfinite(observed.in_use).all(axis=-1).sum(axis=1)
             bad = list(_bad_views(evidence, name, observed.errors, counts))
             yield from bad
             yield from _bad_corners(evidence, observed, {view for finding in bad for view in finding.pictures})
@@ -63,7 +66,7 @@ def _bad_views(evidence: Evidence, name: str, errors: Array, counts: Array) -> I
 
 def _bad_corners(evidence: Evidence, observed: Observed, named: set[int]) -> Iterator[Finding]:
     """Views that are not bad as a whole, but for a corner or two."""
-    lengths = np.linalg.norm(observed.residuals, axis=-1)
+    lengths = np.linalg.norm(observed.in_use, axis=-1)
     far = lengths > max(FAR_CORNER * observed.scatter, VISIBLE_PX)
     for view in map(int, np.flatnonzero(far.any(axis=1))):
         if view in named:
@@ -113,7 +116,7 @@ def blurred_view(rng: Rng, corners: Array, shape: tuple[int, int], strength: flo
     severity="warning",
     view="residual-vectors",
     symptom="A whole row or column of corners is off.",
-    causes=("a line of the board that was taken for its neighbour", "a board half hidden or cut off by the border"),
+    causes=(NEIGHBOUR, "a board half hidden or cut off by the border", "blur or glare along that line"),
     remedy="Detect that picture's corners again, or leave the view out, and solve again.",
     threshold="At least half of a line's corners are off by eight standard deviations and by more than 1.5 px.",
     explains=("outlier-view",),
@@ -128,12 +131,24 @@ def outlier_line(evidence: Evidence) -> Iterator[Finding]:
             worst = max(range(len(lines)), key=lambda line: (off[line] >= 0.5) * _median(of_view[line]))
             if off[worst] >= 0.5:
                 label, corners = lines[worst]
+                median, square = _median(of_view[worst]), _square(observed, view)
                 sentence = (
-                    f"{evidence.picture(observed.name, view)}: {label} of the board is off by "
-                    f"{_median(of_view[worst]):.3g} px, {round(off[worst] * len(corners))} of its {len(corners)} "
-                    f"corners by more than {limit:.2g} px."
+                    f"{evidence.picture(observed.name, view)}: {label} of the board is off by {median:.3g} px, "
+                    f"{round(off[worst] * len(corners))} of its {len(corners)} corners by more than {limit:.2g} px. "
+                    f"A square is {px(square)} wide there."
                 )
-                yield outlier_line.found(sentence, _median(of_view[worst]), "px", observed.name, pictures=(view,))
+                like_neighbour = A_SQUARE[0] <= median / square <= A_SQUARE[1]
+                causes = tuple(each for each in outlier_line.causes if like_neighbour or each != NEIGHBOUR)
+                yield outlier_line.found(sentence, median, "px", observed.name, pictures=(view,), causes=causes)
+
+
+def _square(observed: Observed, view: int) -> float:
+    """The side of a square in a view, the median over the board, in pixels; NaN where no two neighbours were seen."""
+    grid = observed.detections[view].reshape(*observed.shape, 2)
+    sides = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).ravel() for axis in (0, 1)]
+    known = np.concatenate(sides)
+    known = known[np.isfinite(known)]
+    return float(np.median(known)) if len(known) else np.nan
 
 
 def _lines(observed: Observed) -> list[tuple[str, Array]]:
@@ -153,8 +168,8 @@ def _lengths_left_out(observed: Observed, lines: Sequence[Array]) -> list[list[A
     _, by_pose = adjustment.jacobian(observed.name)
     lengths: list[list[Array]] = [[np.empty(0) for _ in lines] for _ in range(adjustment.views)]
     for row, view in enumerate(np.flatnonzero(adjustment.posed)):
-        seen = np.isfinite(observed.residuals[view]).all(axis=-1)
-        residuals = np.where(seen[:, None], observed.residuals[view], 0)
+        seen = np.isfinite(observed.in_use[view]).all(axis=-1)
+        residuals = np.where(seen[:, None], observed.in_use[view], 0)
         sizes = np.linalg.norm(residuals, axis=-1)
         good = seen & (sizes <= max(3 * np.median(sizes[seen]), FAR_LINE * observed.scatter))
         slopes = np.where(seen[:, None, None], by_pose[row], 0)

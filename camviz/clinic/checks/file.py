@@ -124,6 +124,7 @@ def mislabelled(rng: Rng, strength: float) -> Evidence:
         "rolling-shutter",
         "outlier-view",
         "outlier-line",
+        "corners-set-aside",
         "pose-absorbs-error",
         "model-too-simple",
         "split-disagreement",

@@ -10,6 +10,7 @@ import numpy as np
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.cross_validation import halves
 from camviz.calibration.difference import pixel_grid
+from camviz.calibration.solving import STOPPED_SHORT
 from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.fields import smooth_field, warp_columns
@@ -22,6 +23,7 @@ from camviz.lenses.base import Array
 
 SYSTEMATIC = 0.5  # of the noise: what remains of a real lens under the standard model is a third of it
 VISIBLE_PX = 0.1  # RMS, a pattern smaller than which harms nobody
+STUCK = " The solution stopped where the lens folds, short of the least error of this model."
 CLEAR = 3.0  # σ of the corners, which the pattern must reach somewhere
 BEYOND = 3.0  # times the field's longest arrow: what is farther off has another cause
 BENT = 0.005  # of the board's longer side
@@ -49,6 +51,7 @@ STANDARD_ERRORS = 5.0
         "rolling-shutter",
         "outlier-view",
         "outlier-line",
+        "corners-set-aside",
         "fold",
         "near-pole",
         "inverse-not-converged",
@@ -66,7 +69,7 @@ def model_too_simple(evidence: Evidence) -> Iterator[Finding]:
             sentence = (
                 f"{name}: the lens model is too simple. A smooth pattern over the image makes up {field.pixels:.2g} px "
                 f"of the residuals (RMS) and up to {field.most:.2g} px of a single one, where the noise is "
-                f"{field.pixels / field.part:.2g} px."
+                f"{field.pixels / field.part:.2g} px.{STUCK * (STOPPED_SHORT in evidence.calibration.notes)}"
             )
             yield model_too_simple.found(sentence, field.pixels, "px", name, reach=BEYOND * field.most)
 
@@ -114,6 +117,7 @@ def lens_too_rich(rng: Rng, strength: float) -> Evidence:
         "views-differ",
         "outlier-view",
         "outlier-line",
+        "corners-set-aside",
         "pose-absorbs-error",
         "model-too-simple",
         "split-disagreement",
@@ -159,7 +163,7 @@ def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     remedy="Lock focus and zoom, switch stabilisation off, take more views, and solve again.",
     threshold="The focal length changes by 0.3 %, or the cameras differ by at least a pixel (median over the image). "
     "Noise would show it in one set of a million.",
-    explains=("views-differ", "outlier-view", "outlier-line", "pose-absorbs-error"),
+    explains=("views-differ", "outlier-view", "outlier-line", "corners-set-aside", "pose-absorbs-error"),
 )
 def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
     """The check solves for a focal length that changes evenly over the views. It also compares the cameras from the

@@ -107,7 +107,14 @@ def _squares_beside(residuals: Array, columns: Array, freedom: int) -> tuple[flo
     remedy="Take the pictures again with camera and board still, or with a global shutter. Solve again.",
     threshold="The velocities explain at least 0.7 of the noise, by chance in one set of a million. "
     "Columns and both diagonals leave at least 3 % more of the squares than rows do.",
-    explains=("model-too-simple", "outlier-view", "outlier-line", "pose-absorbs-error", "split-disagreement"),
+    explains=(
+        "model-too-simple",
+        "outlier-view",
+        "outlier-line",
+        "corners-set-aside",
+        "pose-absorbs-error",
+        "split-disagreement",
+    ),
 )
 def rolling_shutter(evidence: Evidence) -> Iterator[Finding]:
     """The check fits six velocities of the board to every view, as a rolling shutter would show them. The same along
