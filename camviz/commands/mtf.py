@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from html import escape
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camviz.commands.common import OK, Refusal, add_command, read_picture, refuse_output, write_whole
+from camviz.commands.common import OK, Refusal, add_command, add_megapixels, read_picture, refuse_output, write_whole
 from camviz.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
@@ -51,6 +49,7 @@ def add(commands: Any) -> None:
     light.add_argument("--srgb", action="store_true", help="the numbers are encoded as sRGB")
     command.add_argument("--json", action="store_true", help="the figures for programs; null if unknown")
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with the curves as well")
+    add_megapixels(command)
 
 
 def part(text: str) -> tuple[int, int, int, int]:
@@ -128,9 +127,10 @@ def figures(edge: SlantedEdge) -> dict[str, float]:
 
 def as_json(edge: SlantedEdge) -> str:
     """The figures and the curve as one JSON object; null for those that the edge cannot give."""
-    numbers = {name: value if isfinite(value) else None for name, value in figures(edge).items()}
+    from camviz.files.output import json_text
+
     curve = [{"cycles_per_pixel": f, "mtf": float(edge.mtf(f))} for f in FREQUENCIES]
-    return json.dumps({**numbers, "curve": curve}, indent=2, allow_nan=False)
+    return json_text({**figures(edge), "curve": curve})
 
 
 def as_text(edge: SlantedEdge, photo: Path, taken_as: str) -> str:
