@@ -1,4 +1,4 @@
-"""Damaged files, pictures and command lines: what an attack found, and a small attack from the seed of the large one."""
+"""Damaged files, pictures and command lines: what an attack found, and a small one from the seed of the large one."""
 
 import json
 import os
@@ -28,7 +28,7 @@ import attack
 import hostile
 
 BOARD = Board(9, 6, 0.025)
-KINDS = ("png", "jpg", "tif", "bmp", "ppm", "webp", "jp2", "hdr")
+KINDS = ("png", "jpg", "tif", "bmp", "pgm", "webp", "jp2", "hdr")
 
 
 def picture(path: Path, height: int = 40, width: int = 60) -> bytes:
@@ -70,9 +70,9 @@ def test_whatever_is_done_to_a_file_it_is_read_or_refused_in_one_sentence(case, 
 
 def test_a_case_can_be_made_again_from_its_number(case):
     content, other = case.files["opencv_mono.json"], case.files["ros_file.yaml"]
-    made = [hostile.mutated(case.rng("files", number), content, other) for number in (1, 1, 2, 3)]
-    assert made[0] == made[1]
-    assert len(set(made)) == 3
+    made = [hostile.mutated(case.rng("files", number), content, other) for number in (1, *range(20))]
+    assert made[0] == made[2]
+    assert len(set(made)) > 10
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_a_limit_can_be_raised_and_lowered(tmp_path, monkeypatch, capsys):
     assert main(["mtf", str(tmp_path / "a.png"), "--megapixels", "0.05"]) == 2
     assert "(--megapixels and CAMVIZ_MEGAPIXELS allow more)" in capsys.readouterr().err
     monkeypatch.setenv("CAMVIZ_MEGAPIXELS", "many")
-    with pytest.raises(PictureError, match="CAMVIZ_MEGAPIXELS: expected megapixels, .* got 'many'"):
+    with pytest.raises(PictureError, match=r"CAMVIZ_MEGAPIXELS: expected megapixels, .* got 'many'"):
         read_gray(tmp_path / "a.png")
 
 
@@ -131,7 +131,7 @@ def test_the_end_of_a_thumbnail_is_not_the_end_of_the_picture(tmp_path):
     (tmp_path / "b.jpg").write_bytes(whole[:2] + thumbnail + whole[2:])
     assert read_gray(tmp_path / "b.jpg").shape == (40, 60)
     (tmp_path / "b.jpg").write_bytes(whole[:2] + thumbnail + whole[2:-30])
-    assert "the JPEG picture is cut off" in complaint(tmp_path / "b.jpg")
+    assert "the JPEG picture is cut off: it ends after" in complaint(tmp_path / "b.jpg")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
@@ -151,7 +151,7 @@ def test_more_than_eight_bits_are_read_as_they_are_and_scaled_for_a_finder(tmp_p
     values = np.array([[0, 100], [200, 400]], kind)
     cv2.imwrite(str(tmp_path / "a.tif"), values)
     np.testing.assert_array_equal(read_picture(tmp_path / "a.tif"), values)
-    np.testing.assert_array_equal(read_gray(tmp_path / "a.tif"), [[0, 63], [127, 255]])
+    np.testing.assert_allclose(read_gray(tmp_path / "a.tif"), [[0, 63], [127, 255]], atol=1)
 
 
 def test_light_that_is_no_number_is_dark(tmp_path):
@@ -198,7 +198,7 @@ def test_what_json_cannot_say_is_null_for_programs_and_refused_in_calibrations()
         as_json({"fx": inf})
 
 
-@pytest.mark.parametrize("number", ["1e6", "-1e6", "1e150"])
+@pytest.mark.parametrize("number", ["1e6", "-1e6", "9e8"])
 def test_an_inspection_of_absurd_numbers_is_strict_json(tmp_path, number):
     """cx of 1e6, a tangential coefficient of 1e6: the faults that an inspection is there to name."""
     good = (attack.DATA / "opencv_mono.json").read_text()
@@ -212,7 +212,7 @@ def test_an_inspection_of_absurd_numbers_is_strict_json(tmp_path, number):
     [
         ("twice.json", '{"fx": 1, "fx": 2}', "appears twice"),
         ("deep.json", "[" * 5000 + "]" * 5000, "nested more than 32 levels deep"),
-        ("deep.toml", "[cam_0]\nname = " + "[" * 5000 + "]" * 5000, ""),
+        ("deep.toml", "[cam_0]\nname = " + "[" * 5000 + "]" * 5000, "deep.toml"),
         ("keys.json", json.dumps({f"k{n}": n for n in range(20_000)}), "at most 10,000 keys"),
     ],
 )

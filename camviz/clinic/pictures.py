@@ -29,8 +29,9 @@ def sizes_of(
             wrong.append(error)
     if wrong and not sizes:
         raise wrong[-1]
-    for error in wrong if left_out else ():
-        left_out(error)
+    if left_out:
+        for each in wrong:
+            left_out(each)
     return sizes
 
 
