@@ -98,7 +98,7 @@ def test_the_attack_knows_what_is_wrong(status, out, err, what):
 def test_a_bomb_is_refused_by_its_header_before_anything_is_decoded(tmp_path, monkeypatch):
     (tmp_path / "bomb.png").write_bytes(png(30_000, 30_000))
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
-    assert "it has 30000 × 30000 pixels, 900 megapixels, expected at most 100" in complaint(tmp_path / "bomb.png")
+    assert "it has 30000 × 30000 pixels, 900 megapixels, expected at most 64" in complaint(tmp_path / "bomb.png")
 
 
 def test_a_limit_can_be_raised_and_lowered(tmp_path, monkeypatch, capsys):
@@ -111,6 +111,14 @@ def test_a_limit_can_be_raised_and_lowered(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("CAMVIZ_MEGAPIXELS", "many")
     with pytest.raises(PictureError, match=r"CAMVIZ_MEGAPIXELS: expected megapixels, .* got 'many'"):
         read_gray(tmp_path / "a.png")
+
+
+def test_an_edge_is_looked_for_in_a_part_of_a_large_picture(tmp_path, capsys):
+    picture(tmp_path / "a.png", 4000, 7000)
+    assert main(["mtf", str(tmp_path / "a.png")]) == 2
+    assert "expected an edge within 24 megapixels, got 28: say with --roi where it is." in capsys.readouterr().err
+    assert main(["mtf", str(tmp_path / "a.png"), "--roi", "0,0,30,30"]) == 2
+    assert "holds no edge" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("kind", KINDS)

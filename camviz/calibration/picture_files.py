@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-MEGAPIXELS = 100.0  # what is decoded unless the reader asks for more: any telephone's picture, 100 MB in grey
+MEGAPIXELS = 64.0  # what is decoded unless the reader asks for more; finders take 10 bytes for each pixel
 VARIABLE = "CAMVIZ_MEGAPIXELS"
 MOST_MEGAPIXELS = 1000.0
 BYTES_A_PIXEL = 16  # four channels of 32 bits, uncompressed
@@ -118,7 +118,7 @@ def picture_kind(path: str | PathLike[str]) -> str:
 
 
 def most_megapixels() -> float:
-    """How many megapixels a picture may have: what CAMVIZ_MEGAPIXELS says, else 100. PictureError for nonsense."""
+    """How many megapixels a picture may have: what CAMVIZ_MEGAPIXELS says, else 64. PictureError for nonsense."""
     said = os.environ.get(VARIABLE, "")
     try:
         most = float(said or MEGAPIXELS)

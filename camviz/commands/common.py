@@ -81,7 +81,7 @@ def add_megapixels(command: argparse.ArgumentParser) -> None:
         "--megapixels",
         metavar="N",
         type=bounded("a number of megapixels", 0.01, 1000),
-        help="the largest picture that is read (default: 100, or what CAMVIZ_MEGAPIXELS says)",
+        help="the largest picture that is read (default: 64, or what CAMVIZ_MEGAPIXELS says)",
     )
 
 

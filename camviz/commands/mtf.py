@@ -36,6 +36,7 @@ exit status:
   0  measured
   2  there is no edge that can be measured, or the command cannot be used; one sentence on stderr says why
 """
+MOST_MEGAPIXELS = 24  # that are measured, at 34 bytes a pixel
 FREQUENCIES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)  # cycles per pixel: the curve in JSON
 
 
@@ -67,7 +68,9 @@ def mtf(options: argparse.Namespace) -> int:
 
     if options.report:
         refuse_output(options.report, "page", options.photo)
-    light, taken_as = linear_light(_cut(read_picture(options.photo), options), options)
+    picture = _cut(read_picture(options.photo), options)
+    _refuse_large(picture, options.photo)
+    light, taken_as = linear_light(picture, options)
     try:
         edge = SlantedEdge.of(light)
     except ValueError as error:
@@ -94,6 +97,15 @@ def _cut(picture: np.ndarray, options: argparse.Namespace) -> np.ndarray:
             f"got {x},{y},{width},{height}."
         )
     return picture[y : y + height, x : x + width]
+
+
+def _refuse_large(picture: np.ndarray, photo: Path) -> None:
+    megapixels = picture.shape[0] * picture.shape[1] / 1e6
+    if megapixels > MOST_MEGAPIXELS:
+        raise Refusal(
+            f"{photo}: expected an edge within {MOST_MEGAPIXELS} megapixels, got {megapixels:.4g}: say with --roi "
+            "where it is."
+        )
 
 
 def linear_light(picture: np.ndarray, options: argparse.Namespace) -> tuple[np.ndarray, str]:
