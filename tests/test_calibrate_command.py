@@ -59,13 +59,13 @@ def test_the_camera_of_a_folder_is_written_and_read_by_camviz_and_by_opencv(room
     (room / "shots" / "notes.txt").write_text("passed over")
     assert main(["calibrate", "shots", *WORDS, "--workers", "1", "--fix", "k3"]) == 0
     out, err = capsys.readouterr()
-    assert "view99.jpg: skipped, it is not a picture that can be read." in out
+    assert "view99.jpg: skipped, it is not a picture that can be read, it begins with 'no picture'." in out
     assert out.endswith("camera.yaml: written.\n")
     assert err == ""
     found = camviz.load("camera.yaml")
     assert found.cameras["camera"].intrinsics.fx == pytest.approx(600, abs=2)
     assert found.pictures["camera"] == tuple(f"view{i:02d}.png" for i in range(4))
-    assert found.skipped == (("view99.jpg", "it is not a picture that can be read"),)
+    assert found.skipped == (("view99.jpg", "it is not a picture that can be read, it begins with 'no picture'"),)
     assert found.estimated["camera"] == ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
     storage = cv2.FileStorage("camera.yaml", cv2.FILE_STORAGE_READ)
     np.testing.assert_array_equal(storage.getNode("camera_matrix").mat(), found.cameras["camera"].intrinsics.K)
@@ -94,7 +94,10 @@ def test_bad_input_is_refused_in_one_sentence_and_nothing_is_written(room):
         (["gone.png"], "gone.png: there is no such picture or folder"),
         (["gone*.png"], "gone*.png: no picture fits this pattern"),
         (["none"], "none: there are no pictures in this folder"),
-        (["text"], "none of the pictures can be used: it is not a picture that can be read (a.jpg)"),
+        (
+            ["text"],
+            "of the pictures can be used: it is not a picture that can be read, it begins with 'no picture' (a.jpg)",
+        ),
         (["two"], "at least 3 views of the board are needed for a calibration, got 2"),
         (["shots", "--right", "two/view00.png"], "at least 3 views in which both cameras see the board"),
         (["shots", "-o", "gone/camera.yaml"], "there is no directory gone to write into"),

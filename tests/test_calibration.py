@@ -126,7 +126,7 @@ def test_pictures_that_give_no_view_are_named_with_the_reason(tmp_path):
         "empty.png": "the board was not found in it",
         "gone.png": "it cannot be read (No such file or directory)",
         "large.png": "it has 960×720 pixels, most have 640×480",
-        "text.jpg": "it is not a picture that can be read",
+        "text.jpg": "it is not a picture that can be read, it begins with 'no picture'",
     }
 
 

@@ -324,7 +324,7 @@ def of_64_bits(folder):
         (saturated_throughout, "saturated throughout"),
         (changed_places, "have they changed places?"),
         (copied, "is the same picture as bright_60_0.png"),
-        (cut_short, "no PNG or TIFF picture that can be read"),
+        (cut_short, "the PNG picture is cut off: it ends after 60 bytes"),
         (one_level, "at least two levels of exposure, got 1"),
         (dark_only, "holds dark frames only"),
         (other_names, "expected frames named bright_<exposure ms>_0.png"),

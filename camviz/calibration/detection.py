@@ -29,6 +29,7 @@ Progress = Callable[[int, int], object]
 Look = tuple[tuple[int, int] | None, Array | None, str]
 
 LISTEN = 0.1  # seconds between two checks for Ctrl-C
+FEWEST_OF_A_SIDE = 3  # inner corners of a chessboard that OpenCV's finders take
 WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictures take
 
 
@@ -111,6 +112,11 @@ def _looked(
         raise CannotCalibrate("there are no pictures to look for a board in")
     if board.dictionary is not None:
         charuco_detector(board)  # complains about a board that cannot be
+    elif min(board.columns, board.rows) < FEWEST_OF_A_SIDE:
+        raise CannotCalibrate(
+            f"a chessboard is found by at least {FEWEST_OF_A_SIDE}×{FEWEST_OF_A_SIDE} inner corners, this board has "
+            f"{board.columns}×{board.rows}"
+        )
     looks: dict[int, Look] = {}
     for place, found in _looks([str(path) for path in paths], board, finder, workers):
         looks[place] = found

@@ -10,12 +10,13 @@ import os
 import signal
 import threading
 from contextlib import suppress
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from camviz.calibration.picture_files import PictureError, read_gray
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -26,26 +27,10 @@ Array = NDArray[np.float64]
 
 FINDERS = ("auto", "sectors", "classic")
 FEWEST = 6  # corners of a ChArUco board that give its pose with something left to check it by
+SMALLEST = 16  # pixels along the shorter side, below which OpenCV's finders fail instead of finding nothing
 LARGE = 2000  # pixels along the longer side, beyond which boards are looked for in a smaller copy
 WINDOW = 11  # pixels to either side of a corner that OpenCV's samples refine it from
 SUBPIXEL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.001)
-
-
-def read_gray(path: str | PathLike[str]) -> NDArray[np.uint8] | None:
-    """A picture's brightness (height, width) not turned as its file may ask; None if it is no picture.
-
-    More than 8 bits are scaled to the brightest pixel. Raises OSError for a file that cannot be read.
-    """
-    content = np.fromfile(path, dtype=np.uint8)
-    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-    try:
-        gray = cv2.imdecode(content, flags) if content.size else None
-    except cv2.error:
-        return None
-    if gray is None or gray.dtype == np.uint8:
-        return gray
-    scaled = np.nan_to_num(gray.astype(np.float64)) * (255 / max(float(np.nanmax(gray)), 1e-9))
-    return np.clip(scaled, 0, 255).astype(np.uint8)
 
 
 def find_corners(image: NDArray[Any], board: Board, finder: str = "auto") -> Array | None:
@@ -59,6 +44,8 @@ def find_corners(image: NDArray[Any], board: Board, finder: str = "auto") -> Arr
     if finder not in FINDERS:
         raise ValueError(f"finder must be one of {', '.join(FINDERS)}, got {finder!r}")
     gray = image if image.ndim == 2 else cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY)
+    if min(gray.shape) < SMALLEST:
+        return None
     if board.dictionary is not None:
         return _charuco(gray, board)
     corners = _sectors(gray, board) if finder != "classic" else _classic(gray, board, WINDOW)
@@ -72,6 +59,8 @@ def _sectors(gray: NDArray[Any], board: Board) -> Array | None:
     factor = -(-max(gray.shape) // LARGE)
     if factor > 1:
         height, width = (side // factor for side in gray.shape)
+        if min(height, width) < SMALLEST:
+            return None
         cropped = gray[: height * factor, : width * factor]
         gray = cv2.resize(cropped, (width, height), interpolation=cv2.INTER_AREA)
     for flags in (cv2.CALIB_CB_ACCURACY, cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE):
@@ -141,11 +130,12 @@ def look(path: str, board: Board, finder: str) -> tuple[tuple[int, int] | None, 
     """The size (width, height) of a picture, the corners in it, and in words why there are none."""
     try:
         gray = read_gray(path)
-    except OSError as error:
-        return None, None, f"it cannot be read ({error.strerror})"
-    if gray is None:
-        return None, None, "it is not a picture that can be read"
-    corners = find_corners(gray, board, finder)
+    except PictureError as error:
+        return None, None, error.why
+    try:
+        corners = find_corners(gray, board, finder)
+    except cv2.error as error:
+        return None, None, f"OpenCV's finder failed on it ({error.func})"
     why = "the board was not found in it" if board.dictionary is None else "too little of the board was found in it"
     return (gray.shape[1], gray.shape[0]), corners, why if corners is None else ""
 

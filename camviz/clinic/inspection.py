@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -20,6 +19,7 @@ from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.registry import Finding
 from camviz.clinic.summary import Summary
 from camviz.files import CalibrationError, load
+from camviz.files.output import json_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +76,8 @@ class Inspection:
         return words.worst_of(self.findings) is None
 
     def as_json(self) -> str:
-        """For programs: cameras, findings, checked, skipped, ignored, as docs/clinic.md has them."""
-        return json.dumps(self.as_tree(), indent=2, ensure_ascii=False)
+        """For programs, as strict JSON: cameras, findings, checked, skipped, ignored, as docs/clinic.md has them."""
+        return json_text(self.as_tree())
 
     def as_tree(self) -> dict[str, Any]:
         """What `as_json` writes, as dicts and lists."""

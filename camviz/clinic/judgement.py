@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
+
+from camviz.files.output import json_text
 
 FEWEST_VIEWS = 3  # two cannot tell how much views differ among each other
 VERDICTS = ("fail", "warn", "inconclusive", "pass")  # the worst first
@@ -58,7 +59,7 @@ class Check:
 
     def as_json(self) -> str:
         """The same as strict JSON."""
-        return json.dumps(self.as_tree(), indent=2, ensure_ascii=False, allow_nan=False)
+        return json_text(self.as_tree())
 
     def __str__(self) -> str:
         return self.as_text()

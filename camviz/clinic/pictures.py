@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 
 from camviz.calibration import Detections
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.finding import read_gray
+from camviz.calibration.picture_files import PictureError, picture_size
 from camviz.calibration.types import Board, Calibration
 from camviz.clinic.rig import board_poses
 
 
-def sizes_of(paths: Sequence[str | PathLike[str]]) -> dict[str, tuple[int, int]]:
-    """(width, height) of every picture that can be read, by its path."""
-    pictures = {str(path): read_gray(Path(path)) for path in paths}
-    return {name: (each.shape[1], each.shape[0]) for name, each in pictures.items() if each is not None}
+def sizes_of(
+    paths: Sequence[str | PathLike[str]], left_out: Callable[[PictureError], object] | None = None
+) -> dict[str, tuple[int, int]]:
+    """(width, height) of every picture by its path, as its header says; `left_out` is told of those without one.
+
+    Raises the last PictureError where there are paths and none is of a picture.
+    """
+    sizes: dict[str, tuple[int, int]] = {}
+    wrong: list[PictureError] = []
+    for path in paths:
+        try:
+            sizes[str(path)] = picture_size(path)
+        except PictureError as error:
+            wrong.append(error)
+    if wrong and not sizes:
+        raise wrong[-1]
+    if left_out:
+        for each in wrong:
+            left_out(each)
+    return sizes
 
 
 def with_detections(calibration: Calibration, detections: Detections, board: Board) -> Calibration:

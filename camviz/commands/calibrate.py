@@ -19,6 +19,7 @@ from camviz.commands.common import (
     Refusal,
     add_board,
     add_command,
+    add_megapixels,
     given_board,
     narrator,
     pixels,
@@ -89,6 +90,7 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--goal", metavar="PX", type=pixels, help="the largest expected error wanted (default: 1 px)")
     command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
+    add_megapixels(command)
     add_gate(command)
 
 

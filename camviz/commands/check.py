@@ -16,6 +16,7 @@ from camviz.commands.common import (
     add_board,
     add_colour,
     add_command,
+    add_megapixels,
     given_board,
     loaded,
     pixels,
@@ -74,6 +75,7 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--size", metavar="WxH", type=size, help="image size, where CALIBRATION does not hold it")
     command.add_argument("--json", action="store_true", help="the same for programs")
+    add_megapixels(command)
     add_colour(command)
 
 

@@ -106,7 +106,20 @@ def _run(words: list[str]) -> int:
     if unknown:
         near = did_you_mean(unknown[0], options.parser._option_string_actions)
         raise Refusal(f"unrecognized arguments: {' '.join(unknown)}{near}; see `{options.parser.prog} --help`.")
-    return int(options.run(options, beyond) if options.run is lab.lab else options.run(options))
+    with _pictures_allowed(getattr(options, "megapixels", None)):
+        return int(options.run(options, beyond) if options.run is lab.lab else options.run(options))
+
+
+@contextmanager
+def _pictures_allowed(megapixels: float | None) -> Iterator[None]:
+    """Pictures as large as --megapixels says; without it nothing is imported."""
+    if megapixels is None:
+        yield
+        return
+    from camviz.calibration.picture_files import allowing
+
+    with allowing(megapixels):
+        yield
 
 
 @contextmanager

@@ -75,6 +75,16 @@ def add_colour(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_megapixels(command: argparse.ArgumentParser) -> None:
+    """The option that says how large a picture may be; `camviz.commands.command` heeds it."""
+    command.add_argument(
+        "--megapixels",
+        metavar="N",
+        type=bounded("a number of megapixels", 0.01, 1000),
+        help="the largest picture that is read (default: 64, or what CAMVIZ_MEGAPIXELS says)",
+    )
+
+
 def add_command(commands: Any, name: str, run: Callable[..., int], what: str, description: str) -> Parser:
     command: Parser = commands.add_parser(
         name, help=what, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -183,28 +193,18 @@ def refuse_output(output: Path, what: str, *sources: Path) -> None:
 
 def read_picture(path: Path) -> np.ndarray:
     """The picture as it is in the file: grey, BGR or BGRA."""
-    import cv2
-    import numpy as np
-
+    from camviz.calibration.picture_files import PictureError
+    from camviz.calibration.picture_files import read_picture as read
     from camviz.panoramas.reprojection import LONGEST
 
-    if path != STREAM and not path.is_file():
-        raise Refusal(f"{path}: there is no such picture." if not path.exists() else f"{path}: this is not a file.")
     with on_disk(path) as file:
-        data = np.frombuffer(file.read_bytes(), np.uint8)
-    log = cv2.utils.logging
-    level = log.setLogLevel(log.LOG_LEVEL_SILENT)  # what is wrong with a picture is said here, once
-    try:
-        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-    except cv2.error:
-        picture = None
-    finally:
-        log.setLogLevel(level)
-    if picture is None:
-        raise Refusal(f"{path}: expected a picture (PNG, JPEG, TIFF, WebP …), this cannot be read as one.")
+        try:
+            picture = read(file)
+        except PictureError as error:
+            raise Refusal(f"{error}.") from error
     if max(picture.shape[:2]) > LONGEST:
         raise Refusal(f"{path}: expected at most {LONGEST} pixels a side, got {picture.shape[1]} × {picture.shape[0]}.")
-    return np.asarray(picture)
+    return picture
 
 
 def numbers(text: str) -> tuple[int, int]:

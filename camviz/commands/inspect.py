@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from camviz.commands.common import (
     add_board,
     add_colour,
     add_command,
+    add_megapixels,
     given_board,
     loaded,
     metres,
@@ -32,6 +32,7 @@ from camviz.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz.commands.terminal import say, tell, tell_json
 
 if TYPE_CHECKING:
+    from camviz.calibration import Detections
     from camviz.clinic import Inspection
     from camviz.clinic.gate import Outcome
     from camviz.files import Board, Calibration
@@ -86,6 +87,7 @@ def add(commands: Any) -> None:
     command.add_argument("--json", action="store_true", help="the same for programs")
     add_colour(command)
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with pictures as well")
+    add_megapixels(command)
     add_gate(command)
 
 
@@ -147,14 +149,11 @@ def _inspected(
     paths: list[Path], board: Board | None, compare: Calibration | None, options: argparse.Namespace
 ) -> Inspection:
     from camviz.clinic import inspect, inspect_file
-    from camviz.clinic.pictures import sizes_of
     from camviz.files import CalibrationError
 
     images = pictures(options.images) if options.images else []
     if PICTURES.fullmatch(paths[0].suffix):
-        return inspect(
-            _calibrated(paths, board), compare=compare, pictures=sizes_of(images), board=board, at=options.at
-        )
+        return inspect(_calibrated(paths, board), compare=compare, pictures=_sizes(images), board=board, at=options.at)
     add = _adding(images, board, options)
     with on_disk(paths[0]) as file:
         try:
@@ -162,7 +161,7 @@ def _inspected(
                 file,
                 size=options.size,
                 compare=compare,
-                pictures=sizes_of(images),
+                pictures=_sizes(images),
                 board=board,
                 at=options.at,
                 prepare=add,
@@ -198,6 +197,17 @@ def _with_file(calibration: Calibration, images: list[Path], options: argparse.N
     return replace(with_detections(calibration, found.detections, found.board), notes=calibration.notes + found.notes)
 
 
+def _sizes(images: list[Path]) -> dict[str, tuple[int, int]]:
+    """The pictures' sizes; a picture that is none is named and left out."""
+    from camviz.calibration.picture_files import PictureError
+    from camviz.clinic.pictures import sizes_of
+
+    try:
+        return sizes_of(images, lambda error: say(f"{error}; left out."))
+    except PictureError as error:
+        raise Refusal(f"{error}.") from error
+
+
 def _calibrated(paths: list[Path], board: Board | None) -> Calibration:
     """The calibration of a folder of pictures."""
     if board is None:
@@ -205,34 +215,44 @@ def _calibrated(paths: list[Path], board: Board | None) -> Calibration:
             f"{paths[0].parent}: these are pictures, which are calibrated first: say which board they show, such as "
             "--board 9x6 --square-mm 25."
         )
-    from camviz.calibration import CannotCalibrate, calibrate, detect
+    from camviz.calibration import CannotCalibrate, calibrate
 
     try:
-        with Bar() as bar:
-            detections = detect(paths, board, progress=bar)
-        return replace(calibrate(detections, board), source=paths[0].parent)
+        return replace(calibrate(_detected(paths, board), board), source=paths[0].parent)
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
 
 
 def _with_corners(calibration: Calibration, images: list[Path], board: Board) -> Calibration:
     """The calibration with the corners of the board in the pictures, if it is one camera's and has none."""
-    from camviz.calibration import CannotCalibrate, detect
+    from camviz.calibration import CannotCalibrate
     from camviz.clinic.pictures import with_detections
 
     if len(calibration.cameras) != 1 or calibration.detections:
         return calibration
     try:
-        with Bar() as bar:
-            return with_detections(calibration, detect(images, board, progress=bar), board)
+        return with_detections(calibration, _detected(images, board), board)
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
 
 
+def _detected(paths: list[Path], board: Board) -> Detections:
+    """The board's corners in pictures; those that are left out are named."""
+    from camviz.calibration import detect
+
+    with Bar() as bar:
+        detections = detect(paths, board, progress=bar)
+    for picture, why in detections.skipped:
+        say(f"{picture}: skipped, {why}.")
+    return detections
+
+
 def _print(outcomes: dict[str, Outcome], several: bool, options: argparse.Namespace) -> None:
     if options.json:
+        from camviz.files.output import json_text
+
         trees = [({"file": name} if several else {}) | each.as_tree() for name, each in outcomes.items()]
-        tell_json(json.dumps(trees if several else trees[0], indent=2, ensure_ascii=False))
+        tell_json(json_text(trees if several else trees[0]))
         return
     for name, outcome in outcomes.items():
         said = "\n".join([outcome.inspection.as_text(), *outcome.lines()])

@@ -67,7 +67,7 @@ def as_text(findings: list[Finding]) -> str:
 def as_json(findings: list[Finding]) -> str:
     """A report for programs."""
     good = all(finding.status != "missing" for finding in findings)
-    return json.dumps({"ok": good, "findings": [asdict(finding) for finding in findings]}, indent=2)
+    return json.dumps({"ok": good, "findings": [asdict(finding) for finding in findings]}, indent=2, allow_nan=False)
 
 
 def _summary(findings: list[Finding]) -> str:

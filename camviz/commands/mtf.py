@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from html import escape
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camviz.commands.common import OK, Refusal, add_command, read_picture, refuse_output, write_whole
+from camviz.commands.common import OK, Refusal, add_command, add_megapixels, read_picture, refuse_output, write_whole
 from camviz.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
@@ -38,6 +36,7 @@ exit status:
   0  measured
   2  there is no edge that can be measured, or the command cannot be used; one sentence on stderr says why
 """
+MOST_MEGAPIXELS = 24  # that are measured, at 34 bytes a pixel
 FREQUENCIES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)  # cycles per pixel: the curve in JSON
 
 
@@ -51,6 +50,7 @@ def add(commands: Any) -> None:
     light.add_argument("--srgb", action="store_true", help="the numbers are encoded as sRGB")
     command.add_argument("--json", action="store_true", help="the figures for programs; null if unknown")
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with the curves as well")
+    add_megapixels(command)
 
 
 def part(text: str) -> tuple[int, int, int, int]:
@@ -68,7 +68,9 @@ def mtf(options: argparse.Namespace) -> int:
 
     if options.report:
         refuse_output(options.report, "page", options.photo)
-    light, taken_as = linear_light(_cut(read_picture(options.photo), options), options)
+    picture = _cut(read_picture(options.photo), options)
+    _refuse_large(picture, options.photo)
+    light, taken_as = linear_light(picture, options)
     try:
         edge = SlantedEdge.of(light)
     except ValueError as error:
@@ -95,6 +97,15 @@ def _cut(picture: np.ndarray, options: argparse.Namespace) -> np.ndarray:
             f"got {x},{y},{width},{height}."
         )
     return picture[y : y + height, x : x + width]
+
+
+def _refuse_large(picture: np.ndarray, photo: Path) -> None:
+    megapixels = picture.shape[0] * picture.shape[1] / 1e6
+    if megapixels > MOST_MEGAPIXELS:
+        raise Refusal(
+            f"{photo}: expected an edge within {MOST_MEGAPIXELS} megapixels, got {megapixels:.4g}: say with --roi "
+            "where it is."
+        )
 
 
 def linear_light(picture: np.ndarray, options: argparse.Namespace) -> tuple[np.ndarray, str]:
@@ -128,9 +139,10 @@ def figures(edge: SlantedEdge) -> dict[str, float]:
 
 def as_json(edge: SlantedEdge) -> str:
     """The figures and the curve as one JSON object; null for those that the edge cannot give."""
-    numbers = {name: value if isfinite(value) else None for name, value in figures(edge).items()}
+    from camviz.files.output import json_text
+
     curve = [{"cycles_per_pixel": f, "mtf": float(edge.mtf(f))} for f in FREQUENCIES]
-    return json.dumps({**numbers, "curve": curve}, indent=2, allow_nan=False)
+    return json_text({**figures(edge), "curve": curve})
 
 
 def as_text(edge: SlantedEdge, photo: Path, taken_as: str) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from html import escape
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camviz.commands.common import OK, Refusal, add_command, refuse_output, write_whole
+from camviz.commands.common import OK, Refusal, add_command, add_megapixels, refuse_output, write_whole
 from camviz.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
@@ -53,6 +52,7 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--json", action="store_true", help="the figures for programs; null if withheld, and why")
     command.add_argument("--report", metavar="OUT.html", type=Path, help="write a page with the curves as well")
+    add_megapixels(command)
 
 
 def noise(options: argparse.Namespace) -> int:
@@ -101,11 +101,13 @@ def _refuse_frame(output: Path, recording: Recording) -> None:
 
 def as_json(found: Measurement) -> str:
     """All figures as one JSON object: null for those withheld, with the reason under "why"; bounds under "bounds"."""
+    from camviz.files.output import json_text
+
     judged = found.judged
-    figures: dict[str, Any] = {name: one.value if isfinite(one.value) else None for name, one in judged.items()}
+    figures: dict[str, Any] = {name: one.value for name, one in judged.items()}
     figures["bounds"] = {name: [one.low, one.high] for name, one in judged.items() if one.bounded}
     figures["why"] = {name: one.why for name, one in judged.items() if one.why}
-    return json.dumps(figures, indent=2)
+    return json_text(figures)
 
 
 def as_text(found: Measurement, recording: Recording) -> str:

@@ -7,7 +7,17 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camviz.commands.common import OK, Refusal, add_command, loaded, read_picture, refuse_output, size, write_whole
+from camviz.commands.common import (
+    OK,
+    Refusal,
+    add_command,
+    add_megapixels,
+    loaded,
+    read_picture,
+    refuse_output,
+    size,
+    write_whole,
+)
 from camviz.commands.terminal import tell
 
 if TYPE_CHECKING:
@@ -66,6 +76,7 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--from-camera", metavar="NAME", help="which camera of a calibration file took IN")
     command.add_argument("--to-camera", metavar="NAME", help="which camera of a calibration file is to take OUT")
+    add_megapixels(command)
 
 
 def angle(text: str) -> float:

@@ -74,7 +74,7 @@ def _laid_out(folder: Path) -> dict[str, str]:
 def _manifest(folder: Path) -> dict[str, object]:
     try:
         held = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):  # the last where it is nested thousands deep
         return {}
     return held if isinstance(held, dict) else {}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,26 @@ def as_yaml(tree: dict[str, Any]) -> bytes:
 
 
 def as_json(tree: dict[str, Any] | list[Any]) -> bytes:
-    """A tree as JSON."""
-    return (json.dumps(tree, indent=2, ensure_ascii=False) + "\n").encode()
+    """A tree as JSON, whose numbers are finite; ValueError for others, which no calibration may have."""
+    return (json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def json_text(tree: dict[str, Any] | list[Any]) -> str:
+    """A tree of figures as strict JSON (RFC 8259): what is not finite, which JSON cannot say, is null.
+
+    >>> json_text({"rms": float("nan"), "views": [1, float("inf")]}).split()
+    ['{', '"rms":', 'null,', '"views":', '[', '1,', 'null', ']', '}']
+    """
+    return json.dumps(_finite(tree), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    """The same with None in the place of NaN and infinities."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def as_rows(pose: RigidTransform) -> list[list[float]]:

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.calibration.picture_files import read_picture
 from camviz.lightfields.field import LightField
 
 _HCI = re.compile(r"input_Cam(\d+)\.png")
@@ -118,11 +119,7 @@ def _read(places: dict[Place, Path], width: int | None) -> tuple[NDArray[np.uint
 
 
 def _picture(file: Path) -> NDArray[np.uint8]:
-    data = np.frombuffer(file.read_bytes(), np.uint8)
-    picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-    if picture is None:
-        raise ValueError(f"{file} cannot be read as a picture")
-    return np.ascontiguousarray(picture[..., ::-1])
+    return np.ascontiguousarray(read_picture(file, cv2.IMREAD_COLOR)[..., ::-1])
 
 
 def _parameters(file: Path) -> tuple[float, float, float]:

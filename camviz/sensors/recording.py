@@ -272,17 +272,14 @@ class _Reader:
 
 def _grey(path: Path) -> Frame:
     """A frame (height, width) of 8 or 16 bits, or one of 32 bits whose values are whole numbers of 16."""
-    import cv2
+    from camviz.calibration.picture_files import PictureError, picture_kind, read_picture
 
     try:
-        data = np.frombuffer(path.read_bytes(), np.uint8)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror or error}).") from error
-    if data[:3].tobytes() == b"\xff\xd8\xff":
-        _refuse_suffix(path, "jpeg")
-    frame = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-    if frame is None:
-        raise RecordingError(f"{path}: is no PNG or TIFF picture that can be read.")
+        if picture_kind(path) == "JPEG":
+            _refuse_suffix(path, "jpeg")
+        frame = read_picture(path)
+    except PictureError as error:
+        raise RecordingError(f"{error}.") from error
     if frame.ndim != 2:
         raise RecordingError(
             f"{path}: is in colour ({frame.shape[2]} channels); expected grey values straight from the sensor, "

@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.picture_files import PictureError, read_picture
 from camviz.clinic.evidence import Evidence
 from camviz.views.base import View
 from camviz.views.board_poses import BoardPosesView
@@ -305,9 +305,10 @@ def title_of(name: str) -> str:
 
 def _read(path: Path) -> NDArray[np.uint8] | None:
     """A picture as RGB; None where the file is not a picture."""
-    data = np.fromfile(path, np.uint8)
-    image: Any = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-    return None if image is None else np.ascontiguousarray(image[..., ::-1])
+    try:
+        return np.ascontiguousarray(read_picture(path, cv2.IMREAD_COLOR)[..., ::-1])
+    except PictureError:
+        return None
 
 
 def _reduced(image: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:

@@ -1,0 +1,278 @@
+"""Pictures from files, the one place where they are read.
+
+A file is taken for what its header says before anything of it is decoded: a few kilobytes can announce gigabytes, and
+OpenCV would make room for them. Imports little, because every process that looks for boards reads pictures.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from os import PathLike
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+MEGAPIXELS = 64.0  # what is decoded unless the reader asks for more; finders take 10 bytes for each pixel
+VARIABLE = "CAMVIZ_MEGAPIXELS"
+MOST_MEGAPIXELS = 1000.0
+BYTES_A_PIXEL = 16  # four channels of 32 bits, uncompressed
+BESIDE = 64 * 2**20  # bytes for what cameras put beside the pixels: thumbnails, profiles, maker's notes
+HEAD = 2**16
+
+_KINDS = {
+    "PNG": rb"\x89PNG",
+    "JPEG": rb"\xff\xd8\xff",
+    "TIFF": rb"II[*+]\0|MM\0[*+]",
+    "WebP": rb"RIFF....WEBP",
+    "BMP": rb"BM",
+    "GIF": rb"GIF8",
+    "JPEG 2000": rb"\0\0\0\x0cjP  |\xff\x4f\xff\x51",
+    "PNM": rb"P[1-6f][ \t\r\n#]",
+    "AVIF": rb"....ftypavi[fs]",
+    "Sun raster": rb"\x59\xa6\x6a\x95",
+    "HDR": rb"#\?R(?:ADIANCE|GBE)",
+    "EXR": rb"v/1\x01",
+}
+_PLUGINS = {  # Pillow's, where they are not named as the kind
+    "JPEG": ("JpegImagePlugin", "JPEG"),
+    "WebP": ("WebPImagePlugin", "WEBP"),
+    "JPEG 2000": ("Jpeg2KImagePlugin", "JPEG2000"),
+    "PNM": ("PpmImagePlugin", "PPM"),
+    "Sun raster": ("SunImagePlugin", "SUN"),
+    "BMP": ("BmpImagePlugin", "BMP"),
+    "PNG": ("PngImagePlugin", "PNG"),
+    "GIF": ("GifImagePlugin", "GIF"),
+    "AVIF": ("AvifImagePlugin", "AVIF"),
+}
+_HDR_SIZE = re.compile(rb"\n\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n")
+_EXR_WINDOW = re.compile(rb"dataWindow\0box2i\0\x10\0\0\0(.{16})", re.DOTALL)
+_WIDTH, _HEIGHT = 256, 257  # TIFF's tags
+_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd8]")  # in a JPEG's scan: neither a stuffed byte nor a restart
+_END_OF_IMAGE, _TEMPORARY = 0xD9, 0x01
+
+
+class PictureError(ValueError):
+    """A file that is no picture which can be used; `why` in words without its name, the message with it."""
+
+    def __init__(self, path: str | PathLike[str], why: str) -> None:
+        super().__init__(f"{os.fspath(path)}: {why}")
+        self.why = why
+
+
+def read_picture(path: str | PathLike[str], flags: int = cv2.IMREAD_UNCHANGED) -> NDArray[Any]:
+    """The picture in a file, as cv2.imdecode gives it with `flags`: (height, width) or (height, width, channels), BGR.
+
+    Raises PictureError, in one sentence, for a file that is missing, empty, no picture, cut off, damaged, or has more
+    pixels than `most_megapixels()`.
+    """
+    with _opened(path) as file:
+        kind, (width, height) = _header(path, file)
+        _refuse_large(path, width, height, os.fstat(file.fileno()).st_size)
+        file.seek(0)
+        content = file.read()
+    if _cut_off(kind, content):
+        raise PictureError(path, f"the {kind} picture is cut off: it ends after {len(content):,} bytes, before its end")
+    picture = _decoded(content, flags)
+    if picture is None:
+        raise PictureError(path, f"the {kind} picture is cut off, damaged, or of a kind that OpenCV does not read")
+    return picture
+
+
+def read_gray(path: str | PathLike[str]) -> NDArray[np.uint8]:
+    """A picture's brightness (height, width) not turned as its file may ask.
+
+    More than 8 bits are scaled to the brightest pixel. Raises PictureError as `read_picture` does.
+    """
+    gray = read_picture(path, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION)
+    if gray.dtype == np.uint8:
+        return gray
+    if gray.dtype.kind == "f":
+        gray = np.nan_to_num(gray, posinf=0, neginf=0)
+    scale = 255 / max(float(gray.max()), 1e-9)
+    return np.stack([np.clip(row.astype(np.float64) * scale, 0, 255).astype(np.uint8) for row in gray])
+
+
+def picture_size(path: str | PathLike[str]) -> tuple[int, int]:
+    """(width, height) in pixels as the header says, not turned as the file may ask; nothing is decoded.
+
+    Raises PictureError for a file that is missing, empty or no picture.
+    """
+    with _opened(path) as file:
+        return _header(path, file)[1]
+
+
+def picture_kind(path: str | PathLike[str]) -> str:
+    """ "PNG", "JPEG", "TIFF" …: what the file is, whatever its name ends in. Raises PictureError as `picture_size`."""
+    with _opened(path) as file:
+        return _header(path, file)[0]
+
+
+def most_megapixels() -> float:
+    """How many megapixels a picture may have: what CAMVIZ_MEGAPIXELS says, else 64. PictureError for nonsense."""
+    said = os.environ.get(VARIABLE, "")
+    try:
+        most = float(said or MEGAPIXELS)
+    except ValueError:
+        most = np.nan
+    if not 0 < most <= MOST_MEGAPIXELS:
+        raise PictureError(VARIABLE, f"expected megapixels, above 0 and at most {MOST_MEGAPIXELS:g}, got {said!r}")
+    return most
+
+
+@contextmanager
+def allowing(megapixels: float | None) -> Iterator[None]:
+    """Pictures of so many megapixels, here and in the processes that are started; None leaves things as they are."""
+    before = os.environ.get(VARIABLE)
+    if megapixels is not None:
+        os.environ[VARIABLE] = f"{megapixels:g}"
+    try:
+        yield
+    finally:
+        if megapixels is not None:
+            os.environ.pop(VARIABLE)
+            os.environ.update({} if before is None else {VARIABLE: before})
+
+
+# What a file is -------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _opened(path: str | PathLike[str]) -> Iterator[BinaryIO]:
+    """A regular file that holds something: a pipe would be waited for, and a device might never end."""
+    try:
+        status = os.stat(path)
+        if not stat.S_ISREG(status.st_mode):
+            what = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+            raise PictureError(path, f"expected a picture, this is {what}")
+        if status.st_size == 0:
+            raise PictureError(path, "it is empty, expected a picture")
+        with Path(path).open("rb") as file:
+            yield file
+    except OSError as error:
+        raise PictureError(path, f"it cannot be read ({error.strerror or error})") from error
+    except ValueError as error:
+        if isinstance(error, PictureError):
+            raise
+        raise PictureError(repr(path), "this is not a file name") from error  # a NUL in it
+
+
+def _header(path: str | PathLike[str], file: BinaryIO) -> tuple[str, tuple[int, int]]:
+    """What kind of picture a file is, and its width and height."""
+    head = file.read(HEAD)
+    kind = next((kind for kind, signature in _KINDS.items() if re.match(signature, head, re.DOTALL)), None)
+    if kind is None:
+        raise PictureError(path, f"it is not a picture that can be read, it begins with {_shown(head)}")
+    size = _of_hdr(head) if kind == "HDR" else _of_exr(head) if kind == "EXR" else _by_pillow(kind, file)
+    if size is None or min(size) < 1:
+        raise PictureError(path, f"the header of the {kind} picture is cut off or damaged: it tells no size")
+    return kind, size
+
+
+def _shown(head: bytes) -> str:
+    """How a file begins: as words where it is text, else as hexadecimal bytes."""
+    return repr(head[:12].decode()) if head[:12].isascii() and head[:12].decode().isprintable() else head[:8].hex(" ")
+
+
+def _by_pillow(kind: str, file: BinaryIO) -> tuple[int, int] | None:
+    """The size in a header, None for one that breaks off or makes no sense.
+
+    Image.open is not asked: it refuses what it takes for too many pixels without saying how many there are.
+    """
+    file.seek(0)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # damaged EXIF and the like
+            return _of_tiff(file) if kind == "TIFF" else _of_plugin(*_PLUGINS[kind], file)
+    except Exception:  # of many kinds, from SyntaxError to struct.error
+        return None
+
+
+def _of_plugin(module: str, name: str, file: BinaryIO) -> tuple[int, int]:
+    from PIL import Image
+
+    import_module(f"PIL.{module}")
+    opener, _ = Image.OPEN[name]
+    width, height = opener(file, "").size
+    return width, height
+
+
+def _of_tiff(file: BinaryIO) -> tuple[int, int]:
+    """From the first directory: Pillow refuses pixels of 64 bits and others that OpenCV reads."""
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    big = file.read(4)[2:] in (b"+\0", b"\0+")
+    file.seek(0)
+    directory = ImageFileDirectory_v2(file.read(16 if big else 8))
+    file.seek(directory.next)
+    directory.load(file)
+    return int(directory[_WIDTH]), int(directory[_HEIGHT])
+
+
+def _of_hdr(head: bytes) -> tuple[int, int] | None:
+    found = _HDR_SIZE.search(head)
+    return (int(found[2]), int(found[1])) if found else None
+
+
+def _of_exr(head: bytes) -> tuple[int, int] | None:
+    found = _EXR_WINDOW.search(head)
+    if not found:
+        return None
+    left, top, right, bottom = struct.unpack("<4i", found[1])
+    return right - left + 1, bottom - top + 1
+
+
+def _refuse_large(path: str | PathLike[str], width: int, height: int, size: int) -> None:
+    megapixels, most = width * height / 1e6, most_megapixels()
+    if megapixels > most:
+        raise PictureError(
+            path,
+            f"it has {width} × {height} pixels, {megapixels:.4g} megapixels, expected at most {most:g} "
+            f"(--megapixels and {VARIABLE} allow more)",
+        )
+    if size > BYTES_A_PIXEL * width * height + BESIDE:
+        raise PictureError(path, f"it has {size / 1e6:.0f} MB for {width} × {height} pixels, which no picture needs")
+
+
+# What is in it --------------------------------------------------------------------------------------------------------
+
+
+def _cut_off(kind: str, content: bytes) -> bool:
+    """Whether a picture surely ends before its end: older versions of OpenCV fill it up with grey."""
+    if kind == "PNG":
+        return b"IEND" not in content[-BESIDE:]
+    return kind == "JPEG" and not _reaches_end(content)
+
+
+def _reaches_end(jpeg: bytes) -> bool:
+    """Whether the end marker comes after the segments and scans; the one of a thumbnail inside a segment is not it."""
+    at = 2
+    while found := _MARKER.search(jpeg, at):
+        marker, at = jpeg[found.start() + 1], found.end()
+        if marker == _END_OF_IMAGE:
+            return True
+        if marker != _TEMPORARY:
+            at += int.from_bytes(jpeg[at : at + 2], "big")
+    return False
+
+
+def _decoded(content: bytes, flags: int) -> NDArray[Any] | None:
+    """The pixels; None where OpenCV gives none. What it logs is not shown: the caller says it in one sentence."""
+    log = cv2.utils.logging
+    level = log.setLogLevel(log.LOG_LEVEL_SILENT)
+    try:
+        picture = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+    except cv2.error:
+        return None
+    finally:
+        log.setLogLevel(level)
+    return None if picture is None else np.asarray(picture)
