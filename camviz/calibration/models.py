@@ -111,8 +111,8 @@ def _from_start(start: Lens, views: Views) -> Solution:
 def _calibrate_camera(lens: type[Any], flags: int, views: Views, fixed: tuple[str, ...]) -> Solution:
     """cv2.calibrateCamera, with the flags of a model.
 
-    A rational solution may fold among the very corners, or come near a pole in the image: then the plain one is the better
-    beginning.
+    A rational solution may fold among the very corners, or come near a pole in the image: then the plain one is the
+    better beginning.
     """
     held = sum(flag for flag, names in GROUPS.items() if names <= set(fixed))
     points, pixels = ([each.astype(np.float32) for each in lists] for lists in (views.points, views.pixels))

@@ -1,8 +1,9 @@
 """Solving under a prior on the denominator.
 
-A rational lens has the same picture with many pairs of numerator and denominator. Corners hardly tell them apart: free,
-the denominator follows the noise, and where no corner was seen it comes near 0 or passes through it. So a rational model
-is always solved under a `DenominatorPrior`, as mrcal does it. OpenCV's own minimum is a call of cv2.calibrateCamera away.
+A rational lens has the same picture with many pairs of numerator and denominator. Corners hardly tell them apart:
+free, the denominator follows the noise, and where no corner was seen it comes near 0 or passes through it. So a
+rational model is always solved under a `DenominatorPrior`, as mrcal does it. OpenCV's own minimum is a call of
+cv2.calibrateCamera away.
 
 There are two such priors. The broad one forbids near-poles and little else: a lens whose denominator rises to a
 thousand is what it was without it. Under the strict one there is as good as no denominator. The broad one is taken
@@ -33,7 +34,7 @@ def with_priors(adjustment: Adjustment) -> Adjustment:
 
 
 def regularised(adjustment: Adjustment) -> Adjustment:
-    """The problem at its least cost, each prior broad or strict as the corners have it; `refined` where there is none."""
+    """The problem at its least cost, each prior broad or strict as the corners have it; `refined` without priors."""
     if not adjustment.at_work:
         return adjustment.refined()
     broad = _under(adjustment, adjustment.at_work, BROAD).refined(settled=ROUGHLY)

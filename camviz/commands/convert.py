@@ -30,8 +30,8 @@ cameras is refused with the reason; what it cannot hold beside them (corners, bo
 out. The format of IN is told by its content. A COLMAP model is a folder.
 With --fit MODEL the lens is replaced by the one of that model that fits it best over the image, the error is said, and
 above --tolerance it is refused.
-With --to lut OUT is an archive of tables (.npz) for programs that know no lenses: maps for cv2.remap, that undistort, and
-the rays of a grid of pixels, with the error of reading them between its nodes.
+With --to lut OUT is an archive of tables (.npz) for programs that know no lenses: maps for cv2.remap, that undistort,
+and the rays of a grid of pixels, with the error of reading them between its nodes.
 """
 
 if TYPE_CHECKING:
@@ -152,14 +152,14 @@ def _tabulated(calibration: Calibration, options: argparse.Namespace) -> tuple[s
         raise CalibrationError(f"{name}: {error}") from error
     content = tables.content()
     write_whole(options.output, lambda path: path.write_bytes(content), "tables.npz")
-    target, error, step = tables.target, tables.error, tables.table.u[1] - tables.table.u[0]
-    part = f", over {error.share:.0%} of the pixels" if error.share < 1 else ""
-    u, v = error.worst_at
+    K, off, step = tables.target, tables.error, tables.table.u[1] - tables.table.u[0]
+    part = f", over {off.share:.0%} of the pixels" if off.share < 1 else ""
+    u, v = off.worst_at
+    sizes = f"{off.median:.2g} px off (median) and {off.worst:.2g} px at most, at ({u}, {v}){part}"
     return (
-        f"map_x, map_y: to {target.width}×{target.height} pixels with fx = {target.fx:.2f}, fy = {target.fy:.2f}, "
-        f"cx = {target.cx:.2f}, cy = {target.cy:.2f}.",
-        f"rays: every {step:.3g} px; read bilinearly they are {error.median:.2g} px off (median) and {error.worst:.2g} px at "
-        f"most, at ({u}, {v}){part}.",
+        f"map_x, map_y: to {K.width}×{K.height} pixels with fx = {K.fx:.2f}, fy = {K.fy:.2f}, "
+        f"cx = {K.cx:.2f}, cy = {K.cy:.2f}.",
+        f"rays: every {step:.3g} px; read bilinearly they are {sizes}.",
         f"{options.output}: written from {calibration.format}.",
     )
 

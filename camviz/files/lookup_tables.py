@@ -1,18 +1,16 @@
 """Lookup tables of a camera, for programs that do not know its lens: a NumPy archive (.npz) that cv2.remap can use.
 
-| name | what it holds |
-|---|---|
-| `map_x`, `map_y` | (height, width) float32: for each pixel of the undistorted picture, the pixel of the photograph |
-| `target_K`, `target_size` | the undistorted picture's camera matrix (3, 3), and its width and height |
-| `rays` | (rows, columns, 3) float32: unit rays, x right, y down, z forwards, at the nodes of a grid of pixels |
-| `ray_u`, `ray_v` | (columns,) and (rows,) float64: the nodes' pixel coordinates, evenly from the first to the last pixel |
-| `ray_error_px` | (2,) the median and the worst error of reading `rays` by bilinear interpolation, over every pixel |
-| `ray_error_at` | (2,) the pixel where it is worst |
-| `ray_share` | the share of the pixels at which the table gives a ray |
+- `map_x`, `map_y`: (height, width) float32, for each pixel of the undistorted picture the pixel of the photograph; -1
+  where the photograph shows nothing, which cv2.remap leaves black;
+- `target_K`, `target_size`: the undistorted picture's camera matrix (3, 3), and its width and height;
+- `rays`: (rows, columns, 3) float32, unit rays, x right, y down, z forwards, at the nodes of a grid of pixels;
+- `ray_u`, `ray_v`: (columns,) and (rows,), the nodes' pixel coordinates, evenly from the first to the last pixel;
+- `ray_error_px`, `ray_error_at`: the median and the worst error of reading `rays` by bilinear interpolation, over every
+  pixel, and the pixel where it is worst;
+- `ray_share`: the share of the pixels at which the table gives a ray.
 
-The centre of the first pixel is (0, 0), as OpenCV has it. `map_x` and `map_y` are -1 where the photograph shows nothing:
-cv2.remap leaves such a pixel black. Rays are NaN at nodes where none arrives. The tables need no other knowledge of the
-lens: undistort by `cv2.remap(photograph, map_x, map_y, cv2.INTER_LINEAR)`.
+The centre of the first pixel is (0, 0), as OpenCV has it. Rays are NaN at nodes where none arrives. Undistort by
+`cv2.remap(photograph, map_x, map_y, cv2.INTER_LINEAR)`.
 """
 
 from __future__ import annotations

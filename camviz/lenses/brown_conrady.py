@@ -92,7 +92,7 @@ class BrownConrady(Lens):
             "rational",
             "Brown-Conrady, rational",
             RATIONAL,
-            "and k4 k5 k6, kept from a pole by a prior: wide angles, with many views that reach into the corners of the image",
+            "and k4 k5 k6, kept from poles by a prior: wide angles, with many views up to the image's corners",
             "calibrateCamera",
             "CALIB_RATIONAL_MODEL",
             regularised=True,
