@@ -12,6 +12,7 @@ from camviz.lenses.base import Array, on_plane
 from camviz.lenses.roots import first_positive_root
 from camviz.poses import Rotation
 
+NEARLY_A_POLE = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
 WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more than stretch
 
 
@@ -73,6 +74,11 @@ def ideal_image_radius(camera: Camera) -> float:
     ideal = _ideal(camera, _rectangle(camera.intrinsics, 16))
     radii = np.linalg.norm(ideal, axis=-1)
     return float(radii[np.isfinite(radii)].max(initial=-inf)) if np.isfinite(radii).any() else np.nan
+
+
+def image_reach(camera: Camera) -> float:
+    """How far, in focal lengths on the plane z = 1, an undistorted picture of this camera asks; NaN where nowhere."""
+    return float(np.nanmax([ideal_image_radius(camera), image_corner_radius(camera.intrinsics)]))
 
 
 def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:

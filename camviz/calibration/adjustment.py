@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from camviz.calibration.jacobian import parameter, with_parameters
 from camviz.calibration.linearisation import Linearisation
 from camviz.calibration.problem import POSE
+from camviz.calibration.types import Mask
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
@@ -41,7 +43,7 @@ class Adjustment(Linearisation):
             if not promised > settled * here.sum_of_squares:
                 break
             there = here._moved(shared, views)
-            if there is not None and there.sum_of_squares_over(here.used) <= here.sum_of_squares:
+            if there is not None and there._cost_over(here.used) <= here._cost_over(here.used):
                 here, damping = there, damping / 10
             elif damping < 1e12:
                 damping *= 2  # less up than down: it comes along a curved valley faster (Transtrum & Sethna 2012)
@@ -59,6 +61,9 @@ class Adjustment(Linearisation):
         shared, views = normal.damped(ALL_BUT_FREE).solution()
         fallen = shared @ normal.shared_gradient + np.sum(views * normal.gradients)
         return float(fallen / self.sum_of_squares) if self.sum_of_squares > 0 else 0.0
+
+    def _cost_over(self, used: Mapping[str, Mask]) -> float:
+        return self.sum_of_squares_over(used) + self.cost_of_priors
 
     def _moved(self, shared: Array, twists: Array) -> Adjustment | None:
         """With changed parameters; None where a lens does not take them or a corner in use loses its image."""

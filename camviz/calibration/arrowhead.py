@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,6 +51,14 @@ class Arrowhead:
             self.blocks + other.blocks,
             self.shared_gradient + other.shared_gradient,
             self.gradients + other.gradients,
+        )
+
+    def with_shared(self, by_shared: Array, residuals: Array) -> Arrowhead:
+        """With n more measurements of the shared parameters alone: J's rows (n, s) and the residuals (n,)."""
+        return replace(
+            self,
+            shared=self.shared + by_shared.T @ by_shared,
+            shared_gradient=self.shared_gradient + by_shared.T @ residuals,
         )
 
     def damped(self, damping: float) -> Arrowhead:

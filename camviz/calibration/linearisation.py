@@ -19,14 +19,31 @@ from camviz.lenses.base import Array
 class Linearisation(Problem):
     """The problem near its own cameras and poses, where a pixel is a linear function of the parameters.
 
-    The covariances of poses are those of their twists.
+    The covariances of poses are those of their twists. A prior counts in them as what it is, a measurement that nobody
+    made: they are Bayes' for a lens drawn from it, σ² (JᵀJ + PᵀP)⁻¹ with P of the prior's rows, which is the scatter of
+    repeated calibrations and the mean square of the pull. mrcal takes the scatter alone, which for a strong prior goes
+    to 0. `held_by_priors` says how many parameters are assumed so, and not measured.
     """
 
     @cached_property
     def normal_equations(self) -> Arrowhead:
         """JᵀJ and Jᵀr over the views that have a say, J being the derivative of the *projected* corners."""
         parts = [Arrowhead.of(*self._measured(name)) for name in self.cameras]
-        return sum(parts[1:], start=parts[0])
+        normal = sum(parts[1:], start=parts[0])
+        for rows, residuals in self._assumed.values():
+            normal = normal.with_shared(rows, residuals)
+        return normal
+
+    @cached_property
+    def _assumed(self) -> dict[str, tuple[Array, Array]]:
+        """By camera, the prior's derivative (n, s) by the shared parameters and its residuals (n,), in pixels."""
+        assumed = {}
+        for name, prior in self.at_work.items():
+            by_intrinsics, residuals = prior.rows(self.cameras[name].lens, self.estimated[name])
+            rows = np.zeros((len(residuals), len(self.parameters)))
+            rows[:, self.intrinsics_of(name)] = by_intrinsics
+            assumed[name] = rows, residuals
+        return assumed
 
     def _measured(self, name: str) -> tuple[Array, Array, Array]:
         """Camera `name`'s J by the shared parameters and by the poses, and its r; zero where a corner has no say."""
@@ -57,6 +74,24 @@ class Linearisation(Problem):
         return by_shared, by_first @ twist_jacobian(points_first)
 
     # What it says
+
+    @property
+    def sigma(self) -> float:
+        """The standard deviation in pixels of one coordinate of a detected corner: σ² = ‖x‖²/(N - k).
+
+        k is less by what the priors hold of the parameters (mrcal's formulation.org has that trace, and neglects it).
+        NaN where there are no more measurements than parameters.
+        """
+        left = self.measurements - self.unknowns + sum(self.held_by_priors.values())
+        return float(np.sqrt(self.sum_of_squares / left)) if left > 0 else np.nan
+
+    @cached_property
+    def held_by_priors(self) -> dict[str, float]:
+        """How many of a camera's parameters its prior determines, and not the corners: tr P (JᵀJ + PᵀP)⁻¹ Pᵀ."""
+        return {
+            name: float(np.einsum("ns,st,nt->", rows, self.normal_equations.covariance, rows))
+            for name, (rows, _) in self._assumed.items()
+        }
 
     @cached_property
     def covariance(self) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from camviz.calibration.detection import CannotCalibrate
 from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
+from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
 from camviz.lenses import CalibrationModel, Lens, calibration_models
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
@@ -56,11 +57,12 @@ Solution = tuple[Camera, RigidTransform]  # the poses are cam_from_board, one fo
 class Model:
     """A camera model: its lens, the intrinsic parameters that are solved for, and who solves.
 
-    `solve(views, fixed)` need not hold every parameter in `fixed`.
+    `solve(views, fixed)` need not hold every parameter in `fixed`. A `regularised` model is solved under a prior.
     """
 
     title: str
     parameters: tuple[str, ...]
+    regularised: bool
     solve: Callable[[Views, tuple[str, ...]], Solution] = field(repr=False)
 
 
@@ -109,7 +111,8 @@ def _from_start(start: Lens, views: Views) -> Solution:
 def _calibrate_camera(lens: type[Any], flags: int, views: Views, fixed: tuple[str, ...]) -> Solution:
     """cv2.calibrateCamera, with the flags of a model.
 
-    A rational solution may fold, or have its pole, among the very corners: then the plain one is the better beginning.
+    A rational solution may fold among the very corners, or come near a pole in the image: then the plain one is the
+    better beginning.
     """
     held = sum(flag for flag, names in GROUPS.items() if names <= set(fixed))
     points, pixels = ([each.astype(np.float32) for each in lists] for lists in (views.points, views.pixels))
@@ -119,7 +122,8 @@ def _calibrate_camera(lens: type[Any], flags: int, views: Views, fixed: tuple[st
     camera = Camera(Intrinsics.from_matrix(K, *views.size), lens(*np.ravel(coefficients)[:14].tolist()))
     poses = _poses(rvecs, tvecs)
     seen = np.concatenate([camera.project(pose.apply(each)) for pose, each in zip(poses, views.points, strict=True)])
-    return (camera, poses) if not flags or np.isfinite(seen).all() else _calibrate_camera(lens, 0, views, fixed)
+    good = np.isfinite(seen).all() and weakest_denominator(camera.lens, image_reach(camera))[1] > NEARLY_A_POLE
+    return (camera, poses) if not flags or good else _calibrate_camera(lens, 0, views, fixed)
 
 
 def _calibrate_fisheye(lens: type[Any], flags: int, views: Views, fixed: tuple[str, ...]) -> Solution:
@@ -201,7 +205,7 @@ def _model(lens: type[Any], declared: CalibrationModel) -> Model:
         flags = getattr(cv2, declared.flags) if declared.flags else 0
         return SOLVERS[declared.solver](lens, flags, views, fixed)
 
-    return Model(declared.title, (*PIXELS, *declared.parameters.split()), solve)
+    return Model(declared.title, (*PIXELS, *declared.parameters.split()), declared.regularised, solve)
 
 
 MODELS = {name: _model(lens, declared) for name, (lens, declared) in calibration_models().items()}

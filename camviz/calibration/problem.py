@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.calibration.denominator_prior import DenominatorPrior
 from camviz.calibration.jacobian import parameter
 from camviz.calibration.types import Board, Calibration, Mask
 from camviz.cameras import Camera
@@ -31,7 +32,7 @@ class Problem:
 
     `detections` (views, corners, 2) in pixels are NaN where no corner was seen. Corners `set_aside` (views, corners)
     have residuals, but are not fitted (have no say). Nor is a view of fewer than four corners, or of corners on one
-    line.
+    line. `priors` are what is assumed of a camera's lens beforehand.
     """
 
     board: Board
@@ -41,6 +42,7 @@ class Problem:
     estimated: Mapping[str, tuple[str, ...]]
     set_aside: Mapping[str, Mask] = field(default_factory=dict, repr=False)
     warp: Array | None = None
+    priors: Mapping[str, DenominatorPrior] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         corners = self.board.columns * self.board.rows
@@ -73,6 +75,7 @@ class Problem:
             {name: tuple(calibration.estimated.get(name) or assumed_estimated(cameras[name])) for name in names},
             {name: calibration.set_aside[name] for name in names if name in calibration.set_aside},
             calibration.board_warp,
+            {name: calibration.priors[name] for name in names if name in calibration.priors},
         )
 
     # The measurements
@@ -136,13 +139,18 @@ class Problem:
         return float(np.sqrt(2 * self.sum_of_squares / max(self.measurements, 1)))
 
     @property
-    def sigma(self) -> float:
-        """The standard deviation in pixels of one coordinate of a detected corner: σ² = ‖x‖²/(N - k).
+    def at_work(self) -> dict[str, DenominatorPrior]:
+        """The priors by camera, of those whose denominator is free."""
+        return {
+            name: prior
+            for name, prior in self.priors.items()
+            if set(self.estimated[name]) & set(self.cameras[name].lens.denominator_terms)
+        }
 
-        NaN where there are no more measurements than parameters.
-        """
-        left = self.measurements - self.unknowns
-        return float(np.sqrt(self.sum_of_squares / left)) if left > 0 else np.nan
+    @cached_property
+    def cost_of_priors(self) -> float:
+        """What the priors add to ‖x‖², in px²; infinite where they rule the cameras out."""
+        return sum(prior.cost(self.cameras[name].lens) for name, prior in self.at_work.items())
 
     # The parameters
 

@@ -14,6 +14,7 @@ from camviz.calibration.detection import CannotCalibrate, Detections, seen
 from camviz.calibration.jacobian import with_parameters
 from camviz.calibration.models import MODELS, Model, Views, poses_from_rays
 from camviz.calibration.outliers import Masks, outliers, sentences
+from camviz.calibration.regularisation import regularised, with_priors
 from camviz.calibration.types import Board, Calibration, Mask
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
@@ -121,7 +122,8 @@ def _alone(
 
     def begun(aside: Mask) -> Adjustment:
         camera, poses = _solved(detections, board, kind, fixed, aside)
-        return Adjustment(board, {name: camera}, {name: corners}, poses, {name: estimated}, {name: aside})
+        start = Adjustment(board, {name: camera}, {name: corners}, poses, {name: estimated}, {name: aside})
+        return with_priors(start) if kind.regularised else start
 
     start = begun(np.zeros(corners.shape[:2], dtype=bool))
     return _robust(start, lambda masks: begun(masks[name])) if robust else _settled(start)
@@ -172,6 +174,7 @@ def _paired(alone: Mapping[str, Adjustment], board: Board, estimated: tuple[str,
         RigidTransform.concatenate([poses[camera][view] for view, camera in enumerate(better)]),
         dict.fromkeys(alone, estimated),
         {**left.set_aside, "right": right.set_aside["right"] | otherwise[:, None]},
+        priors={**left.priors, **right.priors},
     )
 
 
@@ -194,7 +197,7 @@ def _robust(adjustment: Adjustment, begin_anew: Callable[[Masks], Adjustment] | 
 def _settled(adjustment: Adjustment) -> Adjustment:
     """At the least squares; a view without a say is given the pose that suits its own corners best."""
     try:
-        adjustment = adjustment.refined()
+        adjustment = regularised(adjustment)
     except np.linalg.LinAlgError as error:  # a corner on the very fold of the lens
         raise CannotCalibrate(FOLDED) from error
     if sum(mask.sum() for mask in adjustment.used.values()) < sum(mask.sum() for mask in _wanted(adjustment)) / 2:
@@ -271,6 +274,7 @@ def _calibration(
         estimated=adjustment.estimated,
         intrinsics_covariance={name: adjustment.intrinsics_covariance(name) for name in adjustment.cameras},
         skipped=skipped,
+        priors=adjustment.priors,
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.calibration.denominator_prior import DenominatorPrior
 from camviz.calibration.redundancy import Redundancy
 from camviz.cameras import Camera, Rig
 from camviz.lenses.base import Array
@@ -99,6 +100,7 @@ class Calibration:
     set_aside: Mapping[str, Mask] = field(default_factory=dict, repr=False)  # name → (views, corners): seen, not used
     estimated: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # name → the intrinsics that were solved for
     intrinsics_covariance: Mapping[str, Array] = field(default_factory=dict, repr=False)  # (n, n), as `estimated` has n
+    priors: Mapping[str, DenominatorPrior] = field(default_factory=dict)  # name → what the solution assumed beforehand
     board_warp: Array | None = None  # (2,) sagittas in metres, see Board.warped
     skipped: tuple[tuple[str, str], ...] = ()  # pictures that were not used, and why
     faults: tuple[CalibrationError, ...] = ()  # what was mended in reading, where `load` was asked to mend

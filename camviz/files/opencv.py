@@ -8,6 +8,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from camviz.calibration.denominator_prior import DenominatorPrior
 from camviz.calibration.types import Board, Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format
@@ -26,7 +27,7 @@ PROJECTION = "p|projection(matrix)?"
 OF_A_PAIR = {"E": "e|essential(matrix)?", "F": "f|fundamental(matrix)?", "Q": "q|disparitytodepth(map|matrix)?"}
 EXTRINSICS, ERRORS, DETECTIONS = "extrinsicparameters", "perviewreprojectionerrors", "imagepoints"
 PICTURES, ASIDE = "picturenames", "setaside"
-ESTIMATED, COVARIANCE = "estimatedparameters", "intrinsicscovariance"
+ESTIMATED, COVARIANCE, PRIOR = "estimatedparameters", "intrinsicscovariance", "denominatorprior"
 
 PAIRS = ({"0", "1"}, {"1", "2"}, {"l", "r"}, {"left", "right"})
 FOUR_COEFFICIENTS = (
@@ -206,7 +207,7 @@ def _views(section: Section, tag: str) -> dict[str, Any]:
 
 
 def _solution(section: Section, tag: str) -> dict[str, Any]:
-    """Which intrinsics of a camera were estimated, and their covariance."""
+    """Which intrinsics of a camera were estimated, their covariance, and the prior that they were estimated under."""
     solution: dict[str, Any] = {}
     if key := _find(section, ESTIMATED, tag):
         solution["estimated"] = words(section, key)
@@ -216,6 +217,11 @@ def _solution(section: Section, tag: str) -> dict[str, Any]:
         count = len(solution.get("estimated", ()))
         solution["intrinsics_covariance"] = section.matrix(key, count, count)
         solution["intrinsics_covariance"].flags.writeable = False
+    if key := _find(section, PRIOR, tag):
+        values = section.matrix(key, 1, 3).ravel().tolist()
+        if not min(values) > 0:
+            raise section.error(key, "three positive numbers (reach, deviation, noise)", values)
+        solution["priors"] = DenominatorPrior(*values)
     return solution
 
 

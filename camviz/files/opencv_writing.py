@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import astuple
 from typing import Any
 from urllib.parse import quote
 
@@ -87,6 +88,8 @@ def _views(calibration: Calibration, name: str, tag: str) -> dict[str, Any]:
         values["estimated_parameters"] = list(calibration.estimated[name])
     if name in calibration.intrinsics_covariance:
         values["intrinsics_covariance"] = np.ascontiguousarray(calibration.intrinsics_covariance[name])
+    if name in calibration.priors:
+        values["denominator_prior"] = np.array([astuple(calibration.priors[name])])
     if name in calibration.detections:
         values["image_points"] = np.ascontiguousarray(calibration.detections[name])
     if name in calibration.set_aside:

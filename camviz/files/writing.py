@@ -28,6 +28,7 @@ BY_CAMERA = (
     "set_aside",
     "estimated",
     "intrinsics_covariance",
+    "priors",
 )
 
 
@@ -164,6 +165,7 @@ def _missing(calibration: Calibration, back: Calibration) -> list[str]:
         "set_aside": "which corners were set aside",
         "estimated": "which parameters were estimated",
         "intrinsics_covariance": "their covariance",
+        "priors": "the prior on the denominator",
         "board_warp": "the bend of the board",
         "skipped": "the pictures that were skipped",
         "world_from_imu": "the place of the IMU",

@@ -44,6 +44,7 @@ class Lens(ABC):
     invalid: ClassVar[tuple[tuple[tuple[float, ...], str], ...]] = ()  # parameters, and the error's message
     plain: ClassVar[type[Lens] | None] = None  # the lens without parameters that it is where all of its own are 0
     goes_round: ClassVar[bool] = False  # true of a panorama, which sees straight behind itself
+    denominator_terms: ClassVar[tuple[str, ...]] = ()  # the parameters a, b … of its `denominator` 1 + a s + b s² + …
     may_mirror: ClassVar[bool] = False  # true where part of the image may be mirrored without a radial fold
 
     def project(self, points_cam: ArrayLike) -> Array:

@@ -92,9 +92,10 @@ class BrownConrady(Lens):
             "rational",
             "Brown-Conrady, rational",
             RATIONAL,
-            "and k4 k5 k6: wide angles, with many views that reach into the corners of the image",
+            "and k4 k5 k6, kept from poles by a prior: wide angles, with many views up to the image's corners",
             "calibrateCamera",
             "CALIB_RATIONAL_MODEL",
+            regularised=True,
         ),
         CalibrationModel(
             "thin-prism",
@@ -119,6 +120,7 @@ class BrownConrady(Lens):
     )
     invalid = (((0,) * 12 + (1.6,), "tau_x must be an angle between -π/2 and π/2 radians, got 1.6"),)
     plain = Perspective
+    denominator_terms = ("k4", "k5", "k6")
     may_mirror = True
 
     def __post_init__(self) -> None:

@@ -28,7 +28,8 @@ class CalibrationModel:
     """A choice of `camviz calibrate --model`: which parameters are solved for beside fx, fy, cx and cy, and how.
 
     `solver` is the function of OpenCV that solves first, with `flags` of its own. Without one the calibration begins
-    with the lens of parameters `start`, at the focal length that fits the boards best.
+    with the lens of parameters `start`, at the focal length that fits the boards best. `regularised` are models whose
+    denominator a prior keeps from 0 (`camviz.calibration.regularisation`).
     """
 
     name: str
@@ -38,6 +39,7 @@ class CalibrationModel:
     solver: str = ""
     flags: str = ""
     start: tuple[float, ...] = ()
+    regularised: bool = False
 
 
 @dataclass(frozen=True)

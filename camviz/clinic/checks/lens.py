@@ -17,8 +17,10 @@ from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.registry import Finding, Rng, finding
 from camviz.clinic.virtual import alone, healthy
 from camviz.distortion import (
+    NEARLY_A_POLE,
     ideal_image_radius,
     image_corner_radius,
+    image_reach,
     is_rational,
     valid_region,
     weakest_denominator,
@@ -26,7 +28,6 @@ from camviz.distortion import (
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, Lens, on_plane
 
-WEAKEST = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
 LOST = 0.01  # of the pixels, fewer than which may fold
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
 NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z = 1 worth the name
@@ -137,9 +138,9 @@ def near_pole(evidence: Evidence) -> Iterator[Finding]:
     if not rational:
         raise NotChecked("no lens here has a denominator (k4 k5 k6)")
     for name, camera in rational.items():
-        reach = float(np.nanmax([ideal_image_radius(camera), image_corner_radius(camera.intrinsics)]))
+        reach = image_reach(camera)
         radius, least = weakest_denominator(camera.lens, reach)
-        if least < WEAKEST:
+        if least < NEARLY_A_POLE:
             what = "passes through 0, which is a pole," if least <= 0 else f"falls to {least:.3g}"
             sentence = (
                 f"{name}: the denominator of the rational model {what} at r = {radius:.3g} focal lengths. "
