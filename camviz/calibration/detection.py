@@ -19,7 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from camviz.calibration.finding import charuco_detector, find_corners, look, look_on_request
+from camviz.calibration.boards import kind_of
+from camviz.calibration.boards.charuco import charuco_dictionary
+from camviz.calibration.finding import find_corners, look, look_on_request
 from camviz.calibration.types import Board, Mask
 from camviz.lenses.base import Array
 
@@ -109,8 +111,8 @@ def _looked(
 ) -> list[Look]:
     if not paths:
         raise CannotCalibrate("there are no pictures to look for a board in")
-    if board.dictionary is not None:
-        charuco_detector(board)  # complains about a board that cannot be
+    if board.kind == "charuco":
+        charuco_dictionary(board)  # complains about a board that cannot be
     looks: dict[int, Look] = {}
     for place, found in _looks([str(path) for path in paths], board, finder, workers):
         looks[place] = found
@@ -148,12 +150,8 @@ def _nothing_found(names: Sequence[str], looks: Sequence[Look], board: Board) ->
     if all(size is None for size, _, _ in looks):
         why, _ = reasons.most_common(1)[0]
         return f"none of the pictures can be used: {why} ({shown})"
-    kind = "chessboard" if board.dictionary is None else f"ChArUco board of {board.dictionary}"
-    return (
-        f"no {kind} with {board.columns}×{board.rows} inner corners ({board.columns + 1}×{board.rows + 1} squares) was "
-        f"found in any of {len(names)} pictures ({shown}): count the corners where four squares meet, "
-        "and see that the whole board with its white margin is in the picture"
-    )
+    kind = kind_of(board)
+    return f"no {kind.says(board)} was found in any of {len(names)} pictures ({shown}): {kind.advice}"
 
 
 def _names(paths: Sequence[str | PathLike[str]]) -> list[str]:

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from camviz.commands.boards import add_board, board_of
 from camviz.commands.common import (
     OK,
     Refusal,
-    add_board,
     add_command,
-    board_of,
     narrator,
     pixels,
     refuse_exhausted,
@@ -33,9 +32,9 @@ if TYPE_CHECKING:
     from camviz.files import Board, Calibration
 
 CALIBRATE = """\
-Finds a chessboard or a ChArUco board in pictures and solves for the camera that took them, or with --right for a pair
-of cameras. IMAGES are files, folders, or patterns such as 'left*.jpg'. Pictures without the board, of another size, or
-that cannot be read are named and skipped. Corners and whole views that contradict the rest are set aside, named, and
+Finds a board (a chessboard, a ChArUco board, Kalibr's AprilGrid, a grid of circles) in pictures and solves for the
+camera that took them, or with --right for a pair of cameras. IMAGES are files, folders, or patterns such as
+'left*.jpg'. Pictures without the board, of another size, or that cannot be read are named and skipped. Corners and whole views that contradict the rest are set aside, named, and
 kept in the file. What is written is OpenCV's YAML, with all that a later inspection needs.
 
 The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
