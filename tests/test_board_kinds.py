@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import Board, Detections, calibrate, find_corners
+from camviz.calibration import Board, Detections, calibrate, chessboards, find_corners
 from camviz.calibration.boards import kinds
 from camviz.calibration.boards.picture import whiteness
+from camviz.calibration.chessboards import everywhere
 from camviz.calibration.circle_grids import bias
 from camviz.calibration.paper import black_discs, black_parts, fitted, pdf
 from camviz.cameras import Camera, Intrinsics
@@ -144,7 +145,7 @@ def test_a_target_that_is_none_is_refused_in_one_sentence(tmp_path, capsys):
     path = tmp_path / "target.yaml"
     path.write_text("target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 0.06\n"
                     "colSpacingMeters: 0.05\n")  # fmt: skip
-    with pytest.raises(CalibrationError, match="expected squares, 0.05 as colSpacingMeters, got 0.06"):
+    with pytest.raises(CalibrationError, match=r"expected squares, 0\.05 as colSpacingMeters, got 0\.06"):
         read_target(path)
     path.write_text("cam0: {camera_model: pinhole}\n")
     assert main(["board", "--board", str(path), "-o", str(tmp_path / "b.pdf")]) == 2
@@ -194,3 +195,28 @@ def test_a_board_that_cannot_be_is_refused(fields, said):
 
 def test_a_chessboard_with_a_short_side_is_not_looked_for():
     assert find_corners(np.full((60, 80), 128, np.uint8), Board(2, 5, 0.03)) is None
+
+
+def test_a_large_photograph_is_searched_at_full_size_only_where_the_board_is(monkeypatch):
+    """The corners are those that the whole picture gives, from less than half of its pixels."""
+    board, camera = BOARDS["chessboard"], Camera(Intrinsics(960, 720, 560, 560, 479.5, 359.5), BrownConrady(-0.2, 0.05))
+    pose = POSE * RigidTransform.from_translation([0.0, 0.0, 0.15])
+    picture = photographed(camera, board, pose)
+    whole = chessboards.everywhere(picture, board)
+    looked = []
+    monkeypatch.setattr(
+        chessboards, "everywhere", lambda gray, board: looked.append(gray.size) or everywhere(gray, board)
+    )
+    found = find_corners(picture, board)
+    assert len(looked) == 1
+    assert looked[0] < picture.size / 2
+    assert np.linalg.norm(found - camera.project(pose.apply(board.corners)), axis=1).max() < 0.1
+    assert min(np.abs(found - each).max() for each in (whole, whole[::-1])) < 0.1
+
+
+def test_a_board_that_the_smaller_copy_does_not_show_is_found_all_the_same(monkeypatch):
+    board = BOARDS["chessboard"]
+    picture = cv2.resize(photographed(CAMERA, board, POSE), (960, 720))
+    found = find_corners(picture, board)
+    monkeypatch.setattr(chessboards, "_rough", lambda gray, board: None)
+    assert np.abs(find_corners(picture, board) - found).max() < 0.2

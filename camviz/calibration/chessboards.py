@@ -15,6 +15,11 @@ from camviz.calibration.boards.kind import Array, Shape
 
 LEAST_SIDE = 3  # corners: OpenCV's finders take no fewer
 LARGE = 2000  # pixels along the longer side, beyond which boards are looked for in a smaller copy
+SMALL = 500_000  # pixels, up to which the whole picture is searched at once
+ROUGH = 640  # pixels along the longer side of the copy in which the board is looked for first
+MARGIN = 2.0  # of the widest squares: what of the picture is kept around the outermost corners
+AGREE = 0.5  # of the narrowest square: further apart, rough and exact corners are not of the same squares
+THOROUGH = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
 WINDOW = 11  # pixels to either side of a corner that OpenCV's samples refine it from
 SUBPIXEL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.001)
 
@@ -33,17 +38,70 @@ def find_chessboard(gray: NDArray[Any], board: Shape, finder: str = "auto") -> A
 
 
 def _sectors(gray: NDArray[Any], board: Shape) -> Array | None:
-    """Without EXHAUSTIVE first: it is quicker, and finds one of OpenCV's sample photographs that the other misses."""
+    """By sectors, in a smaller copy of a very large picture; of a large one only where the board roughly is."""
     factor = -(-max(gray.shape) // LARGE)
     if factor > 1:
         height, width = (side // factor for side in gray.shape)
         cropped = gray[: height * factor, : width * factor]
         gray = cv2.resize(cropped, (width, height), interpolation=cv2.INTER_AREA)
-    for flags in (cv2.CALIB_CB_ACCURACY, cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE):
+    corners = in_part(gray, board) if gray.size > SMALL else None
+    if corners is None:
+        corners = everywhere(gray, board)
+    return corners if corners is None else factor * corners + (factor - 1) / 2
+
+
+def everywhere(gray: NDArray[Any], board: Shape) -> Array | None:
+    """By sectors in the whole picture, which takes 0.4 s for a million pixels.
+
+    Without EXHAUSTIVE first: it is quicker, and finds one of OpenCV's sample photographs that the other misses.
+    """
+    for flags in (cv2.CALIB_CB_ACCURACY, THOROUGH):
         found, corners = cv2.findChessboardCornersSB(gray, (board.columns, board.rows), flags=flags)
         if found:
-            return factor * np.asarray(corners, dtype=float).reshape(-1, 2) + (factor - 1) / 2
+            return np.asarray(corners, dtype=float).reshape(-1, 2)
     return None
+
+
+def in_part(gray: NDArray[Any], board: Shape) -> Array | None:
+    """By sectors at full size, in that part of the picture where a smaller copy shows the board.
+
+    None where the smaller copy shows none, or the two disagree: then the board may still be found everywhere.
+    """
+    rough = _rough(gray, board)
+    if rough is None:
+        return None
+    spacing = _spacing(rough, board)
+    around = MARGIN * spacing.max()
+    left, top = np.maximum(np.floor(rough.min(axis=0) - around), 0).astype(int)
+    right, bottom = np.ceil(rough.max(axis=0) + around).astype(int)
+    part = np.ascontiguousarray(gray[top:bottom, left:right])
+    corners = everywhere(part, board)
+    if corners is None:
+        return None
+    corners += [left, top]
+    apart = min(np.linalg.norm(corners - each, axis=-1).max() for each in (rough, rough[::-1]))
+    return corners if apart < AGREE * spacing.min() else None
+
+
+def _rough(gray: NDArray[Any], board: Shape) -> Array | None:
+    """The corners to a pixel or two, from a smaller copy."""
+    scale = min(ROUGH / max(gray.shape), 1)
+    height, width = (round(side * scale) for side in gray.shape)
+    small = cv2.resize(gray, (width, height), interpolation=cv2.INTER_AREA)
+    size = (board.columns, board.rows)
+    found, corners = cv2.findChessboardCorners(small, size)
+    if not found:
+        found, corners = cv2.findChessboardCornersSB(small, size, flags=THOROUGH)
+    if not found:
+        return None
+    ratio = np.array(gray.shape[::-1]) / [width, height]
+    return np.asarray((np.reshape(corners, (-1, 2)) + 0.5) * ratio - 0.5, dtype=float)
+
+
+def _spacing(corners: Array, board: Shape) -> Array:
+    """The distances of neighbouring corners, in pixels."""
+    grid = corners.reshape(board.rows, board.columns, 2)
+    return np.concatenate([np.linalg.norm(np.diff(grid, axis=axis), axis=-1).ravel() for axis in (0, 1)])
 
 
 def _classic(gray: NDArray[Any], board: Shape, window: int | None = None) -> Array | None:
@@ -53,8 +111,7 @@ def _classic(gray: NDArray[Any], board: Shape, window: int | None = None) -> Arr
         return None
     corners = np.ascontiguousarray(corners, dtype=np.float32).reshape(-1, 1, 2)
     if window is None:
-        grid = corners.reshape(board.rows, board.columns, 2)
-        spacing = min(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min() for axis in (0, 1))
+        spacing = _spacing(corners.reshape(-1, 2).astype(float), board).min()
         window = int(np.clip(0.4 * spacing, 2, WINDOW))
     refined = cv2.cornerSubPix(gray, corners, (window, window), (-1, -1), SUBPIXEL)
     return np.asarray(refined, dtype=float).reshape(-1, 2)

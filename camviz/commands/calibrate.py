@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 CALIBRATE = """\
 Finds a board (a chessboard, a ChArUco board, Kalibr's AprilGrid, a grid of circles) in pictures and solves for the
 camera that took them, or with --right for a pair of cameras. IMAGES are files, folders, or patterns such as
-'left*.jpg'. Pictures without the board, of another size, or that cannot be read are named and skipped. Corners and whole views that contradict the rest are set aside, named, and
-kept in the file. What is written is OpenCV's YAML, with all that a later inspection needs.
+'left*.jpg'. Pictures without the board, of another size, or that cannot be read are named and skipped. Corners and
+whole views that contradict the rest are set aside, named, and kept in the file. What is written is OpenCV's YAML, with
+all that a later inspection needs.
 
 The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
 (left07.jpg and right07.jpg), else by their order.
