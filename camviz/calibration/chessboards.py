@@ -20,6 +20,7 @@ ROUGH = 640  # pixels along the longer side of the copy in which the board is lo
 MARGIN = 2.0  # of the widest squares: what of the picture is kept around the outermost corners
 AGREE = 0.5  # of the narrowest square: further apart, rough and exact corners are not of the same squares
 THOROUGH = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
+CONTRAST = 0.5  # of the board's own: fields beyond its edge that differ by more are squares
 WINDOW = 11  # pixels to either side of a corner that OpenCV's samples refine it from
 SUBPIXEL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.001)
 
@@ -129,3 +130,37 @@ def _black_first(gray: NDArray[Any], corners: Array, board: Shape) -> Array:
     first_is_white = seen[as_first].mean() > seen[~as_first].mean() if not as_first.all() else False
     other_end_differs = (board.columns + board.rows) % 2 == 1
     return corners[::-1].copy() if first_is_white and other_end_differs else corners
+
+
+def goes_on(gray: NDArray[Any], corners: Array, board: Shape) -> bool:
+    """Whether squares go on alternating beyond the outermost squares of a chessboard found in a grey picture.
+
+    The corners (columns * rows, 2) are continued by two rows to each side; the fields there are white around a board
+    that ends, and black and white by turns in a larger one.
+    """
+    grid = corners.reshape(board.rows, board.columns, 2)
+    sides = (grid, grid[::-1], grid.swapaxes(0, 1), grid.swapaxes(0, 1)[::-1])
+    return any(_alternates(gray, side) for side in sides if len(side) >= 3 and side.shape[1] >= 3)
+
+
+def _alternates(gray: NDArray[Any], rows: Array) -> bool:
+    """Whether the second row of fields before rows[0] alternates as the board's own first one does."""
+    before = 3 * rows[0] - 3 * rows[1] + rows[2]
+    twice = 3 * before - 3 * rows[0] + rows[1]
+    own, beyond = _along(gray, rows[0], rows[1]), _along(gray, twice, before)
+    if own is None or beyond is None:
+        return False
+    sign = np.where(np.arange(len(own)) % 2, -1, 1)
+    swing, other = float((sign * own).mean()), float((sign * beyond).mean())
+    steps = np.sign(np.diff(beyond)) == -sign[:-1] * np.sign(other)
+    return swing * other > 0 and abs(other) > CONTRAST * abs(swing) and bool(steps.mean() > 0.8)
+
+
+def _along(gray: NDArray[Any], upper: Array, lower: Array) -> Array | None:
+    """How bright the fields between two rows of corners are at their middles; None where they leave the picture."""
+    middles = (upper[:-1] + upper[1:] + lower[:-1] + lower[1:]) / 4
+    u, v = np.rint(middles).astype(int).T
+    if (u < 0).any() or (v < 0).any() or (u >= gray.shape[1]).any() or (v >= gray.shape[0]).any():
+        return None
+    seen = gray[v, u].astype(float)
+    return np.asarray(seen[: len(seen) // 2 * 2])  # as many that should be black as white

@@ -23,6 +23,7 @@ from camviz.calibration.boards import kind_of
 from camviz.calibration.boards.charuco import charuco_dictionary
 from camviz.calibration.finding import find_corners, look, look_on_request
 from camviz.calibration.types import Board, Mask
+from camviz.calibration.wrong_board import another_board, part_of_a_larger
 from camviz.lenses.base import Array
 
 __all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corners", "seen"]
@@ -77,9 +78,9 @@ def detect(
 
     Pictures without the board, those that cannot be read and those of another size than most are skipped. `progress` is
     called with the numbers of pictures done and in all. `finder` is that of `find_corners`. Raises CannotCalibrate
-    where the board is in none of the pictures, or a process is lost.
+    where the board is in none of the pictures or most show a larger one, or a process is lost.
     """
-    return _gathered(_names(paths), _looked(paths, board, finder, workers, progress), board)
+    return _gathered(paths, _looked(paths, board, finder, workers, progress), board)
 
 
 def detect_pair(
@@ -96,8 +97,8 @@ def detect_pair(
         raise ValueError(f"right must have as many pictures as left, {len(left)}, got {len(right)}")
     looks = _looked([*left, *right], board, finder, workers, progress)
     return (
-        _gathered(_names(left), looks[: len(left)], board),
-        _gathered(_names(right), looks[len(left) :], board),
+        _gathered(left, looks[: len(left)], board),
+        _gathered(right, looks[len(left) :], board),
     )
 
 
@@ -121,10 +122,11 @@ def _looked(
     return [looks[place] for place in range(len(paths))]
 
 
-def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Detections:
+def _gathered(paths: Sequence[str | PathLike[str]], looks: Sequence[Look], board: Board) -> Detections:
+    names = _names(paths)
     sizes = Counter(size for size, corners, _ in looks if corners is not None)
     if not sizes:
-        raise CannotCalibrate(_nothing_found(names, looks, board))
+        raise CannotCalibrate(_nothing_found(paths, names, looks, board))
     size = max(sizes, key=lambda one: sizes[one])
     found, skipped = {}, []
     for place, (own_size, corners, why) in enumerate(looks):
@@ -134,6 +136,9 @@ def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Dete
             skipped.append((names[place], why))
         else:
             found[place] = corners
+    wrong = part_of_a_larger([paths[i] for i in found], [names[i] for i in found], list(found.values()), board)  # type: ignore[arg-type]
+    if wrong:
+        raise CannotCalibrate(wrong)
     return Detections(
         pictures=tuple(names[place] for place in found),
         corners=np.stack(list(found.values())),  # type: ignore[arg-type]
@@ -144,14 +149,17 @@ def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Dete
     )
 
 
-def _nothing_found(names: Sequence[str], looks: Sequence[Look], board: Board) -> str:
+def _nothing_found(
+    paths: Sequence[str | PathLike[str]], names: Sequence[str], looks: Sequence[Look], board: Board
+) -> str:
     reasons = Counter(why for _, _, why in looks)
     shown = ", ".join(names[:3]) + f" and {len(names) - 3} more" * (len(names) > 3)
     if all(size is None for size, _, _ in looks):
         why, _ = reasons.most_common(1)[0]
         return f"none of the pictures can be used: {why} ({shown})"
-    kind = kind_of(board)
-    return f"no {kind.says(board)} was found in any of {len(names)} pictures ({shown}): {kind.advice}"
+    kind, read = kind_of(board), [place for place, (size, _, _) in enumerate(looks) if size is not None]
+    seen = another_board([paths[i] for i in read], [names[i] for i in read], board)
+    return f"no {kind.says(board)} was found in any of {len(names)} pictures ({shown}): {seen or kind.advice}"
 
 
 def _names(paths: Sequence[str | PathLike[str]]) -> list[str]:
