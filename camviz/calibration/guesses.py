@@ -106,7 +106,7 @@ def _chessboard(gray: Gray) -> Guess | None:
         if seen:
             rows, columns = np.asarray(meta).shape[:2]
             board = SimpleNamespace(rows=rows, columns=columns, kind="chessboard")
-            if not goes_on(gray, np.reshape(corners, (-1, 2)).astype(float), board):  # type: ignore[arg-type]
+            if not goes_on(gray, np.reshape(corners, (-1, 2)).astype(float), board):
                 found.append(board)
     if not found:
         return None
