@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.calibration.boards.picture import whiteness
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Rig, transform
 from camviz.draw.items import Face, Item, Line, camera_body
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["board", "boards", "camera", "joined", "points", "residuals", "rig", "scene"]
 
+_DETAILED = 26  # faces along `square_size` of a board that is no chessboard: two to a cell of Kalibr's tags
 _BLACK, _WHITE = (28, 35, 48, 255), (255, 255, 255, 255)
 Colours = NDArray[np.uint8]
 
@@ -55,15 +57,17 @@ def rig(
 
 
 def board(board: Board, world_from_board: RigidTransform | None = None) -> pyvista.PolyData:
-    """A chessboard with its squares, the first inner corner at the board's origin.
+    """A board with its squares, tags or circles, the first of its points at the board's origin.
 
     >>> board(Board(9, 6, 0.025)).n_cells  # squares: 10 by 7
     70
     """
-    square, (s, r) = board.square_size, np.indices((board.columns + 1, board.rows + 1)).reshape(2, -1)
-    corner = np.stack([s - 1, r - 1, np.zeros_like(s)], axis=-1)[:, None] * square
-    outline = corner + square * np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
-    colours = np.where((s + r)[:, None] % 2, _WHITE, _BLACK).repeat(4, axis=0)
+    texels = 1 if board.kind == "chessboard" else _DETAILED
+    white, size = whiteness(board, texels).T, board.square_size / texels
+    s, r = np.indices(white.shape).reshape(2, -1)
+    corner = np.stack([size * s + board.area[0], size * r + board.area[1], np.zeros(s.size)], axis=-1)[:, None]
+    outline = corner + size * np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    colours = np.where(white.reshape(-1, 1) > 0.5, _WHITE, _BLACK).repeat(4, axis=0)
     points = outline.reshape(-1, 3)
     if world_from_board is not None:
         points = transform(world_from_board, points)

@@ -134,8 +134,8 @@ def boards(calibration: Calibration, ax: Any = None, *, camera: str = "", **opti
     """
     seen, ax = Observations.of(calibration, camera), space_axes(ax)
     world_from_cam = calibration.cameras[seen.name].world_from_cam
-    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)])
-    outline = seen.board.square_size * (corners * (seen.board.columns + 1, seen.board.rows + 1, 0) - (1, 1, 0))
+    left, top, right, bottom = seen.board.area
+    outline = np.array([(left, top, 0), (right, top, 0), (right, bottom, 0), (left, bottom, 0), (left, top, 0)])
     for view in np.flatnonzero(seen.shown):
         _lines(ax, [transform(world_from_cam * seen.cam_from_board[view], outline)], **options)
     ax.set_aspect("equal")

@@ -19,8 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from camviz.calibration.finding import charuco_detector, find_corners, look, look_on_request
+from camviz.calibration.boards import kind_of
+from camviz.calibration.boards.charuco import charuco_dictionary
+from camviz.calibration.chessboards import LEAST_SIDE
+from camviz.calibration.finding import find_corners, look, look_on_request
 from camviz.calibration.types import Board, Mask
+from camviz.calibration.wrong_board import another_board, part_of_a_larger
 from camviz.lenses.base import Array
 
 __all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corners", "seen"]
@@ -29,7 +33,6 @@ Progress = Callable[[int, int], object]
 Look = tuple[tuple[int, int] | None, Array | None, str]
 
 LISTEN = 0.1  # seconds between two checks for Ctrl-C
-FEWEST_OF_A_SIDE = 3  # inner corners of a chessboard that OpenCV's finders take
 WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictures take
 
 
@@ -76,9 +79,9 @@ def detect(
 
     Pictures without the board, those that cannot be read and those of another size than most are skipped. `progress` is
     called with the numbers of pictures done and in all. `finder` is that of `find_corners`. Raises CannotCalibrate
-    where the board is in none of the pictures, or a process is lost.
+    where the board is in none of the pictures or most show a larger one, or a process is lost.
     """
-    return _gathered(_names(paths), _looked(paths, board, finder, workers, progress), board)
+    return _gathered(paths, _looked(paths, board, finder, workers, progress), board)
 
 
 def detect_pair(
@@ -95,8 +98,8 @@ def detect_pair(
         raise ValueError(f"right must have as many pictures as left, {len(left)}, got {len(right)}")
     looks = _looked([*left, *right], board, finder, workers, progress)
     return (
-        _gathered(_names(left), looks[: len(left)], board),
-        _gathered(_names(right), looks[len(left) :], board),
+        _gathered(left, looks[: len(left)], board),
+        _gathered(right, looks[len(left) :], board),
     )
 
 
@@ -110,11 +113,11 @@ def _looked(
 ) -> list[Look]:
     if not paths:
         raise CannotCalibrate("there are no pictures to look for a board in")
-    if board.dictionary is not None:
-        charuco_detector(board)  # complains about a board that cannot be
-    elif min(board.columns, board.rows) < FEWEST_OF_A_SIDE:
+    if board.kind == "charuco":
+        charuco_dictionary(board)  # complains about a board that cannot be
+    elif board.kind == "chessboard" and min(board.columns, board.rows) < LEAST_SIDE:
         raise CannotCalibrate(
-            f"a chessboard is found by at least {FEWEST_OF_A_SIDE}×{FEWEST_OF_A_SIDE} inner corners, this board has "
+            f"a chessboard is found by at least {LEAST_SIDE}×{LEAST_SIDE} inner corners, this board has "
             f"{board.columns}×{board.rows}"
         )
     looks: dict[int, Look] = {}
@@ -125,10 +128,11 @@ def _looked(
     return [looks[place] for place in range(len(paths))]
 
 
-def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Detections:
+def _gathered(paths: Sequence[str | PathLike[str]], looks: Sequence[Look], board: Board) -> Detections:
+    names = _names(paths)
     sizes = Counter(size for size, corners, _ in looks if corners is not None)
     if not sizes:
-        raise CannotCalibrate(_nothing_found(names, looks, board))
+        raise CannotCalibrate(_nothing_found(paths, names, looks, board))
     size = max(sizes, key=lambda one: sizes[one])
     found, skipped = {}, []
     for place, (own_size, corners, why) in enumerate(looks):
@@ -138,6 +142,9 @@ def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Dete
             skipped.append((names[place], why))
         else:
             found[place] = corners
+    wrong = part_of_a_larger([paths[i] for i in found], [names[i] for i in found], list(found.values()), board)  # type: ignore[arg-type]
+    if wrong:
+        raise CannotCalibrate(wrong)
     return Detections(
         pictures=tuple(names[place] for place in found),
         corners=np.stack(list(found.values())),  # type: ignore[arg-type]
@@ -148,18 +155,17 @@ def _gathered(names: Sequence[str], looks: Sequence[Look], board: Board) -> Dete
     )
 
 
-def _nothing_found(names: Sequence[str], looks: Sequence[Look], board: Board) -> str:
+def _nothing_found(
+    paths: Sequence[str | PathLike[str]], names: Sequence[str], looks: Sequence[Look], board: Board
+) -> str:
     reasons = Counter(why for _, _, why in looks)
     shown = ", ".join(names[:3]) + f" and {len(names) - 3} more" * (len(names) > 3)
     if all(size is None for size, _, _ in looks):
         why, _ = reasons.most_common(1)[0]
         return f"none of the pictures can be used: {why} ({shown})"
-    kind = "chessboard" if board.dictionary is None else f"ChArUco board of {board.dictionary}"
-    return (
-        f"no {kind} with {board.columns}×{board.rows} inner corners ({board.columns + 1}×{board.rows + 1} squares) was "
-        f"found in any of {len(names)} pictures ({shown}): count the corners where four squares meet, "
-        "and see that the whole board with its white margin is in the picture"
-    )
+    kind, read = kind_of(board), [place for place, (size, _, _) in enumerate(looks) if size is not None]
+    seen = another_board([paths[i] for i in read], [names[i] for i in read], board)
+    return f"no {kind.says(board)} was found in any of {len(names)} pictures ({shown}): {seen or kind.advice}"
 
 
 def _names(paths: Sequence[str | PathLike[str]]) -> list[str]:

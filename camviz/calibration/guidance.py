@@ -107,7 +107,7 @@ def _poses(camera: Camera, board: Board) -> Iterator[RigidTransform]:
     axes = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
     turns = [np.zeros((1, 3)), *(np.radians(tilt) * axes for tilt in TILTS)]
     tilted = Rotation.from_rotvec(np.concatenate(turns))
-    width = (board.columns + 1) * board.square_size
+    width = board.area[2] - board.area[0]
     for x, y in product(POSITIONS, POSITIONS):
         uv = [x * pixels.width - 0.5, y * pixels.height - 0.5]
         ray = camera.lens.unproject(pixels.from_pixels(uv))
@@ -125,11 +125,12 @@ def shows_whole(camera: Camera, board: Board, cam_from_board: RigidTransform) ->
 
 
 def outline(board: Board) -> Array:
-    """The board's edge (n, 3): the corners one square further out than the outermost inner corners."""
-    x, y = np.arange(-1, board.columns + 1), np.arange(-1, board.rows + 1)
+    """Points (n, 3) along the board's edge, of a chessboard the corners of its outermost squares."""
+    left, top, right, bottom = board.area
+    x, y = np.linspace(left, right, board.columns + 2), np.linspace(top, bottom, board.rows + 2)
     across = [(i, j) for i in x for j in (y[0], y[-1])]
     down = [(i, j) for i in (x[0], x[-1]) for j in y[1:-1]]
-    return board.square_size * np.array([(*point, 0) for point in across + down], dtype=float)
+    return np.array([(*point, 0) for point in across + down], dtype=float)
 
 
 def _with_one_more(adjustment: Adjustment, first_from_board: RigidTransform) -> Iterator[Array]:

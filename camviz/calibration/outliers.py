@@ -17,8 +17,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.boards.charuco import FEWEST
 from camviz.calibration.detection import seen
-from camviz.calibration.finding import FEWEST
 from camviz.calibration.types import Mask
 
 Masks = dict[str, Mask]

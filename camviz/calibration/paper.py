@@ -9,6 +9,7 @@ from math import floor
 
 import numpy as np
 
+from camviz.calibration.boards import kind_of
 from camviz.calibration.types import Board
 from camviz.lenses.base import Array
 
@@ -52,6 +53,12 @@ class Sheet:
         parts = black_parts(self.board)
         return np.column_stack([x + parts[:, 0], y - parts[:, 1] - parts[:, 3], parts[:, 2], parts[:, 3]])
 
+    def discs(self) -> Array:
+        """The black discs of the board, (n, 3): x and y of the middle, diameter."""
+        x, y = self.corner
+        discs = black_discs(self.board)
+        return np.column_stack([x + discs[:, 0], y - discs[:, 1], discs[:, 2]])
+
     def ruler(self) -> Array:
         """The black rectangles of the ruler, (n, 4): a line, and a tick every ten millimetres."""
         ticks = [[MARGIN + at - 0.1, 18.0, 0.2, 3.0 if at in (0, 50, RULER) else 2.0] for at in np.arange(0, 101, 10.0)]
@@ -60,61 +67,35 @@ class Sheet:
     def words(self) -> list[tuple[float, float, str]]:
         """What is printed, with x and y of where each line begins."""
         board = self.board
-        square = f"{1000 * board.square_size:g}"
-        marked = ""
-        if board.marker_size is not None:
-            marked = f" --charuco {board.dictionary} --marker-mm {1000 * board.marker_size:g}"
-        kind = "Chessboard" if board.marker_size is None else "ChArUco board"
+        kind = kind_of(board)
+        said = kind.says(board)
         return [
             (MARGIN + RULER + 2, 17.8, "100 mm"),
-            (MARGIN, 13.0, f"{kind}, {board.columns} × {board.rows} inner corners, squares of {square} mm"),
-            (
-                MARGIN,
-                9.5,
-                f"camviz calibrate PICTURES --board {board.columns}x{board.rows} --square-mm {square}{marked}",
-            ),
+            (MARGIN, 13.0, f"{said[0].upper()}{said[1:]}, {kind.measures(board)}"),
+            (MARGIN, 9.5, f"camviz calibrate PICTURES {kind.options(board)}"),
             (MARGIN, 6.0, "Print at 100 %, not fitted to the page: the ruler must measure 100 mm. Keep it flat."),
         ]
 
 
 def size_mm(board: Board) -> tuple[float, float]:
-    """Width and height in millimetres of all the board's squares."""
-    return 1000 * board.square_size * (board.columns + 1), 1000 * board.square_size * (board.rows + 1)
+    """Width and height in millimetres of all that is printed of a board, with the white that its finder needs."""
+    left, top, right, bottom = board.area
+    return 1000 * (right - left), 1000 * (bottom - top)
 
 
 def black_parts(board: Board) -> Array:
-    """What is black of a board, as rectangles (n, 4): x and y of the upper left, width, height, in millimetres.
+    """What is black of a board as rectangles (n, 4): x and y of the upper left, width, height, in millimetres.
 
-    From the board's upper left corner, x to the right and y down; the square there is black. Markers lie in the
-    middles of the white squares, numbered row by row, as OpenCV's CharucoBoard has them.
+    From the board's upper left, x to the right and y down.
     """
-    side = 1000 * board.square_size
-    squares = [(i, j) for j in range(board.rows + 1) for i in range(board.columns + 1)]
-    parts = [(i * side, j * side, side, side) for i, j in squares if (i + j) % 2 == 0]
-    if board.marker_size is not None:
-        for number, (i, j) in enumerate((i, j) for i, j in squares if (i + j) % 2 == 1):
-            parts += _marker(board, number, i * side, j * side)
-    return np.array(parts)
+    left, top = board.area[:2]
+    return np.asarray(1000 * (kind_of(board).drawn(board).rectangles - [left, top, 0, 0]))
 
 
-def _marker(board: Board, number: int, x: float, y: float) -> list[tuple[float, float, float, float]]:
-    """The black runs of a marker's rows of cells, in the square whose upper left is at (x, y)."""
-    import cv2
-
-    from camviz.calibration.finding import charuco_dictionary
-
-    assert board.marker_size is not None
-    dictionary = charuco_dictionary(board)
-    cells = dictionary.markerSize + 2  # with the border
-    image = cv2.aruco.generateImageMarker(dictionary, number, cells)
-    cell = 1000 * board.marker_size / cells
-    off = 500 * (board.square_size - board.marker_size)
-    runs = []
-    for row, line in enumerate(image):
-        edges = np.flatnonzero(np.diff(np.concatenate([[255], line, [255]]).astype(int)))
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
-            runs.append((x + off + start * cell, y + off + row * cell, (end - start) * cell, cell))
-    return runs
+def black_discs(board: Board) -> Array:
+    """The same of what is black discs (n, 3): x and y of the middle, diameter."""
+    left, top = board.area[:2]
+    return np.asarray(1000 * (kind_of(board).drawn(board).discs - [left, top, 0]))
 
 
 def fitted(board: Board, paper: str = "a4") -> Sheet:
@@ -128,16 +109,13 @@ def fitted(board: Board, paper: str = "a4") -> Sheet:
     for width, height in ways:
         if wide + 2 * MARGIN <= width + 1e-9 and high + MARGIN + STRIP <= height + 1e-9:
             return Sheet(board, width, height)
-    room = [
-        min((width - 2 * MARGIN) / (board.columns + 1), (height - MARGIN - STRIP) / (board.rows + 1))
-        for width, height in ways
-    ]
-    largest = floor(10 * max(room) + 1e-9) / 10
-    would = f"squares of at most {largest:g} mm would fit, or" if largest >= 1 else "it would need"
+    kind = kind_of(board)
+    room = max(min((width - 2 * MARGIN) / wide, (height - MARGIN - STRIP) / high) for width, height in ways)
+    largest = floor(10 * 1000 * kind.size(board) * room + 1e-9) / 10
+    would = f"{kind.sized} of at most {largest:g} mm would fit, or" if largest >= 1 else "it would need"
     raise ValueError(
-        f"a board of {board.columns}×{board.rows} inner corners with squares of {1000 * board.square_size:g} mm is "
-        f"{wide:g} × {high:g} mm, too large for the paper {paper}: {would} a paper of {_up(wide + 2 * MARGIN)}x"
-        f"{_up(high + MARGIN + STRIP)}-mm"
+        f"a {kind.says(board)}, {kind.measures(board)}, is {wide:g} × {high:g} mm, too large for the paper {paper}: "
+        f"{would} a paper of {_up(wide + 2 * MARGIN)}x{_up(high + MARGIN + STRIP)}-mm"
     )
 
 
@@ -164,6 +142,8 @@ def pdf(sheet: Sheet) -> bytes:
     for rectangles in (sheet.black(), sheet.ruler()):
         lines += [" ".join(f"{x:.4f}" for x in rectangle) + " re" for rectangle in rectangles]
         lines.append("f")  # in one go, so that parts which touch have no seam
+    for disc in sheet.discs():
+        lines += _disc(*disc)
     for x, y, text in sheet.words():
         lines.append(f"BT /F1 2.9 Tf {x:.3f} {y:.3f} Td <{text.encode('cp1252').hex()}> Tj ET")
     content = "\n".join(lines).encode()
@@ -178,6 +158,19 @@ def pdf(sheet: Sheet) -> bytes:
             b"<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>",
         ]
     )
+
+
+def _disc(x: float, y: float, diameter: float) -> list[str]:
+    """A filled circle: four Bézier curves, which are round to 0.03 %."""
+    radius = diameter / 2
+    handle = radius * 4 / 3 * (np.sqrt(2) - 1)
+    ends = radius * np.array([(1, 0), (0, 1), (-1, 0), (0, -1), (1, 0)])
+    tangents = handle * np.array([(0, 1), (-1, 0), (0, -1), (1, 0), (0, 1)])
+    lines = [f"{x + radius:.4f} {y:.4f} m"]
+    for i in range(4):
+        curve = np.concatenate([ends[i] + tangents[i], ends[i + 1] - tangents[i + 1], ends[i + 1]]) + [x, y] * 3
+        lines.append(" ".join(f"{value:.4f}" for value in curve) + " c")
+    return [*lines, "f"]
 
 
 def _document(objects: Iterable[bytes]) -> bytes:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.calibration.boards import kind_of
+from camviz.calibration.boards.aprilgrid import FAMILY
 from camviz.calibration.denominator_prior import DenominatorPrior
 from camviz.calibration.redundancy import Redundancy
 from camviz.cameras import Camera, Rig
@@ -32,10 +35,13 @@ class CalibrationError(ValueError):
 
 @dataclass(frozen=True)
 class Board:
-    """A chessboard: its inner corners by columns and rows, and the side of a square in metres or the file's unit.
+    """A board: its points by columns and rows, and the distance of two of them in metres or the file's unit.
 
-    A ChArUco board has markers of `marker_size` metres, out of OpenCV's `dictionary` of that name ("DICT_5X5_100"), in
-    its white squares.
+    A chessboard's points are its inner corners, `square_size` is the side of a square. A ChArUco board has markers of
+    `marker_size` metres, out of OpenCV's `dictionary` of that name ("DICT_5X5_100"), in its white squares. An AprilGrid
+    is made by `aprilgrid`; a grid of circles has its circles' centres as points, `square_size` apart, and may say their
+    diameter as `marker_size`. `kind` is a name in `camviz.calibration.boards.kinds()`; without it the board is a
+    chessboard, or a ChArUco board where it has a dictionary.
     """
 
     columns: int
@@ -43,6 +49,7 @@ class Board:
     square_size: float
     marker_size: float | None = None
     dictionary: str | None = None
+    kind: str = ""
 
     def __post_init__(self) -> None:
         for name in ("columns", "rows"):
@@ -50,20 +57,37 @@ class Board:
                 raise ValueError(f"{name} must be a number of inner corners, at least 1, got {getattr(self, name)}")
         if not self.square_size > 0:
             raise ValueError(f"square_size must be a positive length, got {self.square_size}")
-        if (self.marker_size is None) != (self.dictionary is None):
-            raise ValueError(
-                f"marker_size and dictionary must be given together, got {self.marker_size} and {self.dictionary}"
-            )
-        if self.marker_size is not None and not 0 < self.marker_size < self.square_size:
-            raise ValueError(
-                f"marker_size must be a length below square_size = {self.square_size}, got {self.marker_size}"
-            )
+        if not self.kind:
+            plain = self.marker_size is None and self.dictionary is None
+            object.__setattr__(self, "kind", "chessboard" if plain else "charuco")
+        kind_of(self).check(self)
+
+    @classmethod
+    def aprilgrid(cls, columns: int, rows: int, tag_size: float, spacing: float = 0.3) -> Self:
+        """Kalibr's AprilGrid of so many tags, of `tag_size` metres, `spacing` times as much apart.
+
+        Two points a tag stand along each side.
+
+        >>> Board.aprilgrid(6, 6, 0.088, 0.3).corners.shape
+        (144, 3)
+        """
+        return cls(2 * columns, 2 * rows, tag_size * (1 + spacing), tag_size, FAMILY, "aprilgrid")
 
     @property
     def corners(self) -> Array:
-        """The inner corners (columns * rows, 3) in the board's frame, row by row: x along a row, y down, z = 0."""
-        x, y = np.meshgrid(np.arange(self.columns, dtype=float), np.arange(self.rows, dtype=float))
-        return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=-1) * self.square_size
+        """The points (columns * rows, 3) in the board's frame, row by row: x along a row, y down, z = 0."""
+        xy = kind_of(self).points(self)
+        return np.column_stack([xy, np.zeros(len(xy))])
+
+    @property
+    def area(self) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom of the board with the white that its finder needs, in its own frame."""
+        return kind_of(self).area(self)
+
+    @property
+    def length(self) -> float:
+        """The longer side, from the first to the last point."""
+        return float(self.corners[:, :2].max())
 
     def warped(self, warp: ArrayLike) -> Array:
         """The corners (columns * rows, 3) of a bent board: z = warp_x (1 - ξ²) + warp_y (1 - η²), ξ and η from -1 to 1.
@@ -71,7 +95,7 @@ class Board:
         `warp` (2,) has the sagittas in metres at the middle, along the rows and along the columns (mrcal's model).
         """
         corners = self.corners
-        half = np.maximum([self.columns - 1, self.rows - 1], 1) * self.square_size / 2
+        half = np.maximum(corners[:, :2].max(axis=0), self.square_size) / 2
         xi_eta = corners[:, :2] / half - 1
         corners[:, 2] = (1 - xi_eta**2) @ np.asarray(warp, dtype=float)
         return corners

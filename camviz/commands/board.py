@@ -6,18 +6,22 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from camviz.commands.common import OK, Refusal, add_board, add_command, board_of, narrator, refuse_output, write_whole
+from camviz.commands.boards import add_board, board_of
+from camviz.commands.common import OK, Refusal, add_command, narrator, refuse_output, write_whole
 
 BOARD = """\
 Writes a calibration board as a PDF of one page that prints at true scale, with its numbers and a ruler of 100 mm to
 check the print by. Print it at 100 %, on paper glued to glass or a sheet of aluminium: a board that is not flat is the
-commonest fault of calibrations. Without --charuco it is a chessboard, which must be seen as a whole; the markers of a
-ChArUco board tell its corners apart, so that a part of it is enough.
+commonest fault of calibrations. Without --charuco or --kind it is a chessboard, which must be seen as a whole, as must
+the grids of circles. The markers of a ChArUco board and the tags of an AprilGrid tell their corners apart, so that a
+part of the board is enough.
 """
 EPILOG = """\
 examples:
   camviz board -o board.pdf                                        9x6 inner corners, squares of 25 mm, on A4
   camviz board --board 10x7 --square-mm 18 --charuco 5X5_100       with markers of 13.5 mm
+  camviz board --kind aprilgrid --board 6x4 --square-mm 30         Kalibr's: 6x4 tags, 9 mm apart (--spacing 0.3)
+  camviz board --board target.yaml --paper a3                      the board of Kalibr's file
   camviz board --board 13x8 --square-mm 40 --paper 600x420-mm
 """
 

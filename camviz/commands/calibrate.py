@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from camviz.commands.boards import add_board
 from camviz.commands.common import (
     FOUND,
     OK,
     Refusal,
-    add_board,
     add_command,
     add_megapixels,
-    given_board,
     narrator,
     pixels,
     refuse_exhausted,
@@ -39,11 +38,12 @@ if TYPE_CHECKING:
     from camviz.files import Board, Calibration
 
 CALIBRATE = """\
-Finds a chessboard or a ChArUco board in pictures and solves for the camera that took them, or with --right for a pair
-of cameras. IMAGES are files, folders, or patterns such as 'left*.jpg'. Pictures without the board, of another size, or
-that cannot be read are named and skipped. Corners and whole views that contradict the rest are set aside, named, and
-kept in the file. What is written is OpenCV's YAML, with all that a later inspection needs. With --report, or where a
-gate is given, the calibration is inspected as well; findings make it fail only where there is a gate.
+Finds a board (a chessboard, a ChArUco board, Kalibr's AprilGrid, a grid of circles) in pictures and solves for the
+camera that took them, or with --right for a pair of cameras. IMAGES are files, folders, or patterns such as
+'left*.jpg'. Pictures without the board, of another size, or that cannot be read are named and skipped. Corners and
+whole views that contradict the rest are set aside, named, and kept in the file. What is written is OpenCV's YAML, with
+all that a later inspection needs. With --report, or where a gate is given, the calibration is inspected as well;
+findings make it fail only where there is a gate.
 
 With --corners nothing is looked for in pictures: the corners come from files of other programs, which docs/formats.md
 lists. --board, --square-mm and --size say what those files do not hold. IMAGES are then for the report alone.
@@ -142,7 +142,8 @@ def calibrate(options: argparse.Namespace) -> int:
 
 def _refuse_words(options: argparse.Namespace) -> None:
     """Refuses a command that lacks what it works on, or that says it twice."""
-    needed = {"IMAGES": options.images, "--board": options.board, "--square-mm": options.square_mm}
+    square = options.square_mm or isinstance(options.board, Path)
+    needed = {"IMAGES": options.images, "--board": options.board, "--square-mm": square}
     missing = [word for word, given in needed.items() if not given]
     if missing and not options.corners:
         raise Refusal(f"the following arguments are required: {', '.join(missing)}; see `camviz calibrate --help`.")
@@ -164,8 +165,7 @@ def _of_corners(paths: list[Path], options: argparse.Namespace) -> Calibration:
 
 def _of_pictures(left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
     """The camera or the pair that took pictures."""
-    board = given_board(options)
-    assert board is not None
+    board = board_of(options)
     return _pair(left, right, board, options) if right else _single(left, board, options)
 
 

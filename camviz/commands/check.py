@@ -8,16 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from camviz.commands.boards import add_board, given_board
 from camviz.commands.calibrate import FINDERS, Bar, pictures
 from camviz.commands.common import (
     FOUND,
     OK,
     Refusal,
-    add_board,
     add_colour,
     add_command,
     add_megapixels,
-    given_board,
     loaded,
     pixels,
     size,

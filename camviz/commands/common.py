@@ -21,7 +21,7 @@ from camviz.commands.terminal import say, tell
 if TYPE_CHECKING:
     import numpy as np
 
-    from camviz.calibration.types import Board, Calibration
+    from camviz.calibration.types import Calibration
 
 OK, FOUND, REFUSED, LACKING, INTERRUPTED = 0, 1, 2, 3, 130
 STREAM = Path("-")  # stdin or stdout in place of a file
@@ -207,14 +207,6 @@ def read_picture(path: Path) -> np.ndarray:
     return picture
 
 
-def numbers(text: str) -> tuple[int, int]:
-    """9x6 as (9, 6)."""
-    match = re.fullmatch(r"([0-9]{1,3})\s*[xX×*,]\s*([0-9]{1,3})", text.strip())
-    if not match or not (2 <= int(match[1]) <= 200 and 2 <= int(match[2]) <= 200):
-        raise argparse.ArgumentTypeError(f"expected inner corners as COLUMNSxROWS, such as 9x6, got {text!r}")
-    return int(match[1]), int(match[2])
-
-
 def bounded(what: str, low: float, high: float, unit: str = "") -> Callable[[str], float]:
     """Reads an option's number within bounds; its unit may stand behind it."""
 
@@ -233,59 +225,6 @@ def bounded(what: str, low: float, high: float, unit: str = "") -> Callable[[str
 millimetres = bounded("a length in millimetres", 0.1, 10_000)
 metres = bounded("a distance in metres", 0.01, 10_000, "m")
 pixels = bounded("a number of pixels", 0.01, 100, "px")
-
-
-def add_board(command: argparse.ArgumentParser, required: bool = True, default: bool = True) -> None:
-    """The options that say which board it is; one of 9x6 and 25 mm, or none, where they are not required."""
-    corners, side = (" (default: 9x6)", " (default: 25)") if default and not required else ("", "")
-    command.add_argument(
-        "--board",
-        metavar="9x6",
-        type=numbers,
-        required=required,
-        default=(9, 6) if default else None,
-        help="inner corners, where four squares meet, by columns and rows" + corners,
-    )
-    command.add_argument(
-        "--square-mm",
-        metavar="MM",
-        type=millimetres,
-        required=required,
-        default=25.0 if default else None,
-        help="the side of a square" + side,
-    )
-    command.add_argument(
-        "--charuco", metavar="DICT", help="a ChArUco board with markers of this dictionary, such as 5X5_100"
-    )
-    command.add_argument("--marker-mm", metavar="MM", type=millimetres, help="the side of a marker (default: 3/4)")
-
-
-def board_of(options: argparse.Namespace) -> Board:
-    """The board of the options."""
-    from camviz.calibration.finding import charuco_dictionary
-    from camviz.calibration.types import Board
-
-    if options.marker_mm is not None and options.charuco is None:
-        raise Refusal("--marker-mm is for a ChArUco board: name its dictionary with --charuco.")
-    columns, rows = options.board
-    try:
-        if options.charuco is None:
-            return Board(columns, rows, options.square_mm / 1000)
-        marker = options.marker_mm or 0.75 * options.square_mm
-        name = "DICT_" + options.charuco.removeprefix("DICT_")
-        board = Board(columns, rows, options.square_mm / 1000, marker / 1000, name)
-        charuco_dictionary(board)
-    except ValueError as error:
-        raise Refusal(f"{error}.") from error
-    return board
-
-
-def given_board(options: argparse.Namespace) -> Board | None:
-    """The board of the options; None where they name none."""
-    given = [options.board is not None, options.square_mm is not None]
-    if any(given) != all(given):
-        raise Refusal("a board has both: --board COLUMNSxROWS (inner corners) and --square-mm MM.")
-    return board_of(options) if all(given) else None
 
 
 def size(text: str) -> tuple[int, int]:

@@ -8,17 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from camviz.commands.boards import add_board, given_board
 from camviz.commands.calibrate import PICTURES, Bar, pictures
 from camviz.commands.common import (
     FOUND,
     OK,
     REFUSED,
     Refusal,
-    add_board,
     add_colour,
     add_command,
     add_megapixels,
-    given_board,
     loaded,
     metres,
     on_disk,

@@ -178,9 +178,9 @@ def _board(section: Section) -> Board | None:
     with explained(section.where("board")):
         marker = section.number("marker_size") if "marker_size" in section else None
         dictionary = section.text("marker_dictionary") if "marker_dictionary" in section else None
-        return Board(
-            section.whole(width, 1000), section.whole(height, 1000), section.number(square), marker, dictionary
-        )
+        kind = section.text("board_kind") if "board_kind" in section else ""
+        columns, rows = section.whole(width, 1000), section.whole(height, 1000)
+        return Board(columns, rows, section.number(square), marker, dictionary, kind)
 
 
 def _views(section: Section, tag: str) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from camviz.cameras import Camera
 from camviz.files.models import expressed, models_of
 from camviz.lenses import KannalaBrandt
 
+GUESSED = ("chessboard", "charuco")  # kinds of boards that the reader knows by their markers
 MODELS = models_of("opencv")
 TITLE = "OpenCV FileStorage"
 
@@ -65,7 +66,11 @@ def _recorded(calibration: Calibration) -> dict[str, Any]:
     if board := calibration.board:
         values |= {"board_width": board.columns, "board_height": board.rows, "square_size": float(board.square_size)}
         if board.marker_size is not None:
-            values |= {"marker_size": float(board.marker_size), "marker_dictionary": board.dictionary}
+            values["marker_size"] = float(board.marker_size)
+        if board.dictionary is not None:
+            values["marker_dictionary"] = board.dictionary
+        if board.kind not in GUESSED:
+            values["board_kind"] = board.kind
     if calibration.board_warp is not None:
         values["board_warp"] = np.reshape(calibration.board_warp, (1, 2))
     if calibration.skipped:

@@ -1,19 +1,23 @@
-"""A chessboard in space: its rim, and its squares as a picture."""
+"""A board in space: its rim, and what is printed on it as a picture."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.calibration.boards.picture import whiteness
 from camviz.calibration.types import Board
 from camviz.draw.items import Line, TexturedMesh, closed
 from camviz.lenses.base import Array
 
+TEXELS, DETAILED = {"chessboard": 12}, 48  # pixels along `square_size`
+DARK, LIGHT = 40, 245
+
 
 def outline(board: Board) -> Array:
-    """The four corners (4, 3) of the board's squares, one square beyond the inner corners, in its own frame."""
-    right, below = board.columns, board.rows
-    return board.square_size * np.array([[-1, -1, 0], [right, -1, 0], [right, below, 0], [-1, below, 0]], dtype=float)
+    """The four corners (4, 3) of what is printed, of a chessboard one square beyond the inner corners, in its frame."""
+    left, top, right, below = board.area
+    return np.array([[left, top, 0], [right, top, 0], [right, below, 0], [left, below, 0]], dtype=float)
 
 
 def rim(corners: Array, class_: str, width: float) -> Line:
@@ -22,12 +26,11 @@ def rim(corners: Array, class_: str, width: float) -> Line:
 
 
 def squares(corners: Array, board: Board) -> TexturedMesh:
-    """A board's squares as a picture between its corners (4, 3)."""
-    return TexturedMesh.over(corners[[0, 1, 3, 2]].reshape(2, 2, 3), checkers(board), 0.9)
+    """What is printed on a board as a picture between its corners (4, 3)."""
+    return TexturedMesh.over(corners[[0, 1, 3, 2]].reshape(2, 2, 3), printed(board), 0.9)
 
 
-def checkers(board: Board) -> NDArray[np.uint8]:
-    """The board's squares, uint8 RGB, 12 pixels each."""
-    column, row = np.meshgrid(np.arange(board.columns + 1), np.arange(board.rows + 1))
-    shades = np.where((column + row) % 2, 245, 40).astype(np.uint8)
-    return np.repeat(np.kron(shades, np.ones((12, 12), np.uint8))[..., None], 3, axis=-1)
+def printed(board: Board) -> NDArray[np.uint8]:
+    """The board's squares, tags or circles, uint8 RGB, as many pixels to each as its details take."""
+    shades = DARK + (LIGHT - DARK) * whiteness(board, TEXELS.get(board.kind, DETAILED))
+    return np.repeat(np.rint(shades).astype(np.uint8)[..., None], 3, axis=-1)

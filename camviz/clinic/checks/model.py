@@ -128,7 +128,7 @@ def board_warp(evidence: Evidence) -> Iterator[Finding]:
     for name, observed in evidence.with_corners().items():
         board = observed.adjustment.board
         bend = explained(observed.best, name, warp_columns(observed.best, name), smooth_field(observed.best, name))
-        side = (max(board.columns, board.rows) - 1) * board.square_size
+        side = board.length
         worst = bend.values[np.abs(bend.values).argmax()]
         if bend.chance < BY_CHANCE and abs(worst) > BENT * side:
             along, across = bend.values * 1000
@@ -150,7 +150,7 @@ def board_warp(evidence: Evidence) -> Iterator[Finding]:
 )
 def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     """The board is bent along its rows."""
-    side = (max(set_up.board.columns, set_up.board.rows) - 1) * set_up.board.square_size
+    side = set_up.board.length
     return replace(set_up, warp=(strength / 100 * side, 0.0))
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
+from camviz.calibration.boards.charuco import FEWEST
 from camviz.calibration.detection import Detections, seen
-from camviz.calibration.finding import FEWEST, read_gray
+from camviz.calibration.picture_files import PictureError, picture_size
 from camviz.calibration.types import Board, CalibrationError, Mask
 from camviz.files.corners.format import CornerFile, CornerFormat, Corners, Given
 from camviz.files.corners.registry import corner_formats, corner_titles
@@ -106,9 +108,8 @@ def _size(found: Corners, path: Path, given: Size | None, pictures: Sequence[Pat
         return size
     beside = [folder / name for name in found.pictures for folder in (path.parent, Path()) if "\0" not in name]
     for each in [*pictures, *beside]:
-        gray = read_gray(each) if each.is_file() else None
-        if gray is not None:
-            return gray.shape[1], gray.shape[0]
+        with suppress(PictureError):
+            return picture_size(each)
     if otherwise:
         return otherwise
     raise CalibrationError(

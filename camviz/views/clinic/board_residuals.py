@@ -152,10 +152,9 @@ class BoardResidualsView(OrbitView):
 
     def _means_panel(self) -> str:
         seen, board = self.observations, self.observations.board
-        wide, high = (board.columns + 1) * board.square_size, (board.rows + 1) * board.square_size
-        scale = min(455 / wide, 320 / high)
-        left = top = -board.square_size
-        panel = Panel("means", 20, 34, wide * scale, high * scale, left, left + wide, top, top + high)
+        left, top, right, bottom = board.area
+        scale = min(455 / (right - left), 320 / (bottom - top))
+        panel = Panel("means", 20, 34, (right - left) * scale, (bottom - top) * scale, left, right, top, bottom)
         starts = panel.place(seen.corners_board[:, :2])
         ends = panel.place(seen.corners_board[:, :2] + self.scale * self.means)
         grid = starts.reshape(board.rows, board.columns, 2)

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.boards import kind_of
 from camviz.calibration.guidance import Candidate, instruction, next_board_poses
+from camviz.calibration.types import Board
 from camviz.cameras import transform
 from camviz.draw import svg
 from camviz.draw.flow import Sentences, rows
@@ -28,6 +30,7 @@ from camviz.views.clinic.uncertainty import adjusted, determined
 
 _OFFERED, _APART = 8, 0.35  # candidates shown, and how unlike each other: corner distance in widths of the picture
 _SIDE = 16  # points along the edge of a square, so that it bends with the lens
+_DETAILED = 300  # rectangles: a board of more is one of tags
 _LAYOUT = rows((382, {"the board to imitate": 480, "its picture": 480}), (50, {"in words": 960}))
 
 
@@ -107,10 +110,7 @@ class GuidanceView(OrbitView):
             items += boards.board_items(pose, False)
         ghost = transform(self.chosen.cam_from_board, outline(a.board))
         items += [Face(ghost, "orange", 0.25), Line(closed(ghost), "orange dashed", 2.2)]
-        items += [
-            Line(transform(self.chosen.cam_from_board, line), "orange", 1.0)
-            for line in _squares(a.board.columns, a.board.rows, size)
-        ]
+        items += [Line(transform(self.chosen.cam_from_board, line), "orange", 1.0) for line in _lines(a.board)]
         middle = ghost.mean(axis=0)
         typical = float(np.median(np.linalg.norm(self._cam_from_board.translation, axis=-1)))
         farthest = max(float(np.linalg.norm(middle)), typical)
@@ -133,17 +133,13 @@ class GuidanceView(OrbitView):
         ring = np.concatenate([p + along * (q - p) for p, q in zip(corners, np.roll(corners, -1, 0), strict=True)])
 
         def projected(points: Array) -> Array:
-            points = board.square_size * np.column_stack([points, np.zeros(len(points))])
+            points = np.column_stack([points, np.zeros(len(points))])
             return panel.place(camera.project(transform(self.chosen.cam_from_board, points)))
 
-        whole = projected(ring * (board.columns + 1, board.rows + 1) - 1)
+        left, top, right, bottom = board.area
+        whole = projected(ring * (right - left, bottom - top) + (left, top))
         content += svg.polygon(whole, "fill-orange", style="fill-opacity:.18;stroke:none")
-        dark = [
-            projected(ring + (i - 1, j - 1))
-            for i in range(board.columns + 1)
-            for j in range(board.rows + 1)
-            if (i + j) % 2 == 0
-        ]
+        dark = [projected(edge) for edge in _rings(board, ring)]
         content += svg.path([d for d in dark if np.isfinite(d).all()], "fill-orange", closed=True)
         content += svg.line(closed(whole), "orange thick")
         return panel.show(content, title="The picture it would give"), attached
@@ -165,8 +161,17 @@ def unlike(ranked: tuple[Candidate, ...], adjustment: Adjustment, name: str) -> 
     return tuple(kept)
 
 
-def _squares(columns: int, rows: int, size: float) -> list[Array]:
-    """The lines of a board's inner corners, in its own frame."""
-    x, y = size * np.arange(columns), size * np.arange(rows)
-    lines = [np.array([(x[0], b, 0), (x[-1], b, 0)]) for b in y]
-    return lines + [np.array([(a, y[0], 0), (a, y[-1], 0)]) for a in x]
+def _lines(board: Board) -> list[Array]:
+    """The lines through a board's points from the first to the last of each row and column, in its own frame."""
+    grid = board.corners.reshape(board.rows, board.columns, 3)
+    return [*grid[:, [0, -1]], *grid[[0, -1]].swapaxes(0, 1)]
+
+
+def _rings(board: Board, ring: Array) -> list[Array]:
+    """The edges of what is black of a board, each (n, 2) in metres: `ring` (n, 2) is that of the unit square."""
+    drawing = kind_of(board).drawn(board)
+    rings = ring if len(drawing.rectangles) <= _DETAILED else ring[::_SIDE]  # the cells of tags are small
+    around = np.linspace(0, 2 * np.pi, 2 * _SIDE, endpoint=False)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=-1)
+    black = [rings * [wide, high] + [x, y] for x, y, wide, high in drawing.rectangles]
+    return black + [circle * size / 2 + [x, y] for x, y, size in drawing.discs]

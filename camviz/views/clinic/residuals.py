@@ -193,10 +193,11 @@ class ResidualsView(ViewChooser, OrbitView):
     def board_panel(self, place: Panel) -> str:
         """The chosen view's residuals as seen on the board itself, in its own frame."""
         seen, i, board = self.observations, self.index, self.observations.board
-        wide, high = (board.columns + 1) * board.square_size, (board.rows + 1) * board.square_size
+        left, top, right, bottom = board.area
+        wide, high = right - left, bottom - top
         scale = min(place.width / wide, place.height / high)
-        left = -board.square_size - (place.width / scale - wide) / 2
-        top = -board.square_size - (place.height / scale - high) / 2
+        left -= (place.width / scale - wide) / 2
+        top -= (place.height / scale - high) / 2
         panel = replace(place, left=left, top=top, right=left + place.width / scale, bottom=top + place.height / scale)
         corners = seen.corners_board[:, :2]
         grid = panel.place(corners).reshape(board.rows, board.columns, 2)

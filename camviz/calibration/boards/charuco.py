@@ -1,0 +1,127 @@
+"""The ChArUco board: a chessboard with markers in its white squares, which tell its corners apart."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from camviz.calibration.boards.kind import (
+    Array,
+    Drawing,
+    Gray,
+    Kind,
+    Shape,
+    area_of_squares,
+    cells,
+    millimetres,
+    regular,
+    side,
+    squares,
+    squares_of,
+)
+
+FEWEST = 6  # corners that give the board's pose with something left to check it by
+
+
+def find(gray: Gray, shape: Shape, finder: str) -> Array | None:
+    """The corners that are seen, NaN for the others; None where there are few."""
+    corners, ids = detector(shape).detectBoard(gray)[:2]
+    if ids is None or len(ids) < FEWEST:
+        return None
+    seen = np.full((shape.columns * shape.rows, 2), np.nan)
+    seen[np.ravel(ids)] = np.reshape(corners, (-1, 2))
+    return seen
+
+
+def detector(shape: Shape) -> Any:
+    """OpenCV's detector of a ChArUco board; ValueError for a board that cannot be."""
+    import cv2
+
+    assert shape.marker_size is not None
+    size = (shape.columns + 1, shape.rows + 1)
+    dictionary = charuco_dictionary(shape)
+    board = cv2.aruco.CharucoBoard(size, shape.square_size, shape.marker_size, dictionary)
+    return cv2.aruco.CharucoDetector(board)
+
+
+def charuco_dictionary(shape: Shape) -> Any:
+    """OpenCV's dictionary of a board's markers; ValueError for one that it does not have or that is too small."""
+    dictionary = marker_dictionary(shape.dictionary)
+    held, needed = len(dictionary.bytesList), (shape.columns + 1) * (shape.rows + 1) // 2
+    if held < needed:
+        raise ValueError(f"dictionary must have the {needed} markers of this board, {shape.dictionary} has {held}")
+    return dictionary
+
+
+@lru_cache(maxsize=8)
+def marker_dictionary(name: str | None) -> Any:
+    """OpenCV's dictionary of this name; ValueError for one that it does not have."""
+    import cv2
+
+    names = sorted(name for name in dir(cv2.aruco) if name.startswith("DICT_"))
+    if name not in names:
+        raise ValueError(f"dictionary must be one of {', '.join(names)}, got {name!r}")
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
+def drawn(shape: Shape) -> Drawing:
+    """The squares; and the markers in the middles of the white ones, numbered row by row as OpenCV has them."""
+    import cv2
+
+    assert shape.marker_size is not None
+    dictionary, black, side = charuco_dictionary(shape), squares(shape), shape.square_size
+    count = dictionary.markerSize + 2  # with the border
+    off, cell = (side - shape.marker_size) / 2, shape.marker_size / count
+    white = [(i, j) for j in range(shape.rows + 1) for i in range(shape.columns + 1) if (i + j) % 2 == 1]
+    runs = []
+    for number, (i, j) in enumerate(white):
+        image = cv2.aruco.generateImageMarker(dictionary, number, count)
+        runs += cells(image, (i - 1) * side + off, (j - 1) * side + off, cell)
+    return Drawing(np.vstack([black.rectangles, np.array(runs)]))
+
+
+def check(shape: Shape) -> None:
+    if shape.marker_size is None or shape.dictionary is None:
+        raise ValueError(
+            f"marker_size and dictionary must be given together, got {shape.marker_size} and {shape.dictionary}"
+        )
+    if not 0 < shape.marker_size < shape.square_size:
+        raise ValueError(
+            f"marker_size must be a length below square_size = {shape.square_size}, got {shape.marker_size}"
+        )
+
+
+def says(shape: Shape) -> str:
+    return (
+        f"ChArUco board of {shape.dictionary} with {shape.columns}×{shape.rows} inner corners "
+        f"({shape.columns + 1}×{shape.rows + 1} squares)"
+    )
+
+
+def options(shape: Shape) -> str:
+    assert shape.marker_size is not None
+    return (
+        f"--board {shape.columns}x{shape.rows} --square-mm {millimetres(shape.square_size)} "
+        f"--charuco {shape.dictionary} --marker-mm {millimetres(shape.marker_size)}"
+    )
+
+
+KIND = Kind(
+    name="charuco",
+    title="ChArUco board",
+    counts="inner corners",
+    points=regular,
+    area=area_of_squares,
+    drawn=drawn,
+    find=find,
+    check=check,
+    says=says,
+    options=options,
+    measures=squares_of,
+    sized="squares",
+    size=side,
+    advice="see that the markers are of this dictionary and not blurred",
+    partial=True,
+)
