@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from camviz.commands.boards import add_board
+from camviz.commands.boards import add_board, board_of
 from camviz.commands.common import (
     FOUND,
     OK,

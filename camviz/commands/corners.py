@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from camviz.commands.boards import board_of
 from camviz.commands.common import Parser, Refusal
 
 if TYPE_CHECKING:
@@ -38,11 +39,14 @@ def corners_of(
     from camviz.files import CalibrationError
     from camviz.files.corners import load_corners
 
-    side = None if options.square_mm is None else options.square_mm / 1000
+    shape, side = options.board, None if options.square_mm is None else options.square_mm / 1000
+    if isinstance(shape, Path):
+        board = board_of(options)
+        shape, side = (board.columns, board.rows), board.square_size
     try:
         return load_corners(
             options.corners,
-            shape=options.board,
+            shape=shape,
             square_size=side,
             size=options.size,
             pictures=paths,
