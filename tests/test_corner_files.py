@@ -15,7 +15,7 @@ from test_files_fuzzed import overwritten, reworded
 
 import camviz
 from camviz.calibration import Board, calibrate, detect
-from camviz.calibration.finding import FEWEST
+from camviz.calibration.boards.charuco import FEWEST
 from camviz.clinic.virtual import detections, single
 from camviz.commands.command import main
 from camviz.files import CalibrationError
