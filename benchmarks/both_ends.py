@@ -130,7 +130,7 @@ def main() -> int:
                     show(page, drawn[state])
                     root = page.query_selector(".camviz-explorer")
                     seen = root.evaluate("root => hands.unreadable(root)")
-                    if width == given.all[-1]:
+                    if width in given.all[-1:]:
                         seen += root.evaluate("root => hands.weakInPicture(root)")
                     found += [f"{state}: {one}" for one in seen]
                 shown += len(seen_here)
