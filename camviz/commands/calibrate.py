@@ -18,6 +18,7 @@ from camviz.commands.common import (
     OK,
     Refusal,
     add_command,
+    millimetres,
     narrator,
     pixels,
     refuse_exhausted,
@@ -59,6 +60,7 @@ def add(commands: Any) -> None:
     command.add_argument("images", metavar="IMAGES", nargs="+", help="pictures, folders of them, or patterns")
     command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
     add_board(command)
+    add_baseline(command)
     command.add_argument("--model", choices=list(MODELS), default="standard", help="which lens (default: standard)")
     command.add_argument("--fix", metavar="NAMES", default="", help="parameters not to solve for, such as k3 or p1,p2")
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
@@ -69,6 +71,12 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--goal", metavar="PX", type=pixels, help="the largest expected error wanted (default: 1 px)")
     command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
+
+
+def add_baseline(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--baseline-mm", metavar="MM", type=millimetres, help="the distance of a pair's cameras, to check the board by"
+    )
 
 
 def calibrate(options: argparse.Namespace) -> int:
@@ -85,7 +93,7 @@ def calibrate(options: argparse.Namespace) -> int:
     try:
         calibration = _pair(left, right, board, options) if right else _single(left, board, options)
     except CannotCalibrate as error:
-        raise Refusal(f"{error}.") from error
+        raise Refusal(f"{error}. {_prescribed(left + right, board)}".rstrip()) from error
     try:
         write_calibration(calibration, options.output, "opencv")
     except CalibrationError as error:
@@ -99,11 +107,24 @@ def calibrate(options: argparse.Namespace) -> int:
         told(sentence)
     for sentence in worth(calibration, options.goal):
         told(sentence)
+    if doctored := _prescribed(left + right, board, calibration, options.baseline_mm):
+        told(f"Is the board as described? {doctored}")
     told(f"{options.output}: written.")
     if options.report:
         folders = [each[0].parent for each in (left, right) if each]
         _inspect(calibration, dict(zip(calibration.cameras, folders, strict=True)), options.report)
     return OK
+
+
+def _prescribed(
+    paths: list[Path], board: Board, calibration: Calibration | None = None, baseline_mm: float | None = None
+) -> str:
+    """What the pictures show that is not as the board is described, and what to try; empty where nothing is."""
+    from camviz.clinic.doctor import Shown, diagnose, prescription
+
+    shown = Shown.of(paths, board)
+    baseline = None if baseline_mm is None else baseline_mm / 1000
+    return prescription(diagnose(replace(shown, calibration=calibration, baseline=baseline)))
 
 
 def _inspect(calibration: Calibration, folders: Mapping[str, Path], page: Path) -> None:
@@ -200,7 +221,7 @@ def _solved(solve: Callable[[], Calibration], skipped: Sequence[tuple[str, str]]
     except CannotCalibrate as error:
         named = ", ".join(f"{picture} ({why})" for picture, why in skipped[:3])
         more = f" and {len(skipped) - 3} more" * (len(skipped) > 3)
-        raise Refusal(f"{error}{'; skipped: ' * bool(skipped)}{named}{more}.") from error
+        raise CannotCalibrate(f"{error}{'; skipped: ' * bool(skipped)}{named}{more}") from error
     except ValueError as error:  # a parameter to fix that the model does not have
         if not str(error).startswith("fixed"):
             raise

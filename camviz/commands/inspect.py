@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz.commands.boards import add_board, given_board
-from camviz.commands.calibrate import PICTURES, Bar, pictures
+from camviz.commands.calibrate import PICTURES, Bar, add_baseline, pictures
 from camviz.commands.common import (
     FOUND,
     OK,
@@ -69,6 +69,7 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--images", metavar="IMAGES", nargs="+", help="pictures that the calibration is for")
     add_board(command, required=False, default=False)
+    add_baseline(command)
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
     command.add_argument("--compare", metavar="OTHER", type=Path, help="another calibration of the same cameras")
     command.add_argument("--at", metavar="METRES", type=metres, help="a distance at which to tell the error of a place")
@@ -130,14 +131,24 @@ def _is_model(folder: Path) -> bool:
 def _inspected(
     paths: list[Path], board: Board | None, compare: Calibration | None, options: argparse.Namespace
 ) -> Inspection:
-    from camviz.clinic import inspect, inspect_file
+    from camviz.clinic import Inspection, inspect, inspect_file
     from camviz.clinic.pictures import sizes_of
     from camviz.files import CalibrationError
 
     images = pictures(options.images) if options.images else []
+    baseline = None if options.baseline_mm is None else options.baseline_mm / 1000
     if PICTURES.fullmatch(paths[0].suffix):
+        calibrated = _calibrated(paths, board)
+        if isinstance(calibrated, Inspection):
+            return calibrated
         return inspect(
-            _calibrated(paths, board), compare=compare, pictures=sizes_of(images), board=board, at=options.at
+            calibrated,
+            compare=compare,
+            pictures=sizes_of(images),
+            board=board,
+            at=options.at,
+            baseline=baseline,
+            photographs=paths,
         )
     add = None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
     with on_disk(paths[0]) as file:
@@ -149,32 +160,38 @@ def _inspected(
                 pictures=sizes_of(images),
                 board=board,
                 at=options.at,
+                baseline=baseline,
+                photographs=images,
                 prepare=add,
             )
         except CalibrationError as error:
             raise Refusal(str(error)) from error
 
 
-def _calibrated(paths: list[Path], board: Board | None) -> Calibration:
-    """The calibration of a folder of pictures."""
+def _calibrated(paths: list[Path], board: Board | None) -> Calibration | Inspection:
+    """The calibration of a folder of pictures; or what is wrong with the board as described, where there is none."""
     if board is None:
         raise Refusal(
             f"{paths[0].parent}: these are pictures, which are calibrated first: say which board they show, such as "
             "--board 9x6 --square-mm 25."
         )
     from camviz.calibration import CannotCalibrate, calibrate, detect
+    from camviz.clinic.inspection import inspect_board
 
     try:
         with Bar() as bar:
             detections = detect(paths, board, progress=bar)
         return replace(calibrate(detections, board), source=paths[0].parent)
     except CannotCalibrate as error:
+        if found := inspect_board(paths, board, paths[0].parent):
+            return found
         raise Refusal(f"{error}.") from error
 
 
 def _with_corners(calibration: Calibration, images: list[Path], board: Board) -> Calibration:
     """The calibration with the corners of the board in the pictures, if it is one camera's and has none."""
     from camviz.calibration import CannotCalibrate, detect
+    from camviz.clinic.inspection import inspect_board
     from camviz.clinic.pictures import with_detections
 
     if len(calibration.cameras) != 1 or calibration.detections:
@@ -183,6 +200,8 @@ def _with_corners(calibration: Calibration, images: list[Path], board: Board) ->
         with Bar() as bar:
             return with_detections(calibration, detect(images, board, progress=bar), board)
     except CannotCalibrate as error:
+        if inspect_board(images, board):
+            return calibration  # the inspection says why there are no corners
         raise Refusal(f"{error}.") from error
 
 

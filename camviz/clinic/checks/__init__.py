@@ -16,7 +16,20 @@ from typing import Any
 
 from camviz.clinic.registry import Fault, Kind
 
-ORDER = ("compare", "assumed", "file", "size", "lens", "corners", "boards", "moving", "model", "pair", "frames")
+ORDER = (
+    "compare",
+    "assumed",
+    "file",
+    "size",
+    "lens",
+    "corners",
+    "boards",
+    "moving",
+    "model",
+    "pair",
+    "frames",
+    "described",
+)
 """The modules in the order of their checks; others come after them, by name. Within one the order is as written."""
 
 
