@@ -87,7 +87,7 @@ def _smooth_error(places: Array, moved: Array) -> tuple[float, float] | None:
     """
     if len(places) < FEWEST:
         return None
-    columns = np.polynomial.polynomial.polyvander2d(*places.T, (DEGREE, DEGREE))
+    columns = np.polynomial.polynomial.polyvander2d(places[:, 0], places[:, 1], [DEGREE, DEGREE])
     columns = columns[:, [i + j <= DEGREE for i in range(DEGREE + 1) for j in range(DEGREE + 1)]]
     kept = np.ones(len(places), dtype=bool)
     for _ in range(2):

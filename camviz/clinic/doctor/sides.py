@@ -18,6 +18,7 @@ def sides_swapped(shown: Shown) -> Iterator[tuple[str, str]]:
     if board is not None and board.columns != shown.board.columns:
         sentence = (
             f"The ChArUco board has {board.columns}×{board.rows} inner corners by columns and rows, not "
-            f"{shown.board.columns}×{shown.board.rows}: its markers are numbered along rows of {board.columns + 1} squares."
+            f"{shown.board.columns}×{shown.board.rows}: its markers are numbered along rows of "
+            f"{board.columns + 1} squares."
         )
         yield sentence, f"--board {board.columns}x{board.rows}"

@@ -33,11 +33,9 @@ def symmetric_board(shown: Shown) -> Iterator[tuple[str, str]]:
         return
     if found:
         views = len({view for finding in found for view in finding.pictures})
-        yield (
-            (
-                f"A chessboard of {board.columns}×{board.rows} corners looks the same when it is turned by 180°. The two "
-                f"cameras began at opposite corners in {views} view{'s' * (views > 1)}. A board with one odd and one even "
-                "side has one order."
-            ),
-            f"--board {board.columns}x{board.rows - 1}",
+        sentence = (
+            f"A chessboard of {board.columns}×{board.rows} corners looks the same when it is turned by 180°. The "
+            f"two cameras began at opposite corners in {views} view{'s' * (views > 1)}. "
+            "A board with one odd and one even side has one order."
         )
+        yield sentence, f"--board {board.columns}x{board.rows - 1}"

@@ -19,9 +19,9 @@ class Diagnosis:
     """
 
     trouble: str
+    cause: str
     sentence: str
     option: str
-    cause: str
     value: float | None = None
     unit: str = ""
 
@@ -41,8 +41,8 @@ class Trouble:
 
     def diagnoses(self, shown: Shown) -> Iterable[Diagnosis]:
         """What of this the pictures show."""
-        for sentence, option, *number in self.examine(shown):
-            yield Diagnosis(self.name, sentence, option, self.cause, *number)
+        for seen in self.examine(shown):
+            yield Diagnosis(self.name, self.cause, *seen)
 
 
 def trouble(name: str, cause: str, **more: Any) -> Callable[[Callable[[Shown], Iterable[Seen]]], Trouble]:
