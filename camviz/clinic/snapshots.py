@@ -17,7 +17,7 @@ from camviz.lenses import Lens
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 
-LONGER_SIDE = 480  # pixels
+SIDE = 480  # pixels along the longer side
 TILT_DEG = (15, 35)
 BLACK, WHITE, BEHIND = 40.0, 225.0, 130.0  # grey of ink, of paper, and of what is behind the board
 TEXELS = 32  # along `square_size`
@@ -42,11 +42,11 @@ class Pictured:
 
 
 def pictured(
-    rng: np.random.Generator, board: Board, views: int, lens: Lens | None = None, noise: float = 2.0
+    rng: np.random.Generator, board: Board, views: int, lens: Lens | None = None, noise: float = 2.0, side: int = SIDE
 ) -> Pictured:
-    """Small pictures of a board by a random camera, with this lens or one of its own."""
+    """Pictures of a board by a random camera, `side` pixels along the longer side, with this lens or one of its own."""
     drawn = single(rng, views=1).camera
-    camera = Camera(drawn.intrinsics.within(LONGER_SIDE), lens or drawn.lens)
+    camera = Camera(drawn.intrinsics.within(side), lens or drawn.lens)
     poses = spread_boards(rng, (camera,), board, views, TILT_DEG)
     names = [f"view{view + 1:02}.png" for view in range(views)]
     pictures = {name: snapshot(camera, board, pose, rng, noise) for name, pose in zip(names, poses, strict=True)}

@@ -18,6 +18,7 @@ from camviz.commands.common import (
     OK,
     Refusal,
     add_command,
+    bounded,
     millimetres,
     narrator,
     pixels,
@@ -30,6 +31,7 @@ from camviz.commands.terminal import tell
 from camviz.lenses import calibration_models
 
 if TYPE_CHECKING:
+    from camviz.calibration import CannotCalibrate
     from camviz.files import Board, Calibration
 
 CALIBRATE = """\
@@ -66,6 +68,7 @@ def add(commands: Any) -> None:
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
     command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
     command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
+    add_seconds(command)
     command.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
     )
@@ -76,6 +79,15 @@ def add(commands: Any) -> None:
 def add_baseline(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--baseline-mm", metavar="MM", type=millimetres, help="the distance of a pair's cameras, to check the board by"
+    )
+
+
+def add_seconds(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--seconds",
+        metavar="S",
+        type=bounded("a time in seconds", 0.1, 3600, "s"),
+        help="how long to look for the board in one picture (default: 120 where several processes look)",
     )
 
 
@@ -93,7 +105,7 @@ def calibrate(options: argparse.Namespace) -> int:
     try:
         calibration = _pair(left, right, board, options) if right else _single(left, board, options)
     except CannotCalibrate as error:
-        raise Refusal(f"{error}. {_prescribed(left + right, board)}".rstrip()) from error
+        raise Refusal(_complaint(error, left + right, board)) from error
     try:
         write_calibration(calibration, options.output, "opencv")
     except CalibrationError as error:
@@ -114,6 +126,15 @@ def calibrate(options: argparse.Namespace) -> int:
         folders = [each[0].parent for each in (left, right) if each]
         _inspect(calibration, dict(zip(calibration.cameras, folders, strict=True)), options.report)
     return OK
+
+
+def _complaint(error: CannotCalibrate, paths: list[Path], board: Board) -> str:
+    """Why there is no calibration; and what of the board is not as described, in place of a guess at what it is."""
+    from camviz.calibration.detection import NoBoard
+
+    doctored = _prescribed(paths, board)
+    said = error.said if doctored and isinstance(error, NoBoard) else str(error)
+    return f"{said}. {doctored}".rstrip()
 
 
 def _prescribed(
@@ -196,19 +217,25 @@ def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Cal
     from camviz.calibration import calibrate, detect
 
     with Bar() as bar:
-        detections = detect(paths, board, finder=options.finder, workers=options.workers, progress=bar)
+        detections = detect(paths, board, progress=bar, **_search(options))
     return _solved(lambda: calibrate(detections, board, options.model, **_how(options)), detections.skipped)
 
 
 def _pair(left: list[Path], right: list[Path], board: Board, options: argparse.Namespace) -> Calibration:
-    from camviz.calibration import calibrate_pair, detect_pair
+    from camviz.calibration import CannotCalibrate, calibrate_pair, detect_pair
     from camviz.calibration.pairing import paired
+    from camviz.clinic.doctor import Shown, diagnose, prescription
 
     pairs = paired(left, right)
     with Bar() as bar:
-        both = detect_pair(pairs.left, pairs.right, board, finder=options.finder, workers=options.workers, progress=bar)
+        both = detect_pair(pairs.left, pairs.right, board, progress=bar, **_search(options))
     skipped = both[0].skipped + both[1].skipped + pairs.lonely
-    calibration = _solved(lambda: calibrate_pair(*both, board, options.model, **_how(options)), skipped)
+    try:
+        calibration = _solved(lambda: calibrate_pair(*both, board, options.model, **_how(options)), skipped)
+    except CannotCalibrate as error:
+        if turned := prescription(diagnose(Shown(board, {}, both=both), "corner-order")):
+            raise Refusal(f"{error}. {turned}") from error
+        raise
     return replace(calibration, skipped=calibration.skipped + pairs.lonely)
 
 
@@ -226,6 +253,10 @@ def _solved(solve: Callable[[], Calibration], skipped: Sequence[tuple[str, str]]
         if not str(error).startswith("fixed"):
             raise
         raise Refusal(f"{error}.") from error
+
+
+def _search(options: argparse.Namespace) -> dict[str, Any]:
+    return {"finder": options.finder, "workers": options.workers, "seconds": options.seconds}
 
 
 def _how(options: argparse.Namespace) -> dict[str, Any]:

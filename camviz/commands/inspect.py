@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz.commands.boards import add_board, given_board
-from camviz.commands.calibrate import PICTURES, Bar, add_baseline, pictures
+from camviz.commands.calibrate import PICTURES, Bar, add_baseline, add_seconds, pictures
 from camviz.commands.common import (
     FOUND,
     OK,
@@ -70,6 +70,7 @@ def add(commands: Any) -> None:
     command.add_argument("--images", metavar="IMAGES", nargs="+", help="pictures that the calibration is for")
     add_board(command, required=False, default=False)
     add_baseline(command)
+    add_seconds(command)
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
     command.add_argument("--compare", metavar="OTHER", type=Path, help="another calibration of the same cameras")
     command.add_argument("--at", metavar="METRES", type=metres, help="a distance at which to tell the error of a place")
@@ -138,7 +139,7 @@ def _inspected(
     images = pictures(options.images) if options.images else []
     baseline = None if options.baseline_mm is None else options.baseline_mm / 1000
     if PICTURES.fullmatch(paths[0].suffix):
-        calibrated = _calibrated(paths, board)
+        calibrated = _calibrated(paths, board, options.seconds)
         if isinstance(calibrated, Inspection):
             return calibrated
         return inspect(
@@ -150,7 +151,11 @@ def _inspected(
             baseline=baseline,
             photographs=paths,
         )
-    add = None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
+    add = (
+        None
+        if board is None or not images
+        else lambda calibration: _with_corners(calibration, images, board, options.seconds)
+    )
     with on_disk(paths[0]) as file:
         try:
             return inspect_file(
@@ -168,7 +173,7 @@ def _inspected(
             raise Refusal(str(error)) from error
 
 
-def _calibrated(paths: list[Path], board: Board | None) -> Calibration | Inspection:
+def _calibrated(paths: list[Path], board: Board | None, seconds: float | None) -> Calibration | Inspection:
     """The calibration of a folder of pictures; or what is wrong with the board as described, where there is none."""
     if board is None:
         raise Refusal(
@@ -180,7 +185,7 @@ def _calibrated(paths: list[Path], board: Board | None) -> Calibration | Inspect
 
     try:
         with Bar() as bar:
-            detections = detect(paths, board, progress=bar)
+            detections = detect(paths, board, progress=bar, seconds=seconds)
         return replace(calibrate(detections, board), source=paths[0].parent)
     except CannotCalibrate as error:
         if found := inspect_board(paths, board, paths[0].parent):
@@ -188,7 +193,7 @@ def _calibrated(paths: list[Path], board: Board | None) -> Calibration | Inspect
         raise Refusal(f"{error}.") from error
 
 
-def _with_corners(calibration: Calibration, images: list[Path], board: Board) -> Calibration:
+def _with_corners(calibration: Calibration, images: list[Path], board: Board, seconds: float | None) -> Calibration:
     """The calibration with the corners of the board in the pictures, if it is one camera's and has none."""
     from camviz.calibration import CannotCalibrate, detect
     from camviz.clinic.inspection import inspect_board
@@ -198,7 +203,7 @@ def _with_corners(calibration: Calibration, images: list[Path], board: Board) ->
         return calibration
     try:
         with Bar() as bar:
-            return with_detections(calibration, detect(images, board, progress=bar), board)
+            return with_detections(calibration, detect(images, board, progress=bar, seconds=seconds), board)
     except CannotCalibrate as error:
         if inspect_board(images, board):
             return calibration  # the inspection says why there are no corners

@@ -32,7 +32,7 @@ VIEWS = 3
     causes=("a board that is not as it was described",),
     remedy="Describe the board as it was printed.",
     threshold="Nine tenths of the steps between neighbouring markers are those of another board. "
-    "They are 8 % more than those of the board as described.",
+    "They are at least 2 %, and three, more than those of the board as described.",
     explains=WRONG_NUMBERS,
 )
 def wrong_board(evidence: Evidence) -> Iterator[Finding]:
@@ -113,7 +113,7 @@ def _described(rng: Rng, printed: Board, **otherwise: Any) -> Evidence:
 def by_a_homography(rng: Rng, strength: float) -> Evidence:
     """The corners are those of a homography, in pictures of a lens with barrel distortion of that strength."""
     seen = pictured(rng, CHARUCO, VIEWS, BrownConrady(-strength, strength**2 / 3))
-    corners = np.array([_smooth(CHARUCO, each) for each in seen.corners])
+    corners = np.array([smooth(CHARUCO, each) for each in seen.corners])
     calibration = Calibration(
         {"camera": seen.camera},
         Path("virtual"),
@@ -125,7 +125,7 @@ def by_a_homography(rng: Rng, strength: float) -> Evidence:
     return Evidence(calibration, shown=Shown(CHARUCO, seen.pictures))
 
 
-def _smooth(board: Board, corners: Array) -> Array:
+def smooth(board: Board, corners: Array) -> Array:
     """Where the homography that fits corners (n, 2) best has them."""
     plane = board.corners[:, :2]
     homography, _ = cv2.findHomography(plane, corners)

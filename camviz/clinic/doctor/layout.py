@@ -28,7 +28,8 @@ BORDERS = (1, 2)  # cells: OpenCV's and Kalibr's
 MISREAD = (0.05, 0.95)  # of the numbers: what lies outside may be clutter taken for markers
 ENOUGH = 8  # steps
 EXPLAINED = 0.9  # of the steps, by the board that it is
-BETTER = 0.08  # of the steps: what it must explain beyond the board as described
+BETTER, MORE = 0.02, 3  # of the steps, and steps: what it must explain beyond the board as described
+SURE = 0.99  # of the steps: what the board explains where it is as described
 CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # of a marker, as OpenCV orders them
 
 
@@ -75,12 +76,13 @@ def likeliest(board: Board, seen: Mapping[int, Steps]) -> Board | None:
     shares = {each: _agreeing(each, seen.get(each.border_bits, Counter())) / total for each in _boards(board, seen)}
     best = max(shares, key=lambda each: (round(shares[each], 6), *_alike(board, each)))
     as_described = shares.get(board, 0.0)
-    return best if shares[best] >= EXPLAINED and shares[best] - as_described >= BETTER else None
+    beyond = shares[best] - as_described
+    return best if shares[best] >= EXPLAINED and beyond >= max(BETTER, MORE / total) else None
 
 
 def explained(board: Board, steps: Steps) -> bool:
     """Whether nearly all steps, and enough of them, are those of a board."""
-    return steps.total() >= ENOUGH and _agreeing(board, steps) >= EXPLAINED * steps.total()
+    return steps.total() >= ENOUGH and _agreeing(board, steps) >= SURE * steps.total()
 
 
 def _boards(board: Board, seen: Mapping[int, Steps]) -> Iterator[Board]:

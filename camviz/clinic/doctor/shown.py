@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.calibration.detection import Detections
 from camviz.calibration.finding import read_gray
 from camviz.calibration.types import Board, Calibration
 from camviz.clinic.doctor.layout import BORDERS, Steps, explained, likeliest, steps_of
@@ -26,7 +27,8 @@ FEWEST = 3  # inner corners along a side: no finder takes a smaller board
 class Shown:
     """Pictures that should show a board: grey (height, width) of 8 bits, or files, by the names that they have.
 
-    `calibration` is what was solved from them, and `baseline` the distance of its pair's cameras in metres as somebody
+    `calibration` is what was solved from them; `both` are the corners that a pair's left and right camera saw, where
+    they gave none; and `baseline` the distance of its pair's cameras in metres as somebody
     measured it, where that is known.
     """
 
@@ -34,6 +36,7 @@ class Shown:
     pictures: Mapping[str, NDArray[np.uint8] | str | PathLike[str]] = field(repr=False)
     calibration: Calibration | None = None
     baseline: float | None = None
+    both: tuple[Detections, Detections] | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, paths: Sequence[str | PathLike[str]], board: Board) -> Shown:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import log
 
-from camviz.clinic.checks.pair import baseline_scale
+from camviz.clinic.checks.pair import SAME_LENGTH, UNITS, baseline_scale
 from camviz.clinic.doctor.shown import Shown
 from camviz.clinic.doctor.trouble import trouble
 from camviz.clinic.evidence import Evidence, NotChecked
@@ -28,5 +29,6 @@ def wrong_unit(shown: Shown) -> Iterator[tuple[str, str]]:
 def _side_mm(value: float, unit: str, side: float) -> float:
     """What the side of a square should be, in millimetres."""
     if unit == "times":
-        return 1000 * side / value
+        exact = min(UNITS, key=lambda factor: abs(log(value / factor)))
+        return 1000 * side / (exact if abs(log(value / exact)) < SAME_LENGTH else value)
     return side if value > 1 else 1e6 * side
