@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import Board, CannotCalibrate, Detections, detect, find_corners
+from camviz.calibration import Board, CannotCalibrate, detect, find_corners
 from camviz.calibration.boards.charuco import detector
 from camviz.calibration.boards.picture import whiteness
 from camviz.calibration.paper import fitted, pdf
@@ -17,7 +17,7 @@ from camviz.clinic.doctor import Shown, diagnose, prescription, troubles
 from camviz.clinic.doctor.layout import likeliest, steps_of
 from camviz.clinic.doctor.symmetry import turned_views
 from camviz.clinic.snapshots import pictured
-from camviz.clinic.virtual import pair
+from camviz.clinic.virtual import detections, pair
 from camviz.commands.command import main
 from camviz.files import Calibration, load, write
 
@@ -119,14 +119,11 @@ def test_views_whose_order_is_turned_are_counted_even_where_no_pair_can_be_solve
     left, right = set_up.observed(np.random.default_rng(8))
     right[[1, 4, 6]] = right[[1, 4, 6], ::-1]
     assert turned_views(board, set_up.cameras, (left, right)) == [1, 4, 6]
-    grids = [camera.intrinsics for camera in set_up.cameras]
-    both = [
-        Detections(tuple("12345678"), each, g.width, g.height) for each, g in zip((left, right), grids, strict=True)
-    ]
-    (told,) = diagnose(Shown(board, {}, both=tuple(both)))
+    both = (detections(set_up.cameras[0], left), detections(set_up.cameras[1], right))
+    (told,) = diagnose(Shown(board, {}, both=both))
     assert "in 3 views" in told.sentence
     assert told.option == "--board 9x6"
-    assert diagnose(Shown(replace(board, rows=6), {}, both=tuple(both))) == ()
+    assert diagnose(Shown(replace(board, rows=6), {}, both=both)) == ()
 
 
 @pytest.mark.parametrize(("factor", "said"), [(1000, "--square-mm 25"), (0.001, "--square-mm 25")])

@@ -251,6 +251,35 @@ share) and `residual_px` (σ of a coordinate). Its change is `change_px` between
 `views`, `distance_m`, `rows_px`, `disparity_px`, `depth_error` and `scale` (shares), `scale_sigma` and
 `rectified_rows_px` (rms and median of the corners themselves).
 
+## Is the board as described?
+
+`camviz calibrate` and `camviz inspect` with pictures say what of a board is not as it was described, with the option
+that mends it. This is the board doctor, one file a fault in `camviz/clinic/doctor`. It counts how many squares the
+markers of a ChArUco board are apart, in up to twelve pictures. Each marker's own outline gives the length of a square,
+so that no camera needs to be known. The board is the one whose layout has these steps.
+
+| what is wrong | how it is seen | option |
+|---|---|---|
+| OpenCV before 4.6 drew the board | the steps between markers | `--legacy` |
+| columns and rows are swapped | the steps between markers | `--board 6x9` |
+| the markers have Kalibr's border of two cells | they are read with it | `--border-bits 2` |
+| the markers are numbered from N | the steps between markers | `--first-id N` |
+| the square is in another unit | its size, or a known baseline | `--square-mm`, `--baseline-mm` |
+| a symmetric chessboard turned in one camera of a pair | the pair stands otherwise in some views | `--board 9x6` |
+| corners by a homography, not by a finder | they are smoothly off the saddle points | `camviz calibrate` |
+| the search in a picture does not end | its time is over, and the picture is skipped | `--seconds` |
+
+The first four are the finding `wrong-board`, the others `baseline-scale`, `corner-order` and `interpolated-corners`.
+A chessboard has no wrong order of its sides. Whether its views are turned does not matter to one camera alone.
+
+These are rendered by `python benchmarks/doctor.py`. Pictures have 480 to 720 pixels along the longer side and noise of
+1 to 8 grey levels. The boards have 4×3 to 9×7 inner corners, and lenses barrel distortion up to k1 = -0.4. Healthy sets
+are ChArUco boards, whole and in part, chessboards, AprilGrids, grids of circles, and pairs.
+
+| board | named | what else was named |
+|---|---|---|
+| legacy ChArUco pattern | 50 of 50 | |
+
 ## Findings
 """
 MIDDLE = """\

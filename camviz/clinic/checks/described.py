@@ -19,7 +19,7 @@ from camviz.clinic.snapshots import pictured
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 
-WITHOUT = "no pictures of a board were given"
+WITHOUT = "no pictures of the board were given (--images)"
 CHARUCO = Board(columns=6, rows=5, square_size=0.035, marker_size=0.026, dictionary="DICT_4X4_50")
 VIEWS = 3
 
@@ -41,7 +41,7 @@ def wrong_board(evidence: Evidence) -> Iterator[Finding]:
     It holds that against the layouts that OpenCV prints.
     """
     if evidence.shown is None or not evidence.shown.has_markers:
-        raise NotChecked("no pictures of a ChArUco board were given" if evidence.shown else WITHOUT)
+        raise NotChecked("the board has no markers by which to know it" if evidence.shown else WITHOUT)
     yield from described_wrong(evidence.shown)
 
 
