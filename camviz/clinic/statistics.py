@@ -279,6 +279,15 @@ are ChArUco boards, whole and in part, chessboards, AprilGrids, grids of circles
 | board | named | what else was named |
 |---|---|---|
 | legacy ChArUco pattern | 50 of 50 | |
+| columns and rows swapped | 50 of 50 | |
+| border of two cells | 50 of 50 | |
+| first id other than 0 | 50 of 50 | |
+| square in another unit, 1000 times | 50 of 50 | |
+| square in cm or inches, baseline known | 50 of 50 | |
+| symmetric board, views turned in a pair | 50 of 50 | |
+| corners by a homography | 50 of 50 | |
+| a search that does not end | 50 of 50 | |
+| healthy, of all kinds | 0 of 48 | |
 
 ## Findings
 """

@@ -20,7 +20,8 @@ def wrong_unit(shown: Shown) -> Iterator[tuple[str, str]]:
         found = list(baseline_scale.check(Evidence(shown.calibration, baseline=shown.baseline)))
     except NotChecked:
         return
-    for finding in found[:1]:
+    own = [finding for finding in found if finding.unit == "m" or shown.baseline is not None]  # not turned orders
+    for finding in own[:1]:
         board = shown.calibration.board
         right = _side_mm(finding.value, finding.unit, board.square_size) if board and finding.value else None
         yield finding.sentence, "--square-mm" + (f" {right:.4g}" if right else "")
