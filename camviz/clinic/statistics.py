@@ -273,7 +273,7 @@ The first four are the finding `wrong-board`, the others `baseline-scale`, `corn
 A chessboard has no wrong order of its sides. Whether its views are turned does not matter to one camera alone.
 
 These are rendered by `python benchmarks/doctor.py`. Pictures have 480 to 720 pixels along the longer side and noise of
-1 to 8 grey levels. The boards have 4×3 to 9×7 inner corners, and lenses barrel distortion up to k1 = -0.4. Healthy sets
+1 to 8 grey levels. The boards have 4×3 to 10×6 inner corners, and lenses barrel distortion up to k1 = -0.4. Healthy sets
 are ChArUco boards, whole and in part, chessboards, AprilGrids, grids of circles, and pairs.
 
 | board | named | what else was named |
