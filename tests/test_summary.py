@@ -28,8 +28,8 @@ from camviz.views.clinic.uncertainty import UncertaintyView
 from camviz.widgets.inspection import CAMERA, LOOK, LiveInspection
 
 SKIPPED = (
-    "7 could not because the file holds one camera, not a pair, and because it needs another calibration (--compare) "
-    "(2 more reasons below)"
+    "9 could not because the file holds one camera, not a pair, and because no pictures of the board were given "
+    "(--images) (2 more reasons below)"
 )
 
 

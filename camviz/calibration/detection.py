@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import sys
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
+from math import inf
 from multiprocessing.connection import Connection, wait
 from os import PathLike
 from pathlib import Path
-from types import SimpleNamespace
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -22,7 +17,8 @@ import numpy as np
 from camviz.calibration.boards import kind_of
 from camviz.calibration.boards.charuco import charuco_dictionary
 from camviz.calibration.chessboards import LEAST_SIDE
-from camviz.calibration.finding import find_corners, look, look_on_request
+from camviz.calibration.finding import find_corners, look
+from camviz.calibration.processes import Crew, processors, signals_put_off
 from camviz.calibration.types import Board, Mask
 from camviz.calibration.wrong_board import another_board, part_of_a_larger
 from camviz.lenses.base import Array
@@ -33,11 +29,20 @@ Progress = Callable[[int, int], object]
 Look = tuple[tuple[int, int] | None, Array | None, str]
 
 LISTEN = 0.1  # seconds between two checks for Ctrl-C
+PATIENCE = 120.0  # seconds that a process has for one picture, unless somebody says otherwise
 WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictures take
 
 
 class CannotCalibrate(ValueError):  # noqa: N818 - it says what is the case
     """Pictures or corners that no camera can be calibrated from; the message is one sentence."""
+
+
+class NoBoard(CannotCalibrate):
+    """A board that is in none of the pictures: `said` tells so, and what is not as described may follow it."""
+
+    def __init__(self, said: str, advice: str) -> None:
+        super().__init__(f"{said}: {advice}")
+        self.said = said
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +79,18 @@ def detect(
     finder: str = "auto",
     workers: int | None = None,
     progress: Progress | None = None,
+    seconds: float | None = None,
 ) -> Detections:
     """Find a board in pictures, in `workers` processes (default: as many as there are processors, for many pictures).
 
     Pictures without the board, those that cannot be read and those of another size than most are skipped. `progress` is
     called with the numbers of pictures done and in all. `finder` is that of `find_corners`. Raises CannotCalibrate
     where the board is in none of the pictures or most show a larger one, or a process is lost.
+
+    A search that does not end within `seconds` is ended, and its picture skipped. Without `seconds` that is so after
+    two minutes, and only where there are enough pictures for several processes.
     """
-    return _gathered(paths, _looked(paths, board, finder, workers, progress), board)
+    return _gathered(paths, _looked(paths, board, finder, workers, progress, seconds), board)
 
 
 def detect_pair(
@@ -92,11 +101,12 @@ def detect_pair(
     finder: str = "auto",
     workers: int | None = None,
     progress: Progress | None = None,
+    seconds: float | None = None,
 ) -> tuple[Detections, Detections]:
     """`detect` in the pictures of two cameras at once; those with the same index are of one moment."""
     if len(left) != len(right):
         raise ValueError(f"right must have as many pictures as left, {len(left)}, got {len(right)}")
-    looks = _looked([*left, *right], board, finder, workers, progress)
+    looks = _looked([*left, *right], board, finder, workers, progress, seconds)
     return (
         _gathered(left, looks[: len(left)], board),
         _gathered(right, looks[len(left) :], board),
@@ -109,7 +119,12 @@ def seen(corners: Array) -> Mask:
 
 
 def _looked(
-    paths: Sequence[str | PathLike[str]], board: Board, finder: str, workers: int | None, progress: Progress | None
+    paths: Sequence[str | PathLike[str]],
+    board: Board,
+    finder: str,
+    workers: int | None,
+    progress: Progress | None,
+    seconds: float | None,
 ) -> list[Look]:
     if not paths:
         raise CannotCalibrate("there are no pictures to look for a board in")
@@ -121,7 +136,7 @@ def _looked(
             f"{board.columns}×{board.rows}"
         )
     looks: dict[int, Look] = {}
-    for place, found in _looks([str(path) for path in paths], board, finder, workers):
+    for place, found in _looks([str(path) for path in paths], board, finder, workers, seconds):
         looks[place] = found
         if progress:
             progress(len(looks), len(paths))
@@ -132,7 +147,7 @@ def _gathered(paths: Sequence[str | PathLike[str]], looks: Sequence[Look], board
     names = _names(paths)
     sizes = Counter(size for size, corners, _ in looks if corners is not None)
     if not sizes:
-        raise CannotCalibrate(_nothing_found(paths, names, looks, board))
+        raise _nothing_found(paths, names, looks, board)
     size = max(sizes, key=lambda one: sizes[one])
     found, skipped = {}, []
     for place, (own_size, corners, why) in enumerate(looks):
@@ -157,15 +172,16 @@ def _gathered(paths: Sequence[str | PathLike[str]], looks: Sequence[Look], board
 
 def _nothing_found(
     paths: Sequence[str | PathLike[str]], names: Sequence[str], looks: Sequence[Look], board: Board
-) -> str:
+) -> CannotCalibrate:
     reasons = Counter(why for _, _, why in looks)
     shown = ", ".join(names[:3]) + f" and {len(names) - 3} more" * (len(names) > 3)
     if all(size is None for size, _, _ in looks):
         why, _ = reasons.most_common(1)[0]
-        return f"none of the pictures can be used: {why} ({shown})"
+        return CannotCalibrate(f"none of the pictures can be used: {why} ({shown})")
     kind, read = kind_of(board), [place for place, (size, _, _) in enumerate(looks) if size is not None]
     seen = another_board([paths[i] for i in read], [names[i] for i in read], board)
-    return f"no {kind.says(board)} was found in any of {len(names)} pictures ({shown}): {seen or kind.advice}"
+    said = f"no {kind.says(board)} was found in any of {len(names)} pictures ({shown})"
+    return NoBoard(said, seen or kind.advice)
 
 
 def _names(paths: Sequence[str | PathLike[str]]) -> list[str]:
@@ -174,37 +190,49 @@ def _names(paths: Sequence[str | PathLike[str]]) -> list[str]:
     return names if len(set(names)) == len(names) else [Path(path).as_posix() for path in paths]
 
 
-def _looks(paths: list[str], board: Board, finder: str, workers: int | None) -> Iterator[tuple[int, Look]]:
+def _looks(
+    paths: list[str], board: Board, finder: str, workers: int | None, seconds: float | None
+) -> Iterator[tuple[int, Look]]:
     if workers is None:
-        workers = min(_processors(), len(paths) // WORTH_A_PROCESS)
-    if workers > 1 and len(paths) > 1:
-        yield from _in_processes(paths, board, finder, workers)
+        workers = min(processors(), len(paths) // WORTH_A_PROCESS)
+    if (workers > 1 and len(paths) > 1) or seconds is not None:
+        yield from _in_processes(paths, board, finder, max(workers, 1), seconds or PATIENCE)
     else:
         for place, path in enumerate(paths):
             yield place, look(path, board, finder)
 
 
-def _in_processes(paths: list[str], board: Board, finder: str, workers: int) -> Iterator[tuple[int, Look]]:
+def _in_processes(
+    paths: list[str], board: Board, finder: str, workers: int, seconds: float
+) -> Iterator[tuple[int, Look]]:
     """Each process has one picture at a time, by a pipe of its own; signals are heard between two pictures.
 
     Python raises KeyboardInterrupt between any two of its steps. Where that is just after a lock was taken, as in
     `concurrent.futures`, the lock is never given back and everybody waits for it. So no lock takes part in this.
+
+    The first thing that comes from a process says that it is ready; from then on a picture's time counts.
     """
     waiting = enumerate(paths)
-    busy: dict[Any, int] = {}  # the picture's place, by pipe
-    with _signals_put_off() as hear, _running(min(workers, len(paths)), board, finder) as pipes:
+    busy: dict[Any, tuple[int | None, float]] = {}  # the picture's place and when its time is over, by pipe
+    with signals_put_off() as hear, Crew(board, finder) as crew:
         try:
-            for pipe in pipes:
-                _hand_out(waiting, pipe, busy)
+            busy |= {crew.another(): (None, inf) for _ in range(min(workers, len(paths)))}
             while busy:
                 hear()
+                for pipe, (place, end) in list(busy.items()):
+                    if place is not None and monotonic() > end and not pipe.poll():
+                        del busy[pipe]
+                        crew.dismiss(pipe)
+                        busy[crew.another()] = None, inf
+                        yield place, (None, None, f"the search for the board did not end within {seconds:g} s")
                 ready: list[Any] = wait(list(busy), timeout=LISTEN)
                 for pipe in ready:
-                    place, found = busy.pop(pipe), pipe.recv()
-                    _hand_out(waiting, pipe, busy)
+                    (place, _), found = busy.pop(pipe), pipe.recv()
+                    _hand_out(waiting, pipe, busy, seconds)
                     if isinstance(found, Exception):
                         raise found
-                    yield place, found
+                    if place is not None:
+                        yield place, found
         except (EOFError, ConnectionError) as error:
             raise CannotCalibrate(
                 "a process that was looking for boards was ended from outside, perhaps because memory ran out: "
@@ -212,94 +240,11 @@ def _in_processes(paths: list[str], board: Board, finder: str, workers: int) -> 
             ) from error
 
 
-def _hand_out(waiting: Iterator[tuple[int, str]], pipe: Connection, busy: dict[Any, int]) -> None:
+def _hand_out(
+    waiting: Iterator[tuple[int, str]], pipe: Connection, busy: dict[Any, tuple[int | None, float]], seconds: float
+) -> None:
     """Send the next picture to a process, if there is one."""
     for place, path in waiting:
-        busy[pipe] = place
+        busy[pipe] = place, monotonic() + seconds
         pipe.send(path)
         return
-
-
-@contextmanager
-def _running(count: int, board: Board, finder: str) -> Iterator[list[Connection]]:
-    """The pipes to `count` processes that look for boards; the processes are gone when the block is left."""
-    context = multiprocessing.get_context("spawn")
-    plain: Any = SimpleNamespace(**vars(board))  # what a process can unpack without importing half of camviz
-    started: list[tuple[Any, Connection]] = []
-    try:
-        with _starting_processes():
-            for _ in range(count):
-                ours, theirs = context.Pipe()
-                process = context.Process(target=look_on_request, args=(theirs, plain, finder), daemon=True)
-                process.start()
-                theirs.close()
-                started.append((process, ours))
-        yield [pipe for _, pipe in started]
-    finally:
-        for process, _ in started:
-            process.kill()
-        for process, pipe in started:
-            process.join()
-            pipe.close()
-
-
-@contextmanager
-def _signals_put_off() -> Iterator[Callable[[], None]]:
-    """Ctrl-C and SIGTERM wait until what this gives is called, or the block is left."""
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: None  # signals interrupt the main thread only
-        return
-    came: list[int] = []
-    handlers: dict[int, Any] = {
-        number: signal.getsignal(number)
-        for number in (signal.SIGINT, signal.SIGTERM)
-        if signal.getsignal(number) not in (signal.SIG_IGN, None)
-    }
-
-    def note(number: int, _: object) -> None:
-        came.append(number)
-
-    def hear() -> None:
-        while came:
-            number = came.pop(0)
-            signal.signal(number, handlers[number])
-            try:
-                signal.raise_signal(number)
-            finally:
-                signal.signal(number, note)
-
-    for number in handlers:
-        signal.signal(number, note)
-    try:
-        yield hear
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        for number in came:
-            signal.raise_signal(number)
-
-
-@contextmanager
-def _starting_processes() -> Iterator[None]:
-    """Processes started here do not run the caller's script again, of which they need nothing; Ctrl-C is not theirs."""
-    main = sys.modules["__main__"]
-    held = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
-    block: Any = getattr(signal, "pthread_sigmask", lambda *_: set())  # inherited; not on Windows
-    if os.name == "posix":
-        from multiprocessing import resource_tracker
-
-        resource_tracker.ensure_running()  # which would come with the first process, and unblock SIGINT
-    mask = block(getattr(signal, "SIG_BLOCK", None), {signal.SIGINT})
-    try:
-        main.__spec__ = None
-        if "__file__" in held:
-            del main.__file__
-        yield
-    finally:
-        for name, value in held.items():
-            setattr(main, name, value)
-        block(getattr(signal, "SIG_SETMASK", None), mask)
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -61,11 +61,12 @@ def look(path: str, board: Shape, finder: str) -> tuple[tuple[int, int] | None, 
 
 
 def look_on_request(requests: Connection, board: Shape, finder: str) -> None:
-    """In a process of its own: `look` at each picture asked for, until nobody asks any more."""
+    """In a process of its own: say None when ready, then `look` at each picture asked for, until nobody asks."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     cv2.setNumThreads(1)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(EOFError, ConnectionError):  # whoever asked has gone
+        requests.send(None)
         while True:
             requests.send(_look_or_error(requests.recv(), board, finder))
 

@@ -40,7 +40,9 @@ class Board:
     A chessboard's points are its inner corners, `square_size` is the side of a square. A ChArUco board has markers of
     `marker_size` metres, out of OpenCV's `dictionary` of that name ("DICT_5X5_100"), in its white squares. An AprilGrid
     is made by `aprilgrid`; a grid of circles has its circles' centres as points, `square_size` apart, and may say their
-    diameter as `marker_size`. `kind` is a name in `camviz.calibration.boards.kinds()`; without it the board is a
+    diameter as `marker_size`. The markers of a ChArUco board have a border of `border_bits` cells and are numbered from
+    `first_id`; with `legacy` they are laid out as OpenCV before 4.6 did it, white first where the squares' rows are
+    even. `kind` is a name in `camviz.calibration.boards.kinds()`; without it the board is a
     chessboard, or a ChArUco board where it has a dictionary.
     """
 
@@ -50,6 +52,9 @@ class Board:
     marker_size: float | None = None
     dictionary: str | None = None
     kind: str = ""
+    legacy: bool = False
+    first_id: int = 0
+    border_bits: int = 1
 
     def __post_init__(self) -> None:
         for name in ("columns", "rows"):
@@ -60,6 +65,11 @@ class Board:
         if not self.kind:
             plain = self.marker_size is None and self.dictionary is None
             object.__setattr__(self, "kind", "chessboard" if plain else "charuco")
+        if self.kind != "charuco" and (self.legacy, self.first_id, self.border_bits) != (False, 0, 1):
+            raise ValueError(
+                "legacy, first_id and border_bits must be left out of all boards but a ChArUco board, got "
+                f"{self.legacy}, {self.first_id} and {self.border_bits}"
+            )
         kind_of(self).check(self)
 
     @classmethod

@@ -12,6 +12,7 @@ import numpy as np
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
+from camviz.clinic.doctor.shown import Shown
 from camviz.clinic.observed import Observed
 from camviz.clinic.rig import StereoPair, board_poses, pairs
 from camviz.poses import RigidTransform
@@ -25,14 +26,18 @@ class NotChecked(Exception):  # noqa: N818 - it is an answer, not an error
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A calibration, another one, (width, height) of pictures by their names, the board as it was measured, and
-    a distance in metres at which errors matter."""
+    """A calibration, another one, (width, height) of pictures by their names, the board as it was measured, a distance
+    in metres at which errors matter, the length in metres of a pair's baseline as it was measured, and pictures of the
+    board.
+    """
 
     calibration: Calibration
     compare: Calibration | None = None
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     board: Board | None = None
     at: float | None = None
+    baseline: float | None = None
+    shown: Shown | None = None
     _made: dict[tuple[str, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property

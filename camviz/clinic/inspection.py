@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -15,6 +15,8 @@ from camviz.clinic import words
 from camviz.clinic.apart import Apart, differences
 from camviz.clinic.causes import by_causes
 from camviz.clinic.checks import kinds
+from camviz.clinic.checks.described import described_wrong
+from camviz.clinic.doctor import Shown
 from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.registry import Finding
 from camviz.clinic.summary import Summary
@@ -133,14 +135,31 @@ def inspect(
     pictures: Mapping[str, tuple[int, int]] | None = None,
     board: Board | None = None,
     at: float | None = None,
+    baseline: float | None = None,
+    photographs: Sequence[str | PathLike[str]] = (),
 ) -> Inspection:
     """What is wrong with a calibration.
 
     `compare` is another calibration of the same cameras. `pictures` are the sizes (width, height) of pictures by
     their names that the calibration is meant for. `board` is the board as it was measured, where that is known.
-    `at` is a distance in metres at which the error of a place is told.
+    `at` is a distance in metres at which the error of a place is told, `baseline` the length in metres of a pair's
+    baseline as it was measured. `photographs` are files that show the board.
     """
-    return Inspection.of(Evidence(calibration, compare, pictures or {}, board, at))
+    printed = board or calibration.board
+    shown = Shown.of(photographs, printed) if photographs and printed else None
+    return Inspection.of(Evidence(calibration, compare, pictures or {}, board, at, baseline, shown))
+
+
+def inspect_board(
+    photographs: Sequence[str | PathLike[str]], board: Board, source: Path | None = None
+) -> Inspection | None:
+    """What is wrong with the description of a board where its pictures give no calibration; None where nothing is."""
+    findings = tuple(described_wrong(Shown.of(photographs, board)))
+    if not findings:
+        return None
+    why = "the board is not as described, and there is no calibration"
+    skipped = tuple((id, why) for id in kinds() if id != findings[0].id)
+    return Inspection(None, findings, (findings[0].id,), skipped, source=source)
 
 
 def inspect_file(
@@ -151,6 +170,8 @@ def inspect_file(
     pictures: Mapping[str, tuple[int, int]] | None = None,
     board: Board | None = None,
     at: float | None = None,
+    baseline: float | None = None,
+    photographs: Sequence[str | PathLike[str]] = (),
     prepare: Callable[[Calibration], Calibration] | None = None,
 ) -> Inspection:
     """What is wrong with a calibration file, also with one that every other command refuses.
@@ -168,4 +189,12 @@ def inspect_file(
         skipped = tuple((id, why) for id in kinds() if id != error.id)
         return Inspection(None, (finding,), (error.id,), skipped, source=Path(path), made=(finding,))
     calibration = prepare(calibration) if prepare else calibration
-    return inspect(calibration, compare=compare, pictures=pictures, board=board, at=at)
+    return inspect(
+        calibration,
+        compare=compare,
+        pictures=pictures,
+        board=board,
+        at=at,
+        baseline=baseline,
+        photographs=photographs,
+    )

@@ -315,6 +315,44 @@ holds against each other:
 Each number is moved by half a unit of its last printed digit, and what that changes is added up. That is how far
 rounding can put apart two that agree. An exact zero counts as exact.
 
+## Is the board as described?
+
+`camviz calibrate` and `camviz inspect` with pictures say what of a board is not as it was described, with the option
+that mends it. This is the board doctor, one file a fault in `camviz/clinic/doctor`. It counts how many squares the
+markers of a ChArUco board are apart, in up to twelve pictures. Each marker's own outline gives the length of a square,
+so that no camera needs to be known. The board is the one whose layout has these steps.
+
+| what is wrong | how it is seen | option |
+|---|---|---|
+| OpenCV before 4.6 drew the board | the steps between markers | `--legacy` |
+| columns and rows are swapped | the steps between markers | `--board 6x9` |
+| the markers have Kalibr's border of two cells | they are read with it | `--border-bits 2` |
+| the markers are numbered from N | the steps between markers | `--first-id N` |
+| the square is in another unit | its size, or a known baseline | `--square-mm`, `--baseline-mm` |
+| a symmetric chessboard turned in one camera of a pair | the pair stands otherwise in some views | `--board 9x6` |
+| corners by a homography, not by a finder | they are smoothly off the saddle points | `camviz calibrate` |
+| the search in a picture does not end | its time is over, and the picture is skipped | `--seconds` |
+
+The first four are the finding `wrong-board`, the others `baseline-scale`, `corner-order` and `interpolated-corners`.
+A chessboard has no wrong order of its sides. Whether its views are turned does not matter to one camera alone.
+
+These are rendered by `python benchmarks/doctor.py`. Pictures have 480 to 720 pixels along the longer side and noise of
+1 to 8 grey levels. The boards have 4×3 to 10×6 inner corners, and lenses barrel distortion up to k1 = -0.4. Healthy
+sets are ChArUco boards, whole and in part, chessboards, AprilGrids, grids of circles, and pairs.
+
+| board | named | what else was named |
+|---|---|---|
+| legacy ChArUco pattern | 50 of 50 | |
+| columns and rows swapped | 50 of 50 | |
+| border of two cells | 50 of 50 | |
+| first id other than 0 | 50 of 50 | |
+| square in another unit, 1000 times | 50 of 50 | |
+| square in cm or inches, baseline known | 50 of 50 | |
+| symmetric board, views turned in a pair | 50 of 50 | |
+| corners by a homography | 50 of 50 | |
+| a search that does not end | 50 of 50 | |
+| healthy, of all kinds | 0 of 48 | |
+
 ## Findings
 """
 MIDDLE = """\

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from camviz.calibration.boards import kinds
 from camviz.commands.common import Refusal, bounded, millimetres
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 SIDE_MM = 25.0
 SPACING = 0.3  # of a tag's side: what Kalibr's own targets have
+AS_OPENCV = {"legacy": False, "first_id": 0, "border_bits": 1}  # how OpenCV prints a ChArUco board
 TARGET = (".yaml", ".yml")
 
 
@@ -63,6 +64,35 @@ def add_board(command: argparse.ArgumentParser, required: bool = True, default: 
         type=bounded("a ratio", 0.01, 0.99),
         help=f"between an AprilGrid's tags, in their side (default: {SPACING})",
     )
+    _add_markers(command)
+
+
+def _add_markers(command: argparse.ArgumentParser) -> None:
+    """How the markers of a ChArUco board are printed."""
+    command.add_argument(
+        "--legacy", action="store_true", help="a ChArUco board laid out as OpenCV before 4.6 did it (even rows)"
+    )
+    command.add_argument(
+        "--first-id", metavar="N", type=_number, default=0, help="of a ChArUco board's markers (default: 0)"
+    )
+    command.add_argument(
+        "--border-bits",
+        metavar="N",
+        type=int,
+        choices=(1, 2),
+        default=1,
+        help="cells of the black border of a ChArUco board's markers: 1 (default), or 2 as Kalibr has it",
+    )
+
+
+def _printed(options: argparse.Namespace) -> dict[str, Any]:
+    return {name: getattr(options, name) for name in AS_OPENCV}
+
+
+def _number(text: str) -> int:
+    if not re.fullmatch("[0-9]{1,5}", text):
+        raise argparse.ArgumentTypeError(f"expected the number of a marker, such as 0, got {text!r}")
+    return int(text)
 
 
 def board_of(options: argparse.Namespace) -> Board:
@@ -90,7 +120,7 @@ def given_board(options: argparse.Namespace) -> Board | None:
 def _of_file(options: argparse.Namespace) -> Board:
     from camviz.files.target import read_target
 
-    if any((options.kind, options.charuco, options.marker_mm, options.spacing)):
+    if any((options.kind, options.charuco, options.marker_mm, options.spacing, _printed(options) != AS_OPENCV)):
         raise Refusal(f"{options.board}: the file says which board it is: leave --kind and the board's sizes out.")
     return read_target(options.board)
 
@@ -108,11 +138,14 @@ def _board(options: argparse.Namespace) -> Board:
         raise Refusal("--marker-mm is for a ChArUco board: name its dictionary with --charuco.")
     if options.spacing is not None and kind != "aprilgrid":
         raise Refusal("--spacing is for --kind aprilgrid.")
+    printed = _printed(options)
+    if kind != "charuco" and printed != AS_OPENCV:
+        raise Refusal("--legacy, --first-id and --border-bits are for a ChArUco board: name its dictionary.")
     if kind == "aprilgrid":
         return Board.aprilgrid(columns, rows, side, options.spacing or SPACING)
     if kind != "charuco":
         return Board(columns, rows, side, marker, kind=kind)
     name = "DICT_" + options.charuco.removeprefix("DICT_")
-    board = Board(columns, rows, side, 0.75 * side if marker is None else marker, name)
+    board = Board(columns, rows, side, 0.75 * side if marker is None else marker, name, **printed)
     charuco_dictionary(board)
     return board

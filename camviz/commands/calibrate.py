@@ -20,6 +20,8 @@ from camviz.commands.common import (
     Refusal,
     add_command,
     add_megapixels,
+    bounded,
+    millimetres,
     narrator,
     pixels,
     refuse_exhausted,
@@ -34,6 +36,7 @@ from camviz.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz.lenses import calibration_models
 
 if TYPE_CHECKING:
+    from camviz.calibration import CannotCalibrate
     from camviz.clinic import Inspection
     from camviz.files import Board, Calibration
 
@@ -79,12 +82,14 @@ def add(commands: Any) -> None:
     command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
     add_board(command, required=False, default=False)
     add_corners(command)
+    add_baseline(command)
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILES do not hold it")
     command.add_argument("--model", choices=list(MODELS), default="standard", help="which lens (default: standard)")
     command.add_argument("--fix", metavar="NAMES", default="", help="parameters not to solve for, such as k3 or p1,p2")
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
     command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
     command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
+    add_seconds(command)
     command.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
     )
@@ -92,6 +97,21 @@ def add(commands: Any) -> None:
     command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
     add_megapixels(command)
     add_gate(command)
+
+
+def add_baseline(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--baseline-mm", metavar="MM", type=millimetres, help="the distance of a pair's cameras, to check the board by"
+    )
+
+
+def add_seconds(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--seconds",
+        metavar="S",
+        type=bounded("a time in seconds", 0.1, 3600, "s"),
+        help="how long to look for the board in one picture (default: 120 where several processes look)",
+    )
 
 
 def calibrate(options: argparse.Namespace) -> int:
@@ -112,7 +132,7 @@ def calibrate(options: argparse.Namespace) -> int:
     try:
         calibration = _of_corners(left, options) if options.corners else _of_pictures(left, right, options)
     except CannotCalibrate as error:
-        raise Refusal(f"{error}.") from error
+        raise Refusal(_complaint(error, left + right, options)) from error
     try:
         write_calibration(calibration, options.output, "opencv")
     except CalibrationError as error:
@@ -126,6 +146,8 @@ def calibrate(options: argparse.Namespace) -> int:
         told(sentence)
     for sentence in worth(calibration, options.goal):
         told(sentence)
+    if doctored := _prescribed(left + right, options, calibration):
+        told(f"Is the board as described? {doctored}")
     told(f"{options.output}: written.")
     decides = gate.asked or options.junit is not None
     if not (options.report or decides):
@@ -167,6 +189,26 @@ def _of_pictures(left: list[Path], right: list[Path], options: argparse.Namespac
     """The camera or the pair that took pictures."""
     board = board_of(options)
     return _pair(left, right, board, options) if right else _single(left, board, options)
+
+
+def _complaint(error: CannotCalibrate, paths: list[Path], options: argparse.Namespace) -> str:
+    """Why there is no calibration; and what of the board is not as described, in place of a guess at what it is."""
+    from camviz.calibration.detection import NoBoard
+
+    doctored = _prescribed(paths, options)
+    said = error.said if doctored and isinstance(error, NoBoard) else str(error)
+    return f"{said}. {doctored}".rstrip()
+
+
+def _prescribed(paths: list[Path], options: argparse.Namespace, calibration: Calibration | None = None) -> str:
+    """What the pictures show that is not as the board is described, and what to try; empty where nothing is."""
+    from camviz.clinic.doctor import Shown, diagnose, prescription
+
+    if options.corners:
+        return ""
+    shown = Shown.of(paths, board_of(options))
+    baseline = None if options.baseline_mm is None else options.baseline_mm / 1000
+    return prescription(diagnose(replace(shown, calibration=calibration, baseline=baseline)))
 
 
 def _page(inspection: Inspection, folders: Mapping[str, Path], page: Path) -> None:
@@ -234,19 +276,25 @@ def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Cal
     from camviz.calibration import calibrate, detect
 
     with Bar() as bar:
-        detections = detect(paths, board, finder=options.finder, workers=options.workers, progress=bar)
+        detections = detect(paths, board, progress=bar, **_search(options))
     return _solved(lambda: calibrate(detections, board, options.model, **_how(options)), detections.skipped)
 
 
 def _pair(left: list[Path], right: list[Path], board: Board, options: argparse.Namespace) -> Calibration:
-    from camviz.calibration import calibrate_pair, detect_pair
+    from camviz.calibration import CannotCalibrate, calibrate_pair, detect_pair
     from camviz.calibration.pairing import paired
+    from camviz.clinic.doctor import Shown, diagnose, prescription
 
     pairs = paired(left, right)
     with Bar() as bar:
-        both = detect_pair(pairs.left, pairs.right, board, finder=options.finder, workers=options.workers, progress=bar)
+        both = detect_pair(pairs.left, pairs.right, board, progress=bar, **_search(options))
     skipped = both[0].skipped + both[1].skipped + pairs.lonely
-    calibration = _solved(lambda: calibrate_pair(*both, board, options.model, **_how(options)), skipped)
+    try:
+        calibration = _solved(lambda: calibrate_pair(*both, board, options.model, **_how(options)), skipped)
+    except CannotCalibrate as error:
+        if turned := prescription(diagnose(Shown(board, {}, both=both), "corner-order")):
+            raise Refusal(f"{error}. {turned}") from error
+        raise
     return replace(calibration, skipped=calibration.skipped + pairs.lonely)
 
 
@@ -259,11 +307,15 @@ def _solved(solve: Callable[[], Calibration], skipped: Sequence[tuple[str, str]]
     except CannotCalibrate as error:
         named = ", ".join(f"{picture} ({why})" for picture, why in skipped[:3])
         more = f" and {len(skipped) - 3} more" * (len(skipped) > 3)
-        raise Refusal(f"{error}{'; skipped: ' * bool(skipped)}{named}{more}.") from error
+        raise CannotCalibrate(f"{error}{'; skipped: ' * bool(skipped)}{named}{more}") from error
     except ValueError as error:  # a parameter to fix that the model does not have
         if not str(error).startswith("fixed"):
             raise
         raise Refusal(f"{error}.") from error
+
+
+def _search(options: argparse.Namespace) -> dict[str, Any]:
+    return {"finder": options.finder, "workers": options.workers, "seconds": options.seconds}
 
 
 def _how(options: argparse.Namespace) -> dict[str, Any]:

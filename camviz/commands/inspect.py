@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz.commands.boards import add_board, given_board
-from camviz.commands.calibrate import PICTURES, Bar, pictures
+from camviz.commands.calibrate import PICTURES, Bar, add_baseline, add_seconds, pictures
 from camviz.commands.common import (
     FOUND,
     OK,
@@ -80,6 +80,8 @@ def add(commands: Any) -> None:
     command.add_argument("--images", metavar="IMAGES", nargs="+", help="pictures that the calibration is for")
     add_board(command, required=False, default=False)
     add_corners(command)
+    add_baseline(command)
+    add_seconds(command)
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILE does not hold it")
     command.add_argument("--compare", metavar="OTHER", type=Path, help="another calibration of the same cameras")
     command.add_argument("--at", metavar="METRES", type=metres, help="a distance at which to tell the error of a place")
@@ -147,12 +149,24 @@ def _is_model(folder: Path) -> bool:
 def _inspected(
     paths: list[Path], board: Board | None, compare: Calibration | None, options: argparse.Namespace
 ) -> Inspection:
-    from camviz.clinic import inspect, inspect_file
+    from camviz.clinic import Inspection, inspect, inspect_file
     from camviz.files import CalibrationError
 
     images = pictures(options.images) if options.images else []
+    baseline = None if options.baseline_mm is None else options.baseline_mm / 1000
     if PICTURES.fullmatch(paths[0].suffix):
-        return inspect(_calibrated(paths, board), compare=compare, pictures=_sizes(images), board=board, at=options.at)
+        calibrated = _calibrated(paths, board, options.seconds)
+        if isinstance(calibrated, Inspection):
+            return calibrated
+        return inspect(
+            calibrated,
+            compare=compare,
+            pictures=_sizes(images),
+            board=board,
+            at=options.at,
+            baseline=baseline,
+            photographs=paths,
+        )
     add = _adding(images, board, options)
     with on_disk(paths[0]) as file:
         try:
@@ -163,6 +177,8 @@ def _inspected(
                 pictures=_sizes(images),
                 board=board,
                 at=options.at,
+                baseline=baseline,
+                photographs=images,
                 prepare=add,
             )
         except CalibrationError as error:
@@ -175,7 +191,9 @@ def _adding(
     """What adds corners to a calibration that holds none: from files, or else from pictures of a known board."""
     if options.corners:
         return lambda calibration: _with_file(calibration, images, options)
-    return None if board is None or not images else lambda calibration: _with_corners(calibration, images, board)
+    if board is None or not images:
+        return None
+    return lambda calibration: _with_corners(calibration, images, board, options.seconds)
 
 
 def _with_file(calibration: Calibration, images: list[Path], options: argparse.Namespace) -> Calibration:
@@ -207,40 +225,46 @@ def _sizes(images: list[Path]) -> dict[str, tuple[int, int]]:
         raise Refusal(f"{error}.") from error
 
 
-def _calibrated(paths: list[Path], board: Board | None) -> Calibration:
-    """The calibration of a folder of pictures."""
+def _calibrated(paths: list[Path], board: Board | None, seconds: float | None) -> Calibration | Inspection:
+    """The calibration of a folder of pictures; or what is wrong with the board as described, where there is none."""
     if board is None:
         raise Refusal(
             f"{paths[0].parent}: these are pictures, which are calibrated first: say which board they show, such as "
             "--board 9x6 --square-mm 25."
         )
     from camviz.calibration import CannotCalibrate, calibrate
+    from camviz.clinic.inspection import inspect_board
 
     try:
-        return replace(calibrate(_detected(paths, board), board), source=paths[0].parent)
+        return replace(calibrate(_detected(paths, board, seconds), board), source=paths[0].parent)
     except CannotCalibrate as error:
+        if found := inspect_board(paths, board, paths[0].parent):
+            return found
         raise Refusal(f"{error}.") from error
 
 
-def _with_corners(calibration: Calibration, images: list[Path], board: Board) -> Calibration:
+def _with_corners(calibration: Calibration, images: list[Path], board: Board, seconds: float | None) -> Calibration:
     """The calibration with the corners of the board in the pictures, if it is one camera's and has none."""
     from camviz.calibration import CannotCalibrate
+    from camviz.clinic.inspection import inspect_board
     from camviz.clinic.pictures import with_detections
 
     if len(calibration.cameras) != 1 or calibration.detections:
         return calibration
     try:
-        return with_detections(calibration, _detected(images, board), board)
+        return with_detections(calibration, _detected(images, board, seconds), board)
     except CannotCalibrate as error:
+        if inspect_board(images, board):
+            return calibration  # the inspection says why there are no corners
         raise Refusal(f"{error}.") from error
 
 
-def _detected(paths: list[Path], board: Board) -> Detections:
+def _detected(paths: list[Path], board: Board, seconds: float | None) -> Detections:
     """The board's corners in pictures; those that are left out are named."""
     from camviz.calibration import detect
 
     with Bar() as bar:
-        detections = detect(paths, board, progress=bar)
+        detections = detect(paths, board, progress=bar, seconds=seconds)
     for picture, why in detections.skipped:
         say(f"{picture}: skipped, {why}.")
     return detections

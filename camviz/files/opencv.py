@@ -180,7 +180,20 @@ def _board(section: Section) -> Board | None:
         dictionary = section.text("marker_dictionary") if "marker_dictionary" in section else None
         kind = section.text("board_kind") if "board_kind" in section else ""
         columns, rows = section.whole(width, 1000), section.whole(height, 1000)
-        return Board(columns, rows, section.number(square), marker, dictionary, kind)
+        legacy = bool(section.whole("marker_legacy", 1)) if "marker_legacy" in section else False
+        first = section.whole("marker_first_id", 100_000) if "marker_first_id" in section else 0
+        border = section.whole("marker_border_bits", 2) if "marker_border_bits" in section else 1
+        return Board(
+            columns=columns,
+            rows=rows,
+            square_size=section.number(square),
+            marker_size=marker,
+            dictionary=dictionary,
+            kind=kind,
+            legacy=legacy,
+            first_id=first,
+            border_bits=border,
+        )
 
 
 def _views(section: Section, tag: str) -> dict[str, Any]:

@@ -69,6 +69,12 @@ def _recorded(calibration: Calibration) -> dict[str, Any]:
             values["marker_size"] = float(board.marker_size)
         if board.dictionary is not None:
             values["marker_dictionary"] = board.dictionary
+        if board.legacy:
+            values["marker_legacy"] = 1
+        if board.first_id:
+            values["marker_first_id"] = board.first_id
+        if board.border_bits != 1:
+            values["marker_border_bits"] = board.border_bits
         if board.kind not in GUESSED:
             values["board_kind"] = board.kind
     if calibration.board_warp is not None:

@@ -18,7 +18,7 @@ from camviz.clinic.registry import Fault, Kind
 
 ORDER = (
     *("compare", "assumed", "file", "contradiction", "size", "lens"),
-    *("corners", "set_aside", "boards", "moving", "model", "pair", "frames"),
+    *("corners", "set_aside", "boards", "moving", "model", "pair", "frames", "described"),
 )
 """The modules in the order of their checks; others come after them, by name. Within one the order is as written."""
 

@@ -21,6 +21,8 @@ from camviz.twoview import RectifiedPair, rectify
 LENGTHS = (0.001, 10.0)  # metres between which the baseline of a pair is not worth a word
 SQUARES = (0.0005, 0.5)  # the same for the side of a square
 SAME_LENGTH = 0.02
+UNITS = {1 / 1000: "metres", 1 / 10: "centimetres", 1 / 25.4: "inches", 1000: "micrometres"}
+"""By how many times too long lengths are that are in these and taken for millimetres."""
 BLACK = 0.4  # of a rectified picture
 TURNED_DEG = 35.0
 
@@ -79,8 +81,8 @@ swapped = baseline_sign.fault("swapped cameras", "", (1,), promised=1)(_exchange
     "Or a square is above half a metre or below half a millimetre.",
 )
 def baseline_scale(evidence: Evidence) -> Iterator[Finding]:
-    """The check compares the baseline with the board poses of the same file, with the other calibration, and with the
-    size of things.
+    """The check compares the baseline with its measured length, with the board poses of the same file, with the other
+    calibration, and with the size of things.
     """
     board, own_unit = evidence.calibration.board, evidence.calibration.format in OWN_UNIT
     stereo = [] if own_unit else [pair for pair in evidence.pairs if pair.baseline > 0]
@@ -118,6 +120,7 @@ def _baseline(evidence: Evidence, pair: StereoPair) -> Iterator[Finding]:
             ratio = length / known
             sentence = (
                 f"{pair.title}: the baseline is {length:.4g} m long, {ratio:.4g} times the {known:.4g} m of {said}."
+                + _as_if(ratio)
             )
             yield baseline_scale.found(sentence, ratio, "times", pair.right)
             return
@@ -127,7 +130,17 @@ def _baseline(evidence: Evidence, pair: StereoPair) -> Iterator[Finding]:
         yield baseline_scale.found(sentence, length, "m", pair.right)
 
 
+def _as_if(ratio: float) -> str:
+    """What units one took for another where lengths are so many times too long; empty where it is none."""
+    for factor, units in UNITS.items():
+        if abs(np.log(ratio / factor)) < SAME_LENGTH:
+            return f" {units.capitalize()} were taken for millimetres."
+    return ""
+
+
 def _known_lengths(evidence: Evidence, pair: StereoPair) -> Iterator[tuple[float, str]]:
+    if evidence.baseline is not None:
+        yield evidence.baseline, "the measured one"
     if pair.agreed is not None and pair.by_view is not None:
         lengths = np.linalg.norm(np.atleast_2d(pair.by_view.translation), axis=1)
         yield float(np.median(lengths)), "the boards that both saw"

@@ -1,0 +1,47 @@
+"""The board doctor: what of a board is not as described, seen in its pictures, with the option that mends it.
+
+A trouble is one file here that declares a Trouble: `camviz/clinic/doctor/trouble.py` explains how. `camviz calibrate`
+says what `diagnose` finds, and an inspection has it as `wrong-board`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import MappingProxyType
+
+from camviz.clinic.doctor.shown import Shown
+from camviz.clinic.doctor.trouble import Diagnosis, Trouble
+
+__all__ = ["Diagnosis", "Shown", "Trouble", "diagnose", "prescription", "troubles"]
+
+
+@cache
+def troubles() -> Mapping[str, Trouble]:
+    """Every trouble by its name, in alphabetical order of the files.
+
+    >>> troubles()["legacy pattern"].cause[:15]
+    'a ChArUco board'
+    """
+    modules = [import_module(f"{__name__}.{each.name}") for each in iter_modules(__path__)]
+    found = [value for module in modules for value in vars(module).values() if isinstance(value, Trouble)]
+    return MappingProxyType({each.name: each for each in found})
+
+
+def diagnose(shown: Shown, finding: str | None = None) -> tuple[Diagnosis, ...]:
+    """What of the board is not as described, as its pictures show it; or of that what is one finding alone."""
+    asked = [each for each in troubles().values() if finding in (None, each.finding)]
+    return tuple(diagnosis for each in asked for diagnosis in each.diagnoses(shown))
+
+
+def prescription(diagnoses: Sequence[Diagnosis]) -> str:
+    """What they say, in one line that ends with the options to try; empty where there is none."""
+    if not diagnoses:
+        return ""
+    said = " ".join(each.sentence for each in diagnoses)
+    options = [each.option for each in diagnoses if not each.option.startswith("no ")]
+    without = [each.option.removeprefix("no ") for each in diagnoses if each.option.startswith("no ")]
+    tried = [*([" ".join(options)] if options else []), *(f"without {each}" for each in without)]
+    return f"{said.removesuffix('.')}: try {', '.join(tried)}."
