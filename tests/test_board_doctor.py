@@ -1,6 +1,5 @@
 """The board doctor names what of a board is not as described, with the option that mends it, and nothing else."""
 
-import os
 import threading
 from dataclasses import replace
 
@@ -147,18 +146,21 @@ def test_a_known_baseline_tells_inches_from_millimetres():
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a pipe stands for a picture whose search does not end")
-def test_a_search_that_does_not_end_is_ended_and_its_picture_named(seen, tmp_path):
-    """The second picture never comes; the first and the third are found by the process that takes over."""
+def test_a_search_that_does_not_end_is_ended_and_its_picture_named(tmp_path):
+    """In the second picture, full of squares, the search takes 15 s; the process that takes over finds the third's."""
+    board = Board(columns=9, rows=6, square_size=0.02)
     paths = [tmp_path / name for name in ("a.png", "b.png", "c.png")]
-    os.mkfifo(paths[1])
-    for path, picture in zip(paths[::2], seen["plain"].pictures.values(), strict=True):
+    noise = np.random.default_rng(1).integers(0, 2, (500, 700), dtype=np.uint8) * 255
+    squares = cv2.resize(noise, None, fx=8, fy=8, interpolation=cv2.INTER_NEAREST)
+    first, last = pictured(np.random.default_rng(4), board, 2).pictures.values()
+    for path, picture in zip(paths, (first, squares, last), strict=True):
         cv2.imwrite(str(path), picture)
-    found = detect(paths, CHARUCO, seconds=1.5)
+    found = detect(paths, board, seconds=3)
     assert found.pictures == ("a.png", "c.png")
-    assert found.skipped == (("b.png", "the search for the board did not end within 1.5 s"),)
+    assert found.skipped == (("b.png", "the search for the board did not end within 3 s"),)
     assert threading.active_count() == 1
     with pytest.raises(CannotCalibrate, match=r"did not end within 0\.2 s \(b\.png\)"):
-        detect(paths[1:2], CHARUCO, seconds=0.2)
+        detect(paths[1:2], board, seconds=0.2)
 
 
 # The commands --------------------------------------------------------------------------------------------------------

@@ -159,7 +159,7 @@ def inspect_board(
         return None
     why = "the board is not as described, and there is no calibration"
     skipped = tuple((id, why) for id in kinds() if id != findings[0].id)
-    return Inspection(None, findings, (findings[0].id,), skipped, source=source)
+    return Inspection(None, findings, (findings[0].id,), skipped, source=source, made=findings)
 
 
 def inspect_file(
