@@ -1,5 +1,6 @@
 """The board doctor names what of a board is not as described, with the option that mends it, and nothing else."""
 
+import os
 import threading
 from dataclasses import replace
 
