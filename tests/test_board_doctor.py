@@ -154,10 +154,11 @@ def test_a_search_that_does_not_end_is_ended_and_its_picture_named(tmp_path):
     first, last = pictured(np.random.default_rng(4), board, 2).pictures.values()
     for path, picture in zip(paths, (first, squares, last), strict=True):
         cv2.imwrite(str(path), picture)
+    threads = threading.active_count()
     found = detect(paths, board, seconds=3)
     assert found.pictures == ("a.png", "c.png")
     assert found.skipped == (("b.png", "the search for the board did not end within 3 s"),)
-    assert threading.active_count() == 1
+    assert threading.active_count() <= threads
     with pytest.raises(CannotCalibrate, match=r"did not end within 0\.2 s \(b\.png\)"):
         detect(paths[1:2], board, seconds=0.2)
 
