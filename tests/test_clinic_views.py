@@ -87,7 +87,7 @@ def test_the_number_at_a_bar_is_its_height_with_and_without_the_corners_set_asid
     assert seen.rms_seen[6] > 2 * seen.rms[6]
     assert pale[6] == pytest.approx(seen.rms_seen[6], rel=0.01)
     assert solid[6] == pytest.approx(seen.rms[6], rel=0.01)
-    written = re.findall(r'<text x="([\d.]+)" y="[\d.]+" class="tick middle(?: halo)?"[^>]*>(\d\.\d\d)<', drawn)
+    written = re.findall(r'<text x="([\d.]+)" y="[\d.]+" class="tick middle(?: halo clear)?"[^>]*>(\d\.\d\d)<', drawn)
     at = [(round(panel.data((float(x), 0))[0]) - 1, float(number)) for x, number in written]
     ends = [(i, value) for tops in (solid, pale) for i, value in enumerate(tops) if np.isfinite(value)]
     assert sorted(at) == [(i, pytest.approx(value, abs=0.006)) for i, value in sorted(ends)]

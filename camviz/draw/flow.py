@@ -80,11 +80,16 @@ class Tile:
         fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
         return f'<div class="{kind}" data-tile="{name}" style="{self.style(_PRESENTED)}">{fold}{self._svg(unit)}</div>'
 
-    def image(self, source: str, words: str) -> str:
-        """The tile as an image among others that flow on a page without a style sheet; `words` say what it shows."""
+    def image(self, source: str, words: str, *, later: bool = False) -> str:
+        """The tile as an image among others that flow on a page without a style sheet; `words` say what it shows.
+
+        With `later` the image is loaded when it comes near the screen, and its place is kept free till then.
+        """
+        kept = f' loading="lazy" width="{self.cell[2]:g}" height="{self.cell[3]:g}"' if later else ""
+        tall = ";height:auto" if later else ""
         if self.cell[2] <= SCROLLED:
-            return f'<img alt="{escape(words)}" style="{self.style()}" src="{source}">'
-        image = f'<img alt="{escape(words)}" style="width:100%;min-width:560px" src="{source}">'
+            return f'<img alt="{escape(words)}"{kept} style="{self.style()}{tall}" src="{source}">'
+        image = f'<img alt="{escape(words)}"{kept} style="width:100%;min-width:560px{tall}" src="{source}">'
         return f'<div style="{self.style()};overflow-x:auto">{image}</div>'
 
     @property

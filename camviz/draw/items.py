@@ -12,13 +12,35 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, transform
 from camviz.lenses import Perspective
-from camviz.lenses.base import Array, as_points
+from camviz.lenses.base import Array, as_point, as_points
 from camviz.poses import RigidTransform
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line through points (n, 3) in metres; NaN interrupts it. `width` in picture units; `head` makes it an arrow."""
+    """A line through points in space; NaN interrupts it.
+
+    Parameters
+    ----------
+    points : array_like (n, 3)
+        Points in metres.
+    class_ : str, optional
+        Its colour, a name from the style sheet.
+    width : float, optional
+        In picture units.
+    head : bool, optional
+        Makes it an arrow.
+
+    Raises
+    ------
+    ValueError
+        Where the last axis has not 3 coordinates.
+
+    Examples
+    --------
+    >>> Line([(0, 0, 0), (1, 0, 0)]).points.shape
+    (2, 3)
+    """
 
     points: Array
     class_: str = "ink"
@@ -31,7 +53,28 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A convex outline (n, 3), filled: a fan of triangles around its first vertex. Not drawn when a vertex is NaN."""
+    """A convex outline, filled: a fan of triangles around its first vertex. Not drawn when a vertex is NaN.
+
+    Parameters
+    ----------
+    vertices : array_like (n, 3)
+        Points in metres.
+    colour : str, optional
+        A name from the style sheet, or "#rrggbb".
+    opacity : float, optional
+        From 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        For another opacity, and where the last axis has not 3 coordinates.
+
+    Examples
+    --------
+    >>> Face(np.eye(3), opacity=2)
+    Traceback (most recent call last):
+    ValueError: opacity must lie between 0 and 1, got 2
+    """
 
     vertices: Array
     colour: str = "blue"
@@ -45,10 +88,34 @@ class Face:
 
 @dataclass(frozen=True, eq=False)
 class TexturedMesh:
-    """A picture (height, width, 3), uint8 RGB, stretched over quadrilaterals.
+    """A picture stretched over quadrilaterals.
 
-    `quads` (m, 4) are indices of vertices (n, 3) in metres; uv (n, 2) places these on the picture, u to the right and
-    v upwards, 0 … 1. A quad with a NaN vertex is left out. A flat quad shows the picture in exact perspective.
+    A quad with a NaN vertex is left out. A flat quad shows the picture in exact perspective.
+
+    Parameters
+    ----------
+    vertices : array_like (n, 3)
+        Points in metres.
+    quads : array (m, 4) of int
+        Indices of vertices.
+    uv : array_like (n, 2)
+        Where the vertices lie on the picture, 0 … 1, u to the right and v upwards.
+    picture : array (height, width, 3) of uint8
+        RGB.
+    opacity : float, optional
+        From 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        Where `uv` is not one for each vertex, and for a picture of another form.
+
+    Examples
+    --------
+    >>> grid = np.stack([*np.meshgrid([0, 1, 2], [0, 1]), np.ones((2, 3))], axis=-1)  # 2 × 3 points of a wall
+    >>> TexturedMesh.over(grid, np.zeros((4, 4, 3), np.uint8)).quads
+    array([[0, 1, 4, 3],
+           [1, 2, 5, 4]])
     """
 
     vertices: Array
@@ -67,7 +134,27 @@ class TexturedMesh:
 
     @classmethod
     def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: float = 1.0) -> TexturedMesh:
-        """The picture over a grid of points (m, n, 3), at least 2 × 2, whose rows follow the picture's."""
+        """The picture over a grid of points, whose rows follow the picture's.
+
+        Parameters
+        ----------
+        points : array_like (m, n, 3)
+            At least 2 × 2, in metres.
+        picture : array (height, width, 3) of uint8
+            RGB.
+        opacity : float, optional
+            From 0 to 1.
+
+        Returns
+        -------
+        TexturedMesh
+            Of (m - 1) × (n - 1) quads.
+
+        Raises
+        ------
+        ValueError
+            For points that are no grid.
+        """
         points = as_points(points, 3, "points")
         if points.ndim != 3 or min(points.shape[:2]) < 2:
             raise ValueError(f"points must be a grid (m, n, 3) of at least 2 × 2, got {points.shape}")
@@ -80,7 +167,27 @@ class TexturedMesh:
 
 @dataclass(frozen=True, eq=False)
 class Dots:
-    """Round marks at points (n, 3), `diameter` picture units wide."""
+    """Round marks at points.
+
+    Parameters
+    ----------
+    points : array_like (n, 3)
+        Points in metres.
+    class_ : str, optional
+        Their colour, a name from the style sheet.
+    diameter : float, optional
+        In picture units.
+
+    Raises
+    ------
+    ValueError
+        Where the last axis has not 3 coordinates.
+
+    Examples
+    --------
+    >>> Dots((0, 0, 1)).points  # one point is a list of one
+    array([[0., 0., 1.]])
+    """
 
     points: Array
     class_: str = "ink"
@@ -92,25 +199,64 @@ class Dots:
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """Words beside a point (3,)."""
+    """Words beside a point.
+
+    Parameters
+    ----------
+    point : array_like (3,)
+        In metres.
+    words : str
+        What stands there.
+    class_ : str, optional
+        A name from the style sheet.
+
+    Raises
+    ------
+    ValueError
+        Where the point has not 3 coordinates.
+
+    Examples
+    --------
+    >>> Label((0, 0, 1), "C").words
+    'C'
+    """
 
     point: Array
     words: str
     class_: str = "label"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", as_points(self.point, 3, "point").reshape(3))
+        object.__setattr__(self, "point", as_point(self.point, "point"))
 
 
 SIDE = 16  # points along each side of a camera's rim
 
 Item = Line | Face | TexturedMesh | Dots | Label
+"""What is drawn in space."""
 
 
 def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") -> list[Item]:
-    """The axes of a frame as arrows `length` metres long: x orange, y green, z blue, each with its letter.
+    """The axes of a frame as arrows: x orange, y green, z blue, each with its letter.
 
-    A frame with a name, as the world beside a camera, has capital letters.
+    Parameters
+    ----------
+    world_from_frame : RigidTransform
+        Where the frame is, in metres.
+    length : float
+        Of the arrows, in metres.
+    name : str, optional
+        Of the frame. With one, as the world beside a camera, it has capital letters.
+
+    Returns
+    -------
+    list of Item
+        Lines and labels.
+
+    Examples
+    --------
+    >>> from camviz.poses import RigidTransform
+    >>> [item.words for item in axes_triad(RigidTransform.identity(), 1) if isinstance(item, Label)]
+    ['x', 'y', 'z']
     """
     origin, *tips = transform(world_from_frame, np.vstack([np.zeros(3), length * np.eye(3)]))
     items: list[Item] = []
@@ -129,11 +275,37 @@ def camera_body(
     name: str = "",
     near: float = 0,
 ) -> list[Item]:
-    """A camera as seen from outside: its centre, the volume it sees out to `depth` metres, its up side, its picture.
+    """A camera as seen from outside: its centre, the volume it sees, its up side, its picture.
 
-    The rim is where the rays of the image's border reach `depth`, so it bends with the lens; rays of one lens that
-    all point well forward end on a plane, as a pinhole's image does, those of a wider lens on a sphere. `image`, uint8
-    RGB, is shown there; `near` adds a second rim.
+    The rim is where the rays of the image's border reach `depth`, so it bends with the lens; rays of one lens that all
+    point well forward end on a plane, as a pinhole's image does, those of a wider lens on a sphere.
+
+    Parameters
+    ----------
+    camera : Camera
+        What is drawn.
+    depth : float
+        How far the volume reaches, in metres.
+    image : array (height, width, 3) of uint8, optional
+        RGB, shown at the rim.
+    colour : str, optional
+        A name from the style sheet.
+    name : str, optional
+        A label at the centre.
+    near : float, optional
+        Adds a second rim at this distance in metres.
+
+    Returns
+    -------
+    list of Item
+        The rim first.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> rim, *_ = camera_body(Camera(Intrinsics.from_fov(640, 480, 90)), depth=2)
+    >>> rim.points[0]  # the image's upper left: tan 45° to the left, 3/4 of that up
+    array([-2. , -1.5,  2. ])
     """
     reach = _reach(camera, camera.intrinsics.border(SIDE))
     rim = camera.centre + depth * reach
@@ -151,8 +323,38 @@ def camera_body(
 
 
 def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid") -> list[Item]:
-    """A ground: lines `step` metres apart in the plane y = const around `centre` (3,), `size` metres to each side."""
-    x, y, z = as_points(centre, 3, "centre")
+    """A ground: lines in the plane y = const.
+
+    Parameters
+    ----------
+    centre : array_like (3,)
+        In metres.
+    size : float
+        How far it reaches to each side, in metres.
+    step : float
+        Distance of the lines in metres.
+    class_ : str, optional
+        Their colour, a name from the style sheet.
+
+    Returns
+    -------
+    list of Item
+        One Line, with NaN between its parts.
+
+    Raises
+    ------
+    ValueError
+        For a step that is not positive, and where the centre has not 3 coordinates.
+
+    Examples
+    --------
+    >>> (lines,) = grid_lines((0, 1, 0), size=2, step=1)
+    >>> int(np.isnan(lines.points).any(axis=1).sum())  # five lines each way
+    10
+    """
+    x, y, z = as_point(centre, "centre")
+    if not step > 0:
+        raise ValueError(f"step must be a positive number of metres, got {step}")
     s = np.arange(-size, size + step / 2, step)
     ends = np.array([-size, size, np.nan])
     across, along = np.broadcast_arrays(ends, s[:, None])

@@ -113,7 +113,7 @@ def width(words: str, size: float, *, bold: bool = False, mono: bool = False) ->
     """How wide words of a size are, in the same units.
 
     >>> round(width("focal length", 13))
-    83
+    78
     """
     if mono:
         return _MONO * size * len(words)

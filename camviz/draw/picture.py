@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 
 from camviz.draw.flow import FLOW_WIDTH, Tile
 from camviz.draw.portable import portable
+
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,12 @@ class Picture:
 
         `units` says how many picture units make a CSS pixel in the tile of a name, where it is not one.
         """
-        tiles = "".join(tile.html((units or {}).get(tile.name, 1.0)) for tile in self.tiles)
+        return "".join(self.around(tile.html((units or {}).get(tile.name, 1.0)) for tile in self.tiles))
+
+    def around(self, tiles: Iterable[Part]) -> tuple[Part | str, ...]:
+        """The parts of `flow`: what stands before the tiles, the tiles in the form that they have, and what follows."""
         named = f'aria-label="{escape(self.title)}" aria-description="{escape(self.description)}"'
-        return f'<div class="camviz-flow" role="group" {named}>{tiles}</div>'
+        return (f'<div class="camviz-flow" role="group" {named}>', *tiles, "</div>")
 
     def embedded(self) -> str:
         """The flowing tiles with their photographs inside, for a page that has the style sheets."""
@@ -93,20 +98,28 @@ class Picture:
         )
         return svg.replace("<title>", f"<style>{style()}</style><title>", 1)
 
-    def figure(self) -> str:
-        """An HTML figure whose tiles flow, each an image; the first has the whole alternative text."""
+    def figure(self, address: Callable[[Tile], str] | None = None) -> str:
+        """An HTML figure whose tiles flow, each an image; the first has the whole alternative text.
+
+        The images are inside the figure unless `address` says where a tile's `document` is: then they are loaded when
+        they come near the screen, and have their sizes before.
+        """
         alternatives = [f"{self.title}. {self.description}", *(tile.name for tile in self.tiles[1:])]
         images = "".join(
-            f'<div style="flex:1 1 100%">{tile.sentences}</div>' if tile.words else tile.image(self._alone(tile), words)
+            f'<div style="flex:1 1 100%">{tile.sentences}</div>'
+            if tile.words
+            else (tile.image(address(tile), words, later=True) if address else tile.image(self._alone(tile), words))
             for tile, words in zip(self.tiles, alternatives, strict=True)
         )
         return f'<figure style="margin:0;display:flex;flex-wrap:wrap;max-width:{FLOW_WIDTH}">{images}</figure>'
 
     def _alone(self, tile: Tile) -> str:
-        """A tile as the address of an SVG document; its words grow where it is shown small."""
-        sheet = f"<style>{page_style()}</style>"
-        data = b64encode(self._with_photographs(tile.document(sheet)).encode()).decode()
-        return f"data:image/svg+xml;base64,{data}"
+        """A tile as the address of its document."""
+        return f"data:image/svg+xml;base64,{b64encode(self.document(tile).encode()).decode()}"
+
+    def document(self, tile: Tile) -> str:
+        """A tile as an SVG document with style and photographs inside; its words grow where it is shown small."""
+        return self._with_photographs(tile.document(f"<style>{page_style()}</style>"))
 
     def save(self, path: str | Path, *, theme: str = "light", dpi: float = 192) -> None:
         """Write the picture to a file that ends in .svg, .png or .pdf.
@@ -180,4 +193,5 @@ def _encode(extension: str, image: np.ndarray, options: list[int]) -> bytes:
 
 
 def _mime(data: bytes) -> str:
-    return "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
+    kinds = {b"\x89PNG": "image/png", b"RIFF": "image/webp"}
+    return kinds.get(data[:4], "image/jpeg")

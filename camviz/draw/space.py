@@ -24,7 +24,27 @@ __all__ = [
 
 
 def space_panel(name: str, x: float, y: float, width: float, height: float) -> Panel:
-    """A panel whose coordinates are its own picture units, to be filled by `draw_space`."""
+    """A panel whose coordinates are its own picture units, to be filled by `draw_space`.
+
+    Parameters
+    ----------
+    name : str
+        Of the panel, within its picture.
+    x, y : float
+        Its upper left in picture units.
+    width, height : float
+        Its size in picture units.
+
+    Returns
+    -------
+    Panel
+        Empty.
+
+    Examples
+    --------
+    >>> space_panel("world", 10, 20, 300, 200).right
+    300
+    """
     return Panel(name, x, y, width, height, 0, width, 0, height)
 
 
@@ -38,11 +58,46 @@ def draw_space(
     frame: RigidTransform | None = None,
     scenery: tuple[Item, ...] = (),
 ) -> tuple[str, dict[str, bytes]]:
-    """The content of a panel, and the photographs it needs: the `scenery`, of `scene_items`, and the items in it.
+    """The content of a panel, and the photographs it needs.
 
-    `renderer` is "solid" or "wire"; left out, it is solid wherever OpenGL works, unless the environment variable
-    CAMVIZ_RENDERER says "wire". Both show the same points at the same places. `frame` is world_from_frame where the eye
-    stands in another frame than the world's. Raises ValueError for another renderer.
+    Solid and wireframe pictures show the same points at the same places. Unless `renderer` says which, it is solid
+    wherever OpenGL works and the environment variable CAMVIZ_RENDERER does not say "wire".
+
+    Parameters
+    ----------
+    panel : Panel
+        Of `space_panel`.
+    items : sequence of Item
+        What is drawn.
+    eye : OrbitCamera
+        From where.
+    draft : bool, optional
+        Quickly, while something is dragged.
+    renderer : {"solid", "wire"}, optional
+        How.
+    frame : RigidTransform, optional
+        world_from_frame, where the eye stands in another frame than the world's.
+    scenery : tuple of Item, optional
+        Of `scene_items`.
+
+    Returns
+    -------
+    content : str
+        SVG.
+    photographs : dict of str to bytes
+        Pictures that it shows, by name.
+
+    Raises
+    ------
+    ValueError
+        For another renderer.
+
+    Examples
+    --------
+    >>> eye = OrbitCamera(distance=4, yaw_deg=0, pitch_deg=0)
+    >>> svg, _ = draw_space(space_panel("", 0, 0, 200, 100), [Line([(0, 0, 0), (1, 0, 0)])], eye, renderer="wire")
+    >>> svg.split('"')[1]  # 1 m, 4 m away: 50 / tan(35°/2) / 4
+    'M100,50L139.6,50'
     """
     viewport = _viewport(eye, round(panel.width), round(panel.height))
     if frame is not None:
@@ -61,11 +116,36 @@ def _viewport(eye: OrbitCamera, width: int, height: int) -> Viewport:
 
 @lru_cache(maxsize=4)
 def scene_items(make: Callable[[], Scene], renderer: str) -> tuple[Item, ...]:
-    """The scene that `make` makes, as "solid" shows it, its textured surfaces, or "wire", its outlines, lightly filled.
+    """The items of a scene: its textured surfaces, or its outlines, lightly filled.
 
     The lawn and what stands far off on it are left out: seen from outside, a scene is a model on a table. The items are
     kept and the scene, which is far larger, is not.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the Scene.
+    renderer : {"solid", "wire"}
+        What shows it.
+
+    Returns
+    -------
+    tuple of Item
+        For `draw_space`.
+
+    Raises
+    ------
+    ValueError
+        For another renderer.
+
+    Examples
+    --------
+    >>> from camviz.scenes import textured_scene
+    >>> {type(item).__name__ for item in scene_items(textured_scene, "solid")}
+    {'TexturedMesh'}
     """
+    if renderer not in ("solid", "wire"):
+        raise ValueError(f"renderer must be 'solid' or 'wire', got {renderer!r}")
     scene = make()
     meshes = [mesh for mesh in scene.faces() if _near(mesh.name, mesh.vertices)]
     if renderer == "solid":
@@ -97,9 +177,31 @@ def _near(name: str, points: Array) -> bool:
 
 
 def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
-    """ "solid" or "wire": what was asked for, as far as this machine can do it.
+    """Which renderer is used: the one that was asked for, as far as this machine can do it.
 
     Where nobody asked, a draft is a wireframe once solid pictures have proved too slow to be dragged.
+
+    Parameters
+    ----------
+    renderer : {"solid", "wire"}, optional
+        What is asked for; unless given, what the environment variable CAMVIZ_RENDERER says.
+    draft : bool, optional
+        Quickly, while something is dragged.
+
+    Returns
+    -------
+    str
+        "solid" or "wire".
+
+    Raises
+    ------
+    ValueError
+        For another renderer.
+
+    Examples
+    --------
+    >>> chosen_renderer("wire")
+    'wire'
     """
     asked = renderer or os.environ.get("CAMVIZ_RENDERER") or ""
     if asked not in ("solid", "wire", ""):

@@ -33,6 +33,7 @@ from camviz.views.base import Drawn, OrbitView, answered, choice, slider, switch
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
+_SAMPLES = {True: 25, False: 65}  # of a line of the grid and a side of the contours' grid: in drafts, in fine pictures
 _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
 _BRIGHT = "stroke:#f2c94c"  # on a photograph, in every theme
 _TILES = {  # of the panels
@@ -237,7 +238,7 @@ class DistortionView(OrbitView):
 
     def _picture_panel(self, cell: Cell, *, draft: bool) -> Drawn:
         panel = self._image_panel("picture", cell)
-        straight = _grid_lines(self.intrinsics, 33 if draft else 65)
+        straight = _grid_lines(self.intrinsics, _SAMPLES[draft])
         lines = self._bend(straight) if self.show == "distorted" else straight
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "thin", style=_BRIGHT)
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
@@ -259,11 +260,11 @@ class DistortionView(OrbitView):
     def _your_panel(self, cell: Cell, *, draft: bool) -> Drawn:
         """The same picture by the reader's function: its grid over the photograph, or the photograph straightened."""
         panel = self._image_panel("yours", cell)
-        lines, problem = self._your_bend(_grid_lines(self.intrinsics, 33 if draft else 65))
+        lines, problem = self._your_bend(_grid_lines(self.intrinsics, _SAMPLES[draft]))
         if problem:
             return without(panel, problem, "With your function"), {}
         straight = self.show == "undistorted"
-        right = _grid_lines(self.intrinsics, 33 if draft else 65)
+        right = _grid_lines(self.intrinsics, _SAMPLES[draft])
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(right if straight else lines)), "orange thin")
         title = "Straightened by your function" if straight else "The same, bent by your function"
         return panel.show(self._photograph(panel, "yours") + drawn, title=title), {"yours": self._your_picture(draft)}
@@ -296,9 +297,9 @@ class DistortionView(OrbitView):
         ends = self._distorted(starts)
         arrows = svg.segments(panel.place(starts), panel.place(ends), "blue") + svg.dots(panel.place(ends), "blue", 4.5)
         content = (
-            self._folded_area(panel)
+            self._folded_area(panel, 49 if draft else 97)
             + arrows
-            + self._contours(panel, 33 if draft else 65)
+            + self._contours(panel, _SAMPLES[draft])
             + self._fold_circle(panel, bent=False)
         )
         return panel.show(content, title="Each point goes to its dot", note="contours: px"), {}
@@ -314,8 +315,8 @@ class DistortionView(OrbitView):
         ]
         return svg.path([line for drawn in lines.values() for line in drawn], "muted thin") + "".join(names)
 
-    def _folded_area(self, panel: Panel) -> str:
-        uv = _pixel_grid(self.intrinsics, 97)
+    def _folded_area(self, panel: Panel, samples: int) -> str:
+        uv = _pixel_grid(self.intrinsics, samples)
         xy = self.intrinsics.from_pixels(uv)
         folded = ~np.isfinite(self.camera.lens.project(on_plane(xy))[..., 0])
         outlines = contour_generator(uv[..., 0], uv[..., 1], folded.astype(float)).filled(0.5, 1.5)
@@ -325,14 +326,16 @@ class DistortionView(OrbitView):
 
     def _curve_with_axes(self, cell: Cell, *, draft: bool) -> Drawn:
         x, y, width, height = cell
-        return self.curve_panel(x + 62, y + 34, width - 76, height - 84), {}
+        return self.curve_panel(x + 62, y + 34, width - 76, height - 84, samples=81 if draft else 241), {}
 
-    def curve_panel(self, x: float, y: float, width: float, height: float, *, equation: bool = True) -> str:
+    def curve_panel(
+        self, x: float, y: float, width: float, height: float, *, equation: bool = True, samples: int = 241
+    ) -> str:
         """The radial curve g(r), where it folds and where the picture ends; `x` and `y` are its plot's corner."""
         corner = distortion.image_corner_radius(self.intrinsics) or 1.0  # a single pixel on the axis has none
         top = 1.5 * corner
         panel = plot.plot_panel("curve", x, y, width, height, (0, top), (0, 1.2 * corner))
-        r = np.linspace(0, top, 241)
+        r = np.linspace(0, top, samples)
         fold = self._fold
         curve, beyond = self._radial(np.where(r <= fold, r, np.nan)), self._radial(np.where(r >= fold, r, np.nan))
         lines = (

@@ -16,7 +16,7 @@ from camviz import twoview
 from camviz.cameras import Camera, transform
 from camviz.course.yours import tried
 from camviz.draw import svg
-from camviz.draw.flow import rows
+from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -33,8 +33,9 @@ _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point
 _PATCH = 48  # pixels on a side of the details that are compared
 _PLANES = 40  # epipolar planes in a full turn around the baseline
 _WIDTH, _TALLEST = 460, 345
-_LAYOUT = rows(
-    (388, {"left picture": 480, "right picture": 480}), (236, {"space": 500, "numbers": 280, "details": 180})
+_LAYOUT = shortened(
+    rows((388, {"left picture": 480, "right picture": 480}), (236, {"space": 500, "numbers": 280, "details": 180})),
+    details=116,
 )
 _PANELS = {"space", "match", "epipoles", "F"}
 

@@ -81,13 +81,16 @@ def ceiling(values: Array) -> float:
 
 
 def figures_on(panel: Panel, values: Array) -> str:
-    """Every value (views,) where its bar ends, where there is room for it; a bar that is cut has a break below it."""
+    """Every value (views,) where its bar ends, where there is room for it; a bar that is cut has a break below it.
+
+    A line behind a figure is interrupted by it.
+    """
     places_of = panel.place(np.stack([np.arange(len(values)) + 1, values], axis=-1))
     width = 0.9 * panel.width / (panel.right - panel.left)
     zigzag = np.stack([np.linspace(-width / 2, width / 2, 7), 22 + 4.0 * (-1) ** np.arange(7)], axis=-1)
     breaks = [zigzag + (x, 0) for (x, _), value in zip(places_of, values, strict=True) if value > panel.top]
     figures = [
-        svg.text((x, max(y - 4, 12)), f"{value:.2f}", "tick middle halo")
+        svg.text((x, max(y - 4, 12)), f"{value:.2f}", "tick middle halo clear")
         for (x, y), value in zip(places_of, values, strict=True)
     ]
     return svg.path(breaks, "paper-line cut") + "".join(figures if len(values) <= NAMED else ())

@@ -41,7 +41,7 @@ def short_names(pictures: Sequence[str], views: int) -> tuple[str, ...]:
 def not_at_hand(panel: Panel) -> str:
     """What stands in a panel for want of its photograph: how to have it."""
     words = "The picture is not at hand; name its folder: --images FOLDER, or in a notebook explore(images=FOLDER)."
-    return svg.paragraph((8, panel.height - 60), words, panel.width - 16, "note halo")
+    return svg.paragraph((8, panel.height - 60), words, panel.width - 16, "note halo clear")
 
 
 def no_photographs(view: int) -> None:
