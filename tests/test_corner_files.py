@@ -1,12 +1,14 @@
 """Corners that other programs found are read as they are, or refused in one sentence that names file and line."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from runpy import run_path
 
 import cv2
 import numpy as np
 import pytest
+from commandline import refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_calibrate_command import main_captured
@@ -14,12 +16,13 @@ from test_files import sample
 from test_files_fuzzed import overwritten, reworded
 
 import camviz
-from camviz.calibration import Board, calibrate, detect
+from camviz.calibration import Board, calibrate, calibrate_pair, detect
 from camviz.calibration.boards.charuco import FEWEST
-from camviz.clinic.virtual import detections, single
+from camviz.clinic.virtual import detections, pair, single
 from camviz.commands.command import main
 from camviz.files import CalibrationError
 from camviz.files.corners import corner_formats, load_corners
+from camviz.files.writing import write
 
 PAGE = Path(__file__).parents[1] / "docs" / "formats.md"
 GIVEN = {"shape": (4, 3), "square_size": 0.04, "size": (640, 480)}  # what the examples show
@@ -154,6 +157,80 @@ def test_corners_that_were_not_seen_are_left_out_and_the_camera_is_the_same(virt
     solved = calibrate(read.detections, set_up.board, fixed=("k3",))
     sigma = np.sqrt(np.diag(solved.intrinsics_covariance["camera"]))[0]
     assert abs(solved.cameras["camera"].intrinsics.fx - set_up.camera.intrinsics.fx) < 4 * sigma
+
+
+@pytest.fixture(scope="module")
+def two():
+    """A virtual pair, and the corners of both cameras with noise."""
+    rng = np.random.default_rng(7)
+    set_up = pair(rng, views=8)
+    return set_up, set_up.observed(rng)
+
+
+@pytest.fixture
+def one_thread():
+    """OpenCV adds up in one order, and not in that of its threads."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    yield
+    cv2.setNumThreads(threads)
+
+
+def pair_words(set_up, left="left.vnl", right="right.vnl"):
+    board, grid = set_up.board, set_up.camera.intrinsics
+    words = f"calibrate --corners {left} --right {right} --board {board.columns}x{board.rows} "
+    return [*words.split(), "--square-mm", repr(1000 * board.square_size), "--size", f"{grid.width}x{grid.height}"]
+
+
+def test_a_pair_is_solved_from_two_files_as_from_the_same_corners(two, room, capsys, one_thread):
+    """To the last digit. The right file has its views in another order, one too few, and one of no partner's number."""
+    set_up, (left, right) = two
+    shuffled = [6, 2, 0, 7, 3, 5, 1]  # without view 4
+    written(room, {"left.vnl": vnl([f"left{view:02}.png" for view in range(8)], left)})
+    written(
+        room,
+        {"right.vnl": vnl([*(f"right{view}.png" for view in shuffled), "right9.png"], [*right[shuffled], right[4]])},
+    )
+    assert main(pair_words(set_up)) == 0
+    out = capsys.readouterr().out
+    assert "left04.png: skipped, it has no partner among the pictures of the right camera." in out
+    assert "right9.png: skipped, it has no partner among the pictures of the left camera." in out
+    ours, kept = camviz.load("camera.yaml"), [0, 1, 2, 3, 5, 6, 7]
+    both = zip(set_up.cameras, (left, right), strict=True)
+    seen = [detections(camera, np.ascontiguousarray(each[kept])) for camera, each in both]
+    solved = calibrate_pair(*seen, replace(set_up.board, square_size=1000 * set_up.board.square_size / 1000))
+    write(solved, room / "theirs.yaml", "opencv")
+    theirs = camviz.load("theirs.yaml")
+    for name in ("left", "right"):
+        np.testing.assert_array_equal(ours.cameras[name].intrinsics.K, theirs.cameras[name].intrinsics.K)
+        assert ours.cameras[name].lens == theirs.cameras[name].lens
+        np.testing.assert_array_equal(ours.detections[name], theirs.detections[name])
+    np.testing.assert_array_equal(ours.cameras["right"].centre, theirs.cameras["right"].centre)
+    assert ours.pictures["right"] == tuple(f"right{view}.png" for view in kept)
+
+
+def test_views_whose_names_do_not_tell_their_partners_are_refused(two, room, capsys):
+    """There are as many of one camera as of the other; pictures would be paired by their order, corners are not."""
+    set_up, (left, right) = two
+    letters = "abcdefgh"
+    written(room, {"left.vnl": vnl([f"{each}.png" for each in letters], left)})
+    written(room, {"right.vnl": vnl([f"r{each}.png" for each in letters], right)})
+    assert "their names do not tell the pairs" in refused(capsys, room, *pair_words(set_up))
+
+
+def test_two_files_of_other_boards_are_no_pair(room, capsys):
+    for folder, side in (("one", b"40"), ("two", b"50")):
+        (room / folder).mkdir()
+        example = corner_formats()["babelcalib"].example
+        scale = int(side) / 40
+        lines = example["board.dsc"].decode().splitlines()
+        board = [lines[0].replace("40", side.decode()), lines[1]]
+        for line in lines[2:]:
+            tag, column, row, *place = line.split(",")
+            board.append(",".join([tag, column, row, *(f"{scale * float(each):g}" for each in place)]))
+        written(room / folder, {**example, "board.dsc": "\n".join(board)})
+    said = refused(capsys, room, "calibrate", "--corners", "one", "--right", "two")
+    assert "two: expected the board of one (4×3 inner corners, 40 mm apart), got 4×3 inner corners, 50 mm apart" in said
 
 
 def test_the_photographs_and_their_corners_in_a_file_give_the_same_camera(room, capsys):
@@ -296,7 +373,7 @@ def test_a_board_counted_otherwise_is_refused_with_the_right_one(virtual, tmp_pa
     ("words", "said"),
     [
         ([], "the following arguments are required: IMAGES, --board, --square-mm"),
-        (["--corners", "corners.vnl", "--right", "b.vnl"], "--corners is for one camera"),
+        (["--corners", "view0.orpc", "board.dsc", "--right", "b.vnl"], "b.vnl: there is no such file"),
         (["a.png", "--board", "9x6", "--square-mm", "25", "--size", "9x9"], "--size is for --corners"),
         (["--corners", "gone.vnl"], "gone.vnl: there is no such file"),
         (["--corners", "empty"], "there are no .orpc or .dsc files in this folder"),

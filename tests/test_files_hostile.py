@@ -459,6 +459,8 @@ def test_a_literals_long_strings_are_passed_over(tmp_path):
 
 def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):
     assert "\x1b" not in refusal(tmp_path, 'distortion_model: "\\e[31m\\n\\n red"\nK: [1]\nwidth: 1\nheight: 1')
+    (tmp_path / "cameras.txt").write_text("1 PIN\x04HOLE 640 480 500 510 320 240\n")
+    assert r"camera model 'PIN\x04HOLE'" in complaint(tmp_path / "cameras.txt")
 
 
 @pytest.mark.parametrize(

@@ -273,7 +273,7 @@ def test_metashapes_cameras_stand_where_their_transforms_put_them():
 @pytest.mark.parametrize(
     ("name", "old", "new", "what"),
     [
-        ("colmap/cameras.txt", "PINHOLE 640 480", "SIMPLE_DIVISION 640 480", "camera model SIMPLE_DIVISION"),
+        ("colmap/cameras.txt", "PINHOLE 640 480", "SIMPLE_DIVISION 640 480", "camera model 'SIMPLE_DIVISION'"),
         ("colmap/cameras.txt", "7 PINHOLE 640 480 500 510 320 240", "7 PINHOLE 640 480 5", r"line 6.params: expected"),
         ("colmap/cameras.txt", "3 OPENCV", "1 OPENCV", "line 5: the camera 1 appears twice"),
         ("colmap/images.txt", "2 1 0 0 0 0.5", "2 1 1 0 0 0.5", "quaternion of length 1, got length 1.41"),

@@ -447,6 +447,84 @@ def test_an_ini_tells_the_baseline_as_ost_does(tmp_path):
     assert "pair, 0.12 m to the right" in camviz.load(path).notes[0]
 
 
+def qtm(world, numbers):
+    """Qualisys: r (x - C) has y up and looks along -z; lengths on the sensor are 1/64 px; then the window's corner."""
+    r, C, lengths, D, corner = numbers
+    X, Y, Z = ((world * 1000 - C) @ np.reshape(r, (3, 3)).T * [1, -1, -1]).T
+    fu, fv, cu, cv, skew = lengths
+    x, y = bent(X / Z, Y / Z, *D)
+    return np.stack([(fu * x + skew * y + cu) / 64, (fv * y + cv) / 64], axis=-1) - corner
+
+
+def test_qualisys_lengths_are_64ths_of_a_pixel_in_the_window_of_the_sensor(tmp_path):
+    calibration = camviz.load(sample("qualisys", tmp_path))
+    (camera,) = calibration.cameras.values()
+    r, C = (0.8, 0.6, 0, -0.36, 0.48, 0.8, 0.48, -0.64, 0.6), np.array([1500, -2000, 1750])
+    lengths, D = (107584, 107592, 60848, 34176, 16), (-0.046, 0.14, 0.0006, -0.0004, 0.003)
+    world = transform(camera.world_from_cam, POINTS)
+    np.testing.assert_allclose(camera.project(world), qtm(world, (r, C, lengths, D, [64, 32])), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(camera.centre, C / 1000, rtol=0, atol=1e-12)
+    assert (camera.intrinsics.width, camera.intrinsics.height) == (1792, 1024)
+    assert any("21002 was not calibrated" in note for note in calibration.notes)
+
+
+def test_qualisys_without_a_window_has_the_whole_sensor(tmp_path):
+    path = sample("qualisys", tmp_path)
+    window = '<fov_video left="64" top="32" right="1855" bottom="1055"/>'
+    (camera,) = camviz.load(written(path, path.read_text().replace(window, ""))).cameras.values()
+    assert (camera.intrinsics.width, camera.intrinsics.height) == (1920, 1088)
+    assert camera.intrinsics.cx == pytest.approx(60848 / 64, abs=1e-12)
+
+
+def test_a_qualisys_camera_on_its_side_is_said(tmp_path):
+    path = sample("qualisys", tmp_path)
+    text = path.read_text().replace('viewrotation="0">', 'viewrotation="90">')
+    assert any("viewrotation 90" in note for note in camviz.load(written(path, text)).notes)
+
+
+def test_theias_calibration_is_no_qualisys_though_its_elements_have_the_same_names(tmp_path):
+    """Theia writes pixels and p_cam = R p + t: read as 1/64 px, its cameras would see nothing but a point."""
+    path = sample("qualisys", tmp_path)
+    text = path.read_text().replace('sensorMaxU="122879.0"', 'sensorMaxU="7680"')
+    with pytest.raises(CalibrationError, match=r"sensorMaxU: expected 1/64 px.*Theia.* got 7680"):
+        camviz.load(written(path, text))
+
+
+def test_a_semicolon_begins_a_remark_in_an_ini(tmp_path):
+    """As camera_calibration_parsers of ROS has it in its own test."""
+    path = sample("ost", tmp_path)
+    remarked = written(tmp_path / "a.ini", path.read_text().replace("height\n", "; comment\nheight\n"))
+    assert same_camera(*(camviz.load(each).cameras["narrow_stereo"] for each in (path, remarked)), 0)
+
+
+def test_intrinsics_that_librealsenses_examples_save_have_no_coefficients(tmp_path):
+    numbers = {"fx": 610.0, "fy": 608.75, "ppx": 318.5, "ppy": 247.5, "height": 480, "width": 640, "depth_scale": 0.001}
+    calibration = camviz.load(written(tmp_path / "a.json", json.dumps(numbers)))
+    check(calibration.cameras["camera"], radtan(POINTS, 610, 608.75, 318.5, 247.5))
+    assert calibration.notes == ("The file holds no coeffs of camera: it is read without distortion.",)
+
+
+def test_easymocaps_cameras_of_which_extri_does_not_tell_are_left_out(tmp_path):
+    first = formats()["easymocap"].example.decode()
+    names, rest = first.split('  - "01"\n')
+    both = f'{names}  - "00"\n  - "01"\n{rest}{rest.replace("_01", "_00")}'
+    written(tmp_path / "intri.yml", both)
+    written(tmp_path / "extri.yml", EXTRINSICS)
+    calibration = camviz.load(tmp_path / "intri.yml")
+    assert list(calibration.cameras) == ["01"]
+    assert calibration.notes == ("extri.yml does not say where 00 stood: left out.",)
+
+
+def test_bf_of_a_camera_with_depth_is_no_second_picture(tmp_path):
+    """ORB-SLAM2's TUM1.yaml: Camera.bf is fx times the projector's distance, and the picture is not rectified."""
+    text = (
+        "%YAML:1.0\nCamera.fx: 517.25\nCamera.fy: 516.5\nCamera.cx: 318.75\nCamera.cy: 255.25\nCamera.k1: 0.25\n"
+        "Camera.width: 640\nCamera.height: 480\nCamera.bf: 40.0\n"
+    )
+    assert "rectified" in camviz.load(written(tmp_path / "a.yaml", text)).notes[0]
+    assert camviz.load(written(tmp_path / "b.yaml", f"{text}DepthMapFactor: 5000.0\n")).notes == ()
+
+
 REALSENSE = {
     "brown_conrady": (radtan, [0.125, -0.25, 0.001, -0.002, 0.0625]),
     "kannala_brandt4": (kannala_brandt, [0.125, -0.25, 0.001, -0.002, 0.0]),

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format
@@ -13,11 +11,10 @@ from camviz.files.models import Model
 from camviz.files.section import Section, agreed_size
 from camviz.files.trees import MAX_KEYS, scalar
 from camviz.lenses import BrownConrady
-from camviz.poses import RigidTransform, Rotation
+from camviz.poses import OPENGL, RigidTransform, Rotation
 
 TITLE = "BAL problem"
 MODEL = Model("BAL", BrownConrady, "f cx cy k1 k2")
-OPENGL = RigidTransform.from_rotation(Rotation.from_matrix(np.diag([1.0, -1, -1])))  # y up, z backward
 _START = re.compile(
     r"[ \t]*[0-9]{1,9}[ \t]+[0-9]{1,9}[ \t]+[0-9]{1,9}[ \t]*\r?\n[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+[-+.0-9]"
 )

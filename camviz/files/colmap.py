@@ -81,7 +81,7 @@ def _within(file: File, path: Path) -> AbstractContextManager[None]:
 def unknown_model(name: str) -> CalibrationError:
     """The error for a camera model of COLMAP's that has no lens here."""
     known = ", ".join(model.name for model in MODELS.values())
-    return CalibrationError(f"there is no lens here for the camera model {name}; there is for {known}")
+    return CalibrationError(f"there is no lens here for the camera model {shown(name)}; there is for {known}")
 
 
 def _cameras(path: Path) -> Cameras:

@@ -40,13 +40,18 @@ def read(file: File) -> Calibration:
                 raise intrinsics.error("names", "different names", f"{shown(name)} twice")
             cameras[name] = _camera(intrinsics, name, file.size)
     other = _beside(file, EXTRINSICS, "T")
-    if not is_easymocap(other) or f"T_{names[0]}" not in other.section:
-        note = f"There is no {EXTRINSICS} beside {INTRINSICS}: the cameras are drawn at the origin."
+    known = [name for name in names if is_easymocap(other) and f"T_{name}" in other.section]
+    if not known:
+        note = f"There is no {EXTRINSICS} of these cameras beside {INTRINSICS}: they are drawn at the origin."
         return Calibration(cameras, file.path, TITLE, notes=(note,))
     with named(EXTRINSICS):
-        placed = {name: camera.at(_pose(other.section, name).inv()) for name, camera in cameras.items()}
-        redundant = tuple(each for name in placed for each in _redundant(other.section, name))
-    return Calibration(placed, file.path, TITLE, redundant=redundant)
+        placed = {name: cameras[name].at(_pose(other.section, name).inv()) for name in known}
+        redundant = tuple(each for name in known for each in _redundant(other.section, name))
+    notes: tuple[str, ...] = ()
+    if lost := [name for name in names if name not in placed]:
+        more = f" and {len(lost) - 4} more" * (len(lost) > 4)
+        notes = (f"{EXTRINSICS} does not say where {', '.join(lost[:4])}{more} stood: left out.",)
+    return Calibration(placed, file.path, TITLE, notes=notes, redundant=redundant)
 
 
 def _beside(file: File, name: str, key: str) -> File:

@@ -28,10 +28,25 @@ _KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}
 
 @dataclass(frozen=True)
 class File:
-    """A file or folder that is to be read, and what the caller said of it. Its content is read once, when asked for.
+    """A file or folder that is to be read, and what the caller said of it.
 
-    `size` is (width, height) in pixels, for files that hold none. `mended` is the list of the faults that were cured in
-    reading; where it is None, a fault is an error.
+    Its content is read once, when asked for.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is.
+    size : tuple of int, optional
+        Width and height in pixels, for files that hold none.
+    mended : list of CalibrationError, optional
+        Takes the faults that were cured in reading. Without it a fault is an error.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("camera.yaml").write_text("image_width: 640")
+    >>> File(Path("camera.yaml")).section.number("image_width")
+    640.0
     """
 
     path: Path
@@ -54,7 +69,23 @@ class File:
         return self.mapping(parse(self.text))
 
     def mapping(self, tree: Any) -> Section:
-        """A tree that was read from this file; CalibrationError where it is no mapping."""
+        """A tree that was read from this file, as a section.
+
+        Parameters
+        ----------
+        tree : Any
+            What a parser gave.
+
+        Returns
+        -------
+        Section
+            Its keys.
+
+        Raises
+        ------
+        CalibrationError
+            Where it is no mapping.
+        """
         if not isinstance(tree, dict):
             what = _KINDS.get(type(tree)) or shown(tree)
             raise CalibrationError(f"expected a calibration, this is {what} (`camviz show --help` lists what is read)")
@@ -66,22 +97,59 @@ class Format:
     """One program's calibration file. A module of `camviz.files` that has one as FORMAT adds it everywhere.
 
     `load` and `write`, the help of the commands, the table in docs/formats.md and the tests read these fields.
+
+    Parameters
+    ----------
+    name : str
+        One word, which `camviz convert --to` takes.
+    title : str
+        The program, or its file, as sentences name it: "ROS CameraInfo".
+    file : str
+        What such a file is usually called: "camera.yaml".
+    recognise : callable
+        True for a File of this format; may raise CalibrationError.
+    read : callable
+        From a File to a Calibration; raises CalibrationError for what it cannot take.
+    write : callable, optional
+        From a Calibration to the content; none where the format is only read.
+    endings : tuple of str, optional
+        Where these choose between forms, `write` takes the ending as its second argument.
+    most_cameras : int, optional
+        How many cameras such a file holds at most.
+    own_world : bool, optional
+        Whether the first camera may stand elsewhere than in the world's origin.
+    models : str, optional
+        The camera models it has.
+    says : str, optional
+        Its own conventions, in which it differs from ours.
+    lacks : str, optional
+        What beside `most_cameras` and `own_world` it has no place for.
+    example : bytes, optional
+        A small file, where `write` cannot make one.
+    rank : int, optional
+        Lower ranks are asked first: below 20 by name or first bytes, below 40 by text, then by keys.
+
+    Examples
+    --------
+    >>> from camviz.files import formats
+    >>> formats()["kitti"].title, formats()["kitti"].lacks
+    ('KITTI calib.txt', 'turned cameras, distortion, sizes that differ')
     """
 
-    name: str  # one word, which `camviz convert --to` takes
-    title: str  # the program, or its file, as sentences name it: "ROS CameraInfo"
-    file: str  # what such a file is usually called: "camera.yaml"
-    recognise: Callable[[File], object]  # true for a file of this format; may raise CalibrationError
-    read: Callable[[File], Calibration]  # raises CalibrationError for what it cannot take
-    write: Callable[..., Content] | None = None  # from a Calibration; None where the format is only read
-    endings: tuple[str, ...] = ()  # where these choose between forms, `write` takes the ending as its second argument
-    most_cameras: int | None = None  # how many cameras such a file holds at most
-    own_world: bool = False  # whether the first camera may stand elsewhere than in the world's origin
-    models: str = ""  # the camera models it has
-    says: str = ""  # its own conventions, in which it differs from ours
-    lacks: str = ""  # what beside most_cameras and own_world it has no place for
-    example: bytes = b""  # a small file, where `write` cannot make one
-    rank: int = 50  # lower ranks are asked first: below 20 by name or first bytes, below 40 by text, then by keys
+    name: str
+    title: str
+    file: str
+    recognise: Callable[[File], object]
+    read: Callable[[File], Calibration]
+    write: Callable[..., Content] | None = None
+    endings: tuple[str, ...] = ()
+    most_cameras: int | None = None
+    own_world: bool = False
+    models: str = ""
+    says: str = ""
+    lacks: str = ""
+    example: bytes = b""
+    rank: int = 50
 
     @property
     def holds(self) -> str:
@@ -90,7 +158,25 @@ class Format:
         return counts.get(self.most_cameras, f"at most {self.most_cameras} cameras")
 
     def content(self, calibration: Calibration, ending: str) -> Content:
-        """What is written of a calibration; CalibrationError saying what the format has no place for."""
+        """What is written of a calibration.
+
+        Parameters
+        ----------
+        calibration : Calibration
+            What to write.
+        ending : str
+            Of the file, such as ".yaml".
+
+        Returns
+        -------
+        bytes or dict of str to bytes
+            Of a file, or of the files of a folder by name.
+
+        Raises
+        ------
+        CalibrationError
+            For what the format has no place for, and where it is only read.
+        """
         if self.write is None:
             raise CalibrationError(f"{self.title} is read here, and not written")
         return self.write(calibration, ending) if self.endings else self.write(calibration)

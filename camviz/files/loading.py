@@ -18,12 +18,37 @@ ANY_SIZE = (640, 480)  # to see whether anything but the size is wrong with a fi
 
 
 def load(path: str | PathLike[str], *, size: Size | None = None, mend: bool = False) -> Calibration:
-    """Read a calibration of one of the formats that docs/formats.md lists; its content tells which.
+    r"""Read a calibration of one of the formats that docs/formats.md lists; its content tells which.
 
-    A COLMAP model may be named by its folder. `size` is (width, height) in pixels, for files that do not hold it. With
-    `mend` a fault that has an obvious cure, such as a transposed K, is cured, and listed in the calibration's
-    `faults`. Raises CalibrationError, a ValueError whose message is one sentence, for everything that is not such a
-    calibration. The file is data: nothing in it is run.
+    The file is data: nothing in it is run.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The file. A COLMAP model may be named by its folder.
+    size : tuple of int, optional
+        Width and height in pixels, for files that do not hold them.
+    mend : bool, optional
+        Cure faults that have an obvious cure, such as a transposed K, and list them in `Calibration.faults`.
+
+    Returns
+    -------
+    Calibration
+        The cameras in place, and what else the file holds.
+
+    Raises
+    ------
+    CalibrationError
+        For everything that is not such a calibration. It is a ValueError, and its message is one sentence.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> rows = "P0: 700 0 600 0 0 700 180 0 0 0 1 0", "P1: 700 0 600 -350 0 700 180 0 0 0 1 0"
+    >>> _ = Path("calib.txt").write_text("\n".join(rows))
+    >>> pair = load("calib.txt", size=(1242, 375))
+    >>> f"{pair.format}: {', '.join(pair.cameras)}, {pair.cameras['P1'].centre[0]} m apart"  # 350/700
+    'KITTI calib.txt: P0, P1, 0.5 m apart'
     """
     file = File(Path(path), None if size is None else _checked_size(size), [] if mend else None)
     refuse_no_file(file.path)
@@ -33,7 +58,30 @@ def load(path: str | PathLike[str], *, size: Size | None = None, mend: bool = Fa
 
 
 def format_of(file: File) -> Format:
-    """The format of a file or folder; CalibrationError saying what it looks like where none knows it."""
+    """The format of a file or folder.
+
+    Parameters
+    ----------
+    file : File
+        What is to be read.
+
+    Returns
+    -------
+    Format
+        The first one that recognises it.
+
+    Raises
+    ------
+    CalibrationError
+        Where none knows it: it says what the file looks like.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("calib.txt").write_text("P0: 700 0 600 0 0 700 180 0 0 0 1 0")
+    >>> format_of(File(Path("calib.txt"))).name
+    'kitti'
+    """
     try:
         for format in sorted(formats().values(), key=lambda format: format.rank):
             if format.recognise(file):

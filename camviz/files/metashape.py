@@ -13,7 +13,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.files.format import File, Format
 from camviz.files.models import expressed, models_of
 from camviz.files.section import Section, Size, agreed_size
-from camviz.files.trees import Repeated, shown
+from camviz.files.trees import shown
 
 MODELS = models_of("metashape")
 TYPES = {"frame": 0, "fisheye": 1, "equidistant_fisheye": 1, "spherical": 2, "cylindrical": 3}
@@ -31,7 +31,7 @@ def read(file: File) -> Calibration:
 
 
 def _read_document(chunk: Section, file: File) -> Calibration:
-    sensors = {str(sensor.get("id", "a number")): sensor for sensor in _each(chunk.section("sensors"), "sensor")}
+    sensors = {str(sensor.get("id", "a number")): sensor for sensor in chunk.section("sensors").repeated("sensor")}
     shared: dict[str, Camera] = {}
     cameras: dict[str, Camera] = {}
     lost = 0
@@ -52,24 +52,15 @@ def _read_document(chunk: Section, file: File) -> Calibration:
     return Calibration(cameras, file.path, "Metashape cameras", notes=tuple(notes))
 
 
-def _each(section: Section, name: str) -> list[Section]:
-    """The elements of a name inside another, however many there are."""
-    held = section.values.get(name)
-    parts = held if isinstance(held, Repeated) else [] if held is None else [held]
-    if not all(isinstance(value, dict) for value in parts):
-        raise section.error(name, "elements with attributes", shown(held))
-    return [section.part(value, section.where(f"{name}[{index}]")) for index, value in enumerate(parts)]
-
-
 def _cameras(section: Section) -> Iterator[Section]:
     """Those of a list, and those in its groups."""
-    yield from _each(section, "camera")
-    for group in _each(section, "group"):
+    yield from section.repeated("camera")
+    for group in section.repeated("group"):
         yield from _cameras(group)
 
 
 def _sensor(sensor: Section, size: Size | None) -> Camera:
-    found = _each(sensor, "calibration")
+    found = sensor.repeated("calibration")
     adjusted = [part for part in found if part.values.get("class") == "adjusted"] or found
     if not adjusted:
         raise sensor.error("calibration", "a calibration", "none")

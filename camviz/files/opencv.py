@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
 from camviz.calibration.denominator_prior import DenominatorPrior
+from camviz.calibration.stamp import LONGEST, Stamp
 from camviz.calibration.types import Board, Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format
@@ -28,6 +30,10 @@ OF_A_PAIR = {"E": "e|essential(matrix)?", "F": "f|fundamental(matrix)?", "Q": "q
 EXTRINSICS, ERRORS, DETECTIONS = "extrinsicparameters", "perviewreprojectionerrors", "imagepoints"
 PICTURES, ASIDE = "picturenames", "setaside"
 ESTIMATED, COVARIANCE, PRIOR = "estimatedparameters", "intrinsicscovariance", "denominatorprior"
+
+STAMP = "stamp"
+NUMBERS = ("focal_lengths", "focus_distances", "digital_zooms")
+SEVERAL = ("cameras", "lenses", "taken")
 
 PAIRS = ({"0", "1"}, {"1", "2"}, {"l", "r"}, {"left", "right"})
 FOUR_COEFFICIENTS = (
@@ -148,7 +154,8 @@ def _recorded(section: Section, tags: dict[str, str], notes: list[str]) -> dict[
     """All that a calibration holds beside its cameras, whose names have the tags of their keys."""
     by_name: dict[str, dict[str, Any]] = {}
     for name, tag in tags.items():
-        for field, value in (_views(section, tag) | _solution(section, tag)).items():
+        of_camera = _views(section, tag) | _solution(section, tag) | _stamp(section, tag)
+        for field, value in of_camera.items():
             by_name.setdefault(field, {})[name] = value
     warp = np.array(section.vector("board_warp", [2], "sagittas along x and y")) if "board_warp" in section else None
     if warp is not None:
@@ -236,6 +243,28 @@ def _solution(section: Section, tag: str) -> dict[str, Any]:
             raise section.error(key, "three positive numbers (reach, deviation, noise)", values)
         solution["priors"] = DenominatorPrior(*values)
     return solution
+
+
+def _stamp(section: Section, tag: str) -> dict[str, Any]:
+    """What `camviz calibrate` says of how and when the calibration was made; of other programs their time of it."""
+    key = _find(section, STAMP, tag)
+    if key is None:
+        time = section.values.get("calibration_time")
+        return {"stamps": Stamp(made=time[:LONGEST])} if isinstance(time, str) and time.isprintable() else {}
+    part, held = section.section(key), dict[str, Any]()
+    for each in fields(Stamp):
+        if each.name not in part:
+            continue
+        if each.name in NUMBERS:
+            held[each.name] = tuple(sorted(float(x) for x in part.array(each.name).ravel()))
+            if min(held[each.name], default=1.0) <= 0:
+                raise part.error(each.name, "positive numbers", f"{held[each.name][0]:g}")
+        elif each.name == "views":
+            held[each.name] = part.whole(each.name, 1_000_000)
+        else:
+            said = tuple(" ".join(word.split())[: 10 * LONGEST] for word in words(part, each.name))
+            held[each.name] = said if each.name in SEVERAL else " ".join(said)
+    return {"stamps": Stamp(**held)}
 
 
 def _mask(section: Section, key: str, detections: Any) -> Any:

@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from camviz.calibration.stamp import Stamp
 from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.models import expressed, models_of
@@ -16,6 +17,7 @@ from camviz.lenses import KannalaBrandt
 
 GUESSED = ("chessboard", "charuco")  # kinds of boards that the reader knows by their markers
 MODELS = models_of("opencv")
+NO_STAMP = Stamp()
 TITLE = "OpenCV FileStorage"
 
 
@@ -105,6 +107,8 @@ def _views(calibration: Calibration, name: str, tag: str) -> dict[str, Any]:
         values["image_points"] = np.ascontiguousarray(calibration.detections[name])
     if name in calibration.set_aside:
         values["set_aside"] = np.ascontiguousarray(calibration.set_aside[name], dtype=np.uint8)
+    if stamp := calibration.stamps.get(name, NO_STAMP).known():
+        values["stamp"] = stamp
     return {f"{key}{tag}": value for key, value in values.items()}
 
 
@@ -114,14 +118,27 @@ def _stored(values: dict[str, Any], ending: str) -> bytes:
     ending = ending if ending in (".xml", ".json") else ".yml"
     storage = cv2.FileStorage(f"calibration{ending}", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     for key, value in values.items():
-        if isinstance(value, list):
-            storage.startWriteStruct(key, cv2.FileNode_SEQ)
-            for word in value:
-                storage.write("", _escaped(word))
+        if isinstance(value, dict):
+            storage.startWriteStruct(key, cv2.FileNode_MAP)
+            for name, held in value.items():
+                _store(storage, name, _escaped(held) if isinstance(held, str) else held)
             storage.endWriteStruct()
         else:
-            storage.write(key, value)
+            _store(storage, key, value)
     return str(storage.releaseAndGetString()).encode()
+
+
+def _store(storage: Any, key: str, value: Any) -> None:
+    """A word, a number or a matrix, or a list of numbers or words, of which only those of a list are escaped here."""
+    import cv2
+
+    if isinstance(value, list):
+        storage.startWriteStruct(key, cv2.FileNode_SEQ)
+        for each in value:
+            storage.write("", _escaped(each) if isinstance(each, str) else each)
+        storage.endWriteStruct()
+    else:
+        storage.write(key, value)
 
 
 def _escaped(word: str) -> str:

@@ -23,6 +23,7 @@ MODELS = models_of("orbslam")
 READ = [*MODELS, Model("Rectified", Perspective, "fx fy cx cy")]
 LEFT_FROM_RIGHT = ("Stereo.T_c1_c2", "Tlr")
 IMU_FROM_LEFT = ("IMU.T_b_c1", "Tbc")
+DEPTH = ("RGBD.DepthMapFactor", "DepthMapFactor")  # only settings for a camera with depth have it
 
 
 def read(file: File) -> Calibration:
@@ -63,7 +64,10 @@ def _pose(section: Section, keys: tuple[str, ...]) -> RigidTransform | None:
 
 
 def _notes(section: Section) -> list[str]:
-    notes = []
+    """What a pair's settings say of the other camera; of an RGB-D camera bf is that of no second picture."""
+    notes: list[str] = []
+    if any(key in section for key in DEPTH):
+        return notes
     if "Camera2.fx" not in section and ("Camera.bf" in section or "Stereo.b" in section):
         baseline = section.number("Stereo.b") if "Stereo.b" in section else _baseline(section)
         notes.append(f"These are rectified pictures; the other camera of the pair is {baseline:.4g} m to the right.")

@@ -50,7 +50,7 @@ def _lines(file: File) -> tuple[Section, str]:
         elif line.startswith("[") and line.endswith("]"):
             key, inside = "", line[1:-1]
             camera = inside if inside and inside not in ("image", "externals") else camera
-        elif key and line and not line.startswith("#"):
+        elif key and line and not line.startswith(("#", ";")):
             rows[key] += [scalar(word) for word in line.split(maxsplit=MOST_WORDS)]
     return Section(rows, mended=file.mended), camera
 

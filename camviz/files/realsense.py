@@ -26,13 +26,17 @@ ASSUMED = (
     "The file names no distortion model: the coefficients of {} are read as those of brown_conrady, k1 k2 p1 p2 k3."
 )
 
+NO_COEFFICIENTS = "The file holds no coeffs of {}: it is read without distortion."
+
 
 def read(file: File) -> Calibration:
     """Each stream as a camera at the origin, under its key."""
     cameras, notes = {}, []
     for name, part in _streams(file.section):
         cameras[name] = _camera(part, file.size)
-        if any(part.vector("coeffs", [4, 5], "five numbers")) and "model" not in part:
+        if "coeffs" not in part:
+            notes.append(NO_COEFFICIENTS.format(name))
+        elif any(part.vector("coeffs", [4, 5], "five numbers")) and "model" not in part:
             notes.append(ASSUMED.format(name))
     if len(cameras) > 1:
         notes.append("How the streams stand to each other is not read: they are drawn at one place.")
@@ -40,12 +44,12 @@ def read(file: File) -> Calibration:
 
 
 def is_intrinsics(file: File) -> bool:
-    """True where ppx stands beside coeffs, or in a mapping of a mapping."""
+    """True where ppx stands beside coeffs or fx, or in a mapping of a mapping."""
     return next(_streams(file.section), None) is not None
 
 
 def _streams(section: Section, depth: int = 3, name: str = "camera") -> Iterator[tuple[str, Section]]:
-    if "ppx" in section and "coeffs" in section:
+    if "ppx" in section and ("coeffs" in section or "fx" in section):
         yield name, section
     elif depth:
         for key, value in section.values.items():
@@ -56,7 +60,7 @@ def _streams(section: Section, depth: int = 3, name: str = "camera") -> Iterator
 def _camera(part: Section, given: Size | None) -> Camera:
     model = _model(part)
     values = [part.number(key) for key in ("fx", "fy", "ppx", "ppy")]
-    coefficients = part.vector("coeffs", [4, 5], "five numbers")
+    coefficients = part.vector("coeffs", [4, 5], "five numbers") if "coeffs" in part else [0.0] * 5
     count = len(model.names) - 4
     if any(coefficients[count:]):
         raise part.error("coeffs", f"{count} numbers for {model.name}, with zeros after them", shown(coefficients))
@@ -82,7 +86,7 @@ FORMAT = Format(
     recognise=is_intrinsics,
     read=read,
     models="none, brown_conrady, kannala_brandt4, ftheta; modified_ and inverse_brown_conrady whose terms are 0",
-    says="fx fy ppx ppy coeffs model of rs2_intrinsics, alone or by stream",
+    says="fx fy ppx ppy coeffs model of rs2_intrinsics, alone or by stream; without coeffs no distortion is read",
     example=b'{"color": {"width": 640, "height": 480, "ppx": 318.5, "ppy": 241.25, "fx": 608.75, "fy": 609.5,\n'
     b'  "model": "distortion.brown_conrady", "coeffs": [0.125, -0.25, 0.001, -0.002, 0.0625]}}\n',
     rank=48,

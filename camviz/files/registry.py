@@ -11,8 +11,20 @@ from camviz.files.format import Format
 
 
 def formats() -> Mapping[str, Format]:
-    """The formats by name, in alphabetical order; ValueError where two modules use one name.
+    """The formats by name, in alphabetical order.
 
+    Returns
+    -------
+    mapping of str to Format
+        One for each module of `camviz.files` that has a FORMAT.
+
+    Raises
+    ------
+    ValueError
+        Where two modules use one name.
+
+    Examples
+    --------
     >>> [name for name in formats() if name.startswith("co")]
     ['colmap', 'colmap-bin']
     """

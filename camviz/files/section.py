@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from camviz.calibration.types import CalibrationError
 from camviz.cameras import Intrinsics
-from camviz.files.trees import MAX_NODES, shown
+from camviz.files.trees import MAX_NODES, Repeated, shown
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 
@@ -80,6 +80,14 @@ class Section:
         if not isinstance(held, list) or not all(isinstance(part, dict) for part in held):
             raise self.error(key, "a list of mappings", shown(held))
         return [self.part(part, self.where(f"{key}[{index}]")) for index, part in enumerate(held)]
+
+    def repeated(self, key: str) -> list[Section]:
+        """The XML elements of a name, however many there are."""
+        held = self.values.get(key)
+        parts = held if isinstance(held, Repeated) else [] if held is None else [held]
+        if not all(isinstance(value, dict) for value in parts):
+            raise self.error(key, "elements with attributes", shown(held))
+        return [self.part(value, self.where(f"{key}[{index}]")) for index, value in enumerate(parts)]
 
     def text(self, key: str) -> str:
         """A word."""

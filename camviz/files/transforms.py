@@ -18,11 +18,10 @@ from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.files.trees import shown
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
 from camviz.lenses.base import Array
-from camviz.poses import RigidTransform, Rotation
+from camviz.poses import OPENGL
 
 TITLE = "transforms.json"
 FIRST_PIXEL = 0.5
-OPENGL = RigidTransform.from_rotation(Rotation.from_matrix(np.diag([1.0, -1, -1])))  # y up, z backward
 MODELS = models_of("nerfstudio")
 STRAIGHT = ("PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")
 KEYS = {"fx": "fl_x", "fy": "fl_y"}

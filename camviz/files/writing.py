@@ -29,14 +29,44 @@ BY_CAMERA = (
     "estimated",
     "intrinsics_covariance",
     "priors",
+    "stamps",
 )
 
 
 def write(calibration: Calibration, path: str | PathLike[str], format: str) -> tuple[str, ...]:
-    """Write a calibration in a format of this name and return in sentences what it could not hold beside the cameras.
+    """Write a calibration in another format, whole and unchanged, or not at all.
 
-    Pixels, lenses and poses are written so that they are read back the same, or not at all: CalibrationError says
-    what the format has no place for. The file appears under its name when it is complete; COLMAP's is a folder.
+    Pixels, lenses and poses are written so that they are read back the same. The file appears under its name when it is
+    complete; COLMAP's is a folder.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        What to write.
+    path : str or PathLike
+        Where to.
+    format : str
+        One of `formats()` that can be written.
+
+    Returns
+    -------
+    tuple of str
+        In sentences what the format could not hold beside the cameras.
+
+    Raises
+    ------
+    CalibrationError
+        For what the format has no place for, an unknown format, and a place that cannot be written to.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> one = Calibration({"camera": Camera(Intrinsics.from_fov(640, 480, 90))}, Path(), "a data sheet")
+    >>> write(one, "camera.yaml", "ros")
+    ()
+    >>> load("camera.yaml").cameras["camera"].intrinsics == one.cameras["camera"].intrinsics
+    True
     """
     path = Path(path)
     known = written()
@@ -69,7 +99,34 @@ def _refuse_cameras(calibration: Calibration, format: Format) -> None:
 
 
 def alone(calibration: Calibration, name: str) -> Calibration:
-    """One of the cameras and what was recorded of it, where it stands."""
+    """One of the cameras and what was recorded of it, where it stands.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Of several cameras.
+    name : str
+        The camera.
+
+    Returns
+    -------
+    Calibration
+        Of this camera alone.
+
+    Raises
+    ------
+    CalibrationError
+        For a name that is none of theirs.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> camera = Camera(Intrinsics.from_fov(640, 480, 90))
+    >>> pair = Calibration({"left": camera, "right": camera}, Path(), "a data sheet")
+    >>> list(alone(pair, "right").cameras)
+    ['right']
+    """
     if name not in calibration.cameras:
         names = ", ".join(calibration.cameras)
         raise CalibrationError(f"{calibration.source}: expected one of the cameras {names}, got {name!r}")
@@ -80,7 +137,26 @@ def alone(calibration: Calibration, name: str) -> Calibration:
 
 
 def from_first_camera(calibration: Calibration) -> Calibration:
-    """The same cameras with the first one's frame as the world."""
+    """The same cameras with the first one's frame as the world.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Whose cameras stand anywhere.
+
+    Returns
+    -------
+    Calibration
+        With the first camera in the origin, looking along z.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from camviz.cameras import Camera, Intrinsics, look_at
+    >>> away = Camera(Intrinsics.from_fov(640, 480, 90), world_from_cam=look_at((3, 0, 0), (0, 0, 0)))
+    >>> from_first_camera(Calibration({"camera": away}, Path(), "here")).cameras["camera"].centre
+    array([0., 0., 0.])
+    """
     first_from_world = next(iter(calibration.cameras.values())).cam_from_world
     names = list(calibration.cameras)
     moved = {name: camera.at(first_from_world * camera.world_from_cam) for name, camera in calibration.cameras.items()}
@@ -168,6 +244,7 @@ def _missing(calibration: Calibration, back: Calibration) -> list[str]:
         "priors": "the prior on the denominator",
         "board_warp": "the bend of the board",
         "skipped": "the pictures that were skipped",
+        "stamps": "what it was made for and when",
         "world_from_imu": "the place of the IMU",
     }
     lost = [said for field, said in kinds.items() if _held(calibration, field) and not _held(back, field)]

@@ -26,7 +26,20 @@ MISSING = ("-", "", "nan")  # what stands for a coordinate where no corner was s
 
 @dataclass(frozen=True)
 class CornerFile:
-    """A text file that may hold corners. Its content is read once, when asked for."""
+    r"""A text file that may hold corners. Its content is read once, when asked for.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("corners.vnl").write_text("# filename x y\n\nleft.png 10 20\n")
+    >>> list(CornerFile(Path("corners.vnl")).lines)
+    [(1, '# filename x y'), (3, 'left.png 10 20')]
+    """
 
     path: Path
 
@@ -48,16 +61,44 @@ class CornerFile:
 
 @dataclass(frozen=True)
 class Given:
-    """What the caller says of corner files: the board's inner corners as (columns, rows) and a square's side in metres.
+    """What the caller says of corner files; what a file says itself must agree.
 
-    What a file says itself must agree.
+    Parameters
+    ----------
+    shape : tuple of int, optional
+        The board's inner corners as (columns, rows).
+    square_size : float, optional
+        Side of a square in metres.
+
+    Examples
+    --------
+    >>> Given(shape=(9, 6)).board(square_size=0.025).square_size  # the one from the caller, the other from the file
+    0.025
     """
 
     shape: tuple[int, int] | None = None
     square_size: float | None = None
 
     def board(self, shape: tuple[int, int] | None = None, square_size: float | None = None) -> Board:
-        """The board of a file that says so much of it; CalibrationError where something is missing or contradicts."""
+        """The board of a file that says so much of it.
+
+        Parameters
+        ----------
+        shape : tuple of int, optional
+            What the file says: inner corners as (columns, rows).
+        square_size : float, optional
+            What the file says: side of a square in metres.
+
+        Returns
+        -------
+        Board
+            A chessboard.
+
+        Raises
+        ------
+        CalibrationError
+            Where something is missing or contradicts.
+        """
         columns, rows = self._one("inner corners", self.shape, shape, "--board COLUMNSxROWS (inner corners)")
         side = self._one("side of a square", self.square_size, square_size, "--square-mm MM")
         if columns * rows > MOST_CORNERS:
@@ -77,16 +118,39 @@ class Given:
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """The corners (columns * rows, 2) of a board by picture, in pixels with the first pixel's centre at (0, 0).
+    r"""What corner files hold: the corners of a board by picture.
 
-    They are in the order of `Board.corners`, NaN where a corner was not seen. `lines` (columns * rows,) say by picture
-    in which line each one stands. `size` is (width, height) of the pictures, where the files hold it.
+    Attributes
+    ----------
+    board : Board
+        What was seen.
+    pictures : mapping of str to array (columns * rows, 2)
+        Pixels by picture, the first pixel's centre at (0, 0), in the order of `Board.corners`; NaN where a corner was
+        not seen.
+    lines : mapping of str to array (columns * rows,) of int
+        By picture the number of the line in which each corner stands.
+    files : mapping of str to Path
+        By picture the file.
+    size : tuple of int, optional
+        Width and height of the pictures in pixels, where the files hold it.
+    notes : tuple of str
+        What a reader should know.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from camviz.files.corners import corner_formats
+    >>> _ = Path("corners.vnl").write_text("# filename x y\nleft.png 10 20\nleft.png - -\n")
+    >>> read = corner_formats()["mrcal"].read([CornerFile(Path("corners.vnl"))], Given((2, 1), 0.025))
+    >>> read.pictures["left.png"]
+    array([[10., 20.],
+           [nan, nan]])
     """
 
     board: Board
     pictures: Mapping[str, Array]
     lines: Mapping[str, Array] = field(repr=False)
-    files: Mapping[str, Path] = field(repr=False)  # by picture
+    files: Mapping[str, Path] = field(repr=False)
     size: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
 
@@ -96,17 +160,44 @@ class CornerFormat:
     """One program's corner files. A module of `camviz.files.corners` that has one as FORMAT adds it everywhere.
 
     `load_corners`, the help of the commands, the table in docs/formats.md and the tests read these fields.
+
+    Parameters
+    ----------
+    name : str
+        One word.
+    title : str
+        The program's file, as sentences name it: "mrcal's corners.vnl".
+    recognise : callable
+        True for a CornerFile of this format.
+    read : callable
+        From a sequence of CornerFile and what is Given to Corners; raises CalibrationError for what it cannot take.
+    several : bool
+        Whether a set of pictures may be several files.
+    holds : str
+        What of board and image size it holds, for the docs.
+    says : str
+        Its conventions.
+    source : str
+        Where its layout is written down.
+    example : mapping of str to bytes
+        Small files by their names.
+
+    Examples
+    --------
+    >>> from camviz.files.corners import corner_formats
+    >>> list(corner_formats()["mrcal"].example)
+    ['corners.vnl']
     """
 
-    name: str  # one word
-    title: str  # the program's file, as sentences name it: "mrcal's corners.vnl"
-    recognise: Callable[[CornerFile], bool]  # true for a file of this format
-    read: Callable[[Sequence[CornerFile], Given], Corners]  # raises CalibrationError for what it cannot take
-    several: bool  # whether a set of pictures may be several files
-    holds: str  # what of board and image size it holds, for the docs
-    says: str  # its conventions
-    source: str  # where its layout is written down
-    example: Mapping[str, bytes]  # small files by their names
+    name: str
+    title: str
+    recognise: Callable[[CornerFile], bool]
+    read: Callable[[Sequence[CornerFile], Given], Corners]
+    several: bool
+    holds: str
+    says: str
+    source: str
+    example: Mapping[str, bytes]
 
 
 @dataclass(eq=False)

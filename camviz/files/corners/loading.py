@@ -27,7 +27,25 @@ ENDINGS = (".orpc", ".dsc")  # of a folder's files
 
 @dataclass(frozen=True, eq=False)
 class LoadedCorners:
-    """Corners as if they had been found in pictures, the board they are of, and what a reader should know."""
+    r"""Corners as if they had been found in pictures, the board they are of, and what a reader should know.
+
+    Attributes
+    ----------
+    detections : Detections
+        For `calibrate`.
+    board : Board
+        For `calibrate`.
+    notes : tuple of str
+        What a reader should know of the files.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> rows = [f"a.png {100 + 40 * column} {90 + 40 * row}" for row in range(3) for column in range(4)]
+    >>> _ = Path("corners.vnl").write_text("\n".join(["# filename x y", *rows, "b.png - -"]))
+    >>> load_corners(["corners.vnl"], shape=(4, 3), square_size=0.025, size=(640, 480)).detections.skipped
+    (('b.png', 'none of its corners are known, 6 are needed'),)
+    """
 
     detections: Detections
     board: Board
@@ -43,15 +61,48 @@ def load_corners(
     pictures: Sequence[str | PathLike[str]] = (),
     otherwise: Size | None = None,
 ) -> LoadedCorners:
-    """Read the corners of one camera's pictures from one of the files that docs/formats.md lists.
+    r"""Read the corners of one camera's pictures from one of the files that docs/formats.md lists.
 
-    `shape` are the board's inner corners (columns, rows) and `square_size` is in metres; `size` is (width, height) of
-    the pictures in pixels. Each is needed where the files do not hold it; what they hold must agree. The size is also
-    taken from `pictures`, or from a picture that the file names and that is there, or else is `otherwise`. Pixels
-    count from the centre of the first one, (0, 0). A picture with fewer than six corners, or with corners on one line
-    of the board, is skipped. Raises CalibrationError for everything else: one sentence with the file and, where there
-    is one, the line.
+    Shape, side of a square and size are each needed where the files do not hold them; what they hold must agree. A
+    picture with fewer than six corners, or with corners on one line of the board, is skipped.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        The files, or a folder of them.
+    shape : tuple of int, optional
+        The board's inner corners as (columns, rows).
+    square_size : float, optional
+        Side of a square in metres.
+    size : tuple of int, optional
+        Width and height of the pictures in pixels. It is also taken from `pictures`, or from a picture that the file
+        names and that is there.
+    pictures : sequence of path, optional
+        Pictures of that size.
+    otherwise : tuple of int, optional
+        The size where nothing tells it.
+
+    Returns
+    -------
+    LoadedCorners
+        Pixels count from the centre of the first one, (0, 0).
+
+    Raises
+    ------
+    CalibrationError
+        For everything else: one sentence with the file and, where there is one, the line.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> rows = [f"a.png {100 + 40 * column} {90 + 40 * row}" for row in range(3) for column in range(4)]
+    >>> _ = Path("corners.vnl").write_text("\n".join(["# filename x y", *rows]))  # as mrcal has them
+    >>> found = load_corners(["corners.vnl"], shape=(4, 3), square_size=0.025, size=(640, 480)).detections
+    >>> found.corners[0, 5]  # the second row's second corner
+    array([140., 130.])
     """
+    if not paths:
+        raise CalibrationError("paths: expected at least one file of corners, got none")
     files = [CornerFile(path) for path in _files([Path(path) for path in paths])]
     chosen = _format(files)
     if len(files) > 1 and not chosen.several:
