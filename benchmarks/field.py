@@ -9,9 +9,9 @@ CAMVIZ_FIELD has a folder for each repository, named owner+name, at the commit t
 there, or has other files, is named and left out. The corners are found once, by camviz, kept in CAMVIZ_FIELD/found and
 given to all three programs.
 
-Every fifth view is held out, the third first. The others give the camera. A held-out view's pose is fitted to one half
-of its board, and the other half is predicted: left, right, top and bottom in turn. The held-out error is the RMS
-distance of all these predictions from the corners, in pixels, with the board flat and the same for every program.
+Every fifth view is held out, the others give the camera: five times, until each view was held out once. A held-out
+view is posed by one half of its board, and the other half is predicted: left, right, top and bottom in turn. The
+held-out error is the RMS distance of all these predictions from the corners, in pixels, the board flat for everyone.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from camviz.lenses import BrownConrady, KannalaBrandt
 MANIFEST = Path(__file__).with_name("field.toml")
 PAGE = Path(__file__).parents[1] / "docs" / "clinic.md"
 TABLE = "<!-- The tables below are printed by: python benchmarks/field.py -->"
-EVERY, FIRST = 5, 2  # of the views, held out
+FOLDS = 5  # every so many views one is held out
 MRCAL = {"standard": "LENSMODEL_OPENCV5", "rational": "LENSMODEL_OPENCV8"}
 FLAGS = {"standard": 0, "rational": cv2.CALIB_RATIONAL_MODEL}
 BEHIND = 1.02
@@ -168,9 +168,9 @@ FAILURES = (CannotCalibrate, ValueError, cv2.error, subprocess.SubprocessError, 
 # The held-out error ---------------------------------------------------------------------------------------------------
 
 
-def split(detections: Detections) -> tuple[Detections, Detections]:
-    """The views to solve from, and those that are held out."""
-    out = np.arange(len(detections.corners)) % EVERY == FIRST
+def split(detections: Detections, first: int) -> tuple[Detections, Detections]:
+    """The views to solve from, and those that are held out: the `first`, counted from 0, and every fifth after it."""
+    out = np.arange(len(detections.corners)) % FOLDS == first
     return _only(detections, ~out), _only(detections, out)
 
 
@@ -179,36 +179,44 @@ def _only(detections: Detections, views: np.ndarray) -> Detections:
     return replace(detections, pictures=names, corners=detections.corners[views], skipped=(), places=())
 
 
-def held_out_px(camera: Camera, detections: Detections, board: Board) -> float:
-    """The RMS in pixels of the corners that a view's pose was not fitted to; infinite where one has no image."""
+def held_out_squares(camera: Camera, detections: Detections, board: Board) -> np.ndarray:
+    """The squared errors (n,) in px² of corners that a pose was not fitted to; infinite where one has no image."""
     there, alone = seen(detections.corners), Camera(camera.intrinsics, camera.lens)
     squares = []
     for corners, mask in zip(detections.corners, there, strict=True):
         for half in board_halves(board):
             fit, asked = mask & half, mask & ~half
-            if fit.sum() < 6 or not asked.any():
+            if fit.sum() < 6 or not asked.any() or _in_line(board.corners[fit]):
                 continue
             pose = poses_from_rays(alone, [board.corners[fit]], [corners[fit]])
             aside = {"camera": (mask & ~fit)[None]}
             problem = Adjustment(board, {"camera": alone}, {"camera": corners[None]}, pose, {"camera": ()}, aside)
             off = problem.refined(only_poses=True).residuals["camera"][0][asked]
             squares.append(np.sum(np.nan_to_num(off, nan=np.inf) ** 2, axis=-1))
-    return float(np.sqrt(np.mean(np.concatenate(squares))))
+    return np.concatenate(squares)
+
+
+def _in_line(points: np.ndarray) -> bool:
+    """Whether points (n, 3) lie on one line, which gives no pose."""
+    return bool(np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-9) < 2)
 
 
 def scored(solve: Callable[..., Camera], detections: Detections, board: Board, model: str) -> tuple[str, float]:
-    """The held-out error and the seconds that the solution took, as a cell, and the error as a number."""
-    seen_by_all, asked = split(detections)
-    start = time.perf_counter()
+    """The held-out error over all folds and the seconds of a solution, as a cell, and the error as a number."""
+    squares, took = [], 0.0
     try:
-        camera = solve(seen_by_all, board, model)
-        took = time.perf_counter() - start
-        error = held_out_px(camera, asked, board)
+        for first in range(FOLDS):
+            seen_by_all, asked = split(detections, first)
+            start = time.perf_counter()
+            camera = solve(seen_by_all, board, model)
+            took += (time.perf_counter() - start) / FOLDS
+            squares.append(held_out_squares(camera, asked, board))
     except NotImplementedError:
         return "–", np.inf
     except FAILURES as failure:
         print(f"  {solve.__name__} {model}: {str(failure)[:200]}", file=sys.stderr)
         return "fails", np.inf
+    error = float(np.sqrt(np.mean(np.concatenate(squares))))
     return f"{error:.3f} ({took:.1f} s)", error
 
 

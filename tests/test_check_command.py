@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -9,9 +10,9 @@ import pytest
 from commandline import refused
 from test_files import sample
 
-from camviz.calibration import calibrate, calibrate_pair, detect
+from camviz.calibration import CannotCalibrate, calibrate, calibrate_pair, detect
 from camviz.calibration.types import Board
-from camviz.clinic.virtual import detections, single
+from camviz.clinic.virtual import detections, healthy_pair, single
 from camviz.commands.command import main
 from camviz.files.writing import write
 
@@ -118,3 +119,70 @@ def test_what_cannot_be_used_is_said_in_one_sentence(half, room, capsys):
         ((half, left, "--board", "8x8", "--square-mm", "25"), "8×8 inner corners"),
     ):
         assert said in refused(capsys, room, "check", *words)
+
+
+def test_a_projects_gate_decides_about_a_check_as_about_an_inspection(virtual, capsys, room):
+    """A camera 1 % longer fails, pictures of half the size are warned of: a gate for faults lets the latter pass."""
+    after, see = virtual
+    grid = after.camera.intrinsics
+    half = replace(after.camera, intrinsics=grid.resized(grid.width // 2, grid.height // 2))
+    longer = replace(after.camera, intrinsics=replace(grid, fx=1.01 * grid.fx, fy=1.01 * grid.fy))
+    see(half)
+    assert main(["check", "camera.yaml", "new.png", "--fail-on", "fault"]) == 0
+    assert "\nGate (options): passed.\n" in capsys.readouterr().out
+    (room / "camviz.toml").write_text('fail-on = ["fault"]\n[limits]\nrms-px = 0.5\n')
+    assert main(["check", "camera.yaml", "new.png"]) == 0
+    assert "rms-px is not checked: `camviz inspect` does.\nGate (camviz.toml): passed.\n" in capsys.readouterr().out
+    assert main(["check", "camera.yaml", "new.png", "--fail-on", "warning"]) == 1  # the command line wins
+    assert "failed by camera (warn)." in capsys.readouterr().out
+    see(longer)
+    assert main(["check", "camera.yaml", "new.png", "--json"]) == 1
+    gate = json.loads(capsys.readouterr().out)["gate"]
+    assert gate == {"passed": False, "fail_on": ["fault"], "failed_by": ["fail"]}
+    assert "did you mean" in refused(capsys, room, "check", "camera.yaml", "new.png", "--fail-on", "faultt")
+
+
+def test_the_limit_of_the_file_is_that_of_the_option(virtual, capsys, room):
+    """0.05 px is less than can be told: inconclusive (4), which no gate lets pass. The option wins over the file."""
+    after, see = virtual
+    see(after.camera)
+    (room / "camviz.toml").write_text("fail-on = []\n[limits]\nchange-px = 0.05\n")
+    assert main(["check", "camera.yaml", "new.png", "--json"]) == 4
+    assert json.loads(capsys.readouterr().out)["limit_px"] == 0.05
+    assert main(["check", "camera.yaml", "new.png", "--limit", "change-px=1"]) == 0
+    assert main(["check", "camera.yaml", "new.png", "--limit-px", "1"]) == 0
+    capsys.readouterr()
+
+
+def test_junit_has_a_case_for_every_camera_that_is_judged(virtual, capsys):
+    after, see = virtual
+    grid = after.camera.intrinsics
+    longer = replace(after.camera, intrinsics=replace(grid, fx=1.01 * grid.fx, fy=1.01 * grid.fy))
+    for camera, words, kind in (
+        (after.camera, (), "system-out"),
+        (longer, (), "failure"),
+        (after.camera, ("--limit-px", "0.05"), "error"),
+    ):
+        see(camera)
+        main(["check", "camera.yaml", "new.png", "--junit", "out.xml", *words])
+        (suite,) = ElementTree.parse("out.xml").getroot()
+        (case,) = suite
+        assert (suite.get("name"), case.get("name"), case[0].tag) == ("camera.yaml", "check camera", kind)
+    capsys.readouterr()
+
+
+def test_the_time_that_a_picture_may_take_is_handed_to_the_search(virtual, monkeypatch, capsys, room):
+    """As it is in `camviz calibrate`, of one camera and of a pair."""
+    asked = []
+
+    def looking(*_, seconds=None, **__):
+        asked.append(seconds)
+        raise CannotCalibrate("enough")
+
+    monkeypatch.setattr("camviz.calibration.detect", looking)
+    monkeypatch.setattr("camviz.calibration.detect_pair", looking)
+    assert "enough" in refused(capsys, room, "check", "camera.yaml", "new.png", "--seconds", "7")
+    write(healthy_pair(np.random.default_rng(0)), room / "pair.yaml", "opencv")
+    assert "enough" in refused(capsys, room, "check", "pair.yaml", "new.png", "--right", "new.png", "--seconds", "8")
+    assert asked == [7, 8]
+    assert "expected a time in seconds" in refused(capsys, room, "check", "camera.yaml", "new.png", "--seconds", "0")

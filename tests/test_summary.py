@@ -28,8 +28,8 @@ from camviz.views.clinic.uncertainty import UncertaintyView
 from camviz.widgets.inspection import CAMERA, LOOK, LiveInspection
 
 SKIPPED = (
-    "9 could not because the file holds one camera, not a pair, and because no pictures of the board were given "
-    "(--images) (3 more reasons below)"
+    "10 could not because the file holds one camera, not a pair, and because no pictures of the board were given "
+    "(--images) (4 more reasons below)"
 )
 
 
@@ -61,7 +61,7 @@ def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
     inspection = inspect(bare())
     reasons = {why for _, why in inspection.skipped}
     assert inspection.verdict.startswith(
-        "Nothing wrong was found; 11 checks ran, 23 could not because the file holds no"
+        "Nothing wrong was found; 11 checks ran, 24 could not because the file holds no"
     )
     assert inspection.verdict.endswith(f"({len(reasons) - 2} more reasons below).")
 

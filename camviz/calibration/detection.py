@@ -17,7 +17,7 @@ import numpy as np
 from camviz.calibration.boards import kind_of
 from camviz.calibration.boards.charuco import charuco_dictionary
 from camviz.calibration.chessboards import LEAST_SIDE
-from camviz.calibration.finding import find_corners, look
+from camviz.calibration.finding import check_finder, find_corners, look
 from camviz.calibration.processes import Crew, processors, signals_put_off
 from camviz.calibration.types import Board, Mask
 from camviz.calibration.wrong_board import another_board, part_of_a_larger
@@ -34,7 +34,16 @@ WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictu
 
 
 class CannotCalibrate(ValueError):  # noqa: N818 - it says what is the case
-    """Pictures or corners that no camera can be calibrated from; the message is one sentence."""
+    """Pictures or corners that no camera can be calibrated from; the message is one sentence.
+
+    Examples
+    --------
+    >>> from camviz.calibration import Board, calibrate
+    >>> board = Board(9, 6, 0.025)
+    >>> calibrate(Detections(("a.png", "b.png"), np.zeros((2, 54, 2)), 640, 480), board)
+    Traceback (most recent call last):
+    camviz.calibration.detection.CannotCalibrate: at least 3 views of the board are needed for a calibration, got 2
+    """
 
 
 class NoBoard(CannotCalibrate):
@@ -47,10 +56,31 @@ class NoBoard(CannotCalibrate):
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """The board's corners (views, corners, 2) in pictures of one size, in pixels, NaN where a corner was not seen.
+    """The board's corners in pictures of one size.
 
-    `pictures` names the views. `skipped` are the pictures without a view, each with the reason. `places` are the views'
-    indices among all the pictures that were looked at, by which those of a pair find each other.
+    Parameters
+    ----------
+    pictures : tuple of str
+        Names of the views.
+    corners : array (views, corners, 2)
+        Pixels, NaN where a corner was not seen.
+    width, height : int
+        Size of the pictures in pixels.
+    skipped : tuple of (str, str), optional
+        Pictures without a view, each with the reason.
+    places : tuple of int, optional
+        The views' indices among all the pictures that were looked at, by which those of a pair find each other.
+
+    Raises
+    ------
+    ValueError
+        Where corners or places are not one for each picture.
+
+    Examples
+    --------
+    >>> found = Detections(("a.png",), np.array([[[10, 20], [np.nan, np.nan]]]), 640, 480)
+    >>> seen(found.corners)
+    array([[ True, False]])
     """
 
     pictures: tuple[str, ...]
@@ -61,6 +91,7 @@ class Detections:
     places: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "corners", np.asarray(self.corners, dtype=float))
         if self.corners.ndim != 3 or self.corners.shape[-1] != 2 or len(self.corners) != len(self.pictures):
             raise ValueError(
                 f"corners must have shape ({len(self.pictures)}, corners, 2), as there are pictures, "
@@ -81,14 +112,48 @@ def detect(
     progress: Progress | None = None,
     seconds: float | None = None,
 ) -> Detections:
-    """Find a board in pictures, in `workers` processes (default: as many as there are processors, for many pictures).
+    """Find a board in pictures, in several processes where there are many.
 
-    Pictures without the board, those that cannot be read and those of another size than most are skipped. `progress` is
-    called with the numbers of pictures done and in all. `finder` is that of `find_corners`. Raises CannotCalibrate
-    where the board is in none of the pictures or most show a larger one, or a process is lost.
+    Pictures without the board, those that cannot be read and those of another size than most are skipped.
 
-    A search that does not end within `seconds` is ended, and its picture skipped. Without `seconds` that is so after
-    two minutes, and only where there are enough pictures for several processes.
+    Parameters
+    ----------
+    paths : sequence of path
+        The pictures.
+    board : Board
+        What they show.
+    finder : {"auto", "sectors", "classic"}, optional
+        How a chessboard is found: see `find_corners`.
+    workers : int, optional
+        Processes; unless given, as many as there are processors, for many pictures.
+    progress : callable, optional
+        Called with the numbers of pictures done and in all.
+    seconds : float, optional
+        A search that takes longer is ended, and its picture skipped. Unless given, that is so after two minutes, and
+        only where there are enough pictures for several processes.
+
+    Returns
+    -------
+    Detections
+        One view for each picture that shows the board.
+
+    Raises
+    ------
+    CannotCalibrate
+        Where the board is in none of the pictures or most show a larger one, or a process is lost.
+    ValueError
+        For another finder, and for one path in place of a list.
+
+    Examples
+    --------
+    >>> from camviz.calibration import Board
+    >>> from PIL import Image
+    >>> from camviz.calibration.boards.picture import whiteness
+    >>> board = Board(9, 6, 0.025)
+    >>> white = whiteness(board, 20, margin=1)  # squares of 20 pixels
+    >>> Image.fromarray((255 * white).astype(np.uint8)).save("board.png")
+    >>> detect(["board.png"], board).corners[0, 0].round(1)  # after 20 of margin and 20 of a square: between 39 and 40
+    array([39.5, 39.5])
     """
     return _gathered(paths, _looked(paths, board, finder, workers, progress, seconds), board)
 
@@ -103,7 +168,38 @@ def detect_pair(
     progress: Progress | None = None,
     seconds: float | None = None,
 ) -> tuple[Detections, Detections]:
-    """`detect` in the pictures of two cameras at once; those with the same index are of one moment."""
+    """`detect` in the pictures of two cameras at once; those with the same index are of one moment.
+
+    Parameters
+    ----------
+    left, right : sequence of path
+        The pictures of either camera, as many of the one as of the other.
+    board : Board
+        What they show.
+    finder, workers, progress, seconds : optional
+        As of `detect`.
+
+    Returns
+    -------
+    left : Detections
+        Of the left camera.
+    right : Detections
+        Of the right camera.
+
+    Raises
+    ------
+    ValueError
+        Where there are not as many pictures of both.
+    CannotCalibrate
+        Where `detect` would.
+
+    Examples
+    --------
+    >>> from camviz.calibration import Board
+    >>> detect_pair(["left1.png", "left2.png"], ["right1.png"], Board(9, 6, 0.025))
+    Traceback (most recent call last):
+    ValueError: right must have as many pictures as left, 2, got 1
+    """
     if len(left) != len(right):
         raise ValueError(f"right must have as many pictures as left, {len(left)}, got {len(right)}")
     looks = _looked([*left, *right], board, finder, workers, progress, seconds)
@@ -114,7 +210,23 @@ def detect_pair(
 
 
 def seen(corners: Array) -> Mask:
-    """Which corners (..., 2) were seen, (...)."""
+    """Which corners were seen.
+
+    Parameters
+    ----------
+    corners : array (..., 2)
+        Pixels, NaN where a corner was not seen.
+
+    Returns
+    -------
+    array (...) of bool
+        True where both coordinates are numbers.
+
+    Examples
+    --------
+    >>> seen(np.array([[10, 20], [np.nan, 20]]))
+    array([ True, False])
+    """
     return np.asarray(np.isfinite(corners).all(axis=-1))
 
 
@@ -126,8 +238,11 @@ def _looked(
     progress: Progress | None,
     seconds: float | None,
 ) -> list[Look]:
+    if isinstance(paths, (str, PathLike)):
+        raise ValueError(f"pictures must be a list of paths, got the one path {str(paths)!r}")
     if not paths:
         raise CannotCalibrate("there are no pictures to look for a board in")
+    check_finder(finder)
     if board.kind == "charuco":
         charuco_dictionary(board)  # complains about a board that cannot be
     elif board.kind == "chessboard" and min(board.columns, board.rows) < LEAST_SIDE:

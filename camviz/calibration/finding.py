@@ -30,20 +30,57 @@ FINDERS = ("auto", "sectors", "classic")
 
 
 def find_corners(image: NDArray[Any], board: Shape, finder: str = "auto") -> Array | None:
-    """The points (columns * rows, 2) of a board in a picture (height, width[, 3]) of 8 bits; None without it.
+    """The points of a board in one picture.
 
     In the order of `board.corners`, a chessboard's beginning at a black square in the board's corner; if both such
-    squares are black, either of them may come first. Chessboards and circle grids count only as a whole; points of a
-    ChArUco board or of an AprilGrid that are not seen are NaN. `finder` says how a chessboard is found: "sectors" is
-    OpenCV's findChessboardCornersSB (Duda & Frese 2018), "classic" is findChessboardCorners with cornerSubPix, "auto"
-    the first of the two that finds it.
+    squares are black, either of them may come first. Chessboards and circle grids count only as a whole.
+
+    Parameters
+    ----------
+    image : array (height, width) or (height, width, 3)
+        Grey or RGB, 8 bits.
+    board : Board
+        What to look for.
+    finder : {"auto", "sectors", "classic"}, optional
+        How a chessboard is found. "sectors" is OpenCV's findChessboardCornersSB, "classic" is findChessboardCorners
+        with cornerSubPix, "auto" the first of the two that finds it.
+
+    Returns
+    -------
+    array (columns * rows, 2) or None
+        Pixels, NaN for points of a ChArUco board or of an AprilGrid that are not seen; None without the board.
+
+    Raises
+    ------
+    ValueError
+        For another finder, and for a picture of another form.
+
+    References
+    ----------
+    A. Duda & U. Frese, *Accurate detection and localization of checkerboard corners for calibration*, BMVC (2018).
+
+    Examples
+    --------
+    >>> from camviz.calibration.types import Board
+    >>> squares = np.add.outer(np.arange(7), np.arange(10)) % 2 * 255  # of ten by seven, the first one black
+    >>> picture = np.pad(squares, 1, constant_values=255).repeat(30, axis=0).repeat(30, axis=1).astype(np.uint8)
+    >>> find_corners(picture, Board(9, 6, 0.025))[:2].round(1)  # edges lie between pixels 59 and 60, 89 and 90
+    array([[59.5, 59.5],
+           [89.5, 59.5]])
     """
-    if finder not in FINDERS:
-        raise ValueError(f"finder must be one of {', '.join(FINDERS)}, got {finder!r}")
+    check_finder(finder)
+    if image.dtype != np.uint8 or not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)):
+        raise ValueError(f"image must be uint8 (height, width) or (height, width, 3), got {image.dtype} {image.shape}")
     gray = image if image.ndim == 2 else cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY)
     if min(gray.shape) < SMALLEST:
         return None
     return kind_of(board).find(gray, board, finder)
+
+
+def check_finder(finder: str) -> None:
+    """Raises ValueError for a finder that is not one of FINDERS."""
+    if finder not in FINDERS:
+        raise ValueError(f"finder must be one of {', '.join(FINDERS)}, got {finder!r}")
 
 
 def look(path: str, board: Shape, finder: str) -> tuple[tuple[int, int] | None, Array | None, str]:

@@ -209,3 +209,8 @@ def _model(lens: type[Any], declared: CalibrationModel) -> Model:
 
 
 MODELS = {name: _model(lens, declared) for name, (lens, declared) in calibration_models().items()}
+"""The camera models that can be calibrated, by the names that `camviz calibrate --model` takes.
+
+>>> MODELS["fisheye"].parameters
+('fx', 'fy', 'cx', 'cy', 'k1', 'k2', 'k3', 'k4')
+"""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from camviz.calibration.detection import CannotCalibrate
+from camviz.calibration.detection import CannotCalibrate, Detections
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,11 @@ class Pairs:
     lonely: tuple[tuple[str, str], ...] = ()
 
 
-def paired(left: Sequence[Path], right: Sequence[Path]) -> Pairs:
+def paired(left: Sequence[Path], right: Sequence[Path], *, by_order: bool = True) -> Pairs:
     """Pictures of the same name are of one moment, else those with the same last number in their names, else by order.
 
-    Order decides only where there are as many pictures of one camera as of the other. Raises CannotCalibrate where
-    nothing tells the partners.
+    Order decides only where there are as many pictures of one camera as of the other, and `by_order` lets it. Raises
+    CannotCalibrate where nothing tells the partners.
     """
     for key in (_name, last_number):
         first, second = _by_key(left, key), _by_key(right, key)
@@ -38,12 +38,47 @@ def paired(left: Sequence[Path], right: Sequence[Path]) -> Pairs:
                     (path.name, f"it has no partner among the pictures of the {other} camera") for path, other in alone
                 ),
             )
-    if len(left) != len(right):
+    if len(left) != len(right) or not by_order:
         raise CannotCalibrate(
             f"there are {len(left)} pictures of the left camera and {len(right)} of the right one, and their names do "
             "not tell the pairs: give pictures of one moment the same number, as in left01.jpg and right01.jpg"
         )
     return Pairs(tuple(left), tuple(right))
+
+
+def paired_detections(left: Detections, right: Detections) -> tuple[Detections, Detections]:
+    """The views of two cameras with the same `places` for those of one moment; views without a partner are skipped.
+
+    Views are paired as `paired` has it, by their names alone: where corners come from files, nothing is known of their
+    order. Raises CannotCalibrate where the names do not tell the partners.
+    """
+    both = [_names(left), _names(right)]
+    pairs = paired(*both, by_order=False)
+    alone = dict(pairs.lonely)
+    first, second = (
+        _placed(detections, partners, alone) for detections, partners in ((left, pairs.left), (right, pairs.right))
+    )
+    return first, second
+
+
+def _names(detections: Detections) -> list[Path]:
+    """The pictures with a view, and then those without."""
+    return [Path(name) for name in (*detections.pictures, *(name for name, _ in detections.skipped))]
+
+
+def _placed(detections: Detections, partners: Sequence[Path], alone: Mapping[str, str]) -> Detections:
+    """The views that have partners, at their places among these."""
+    places = {path: place for place, path in enumerate(partners)}
+    kept = [view for view, name in enumerate(detections.pictures) if Path(name) in places]
+    names = tuple(detections.pictures[view] for view in kept)
+    lonely = tuple((name, alone[Path(name).name]) for name in detections.pictures if name not in names)
+    return replace(
+        detections,
+        pictures=names,
+        corners=detections.corners[kept],
+        skipped=detections.skipped + lonely,
+        places=tuple(places[Path(name)] for name in names),
+    )
 
 
 def _by_key(paths: Sequence[Path], key: Callable[[Path], str]) -> dict[str, Path] | None:

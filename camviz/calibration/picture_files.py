@@ -11,7 +11,7 @@ import re
 import stat
 import struct
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from os import PathLike
@@ -54,6 +54,8 @@ _PLUGINS = {  # Pillow's, where they are not named as the kind
     "GIF": ("GifImagePlugin", "GIF"),
     "AVIF": ("AvifImagePlugin", "AVIF"),
 }
+_WITH_EXIF = {"TIFF": ("TiffImagePlugin", "TIFF")} | {kind: _PLUGINS[kind] for kind in ("JPEG", "PNG", "WebP")}
+_EXIF = 0x8769  # the tag of EXIF's own directory
 _HDR_SIZE = re.compile(rb"\n\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n")
 _EXR_WINDOW = re.compile(rb"dataWindow\0box2i\0\x10\0\0\0(.{16})", re.DOTALL)
 _WIDTH, _HEIGHT = 256, 257  # TIFF's tags
@@ -115,6 +117,25 @@ def picture_kind(path: str | PathLike[str]) -> str:
     """ "PNG", "JPEG", "TIFF" …: what the file is, whatever its name ends in. Raises PictureError as `picture_size`."""
     with _opened(path) as file:
         return _header(path, file)[0]
+
+
+def picture_exif(path: str | PathLike[str]) -> Mapping[int, Any]:
+    """The EXIF tags of a picture by their numbers, as Pillow reads them; empty where it has none, or damaged ones.
+
+    Raises PictureError as `picture_size`.
+    """
+    with _opened(path) as file:
+        kind, _ = _header(path, file)
+        if kind not in _WITH_EXIF:
+            return {}
+        file.seek(0)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                exif = _plugin(*_WITH_EXIF[kind], file).getexif()
+                return {**exif, **exif.get_ifd(_EXIF)}
+        except Exception:  # of many kinds, from SyntaxError to struct.error
+            return {}
 
 
 def most_megapixels() -> float:
@@ -198,12 +219,17 @@ def _by_pillow(kind: str, file: BinaryIO) -> tuple[int, int] | None:
 
 
 def _of_plugin(module: str, name: str, file: BinaryIO) -> tuple[int, int]:
+    width, height = _plugin(module, name, file).size
+    return width, height
+
+
+def _plugin(module: str, name: str, file: BinaryIO) -> Any:
+    """Pillow's picture of a file, of which nothing is decoded."""
     from PIL import Image
 
     import_module(f"PIL.{module}")
     opener, _ = Image.OPEN[name]
-    width, height = opener(file, "").size
-    return width, height
+    return opener(file, "")
 
 
 def _of_tiff(file: BinaryIO) -> tuple[int, int]:

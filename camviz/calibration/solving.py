@@ -40,12 +40,42 @@ FOLDED = (
 def calibrate(
     detections: Detections, board: Board, model: str = "standard", *, fixed: Sequence[str] = (), robust: bool = True
 ) -> Calibration:
-    """The camera, named "camera", that saw a board in at least three views.
+    """The camera that saw a board in at least three views.
 
-    `model` is one of MODELS. Parameters that are `fixed` are not solved for: the principal point (cx, cy) stays in the
-    middle of the image, all others stay 0. With `robust`, corners and views that the rest contradicts are set aside:
-    see `camviz.calibration.outliers`. Raises CannotCalibrate where the views do not give a camera, ValueError for an
-    unknown model or parameter.
+    Parameters
+    ----------
+    detections : Detections
+        The corners.
+    board : Board
+        Their places.
+    model : str, optional
+        One of MODELS.
+    fixed : sequence of str, optional
+        Parameters that are not solved for: the principal point (cx, cy) stays in the middle of the image, all others
+        stay 0.
+    robust : bool, optional
+        Set aside corners and views that the rest contradicts: see `camviz.calibration.outliers`.
+
+    Returns
+    -------
+    Calibration
+        With one camera, named "camera".
+
+    Raises
+    ------
+    CannotCalibrate
+        Where the views do not give a camera.
+    ValueError
+        For an unknown model or parameter, and for corners of another board.
+
+    Examples
+    --------
+    >>> from camviz.clinic import virtual
+    >>> rng = np.random.default_rng(1)
+    >>> truth = virtual.single(rng)  # a camera and boards before it, whose corners are seen with noise
+    >>> found = calibrate(virtual.detections(truth.camera, truth.observed(rng)[0]), truth.board)
+    >>> bool(abs(found.cameras["camera"].intrinsics.fx / truth.camera.intrinsics.fx - 1) < 0.002)
+    True
     """
     kind, estimated = _model(model, fixed)
     adjustment = _alone("camera", detections, board, kind, estimated, robust)
@@ -62,12 +92,48 @@ def calibrate_pair(
     robust: bool = True,
     joint: bool = True,
 ) -> Calibration:
-    """The cameras "left" and "right" of a pair, from the views that both have; the left one's frame is the world.
+    """The cameras of a pair, from the views that both have; the left one's frame is the world.
 
     Views are of one moment that have the same place among the pictures (`Detections.places`). All is solved for
-    together: both cameras, where the right one stands, and one pose of the board for each view. Without `joint` each
-    camera stays as it is when calibrated alone, and only the poses are solved for (OpenCV's CALIB_FIX_INTRINSIC).
-    Otherwise as `calibrate`.
+    together: both cameras, where the right one stands, and one pose of the board for each view.
+
+    Parameters
+    ----------
+    left, right : Detections
+        The corners that either camera saw.
+    board : Board
+        Their places.
+    model : str, optional
+        One of MODELS.
+    fixed : sequence of str, optional
+        Parameters that are not solved for, as of `calibrate`.
+    robust : bool, optional
+        Set aside what the rest contradicts, as of `calibrate`.
+    joint : bool, optional
+        Otherwise each camera stays as it is when calibrated alone, and only the poses are solved for (OpenCV's
+        CALIB_FIX_INTRINSIC).
+
+    Returns
+    -------
+    Calibration
+        With the cameras "left" and "right".
+
+    Raises
+    ------
+    CannotCalibrate
+        Where fewer than three views are common, or the views do not give a camera.
+    ValueError
+        For an unknown model or parameter, and for corners of another board.
+
+    Examples
+    --------
+    >>> from camviz.clinic import virtual
+    >>> rng = np.random.default_rng(1)
+    >>> truth = virtual.pair(rng, views=6)
+    >>> seen = (virtual.detections(*each) for each in zip(truth.cameras, truth.observed(rng)))
+    >>> off = calibrate_pair(*seen, truth.board).cameras["right"].centre - truth.cameras[1].centre
+    >>> bool(np.linalg.norm(off) < 0.001)  # the right camera stands within a millimetre of where it is
+    True
     """
     kind, estimated = _model(model, fixed)
     both = {"left": left, "right": right}
@@ -99,6 +165,8 @@ def _model(name: str, fixed: Sequence[str]) -> tuple[Model, tuple[str, ...]]:
         raise ValueError(f"model must be one of {', '.join(MODELS)}, got {name!r}")
     kind = MODELS[name]
     free = [parameter for parameter in kind.parameters if parameter not in ("fx", "fy", "xi")]
+    if isinstance(fixed, str):
+        raise ValueError(f"fixed must be a list of parameters, got the one word {fixed!r}")
     for parameter in fixed:
         if parameter not in free:
             raise ValueError(f"fixed must be some of {', '.join(free)} of the model {name}, got {parameter!r}")

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, as_point
 from camviz.poses import RigidTransform, Rotation
 from camviz.twoview import homography
 
@@ -23,10 +23,36 @@ _UNDECIDED = 1e-10  # of the largest singular value: below this is rounding
 
 
 def constraints(H: ArrayLike) -> Array:
-    """What one homography says about b = (B₁₁, B₁₂, B₂₂, B₁₃, B₂₃, B₃₃), B = K⁻ᵀ K⁻¹: two rows (2, 6), rows · b = 0.
+    """What one homography says about B = K⁻ᵀ K⁻¹: rows with rows · b = 0 for b = (B₁₁, B₁₂, B₂₂, B₁₃, B₂₃, B₃₃).
 
-    h₁ᵀ B h₂ = 0, and h₁ᵀ B h₁ = h₂ᵀ B h₂ (Zhang's eq. 3, 4 and 8). With H[2, 2] = 1 a row weighs as much as its board
-    is large in the image.
+    h₁ᵀ B h₂ = 0, and h₁ᵀ B h₁ = h₂ᵀ B h₂. With H[2, 2] = 1 a row weighs as much as its board is large in the image.
+
+    Parameters
+    ----------
+    H : array_like (3, 3)
+        From the board's plane in metres to pixels.
+
+    Returns
+    -------
+    array (2, 6)
+        The two rows.
+
+    Raises
+    ------
+    ValueError
+        For a matrix of another shape, or with a number that is not finite.
+
+    References
+    ----------
+    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), eq. 3, 4 and 8.
+
+    Examples
+    --------
+    >>> from camviz.poses import Rotation
+    >>> R = Rotation.from_rotvec([0.5, 0.2, 0]).as_matrix()
+    >>> H = np.column_stack([R[:, :2], (0, 0, 1)])  # seen by a camera of K = 1, so that B = 1
+    >>> np.abs(constraints(H) @ [1, 0, 1, 0, 0, 1]).max() < 1e-12
+    np.True_
     """
     h1, h2, h3 = _matrix(H, "H").T
     h1, h2 = h1 / h3[2], h2 / h3[2]
@@ -34,11 +60,40 @@ def constraints(H: ArrayLike) -> Array:
 
 
 def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Array:
-    """K (3, 3) of the one camera behind all these homographies: two of them, or three where `skew` is unknown too.
+    """The one camera matrix behind all these homographies, in closed form and without distortion.
 
     Boards that are parallel count as one, and boards tilted about one and the same row or column leave K undetermined.
-    Raises ValueError where there are too few, where they determine no K, or where no K fits them (with noise, nearly
-    parallel boards).
+
+    Parameters
+    ----------
+    homographies : sequence of array_like (3, 3)
+        From the board's plane in metres to pixels: at least two, or three where skew is unknown too.
+    skew : bool, optional
+        Solve for skew as well; otherwise it is 0.
+
+    Returns
+    -------
+    array (3, 3)
+        K in pixels, with K[2, 2] = 1.
+
+    Raises
+    ------
+    ValueError
+        For too few homographies, for those that determine no K, or where no K fits them (with noise, nearly parallel
+        boards).
+
+    References
+    ----------
+    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
+
+    Examples
+    --------
+    >>> from camviz.poses import Rotation
+    >>> K = np.array([[500, 0, 320], [0, 510, 240], [0, 0, 1]])
+    >>> turns = Rotation.from_rotvec([[0.5, 0.1, 0], [0.1, -0.6, 0.2]])  # of two boards, 1 m away
+    >>> H = [K @ np.column_stack([R[:, :2], (0, 0, 1)]) for R in turns.as_matrix()]
+    >>> np.allclose(camera_matrix(H), K)
+    True
     """
     needed = 3 if skew else 2
     if len(homographies) < needed:
@@ -52,15 +107,46 @@ def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Arra
 
 
 def focal_lengths(homographies: Sequence[ArrayLike], centre: ArrayLike) -> tuple[float, float]:
-    """(fx, fy) in pixels from one homography or more, where the principal point `centre` (2,) is known and skew is 0.
+    """The focal lengths, where the principal point is known and skew is 0.
 
-    Two unknowns, two constraints: one board is enough, if it is tilted about a slanting axis. Raises ValueError for one
-    that faces the camera, or is tilted about a row or a column of the picture: that loses a constraint.
+    Two unknowns, two constraints: one board is enough, if it is tilted about a slanting axis. One that faces the
+    camera, or is tilted about a row or a column of the picture, loses a constraint.
+
+    Parameters
+    ----------
+    homographies : sequence of array_like (3, 3)
+        From the board's plane in metres to pixels: one or more.
+    centre : array_like (2,)
+        The principal point in pixels.
+
+    Returns
+    -------
+    fx : float
+        In pixels.
+    fy : float
+        In pixels.
+
+    Raises
+    ------
+    ValueError
+        Without a homography, where they determine no focal length, and for a centre of another shape.
+
+    References
+    ----------
+    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
+
+    Examples
+    --------
+    >>> from camviz.poses import Rotation
+    >>> R = Rotation.from_rotvec([0.5, 0.3, 0]).as_matrix()  # about a slanting axis
+    >>> H = [[500, 0, 320], [0, 510, 240], [0, 0, 1]] @ np.column_stack([R[:, :2], (0, 0, 1)])
+    >>> np.round(focal_lengths([H], centre=(320, 240)), 6)
+    array([500., 510.])
     """
     if not len(homographies):
         raise ValueError("homographies must hold at least one, got none")
     to_centre = np.eye(3)
-    to_centre[:2, 2] = -np.asarray(centre, dtype=float)
+    to_centre[:2, 2] = -as_point(centre, "centre", 2)
     V = np.concatenate([constraints(to_centre @ _matrix(H, "H")) for H in homographies])
     b = _null_vector(V[:, [0, 2, 5]])  # B = diag(1/fx², 1/fy², 1), up to scale
     squared = b[2] / b[:2]
@@ -70,11 +156,42 @@ def focal_lengths(homographies: Sequence[ArrayLike], centre: ArrayLike) -> tuple
 
 
 def board_pose(H: ArrayLike, K: ArrayLike) -> RigidTransform:
-    """cam_from_board of the board behind homography H (3, 3), in front of the camera (Zhang's section 3.1).
+    """The pose of the board behind a homography, in front of the camera.
 
     K⁻¹ H = λ [r₁ r₂ t]; with noise r₁ and r₂ are not quite perpendicular, and the nearest rotation is taken.
+
+    Parameters
+    ----------
+    H : array_like (3, 3)
+        From the board's plane in metres to pixels.
+    K : array_like (3, 3)
+        The camera matrix in pixels.
+
+    Returns
+    -------
+    RigidTransform
+        cam_from_board, in metres.
+
+    Raises
+    ------
+    ValueError
+        For a matrix of another shape, with a number that is not finite, and for a K without an inverse.
+
+    References
+    ----------
+    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
+
+    Examples
+    --------
+    >>> K = np.array([[500, 0, 320], [0, 500, 240], [0, 0, 1]])
+    >>> H = K @ [[1, 0, 0.1], [0, 1, 0], [0, 0, 2]]  # it faces the camera, 2 m away and 0.1 m to the right
+    >>> board_pose(H, K).translation.round(6)
+    array([0.1, 0. , 2. ])
     """
-    M = np.linalg.solve(_matrix(K, "K"), _matrix(H, "H"))
+    K = _matrix(K, "K")
+    if not np.linalg.matrix_rank(K) == 3:
+        raise ValueError(f"K must be a camera matrix, which has an inverse, got {K.tolist()}")
+    M = np.linalg.solve(K, _matrix(H, "H"))
     M *= np.sign(M[2, 2]) / np.sqrt(np.linalg.norm(M[:, 0]) * np.linalg.norm(M[:, 1]))
     U, _, Vt = np.linalg.svd(np.column_stack([M[:, 0], M[:, 1], np.cross(M[:, 0], M[:, 1])]))
     return RigidTransform.from_components(M[:, 2], Rotation.from_matrix(U @ Vt))

@@ -13,6 +13,7 @@ from camviz.calibration.types import Board, Calibration
 from camviz.clinic.gaps import gaps
 from camviz.clinic.judgement import FEWEST_VIEWS, Judgement, listed, px, rated
 from camviz.clinic.refit import Refit, far_columns, reach
+from camviz.clinic.stamps import SizeChange, size_change
 from camviz.lenses.base import Array
 
 FEWEST_CORNERS = 60  # 120 measurements, for 6 of each pose, 2 of the board's bend and 5 of the camera
@@ -31,8 +32,10 @@ def camera_judgement(
     if (seen.width, seen.height) != (grid.width, grid.height):
         scale = seen.width / grid.width
         sizes = f"the pictures have {seen.width}×{seen.height} pixels, the calibration has {grid.width}×{grid.height}"
+        change = size_change((grid.width, grid.height), (seen.width, seen.height))
+        sizes += f", which {change.words}"
         if abs(scale * grid.height - seen.height) > 1:
-            return _cropped(name, sizes), None
+            return _cropped(name, sizes, change), None
         camera = replace(camera, intrinsics=grid.resized(seen.width, seen.height))
         resized = f"{sizes}. Converted by f' = s f and c' = s c + (s - 1)/2, with s = {scale:.4g}, "
     count = np.isfinite(seen.corners).all(axis=-1).sum(axis=1)
@@ -54,12 +57,10 @@ def camera_judgement(
     return Judgement(name, verdict, f"{name}: {resized}{reason}.", settle, _facts(refit), _numbers(refit)), refit
 
 
-def _cropped(name: str, sizes: str) -> Judgement:
-    reason = (
-        f"{name}: {sizes}. They are cropped or of another mode, for no one factor leads from one size to the other."
-    )
-    settle = "pictures of the calibration's size; or the crop's first pixel (x0, y0), and c' = c - (x0, y0)."
-    return Judgement(name, "fail", reason, settle)
+def _cropped(name: str, sizes: str, change: SizeChange) -> Judgement:
+    crop = " and the crop's first pixel (x0, y0), with c' = c - (x0, y0)" if "crop" in change.kind else ""
+    settle = f"pictures of the calibration's size{'; or' * bool(crop)}{crop.removeprefix(' and')}."
+    return Judgement(name, "fail", f"{name}: {sizes}.", settle, numbers={"size_change": change.kind})
 
 
 def _too_few(name: str, count: Array) -> Judgement:

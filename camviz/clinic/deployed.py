@@ -7,15 +7,19 @@ not rest on residuals: `Refit` asks what solving the camera anew would change ov
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from camviz.calibration.detection import Detections
+from camviz.calibration.stamp import Stamp
 from camviz.calibration.types import Board, Calibration
 from camviz.clinic.camera_check import camera_judgement
 from camviz.clinic.judgement import Check
 from camviz.clinic.pair_check import pair_judgement
 from camviz.clinic.rig import pairs
+from camviz.clinic.stamps import contradictions, holds_for
 
 LIMIT_PX = 1.0  # RMS over the image
+NOT_TOLD: Mapping[str, Stamp] = MappingProxyType({})
 SAME_SQUARE = 1e-3  # of its side
 UNSEEN = (
     "One camera alone does not show a turn of the whole camera in its mount. Most of a shift of the principal point "
@@ -28,15 +32,40 @@ def check(
     detections: Detections | Mapping[str, Detections],
     board: Board | None = None,
     limit: float = LIMIT_PX,
+    taken: Mapping[str, Stamp] = NOT_TOLD,
 ) -> Check:
-    """Whether a calibration still holds, by a board's corners in new pictures of its camera, or of its cameras by name.
+    """Whether a calibration still holds, by a board's corners in new pictures of its cameras.
 
-    `board` is by default that of the calibration. `limit` is how far it may be off over the image, in pixels: the RMS
-    of far points, once a turn of the whole camera is taken out. The verdict is "pass" where the calibration is surely
-    (99 %) within the limit, "fail" where it is surely beyond it, "warn" where it is surely beyond half of it, and
-    "inconclusive" where the pictures do not tell. Corners of both cameras of a pair judge the pair, too. Raises
-    ValueError without a board, for an unknown camera, for corners of another board, and for a limit not above 0.
+    The verdict is "pass" where the calibration is surely (99 %) within the limit, "fail" where it is surely beyond it,
+    "warn" where it is surely beyond half of it, and "inconclusive" where the pictures do not tell. Corners of both
+    cameras of a pair judge the pair, too.
 
+    Parameters
+    ----------
+    calibration : Calibration
+        What is in use.
+    detections : Detections or mapping of str to Detections
+        The corners, of one camera or of cameras by name.
+    board : Board, optional
+        That of the calibration unless given.
+    limit : float, optional
+        How far it may be off over the image, in pixels: the RMS of far points, once a turn of the whole camera is taken
+        out.
+    taken : mapping of str to Stamp, optional
+        How the new pictures were taken, by camera: what of it contradicts the calibration's stamp is told.
+
+    Returns
+    -------
+    Check
+        The verdict, with its reasons and numbers.
+
+    Raises
+    ------
+    ValueError
+        Without a board, for an unknown camera, for corners of another board, and for a limit not above 0.
+
+    Examples
+    --------
     >>> from dataclasses import replace
     >>> import numpy as np
     >>> from camviz.clinic.virtual import detections, single
@@ -61,7 +90,14 @@ def check(
     for pair in pairs(calibration):
         if found.keys() >= {pair.left, pair.right}:
             judgements.append(pair_judgement(pair, found, board, limit, refits))
-    return Check(limit, tuple(judgements), _notes(calibration, board, found))
+    against = {name: tuple(contradictions(calibration.stamps.get(name, Stamp()), taken[name])) for name in taken}
+    return Check(
+        limit,
+        tuple(judgements),
+        _notes(calibration, board, found),
+        tuple(sentence for name in found if (sentence := holds_for(calibration, name))),
+        {name: several for name, several in against.items() if several},
+    )
 
 
 def _by_name(

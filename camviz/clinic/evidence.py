@@ -10,6 +10,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
+from camviz.calibration.stamp import Stamp
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
 from camviz.clinic.doctor.shown import Shown
@@ -27,8 +28,8 @@ class NotChecked(Exception):  # noqa: N818 - it is an answer, not an error
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """A calibration, another one, (width, height) of pictures by their names, the board as it was measured, a distance
-    in metres at which errors matter, the length in metres of a pair's baseline as it was measured, and pictures of the
-    board.
+    in metres at which errors matter, the length in metres of a pair's baseline as it was measured, pictures of the
+    board, and how new pictures were taken.
     """
 
     calibration: Calibration
@@ -38,6 +39,7 @@ class Evidence:
     at: float | None = None
     baseline: float | None = None
     shown: Shown | None = None
+    taken: Stamp | None = None
     _made: dict[tuple[str, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property

@@ -8,6 +8,7 @@ from typing import Any
 
 from camviz.clinic.checks import kinds
 from camviz.clinic.inspection import Inspection
+from camviz.clinic.judgement import Check, Judgement
 from camviz.clinic.registry import SEVERITIES, Finding
 
 DEFAULT = ("warning",)  # a severity and all worse ones
@@ -22,9 +23,11 @@ class Limit:
     lacking: str
 
 
+CHANGE = "change-px"  # new pictures tell it, and not a file
 LIMITS = {
     "rms-px": Limit("RMS error", "px", "the file does not hold its errors"),
     "expected-error-px": Limit("largest expected error (Max ERE)", "px", "the file holds no corners that determine it"),
+    CHANGE: Limit("change since the calibration", "px", "`camviz check` measures it, in new pictures"),
 }
 """What can be limited, by the name that files and options have for it."""
 
@@ -33,10 +36,24 @@ LIMITS = {
 class Gate:
     """What makes a calibration fail, and what does not count.
 
-    `fail_on` has ids of findings, and severities, which mean themselves and what is worse. Findings whose ids are in
-    `ignore` are set aside. `limits` are the largest numbers allowed, by the names of LIMITS. `source` says where it
-    was asked for. Raises UnknownName for what none of these is called.
+    Parameters
+    ----------
+    fail_on : tuple of str, optional
+        Ids of findings, and severities, which mean themselves and what is worse; "warning" unless given.
+    ignore : tuple of str, optional
+        Ids of findings that are set aside.
+    limits : mapping of str to float, optional
+        The largest numbers allowed, by the names of LIMITS.
+    source : str, optional
+        Where it was asked for.
 
+    Raises
+    ------
+    UnknownName
+        For what is no finding, severity or limit.
+
+    Examples
+    --------
     >>> Gate(("fold",), ignore=("fodl",))
     Traceback (most recent call last):
     camviz.clinic.gate.UnknownName: ignore: expected the id of a finding, got 'fodl'
@@ -58,26 +75,88 @@ class Gate:
         """Whether anybody asked for it; the gate that nobody asked for does what an inspection does by itself."""
         return self != Gate()
 
+    def told(self, failed_by: tuple[str, ...]) -> str:
+        """The line that says by what the gate is failed, or that it is passed.
+
+        Parameters
+        ----------
+        failed_by : tuple of str
+            What decided, a name each.
+
+        Returns
+        -------
+        str
+            One sentence.
+        """
+        source = f" ({self.source})" if self.source else ""
+        by = ", ".join(failed_by)
+        return f"Gate{source}: {f'failed by {by}' if by else 'passed'}."
+
     def decides(self, finding: Finding) -> bool:
-        """Whether a calibration with this finding fails."""
+        """Whether a calibration with this finding fails.
+
+        Parameters
+        ----------
+        finding : Finding
+            What was found.
+
+        Returns
+        -------
+        bool
+            True where `fail_on` has its id, its severity or a milder one.
+        """
+        return finding.id in self.fail_on or self._decided_by(finding.severity)
+
+    def _decided_by(self, severity: str) -> bool:
         severe = (SEVERITIES.index(name) for name in self.fail_on if name in SEVERITIES)
-        return finding.id in self.fail_on or SEVERITIES.index(finding.severity) <= max(severe, default=-1)
+        return SEVERITIES.index(severity) <= max(severe, default=-1)
 
     def judge(self, inspection: Inspection) -> Outcome:
-        """The inspection without what is ignored, and what decides about it."""
+        """The inspection without what is ignored, and what decides about it.
+
+        Parameters
+        ----------
+        inspection : Inspection
+            What was found.
+
+        Returns
+        -------
+        Outcome
+            Whether it passed, and by what it failed.
+        """
         seen = inspection.ignoring(self.ignore)
         return Outcome(
             self, seen, tuple(each for each in seen.findings if self.decides(each)), tuple(self._measured(seen))
         )
 
+    def audit(self, check: Check) -> Audit:
+        """What decides about a check of a calibration in use: "fail" is as a fault, "warn" as a warning.
+
+        Ids of findings do not concern it.
+
+        Parameters
+        ----------
+        check : Check
+            What new pictures say of the calibration.
+
+        Returns
+        -------
+        Audit
+            Whether it passed, and by what it failed.
+        """
+        severity = {"fail": "fault", "warn": "warning"}
+        decided = (each for each in check.judgements if each.verdict in severity)
+        return Audit(self, check, tuple(each for each in decided if self._decided_by(severity[each.verdict])))
+
     def _measured(self, inspection: Inspection) -> Iterator[Measured]:
         summary = inspection.summary
+        of = {"rms-px": summary.rms, "expected-error-px": summary.largest_error} if summary else {}
         for name, most in self.limits.items():
             if summary is None:
                 yield Measured(name, "", most, None)
                 continue
             for camera in summary.evidence.cameras:
-                value = summary.rms(camera) if name == "rms-px" else summary.largest_error(camera)
+                value = None if name == CHANGE else of[name](camera)
                 yield Measured(name, camera, most, value)
 
 
@@ -130,9 +209,7 @@ class Outcome:
         if not self.gate.asked:
             return
         yield from (each.sentence for each in self.measured)
-        by = ", ".join(self.failed_by)
-        source = f" ({self.gate.source})" if self.gate.source else ""
-        yield f"Gate{source}: {f'failed by {by}' if by else 'passed'}."
+        yield self.gate.told(self.failed_by)
 
     def as_tree(self) -> dict[str, Any]:
         """The inspection for programs, and under "gate" what decided."""
@@ -149,6 +226,35 @@ class Outcome:
                 "limits": limits,
             }
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """What a gate says of a check by new pictures: `failing` are the judgements that decide against it."""
+
+    gate: Gate
+    check: Check
+    failing: tuple[Judgement, ...]
+
+    @property
+    def verdict(self) -> str:
+        """The check's own, and "pass" where a warning or a failure does not decide."""
+        undecided = [each for each in self.check.judgements if each.verdict == "inconclusive"]
+        if self.failing:
+            return self.check.verdict
+        return "inconclusive" if undecided else "pass"
+
+    def lines(self) -> Iterator[str]:
+        """What the gate says, in lines; nothing where nobody asked for a gate."""
+        if self.gate.asked:
+            yield from (f"{name} is not checked: `camviz inspect` does." for name in self.gate.limits if name != CHANGE)
+            yield self.gate.told(tuple(f"{each.of} ({each.verdict})" for each in self.failing))
+
+    def as_tree(self) -> dict[str, Any]:
+        """The check for programs, and under "gate" what decided."""
+        failed_by = list(dict.fromkeys(each.verdict for each in self.failing))
+        gate = {"passed": not self.failing, "fail_on": list(self.gate.fail_on), "failed_by": failed_by}
+        return self.check.as_tree() | {"gate": gate}
 
 
 class UnknownName(ValueError):  # noqa: N818 - it is what was said, not what went wrong

@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
+from camviz.calibration.stamp import Stamp
 from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera
 from camviz.clinic import words
@@ -30,7 +31,37 @@ class Inspection:
 
     The worst cause comes first, and what follows from a cause comes after it: see `camviz.clinic.causes`.
 
-    `calibration` is None where the file has a fault that leaves nothing to look at.
+    Attributes
+    ----------
+    calibration : Calibration, optional
+        None where the file has a fault that leaves nothing to look at.
+    findings : tuple of Finding
+        What was found, and is not ignored.
+    checked : tuple of str
+        Ids of the findings that were looked for.
+    skipped : tuple of (str, str)
+        Ids of the others, each with the reason.
+    compare : Calibration, optional
+        What it was compared with.
+    source : Path, optional
+        The file, where it could not be read.
+    differences : tuple of Apart
+        By camera, from the calibration that it is compared with.
+    at : float, optional
+        A distance in metres at which errors are told.
+    ignored : tuple of Finding
+        What was found and is left out of `findings`.
+    made : tuple of Finding
+        What the checks made, before causes are told.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from camviz.calibration import Calibration
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> camera = Camera(Intrinsics.from_fov(640, 480, 60))
+    >>> inspect(Calibration({"camera": camera}, Path(), "a data sheet")).healthy
+    True
     """
 
     calibration: Calibration | None
@@ -38,15 +69,26 @@ class Inspection:
     checked: tuple[str, ...]
     skipped: tuple[tuple[str, str], ...] = ()
     compare: Calibration | None = field(default=None, repr=False)
-    source: Path | None = None  # of a file that could not be read
-    differences: tuple[Apart, ...] = ()  # by camera, from the calibration that it is compared with
-    at: float | None = None  # metres, a distance at which errors are told
-    ignored: tuple[Finding, ...] = ()  # what was found and is left out of `findings`
-    made: tuple[Finding, ...] = field(default=(), repr=False)  # what the checks made, before causes are told
+    source: Path | None = None
+    differences: tuple[Apart, ...] = ()
+    at: float | None = None
+    ignored: tuple[Finding, ...] = ()
+    made: tuple[Finding, ...] = field(default=(), repr=False)
 
     @classmethod
     def of(cls, evidence: Evidence) -> Self:
-        """Make every check for which there is evidence."""
+        """Make every check for which there is evidence.
+
+        Parameters
+        ----------
+        evidence : Evidence
+            The calibration, and what is known beside it.
+
+        Returns
+        -------
+        Inspection
+            What they found.
+        """
         findings: list[Finding] = []
         checked, skipped = [], []
         for id, kind in kinds().items():
@@ -67,7 +109,18 @@ class Inspection:
         )
 
     def ignoring(self, ids: Collection[str]) -> Self:
-        """The same without the findings of these ids, which neither count nor explain others; `ignored` has them."""
+        """The same without the findings of some ids, which neither count nor explain others; `ignored` has them.
+
+        Parameters
+        ----------
+        ids : collection of str
+            What to leave out.
+
+        Returns
+        -------
+        Inspection
+            Without them.
+        """
         kept = tuple(each for each in self.made if each.id not in ids)
         left = by_causes((each for each in self.made if each.id in ids), kinds())
         return replace(self, findings=by_causes(kept, kinds()), ignored=left)
@@ -78,11 +131,23 @@ class Inspection:
         return words.worst_of(self.findings) is None
 
     def as_json(self) -> str:
-        """For programs, as strict JSON: cameras, findings, checked, skipped, ignored, as docs/clinic.md has them."""
+        """For programs, as strict JSON: cameras, findings, checked, skipped, ignored, as docs/clinic.md has them.
+
+        Returns
+        -------
+        str
+            JSON.
+        """
         return json_text(self.as_tree())
 
     def as_tree(self) -> dict[str, Any]:
-        """What `as_json` writes, as dicts and lists."""
+        """What `as_json` writes, as dicts and lists.
+
+        Returns
+        -------
+        dict
+            Of what JSON can hold.
+        """
         cameras = self.calibration.cameras if self.calibration else {}
         return {
             "verdict": self.verdict,
@@ -101,7 +166,9 @@ class Inspection:
         rms = self.calibration.rms(name) if self.calibration else None
         pinhole = {key: getattr(grid, key) for key in ("width", "height", "fx", "fy", "cx", "cy")}
         distortion = {key: float(value) for key, value in asdict(lens).items()}
-        return {"name": name, "model": type(lens).__name__} | pinhole | {"distortion": distortion, "rms": rms}
+        stamp = self.calibration.stamps.get(name) if self.calibration else None
+        told = {"distortion": distortion, "rms": rms} | ({"stamp": stamp.known()} if stamp else {})
+        return {"name": name, "model": type(lens).__name__} | pinhole | told
 
     @cached_property
     def summary(self) -> Summary | None:
@@ -119,7 +186,13 @@ class Inspection:
         return self.summary.guidance if self.healthy and self.summary else ""
 
     def as_text(self) -> str:
-        """For people: the findings or that there are none, the calibration at a glance, and what was checked."""
+        """For people: the findings or that there are none, the calibration at a glance, and what was checked.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
         glance = tuple(self.summary.lines()) if self.summary else ()
         said = words.text(self.findings, self.checked, self.skipped, self.next_step, glance, self.ignored)
         return "".join(f"{each.sentence}\n" for each in self.differences) + "\n" * bool(self.differences) + said
@@ -140,14 +213,53 @@ def inspect(
 ) -> Inspection:
     """What is wrong with a calibration.
 
-    `compare` is another calibration of the same cameras. `pictures` are the sizes (width, height) of pictures by
-    their names that the calibration is meant for. `board` is the board as it was measured, where that is known.
-    `at` is a distance in metres at which the error of a place is told, `baseline` the length in metres of a pair's
-    baseline as it was measured. `photographs` are files that show the board.
+    Parameters
+    ----------
+    calibration : Calibration
+        What to look at.
+    compare : Calibration, optional
+        Another calibration of the same cameras.
+    pictures : mapping of str to tuple of int, optional
+        Sizes (width, height) in pixels of pictures, by their names, that the calibration is meant for.
+    board : Board, optional
+        The board as it was measured, where that is known.
+    at : float, optional
+        A distance in metres at which the error of a place is told.
+    baseline : float, optional
+        The length in metres of a pair's baseline as it was measured.
+    photographs : sequence of path, optional
+        Files that show the board.
+
+    Returns
+    -------
+    Inspection
+        Findings, with their remedies, and what was checked.
+
+    Raises
+    ------
+    ValueError
+        For what is no Calibration, such as a path.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from camviz.calibration import Calibration
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.lenses import BrownConrady
+    >>> camera = Camera(Intrinsics.from_fov(640, 480, 100), BrownConrady(k1=-0.3))  # it folds where 1 - 0.9 r² = 0
+    >>> (finding,) = inspect(Calibration({"camera": camera}, Path(), "a data sheet")).findings
+    >>> finding.id, round(finding.value, 3)
+    ('fold', 1.054)
     """
+    if not isinstance(calibration, Calibration):
+        raise ValueError(
+            f"calibration must be a Calibration, as `load` reads one, got {type(calibration).__name__}; `inspect_file` "
+            "takes a path"
+        )
     printed = board or calibration.board
     shown = Shown.of(photographs, printed) if photographs and printed else None
-    return Inspection.of(Evidence(calibration, compare, pictures or {}, board, at, baseline, shown))
+    taken = Stamp.of(photographs) if photographs else None
+    return Inspection.of(Evidence(calibration, compare, pictures or {}, board, at, baseline, shown, taken))
 
 
 def inspect_board(
@@ -176,8 +288,33 @@ def inspect_file(
 ) -> Inspection:
     """What is wrong with a calibration file, also with one that every other command refuses.
 
-    `prepare` may add to what was read, such as the corners in pictures; the rest is as of `inspect`. Raises
-    CalibrationError where the file is not a calibration at all.
+    Parameters
+    ----------
+    path : str or PathLike
+        The file.
+    size : tuple of int, optional
+        Width and height in pixels, for files that do not hold them.
+    compare, pictures, board, at, baseline, photographs : optional
+        As of `inspect`.
+    prepare : callable, optional
+        May add to the Calibration that was read, such as the corners in pictures.
+
+    Returns
+    -------
+    Inspection
+        As of `inspect`; without a calibration where a fault leaves nothing to look at.
+
+    Raises
+    ------
+    CalibrationError
+        Where the file is not a calibration at all.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("calib.txt").write_text("P0: 700 0 600 0 0 700 180 0 0 0 1 0")
+    >>> [finding.severity for finding in inspect_file("calib.txt", size=(1242, 375)).findings]
+    ['note']
     """
     try:
         calibration = load(path, size=size, mend=True)

@@ -101,7 +101,7 @@ def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> 
     sum of squares S in the direction of e columns that are left, makes F = (E/e) / ((S - E)/(N - k - e)) (Seber & Lee
     2003, theorem 4.1). Columns that cannot be told apart from the rest are not counted.
     """
-    residuals, left, scale, known = _projected(adjustment, name, extra, also)
+    residuals, left, scale, known = projected(adjustment, name, extra, also)
     axes, into = _axes(left / scale, APART)
     along = axes.T @ residuals
     count, fallen = axes.shape[1], float(along @ along)
@@ -120,8 +120,8 @@ def explained(adjustment: Adjustment, name: str, extra: Array, *also: Array) -> 
     return Explained(count, F, chance, into @ along / scale, sigmas, part, pixels, float(most))
 
 
-def _projected(
-    adjustment: Adjustment, name: str, extra: Array, also: Sequence[Array]
+def projected(
+    adjustment: Adjustment, name: str, extra: Array, also: Sequence[Array] = ()
 ) -> tuple[Array, Array, Array, int]:
     """Residuals (n,) and columns (n, e) with poses, parameters and `also` taken out; the columns' lengths before; how
     many directions `also` had."""

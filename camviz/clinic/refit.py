@@ -18,11 +18,11 @@ from camviz.cameras import Camera
 from camviz.clinic.fields import smooth_field
 from camviz.clinic.observed import Observed, explained
 from camviz.clinic.rig import board_poses
+from camviz.clinic.view_by_view import ViewByView
 from camviz.lenses.base import Array
 
 SURE = 0.99  # of "surely": how often the true change lies within the bounds
 GRID = (60, 40)  # of pixels over the image, as `--compare` has it
-SAME = 1e-9  # of a view's largest information: less is a direction that the view does not measure
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +106,8 @@ class Refit:
 
     @cached_property
     def scatter(self) -> float:
-        """`scatter` of the camera that was solved anew."""
-        return scatter(self.free)
+        """How much more the views differ than their noise lets expect (`ViewByView.scatter`)."""
+        return ViewByView.of(self.free).scatter
 
     @property
     def covariance(self) -> Array:
@@ -178,28 +178,6 @@ class Refit:
             key: (parameter(self.camera, key), parameter(anew, key), float(sigma))
             for key, sigma in zip(self.free.estimated[self.name], sigmas, strict=True)
         }
-
-
-def scatter(solved: Adjustment) -> float:
-    """How much more the views differ among each other than the noise within them lets expect, at least 1.
-
-    Each view alone would ask for other parameters. Q is what that would take off the sum of squares S, for q more
-    parameters: (Q/q) / ((S - Q)/(N - k - q)), Birge's ratio squared (Birge 1932, Phys. Rev. 40, 207). Real corners
-    are not independent; a covariance times this ratio is that of the scatter from view to view.
-    """
-    gain, more = 0.0, -len(solved.parameters)
-    for view in np.flatnonzero(solved.posed):
-        normal = solved.only([view]).normal_equations
-        gradient = normal.shared_gradient - np.einsum("vms,vm->s", normal.pose_response, normal.gradients)
-        scale = np.sqrt(np.maximum(np.diag(normal.information), np.finfo(float).tiny))
-        values, vectors = np.linalg.eigh(normal.information / np.outer(scale, scale))
-        known = values > SAME * values[-1]
-        gain += float(np.sum((vectors.T @ (gradient / scale))[known] ** 2 / values[known]))
-        more += int(known.sum())
-    left = solved.measurements - solved.unknowns - more
-    if more < 1 or left < 1:
-        return 1.0
-    return max(1.0, (gain / more) / (max(solved.sum_of_squares - gain, np.finfo(float).tiny) / left))
 
 
 def far_columns(camera: Camera, names: Sequence[str]) -> Array:

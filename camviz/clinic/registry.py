@@ -32,9 +32,41 @@ STAGES = ("", "set-up", "corners", "solution")
 class Finding:
     """What is wrong, in one plain sentence, with the number that shows it.
 
-    `camera` is the camera's name, None where the finding concerns all of them. `pictures` are the indices of the views
-    that it concerns. `view` names the view that shows it. `consequence_of` is the id of the finding that explains it,
-    and `count` is how many findings alike it stands for. What a cause explains is no more than `reach` pixels off.
+    Attributes
+    ----------
+    id : str
+        Its kind, one of `camviz.clinic.kinds()`.
+    severity : str
+        "fault", "warning" or "note".
+    sentence : str
+        What is wrong.
+    value : float, optional
+        The number that shows it.
+    unit : str
+        Of the value.
+    camera : str, optional
+        The camera's name; None where the finding concerns all of them.
+    view : str
+        The name of the view that shows it.
+    causes : tuple of str
+        The most likely first.
+    remedy : str
+        What to do.
+    pictures : tuple of int
+        Indices of the views that it concerns.
+    consequence_of : str, optional
+        The id of the finding that explains it.
+    count : int
+        How many findings alike it stands for.
+    reach : float, optional
+        Pixels: what a cause explains is no more than that off.
+
+    Examples
+    --------
+    >>> from camviz.clinic import kinds
+    >>> finding = kinds()["fold"].found("camera: it folds.", 1.05, "focal lengths", "camera")
+    >>> finding.severity, finding.value
+    ('fault', 1.05)
     """
 
     id: str

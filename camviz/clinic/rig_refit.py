@@ -13,8 +13,9 @@ from camviz.calibration.difference import pixel_grid
 from camviz.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz.calibration.types import Board, Mask
 from camviz.cameras import Camera, transform
-from camviz.clinic.refit import GRID, bounds, scatter
+from camviz.clinic.refit import GRID, bounds
 from camviz.clinic.rig import lone_poses, middlemost
+from camviz.clinic.view_by_view import ViewByView
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.twoview.rectify import rectify
@@ -61,7 +62,7 @@ class RigRefit:
     def covariance(self) -> Array:
         """Of the right camera's twist (6, 6), by the scatter from view to view."""
         place = self.free.place_of("right")
-        return scatter(self.free) * self.free.covariance[place, place]
+        return ViewByView.of(self.free).scatter * self.free.covariance[place, place]
 
     @cached_property
     def distance(self) -> float:

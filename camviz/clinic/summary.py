@@ -14,6 +14,7 @@ from camviz.calibration.guidance import instruction, next_board_poses
 from camviz.calibration.types import Calibration
 from camviz.calibration.uncertainty import largest_expected_error, projection_uncertainty
 from camviz.clinic.evidence import Evidence
+from camviz.clinic.stamps import holds_for
 from camviz.clinic.task import TaskError, task_errors
 
 GOOD = 1.0  # pixels: where the largest expected error is below this, no more pictures are asked for (AprilCal's limit)
@@ -43,11 +44,13 @@ class Summary:
 
     @cached_property
     def origin(self) -> tuple[str, ...]:
-        """The file, when it was written, its format, the cameras, and how many pictures were used."""
+        """The file, when it was made or else written, its format, the cameras, and how many pictures were used."""
         calibration, cameras = self.calibration, self.calibration.cameras
         path = calibration.source
         known = path.name and path.exists()
+        made = ", ".join(dict.fromkeys(stamp.made for stamp in calibration.stamps.values() if stamp.made))
         written = f"written {datetime.fromtimestamp(path.stat().st_mtime):%Y-%m-%d %H:%M}" if known else ""
+        written = f"calibrated {made}" if made else written
         sizes = {f"{k.width} × {k.height}" for k in (camera.intrinsics for camera in cameras.values())}
         named = ", ".join(list(cameras)[:MOST_CAMERAS]) + ", …" * (len(cameras) > MOST_CAMERAS)
         shown = "one camera" if named == "camera" else f"{len(cameras)} camera{'s' * (len(cameras) > 1)}: {named}"
@@ -133,9 +136,16 @@ class Summary:
             if sigma is not None or value or key in ("cx", "cy"):
                 yield key, measured(value, sigma)
 
+    @property
+    def holds(self) -> tuple[str, ...]:
+        """What the calibration of each camera holds for, in sentences; nothing where the file does not say."""
+        said = (holds_for(self.calibration, name) for name in self.names)
+        return tuple(sentence for sentence in said if sentence)
+
     def lines(self) -> Iterator[str]:
-        """The same in a few lines: the origin, and each camera's RMS and uncertainty."""
+        """The same in a few lines: the origin, what it holds for, and each camera's RMS and uncertainty."""
         yield " · ".join(self.origin)
+        yield from self.holds
         for name, rows in self.table().items():
             pinhole = ", ".join(f"{key} = {rows[key]}" for key in ("fx", "fy", "cx", "cy"))
             others = "; ".join(f"{key} {rows[key]}" for key in (RMS, MIDDLE, CORNER) if rows[key] != UNKNOWN)

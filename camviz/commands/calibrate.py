@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from camviz.calibration import CannotCalibrate
     from camviz.clinic import Inspection
     from camviz.files import Board, Calibration
+    from camviz.files.corners import LoadedCorners
 
 CALIBRATE = """\
 Finds a board (a chessboard, a ChArUco board, Kalibr's AprilGrid, a grid of circles) in pictures and solves for the
@@ -49,16 +50,18 @@ all that a later inspection needs. With --report, or where a gate is given, the 
 findings make it fail only where there is a gate.
 
 With --corners nothing is looked for in pictures: the corners come from files of other programs, which docs/formats.md
-lists. --board, --square-mm and --size say what those files do not hold. IMAGES are then for the report alone.
+lists. --board, --square-mm and --size say what those files do not hold. IMAGES are then for the report alone, and
+--right names the files of the right camera's corners.
 
 The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
-(left07.jpg and right07.jpg), else by their order.
+(left07.jpg and right07.jpg), else by their order. So do the views in files of corners, but not by their order.
 """
 MODELS = {name: model.says for name, (_, model) in calibration_models().items()}
 EXAMPLES = """\
 examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
   camviz calibrate --corners corners.vnl --board 9x6 --square-mm 25 --size 640x480
+  camviz calibrate --corners left.vnl --right right.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
   camviz calibrate shots/ --board 9x6 --square-mm 25 --fail-on warning --limit rms-px=0.5 --junit clinic.xml
@@ -70,6 +73,7 @@ exit status:
   2  it cannot be solved, or the command cannot be used; one sentence on stderr says why
   3  something is missing on this machine
 """
+MOST_WORDS = 1000
 FINDERS = ("auto", "sectors", "classic")
 PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
 
@@ -79,7 +83,9 @@ def add(commands: Any) -> None:
     models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
     command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
     command.add_argument("images", metavar="IMAGES", nargs="*", help="pictures, folders of them, or patterns")
-    command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
+    command.add_argument(
+        "--right", metavar="IMAGES", nargs="+", help="those of the right camera, or files of its corners"
+    )
     add_board(command, required=False, default=False)
     add_corners(command)
     add_baseline(command)
@@ -92,6 +98,13 @@ def add(commands: Any) -> None:
     add_seconds(command)
     command.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
+    )
+    command.add_argument(
+        "--conditions",
+        metavar="TEXT",
+        type=_remark,
+        default="",
+        help="what else it holds for, to be kept in OUT, such as 'focus taped at 2 m, binning 2x2, 21 °C'",
     )
     command.add_argument("--goal", metavar="PX", type=pixels, help="the largest expected error wanted (default: 1 px)")
     command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
@@ -122,7 +135,7 @@ def calibrate(options: argparse.Namespace) -> int:
 
     _refuse_words(options)
     left = pictures(options.images) if options.images else []
-    right = pictures(options.right) if options.right else []
+    right = _right(options)
     sources = [*left, *right, *(options.corners or [])]
     refuse_output(options.output, "calibration", *sources)
     if options.report:
@@ -130,9 +143,10 @@ def calibrate(options: argparse.Namespace) -> int:
     gate = given_gate(options)
     refuse_junit(options, options.output, *([options.report] if options.report else []), *sources)
     try:
-        calibration = _of_corners(left, options) if options.corners else _of_pictures(left, right, options)
+        calibration = _of_corners(left, right, options) if options.corners else _of_pictures(left, right, options)
     except CannotCalibrate as error:
         raise Refusal(_complaint(error, left + right, options)) from error
+    calibration = _stamped(calibration, left, right, options)
     try:
         write_calibration(calibration, options.output, "opencv")
     except CalibrationError as error:
@@ -169,26 +183,67 @@ def _refuse_words(options: argparse.Namespace) -> None:
     missing = [word for word, given in needed.items() if not given]
     if missing and not options.corners:
         raise Refusal(f"the following arguments are required: {', '.join(missing)}; see `camviz calibrate --help`.")
-    if options.corners and options.right:
-        raise Refusal("--corners is for one camera: calibrate each camera of a pair by itself, without --right.")
     if options.size and not options.corners:
         raise Refusal("--size is for --corners: pictures have a size of their own.")
 
 
-def _of_corners(paths: list[Path], options: argparse.Namespace) -> Calibration:
-    """The camera of the corners in files."""
+def _right(options: argparse.Namespace) -> list[Path]:
+    """The right camera's pictures, or with --corners the files of its corners."""
+    words = options.right or []
+    return [Path(word) for word in words] if options.corners else pictures(words)
+
+
+def _of_corners(paths: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
+    """The camera or the pair of the corners in files."""
     from camviz.calibration import calibrate
 
     found = corners_of(options, paths)
+    if right:
+        return _pair_of_corners(found, corners_of(options, [], files=right), options)
     told = found.detections.skipped
     calibration = _solved(lambda: calibrate(found.detections, found.board, options.model, **_how(options)), told)
     return replace(calibration, notes=found.notes + calibration.notes)
+
+
+def _pair_of_corners(left: LoadedCorners, right: LoadedCorners, options: argparse.Namespace) -> Calibration:
+    """The pair of two cameras' corners, whose views find each other by their names."""
+    from camviz.calibration import calibrate_pair
+    from camviz.calibration.pairing import paired_detections
+
+    if left.board != right.board:
+        described = (
+            f"{each.columns}×{each.rows} inner corners, {1000 * each.square_size:.6g} mm apart"
+            for each in (left.board, right.board)
+        )
+        raise Refusal(
+            f"{options.right[0]}: expected the board of {options.corners[0]} ({next(described)}), got "
+            f"{next(described)}."
+        )
+    both = paired_detections(left.detections, right.detections)
+    skipped = both[0].skipped + both[1].skipped
+    calibration = _solved(lambda: calibrate_pair(*both, left.board, options.model, **_how(options)), skipped)
+    return replace(calibration, notes=tuple(dict.fromkeys(left.notes + right.notes)) + calibration.notes)
 
 
 def _of_pictures(left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
     """The camera or the pair that took pictures."""
     board = board_of(options)
     return _pair(left, right, board, options) if right else _single(left, board, options)
+
+
+def _stamped(calibration: Calibration, left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
+    """With what the calibration of each camera holds for; and a note where the setting changed between its pictures."""
+    from camviz import __version__
+    from camviz.calibration.stamp import Stamp, now
+    from camviz.clinic.stamps import settings_differ
+
+    made = {"made": now(), "program": f"camviz {__version__}", "model": options.model, "conditions": options.conditions}
+    stamps = {
+        name: Stamp.of(pictures, views=int(calibration.used(name).any(axis=1).sum()), **made)
+        for name, pictures in zip(calibration.cameras, (left, right), strict=False)
+    }
+    notes = [f"{name}: {said}" for name, stamp in stamps.items() for said in settings_differ(stamp)]
+    return replace(calibration, stamps=stamps, notes=(*calibration.notes, *notes))
 
 
 def _complaint(error: CannotCalibrate, paths: list[Path], options: argparse.Namespace) -> str:
@@ -325,6 +380,13 @@ def _how(options: argparse.Namespace) -> dict[str, Any]:
 def _natural(path: Path) -> tuple[Any, ...]:
     """left2 before left10."""
     return tuple(int(part) if part.isdigit() else part for part in re.split(r"([0-9]+)", path.name.lower()))
+
+
+def _remark(text: str) -> str:
+    words = " ".join(text.split())
+    if len(words) > MOST_WORDS:
+        raise argparse.ArgumentTypeError(f"expected at most {MOST_WORDS} characters, got {len(words)}")
+    return words
 
 
 def _count(text: str) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz.commands.boards import add_board, given_board
-from camviz.commands.calibrate import FINDERS, Bar, pictures
+from camviz.commands.calibrate import FINDERS, Bar, add_seconds, pictures
 from camviz.commands.common import (
     FOUND,
     OK,
@@ -21,6 +21,8 @@ from camviz.commands.common import (
     pixels,
     size,
 )
+from camviz.commands.gate import EPILOG as GATE
+from camviz.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
@@ -29,7 +31,14 @@ if TYPE_CHECKING:
 
 INCONCLUSIVE = 4
 STATUS = {"pass": OK, "warn": FOUND, "fail": FOUND, "inconclusive": INCONCLUSIVE}
-PAINT = {"^pass:": "green", "^fail:": "red", "^warn:": "yellow", "^inconclusive:": "blue"}
+PAINT = {
+    "^pass:": "green",
+    "^fail:": "red",
+    "^warn:": "yellow",
+    "^inconclusive:": "blue",
+    "^Gate.*: passed": "green",
+    "^Gate.*: failed": "red",
+}
 
 CHECK = """\
 Says whether a calibration still describes its camera, by new pictures of a board. The calibration is held as it is, the
@@ -50,9 +59,12 @@ examples:
   camviz check camera.yaml new/*.jpg
   camviz check camera.yml new/ --board 9x6 --square-mm 25 --limit-px 0.5
   camviz check stereo.yaml new/left/ --right new/right/ --json
+  camviz check camera.yaml new/ --fail-on fault --limit change-px=0.5 --junit check.xml
+
+{gate}  Here a verdict of fail is as a fault, and warn as a warning; ids of findings do not concern it.
 
 exit status:
-  0  pass
+  0  pass, or nothing that the gate fails on
   1  warn or fail
   2  a file cannot be read, or the command cannot be used; one sentence on stderr says why
   3  something is missing on this machine
@@ -62,27 +74,33 @@ exit status:
 
 def add(commands: Any) -> None:
     command = add_command(commands, "check", check, "say whether a calibration still holds", CHECK)
-    command.epilog = EPILOG
+    command.epilog = EPILOG.format(gate=GATE)
     command.add_argument("calibration", metavar="CALIBRATION", type=Path, help="the calibration in use (- is stdin)")
     command.add_argument("images", metavar="IMAGES", nargs="+", help="new pictures, folders of them, or patterns")
     command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
     command.add_argument("--camera", metavar="NAME", help="the camera that took IMAGES, where CALIBRATION has several")
     add_board(command, required=False, default=False)
     command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
-    command.add_argument(
-        "--limit-px", metavar="PX", type=pixels, default=1.0, help="how far it may be off (default: 1)"
-    )
+    add_seconds(command)
+    command.add_argument("--limit-px", metavar="PX", type=pixels, help="how far it may be off (default: 1)")
     command.add_argument("--size", metavar="WxH", type=size, help="image size, where CALIBRATION does not hold it")
     command.add_argument("--json", action="store_true", help="the same for programs")
     add_megapixels(command)
     add_colour(command)
+    add_gate(command)
 
 
 def check(options: argparse.Namespace) -> int:
     """Find the board, judge, and say the verdict."""
     from camviz.calibration import CannotCalibrate
+    from camviz.calibration.stamp import Stamp
     from camviz.clinic import check as judge
+    from camviz.clinic.deployed import LIMIT_PX
+    from camviz.clinic.gate import CHANGE
+    from camviz.files.output import json_text
 
+    gate = given_gate(options)
+    refuse_junit(options, options.calibration, *map(Path, [*options.images, *(options.right or [])]))
     calibration = loaded(options.calibration, options.size)
     board = given_board(options) or calibration.board
     if board is None:
@@ -96,12 +114,16 @@ def check(options: argparse.Namespace) -> int:
             found = _found(names, board, options, bar)
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
-    judged = judge(calibration, found, board, options.limit_px)
+    limit = options.limit_px or gate.limits.get(CHANGE, LIMIT_PX)
+    words = dict(zip(names, (options.images, options.right), strict=False))
+    taken = {name: Stamp.of(pictures(words[name])) for name in names}
+    audit = gate.audit(judge(calibration, found, board, limit, taken))
     if options.json:
-        tell_json(judged.as_json())
+        tell_json(json_text(audit.as_tree()))
     else:
-        tell(judged.as_text(), PAINT, options.color)
-    return STATUS[judged.verdict]
+        tell("\n".join([audit.check.as_text(), *audit.lines()]), PAINT, options.color)
+    write_junit(options, {str(options.calibration): audit})
+    return STATUS[audit.verdict]
 
 
 def _cameras(calibration: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
@@ -135,8 +157,8 @@ def _found(names: tuple[str, ...], board: Board, options: argparse.Namespace, ba
 
     left = pictures(options.images)
     if len(names) == 1:
-        return {names[0]: detect(left, board, finder=options.finder, progress=bar)}
+        return {names[0]: detect(left, board, finder=options.finder, progress=bar, seconds=options.seconds)}
     moments = paired(left, pictures(options.right))
-    both = detect_pair(moments.left, moments.right, board, finder=options.finder, progress=bar)
+    both = detect_pair(moments.left, moments.right, board, finder=options.finder, progress=bar, seconds=options.seconds)
     first = replace(both[0], skipped=both[0].skipped + moments.lonely)
     return dict(zip(names, (first, both[1]), strict=True))

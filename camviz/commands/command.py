@@ -15,10 +15,12 @@ from camviz.commands import (
     board,
     calibrate,
     check,
+    classroom,
     completion,
     convert,
     doctor,
     inspect,
+    join,
     lab,
     mtf,
     noise,
@@ -50,6 +52,7 @@ examples:
   camviz noise shots/                        measure a sensor from its frames: gain, noise, patterns, dark current
   camviz mtf photo.png --roi 300,200,80,120  measure sharpness from a slanted edge
   camviz teacher for-me --slides             write the lessons with plans and keys, sheets and slides into ./for-me
+  camviz class 05 --host 192.168.4.1         let a class vote on the lesson's questions, with telephones or notebooks
 
 A file called - is stdin, or stdout. Colour is for terminals; NO_COLOR and --color never turn it off.
 
@@ -61,7 +64,10 @@ exit status:
   4    camviz check cannot tell from these pictures
   130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
-COMMANDS = (lab, doctor, board, calibrate, inspect, check, show, convert, reproject, noise, mtf, teacher, completion)
+COMMANDS = (
+    *(lab, doctor, board, calibrate, inspect, check, show, convert, reproject, noise, mtf, teacher, classroom, join),
+    completion,
+)
 
 
 class Ended(BaseException):

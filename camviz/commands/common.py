@@ -63,9 +63,9 @@ class Parser(argparse.ArgumentParser):
             ) from None
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean inspect?", where a known word is near."""
-    near = get_close_matches(word, list(known), 1)
+def did_you_mean(word: object, known: Iterable[object]) -> str:
+    """ "; did you mean inspect?", where a known word is near; numbers, too, are taken as they are written."""
+    near = get_close_matches(str(word), map(str, known), 1)
     return f"; did you mean {near[0]}?" if near else ""
 
 

@@ -33,9 +33,12 @@ def _listing() -> str:
 
 
 def corners_of(
-    options: argparse.Namespace, paths: Sequence[Path], otherwise: tuple[int, int] | None = None
+    options: argparse.Namespace,
+    paths: Sequence[Path],
+    otherwise: tuple[int, int] | None = None,
+    files: Sequence[Path] = (),
 ) -> LoadedCorners:
-    """The corners in the files of --corners; pictures tell their size where neither the files nor --size do."""
+    """The corners in `files`, or else in those of --corners; pictures tell their size where these and --size do not."""
     from camviz.files import CalibrationError
     from camviz.files.corners import load_corners
 
@@ -45,7 +48,7 @@ def corners_of(
         shape, side = (board.columns, board.rows), board.square_size
     try:
         return load_corners(
-            options.corners,
+            files or options.corners,
             shape=shape,
             square_size=side,
             size=options.size,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from camviz.commands.common import STREAM, Refusal, did_you_mean, refuse_output, write_whole
 
 if TYPE_CHECKING:
-    from camviz.clinic.gate import Gate, Outcome
+    from camviz.clinic.gate import Audit, Gate, Outcome
 
 SETTINGS, PROJECT, TABLE = "camviz.toml", "pyproject.toml", "camviz"
 NAMES, LIMITS = ("fail-on", "ignore"), "limits"
@@ -22,8 +22,8 @@ EPILOG = """\
 gate:
   --fail-on takes ids of findings and severities (fault, warning, note), which mean themselves and what is worse.
   A project keeps its gate in camviz.toml, or in pyproject.toml under [tool.camviz]: fail-on = ["fault", "fold"],
-  ignore = ["aspect"], [limits] rms-px = 0.5, expected-error-px = 1. It is looked for in the working directory and
-  above it, up to the repository's root. What the command line says wins.
+  ignore = ["aspect"], [limits] rms-px = 0.5, expected-error-px = 1, change-px = 1 (of camviz check). It is looked for
+  in the working directory and above it, up to the repository's root. What the command line says wins.
 """
 
 
@@ -36,7 +36,11 @@ def add_gate(command: argparse.ArgumentParser) -> None:
         "--ignore", metavar="ID,…", type=names, action="extend", help="findings to leave out of verdict and exit status"
     )
     command.add_argument(
-        "--limit", metavar="NAME=PX,…", type=limits, action="extend", help="rms-px=0.5, expected-error-px=1: fail above"
+        "--limit",
+        metavar="NAME=PX,…",
+        type=limits,
+        action="extend",
+        help="rms-px, expected-error-px, of a check change-px: fail above",
     )
     command.add_argument("--junit", metavar="OUT.xml", type=Path, help="write JUnit XML for a CI server as well")
 
@@ -179,7 +183,7 @@ def refuse_junit(options: argparse.Namespace, *others: Path) -> None:
     refuse_output(options.junit, "JUnit file", *others)
 
 
-def write_junit(options: argparse.Namespace, outcomes: Mapping[str, Outcome | str]) -> None:
+def write_junit(options: argparse.Namespace, outcomes: Mapping[str, Outcome | Audit | str]) -> None:
     """Write JUnit's XML where it is asked for."""
     from camviz.report.junit import junit
 

@@ -42,9 +42,10 @@ def glance_html(summary: Summary) -> str:
     more = len(summary.evidence.cameras) - len(table)
     few = f"<p>The first {len(table)} of {len(table) + more} cameras.</p>" if more else ""
     task = "".join(f"<p>{escape(each.sentence)}</p>" for each in summary.task)
+    holds = "".join(f"<p>{escape(sentence)}</p>" for sentence in summary.holds)
     notes = "".join(f'<p class="note">{escape(note)}</p>' for note in summary.calibration.notes)
     return (
-        f'<p class="origin">{escape(" · ".join(summary.origin))}</p><div class="scroll" style="overflow-x:auto">'
+        f'<p class="origin">{escape(" · ".join(summary.origin))}</p>{holds}<div class="scroll" style="overflow-x:auto">'
         f'<table class="glance"><tr><td></td>{head}</tr>{body}</table></div>{few}<p>{LEGEND}</p>{task}{notes}'
     )
 

@@ -12,7 +12,8 @@ from collections.abc import Iterator, Mapping
 from xml.etree import ElementTree
 
 from camviz.clinic import words
-from camviz.clinic.gate import Measured, Outcome
+from camviz.clinic.gate import Audit, Measured, Outcome
+from camviz.clinic.judgement import Judgement
 from camviz.clinic.registry import Finding
 
 NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -21,12 +22,12 @@ NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 Case = tuple[str, str, str, str]  # name; failure, error, skipped, system-out or ""; its message; its text
 
 
-def junit(outcomes: Mapping[str, Outcome | str]) -> str:
+def junit(outcomes: Mapping[str, Outcome | Audit | str]) -> str:
     """The XML of what a gate says of files, by their names; in place of an Outcome, why a file cannot be read."""
     root = ElementTree.Element("testsuites", name="camviz")
     for file, outcome in outcomes.items():
         suite = ElementTree.SubElement(root, "testsuite", name=_clean(file))
-        cases = [("read", "error", outcome, "")] if isinstance(outcome, str) else list(_cases(outcome))
+        cases = list(_all_cases(outcome))
         for case in cases:
             _add(suite, file, case)
         _count(suite, [kind for _, kind, _, _ in cases])
@@ -34,6 +35,22 @@ def junit(outcomes: Mapping[str, Outcome | str]) -> str:
         root.set(key, str(sum(int(suite.get(key, "0")) for suite in root)))
     ElementTree.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
+
+
+def _all_cases(outcome: Outcome | Audit | str) -> Iterator[Case]:
+    if isinstance(outcome, str):
+        yield "read", "error", outcome, ""
+    elif isinstance(outcome, Audit):
+        yield from (_judged(each, outcome) for each in outcome.check.judgements)
+    else:
+        yield from _cases(outcome)
+
+
+def _judged(judgement: Judgement, audit: Audit) -> Case:
+    """A camera or a pair that new pictures judge: failed where that decides, an error where they cannot tell."""
+    told = "\n".join([f"{judgement.verdict}: {judgement.reason}", judgement.settle, *judgement.facts])
+    kind = "failure" if judgement in audit.failing else "error" if judgement.verdict == "inconclusive" else "system-out"
+    return f"check {judgement.of}", kind, judgement.reason * (kind != "system-out"), told
 
 
 def _cases(outcome: Outcome) -> Iterator[Case]:

@@ -24,6 +24,13 @@ COMMONEST = "chessboard"
 def kinds() -> Mapping[str, Kind]:
     """The kinds by name, the chessboard first and the others in alphabetical order.
 
+    Returns
+    -------
+    mapping of str to Kind
+        One for each module of this package that has a KIND.
+
+    Examples
+    --------
     >>> list(kinds())
     ['chessboard', 'aprilgrid', 'asymmetric-circles', 'charuco', 'circles']
     """
@@ -34,7 +41,30 @@ def kinds() -> Mapping[str, Kind]:
 
 
 def kind_of(board: Shape) -> Kind:
-    """The kind of a board; ValueError for a name that is none."""
+    """The kind of a board.
+
+    Parameters
+    ----------
+    board : Shape
+        A `Board`, or what has its fields.
+
+    Returns
+    -------
+    Kind
+        The one of its name.
+
+    Raises
+    ------
+    ValueError
+        For a name that is none.
+
+    Examples
+    --------
+    >>> from camviz.calibration import Board
+    >>> board = Board(9, 6, 0.025)
+    >>> kind_of(board).says(board)
+    'chessboard with 9×6 inner corners (10×7 squares)'
+    """
     if board.kind not in kinds():
         raise ValueError(f"kind must be one of {', '.join(kinds())}, got {board.kind!r}")
     return kinds()[board.kind]

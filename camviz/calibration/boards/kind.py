@@ -15,7 +15,18 @@ Area = tuple[float, float, float, float]
 
 
 class Shape(Protocol):
-    """The fields of a `Board`, which is also what a process that looks for boards is sent."""
+    """The fields of a `Board`, which is also what a process that looks for boards is sent.
+
+    Examples
+    --------
+    >>> from camviz.calibration.boards.kind import regular
+    >>> from camviz.calibration import Board
+    >>> regular(Board(2, 2, 0.025))  # a function of a Shape takes a Board
+    array([[0.   , 0.   ],
+           [0.025, 0.   ],
+           [0.   , 0.025],
+           [0.025, 0.025]])
+    """
 
     @property
     def columns(self) -> int: ...
@@ -39,10 +50,22 @@ class Shape(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """What of a board is black, in metres in the board's frame: x to the right, y down, its first point at (0, 0).
+    """What of a board is black, in its own frame: x to the right, y down, its first point at (0, 0).
 
-    `rectangles` (n, 4) are x and y of the upper left, width and height; `discs` (n, 3) x and y of the middle and the
-    diameter.
+    Parameters
+    ----------
+    rectangles : array (n, 4), optional
+        x and y of the upper left, width and height, in metres.
+    discs : array (n, 3), optional
+        x and y of the middle and the diameter, in metres.
+
+    Examples
+    --------
+    >>> from camviz.calibration import Board
+    >>> board = Board(9, 6, 0.025)
+    >>> from camviz.calibration.boards import kind_of
+    >>> len(kind_of(board).drawn(board).rectangles)  # half of ten by seven squares
+    35
     """
 
     rectangles: Array = field(default_factory=lambda: np.zeros((0, 4)))
@@ -51,18 +74,47 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of board.
+    """A kind of board: where its points are, what of it is black, and how it is found and described.
 
-    `points` gives the points (columns * rows, 2) of a board in metres, row by row from the upper left, y down; the
-    first is (0, 0). `area` is left, top, right and bottom of the board with the white that its finder needs, `drawn`
-    what of it is black. `find` looks for the points in a grey picture (height, width) of 8 bits, and gives them
-    (columns * rows, 2) in pixels, NaN where one was not seen, or None; its last argument is one of `finding.FINDERS`.
-    `check` raises ValueError for a board that cannot be.
+    The functions take a `Shape`. People count a board by what `counts` says and measure what `sized` says.
 
-    People count a board by what `counts` says: `per` points stand along each side of a thing that is counted. They
-    measure `sized` ("squares"), which `size` gives in metres. `says` describes a board in words, `measures` its sizes,
-    `options` is how the commands are told of it, and `advice` what to look at where it is not found. `partial` boards
-    need not be seen as a whole.
+    Parameters
+    ----------
+    name, title : str
+        One word, and the words for people.
+    counts : str
+        What people count: `per` points stand along each side of one.
+    points : callable
+        Gives the points (columns * rows, 2) in metres, row by row from the upper left, y down; the first is (0, 0).
+    area : callable
+        Gives left, top, right and bottom in metres of the board with the white that its finder needs.
+    drawn : callable
+        Gives what is black, a Drawing.
+    find : callable
+        Takes a grey picture (height, width) of 8 bits, a shape and one of `finding.FINDERS`. Gives the points in
+        pixels, (columns * rows, 2), NaN where one was not seen, or None.
+    check : callable
+        Raises ValueError for a board that cannot be.
+    says, measures : callable
+        Describe a board, and its sizes, in words.
+    options : callable
+        Says how the commands are told of it.
+    sized : str
+        What people measure, such as "squares".
+    size : callable
+        Gives that in metres.
+    advice : str
+        What to look at where it is not found.
+    partial : bool, optional
+        Whether the board need not be seen as a whole.
+    per : int, optional
+        Points along each side of a thing that is counted.
+
+    Examples
+    --------
+    >>> from camviz.calibration.boards import kinds
+    >>> kinds()["aprilgrid"].counts, kinds()["aprilgrid"].per
+    ('tags', 2)
     """
 
     name: str

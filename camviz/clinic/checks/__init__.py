@@ -17,7 +17,7 @@ from typing import Any
 from camviz.clinic.registry import Fault, Kind
 
 ORDER = (
-    *("compare", "assumed", "file", "contradiction", "size", "lens"),
+    *("compare", "assumed", "file", "contradiction", "size", "settings", "lens"),
     *("corners", "set_aside", "boards", "moving", "model", "pair", "frames", "described"),
 )
 """The modules in the order of their checks; others come after them, by name. Within one the order is as written."""
@@ -26,6 +26,13 @@ ORDER = (
 def kinds() -> Mapping[str, Kind]:
     """Every kind of finding by its id, in the order of the checks.
 
+    Returns
+    -------
+    mapping of str to Kind
+        With the words of each and its check.
+
+    Examples
+    --------
     >>> kinds()["fold"].severity
     'fault'
     """
@@ -35,6 +42,13 @@ def kinds() -> Mapping[str, Kind]:
 def faults() -> Mapping[str, Fault]:
     """Every fault that can be put into a virtual calibration, by its name.
 
+    Returns
+    -------
+    mapping of str to Fault
+        Each with the id of the finding that must name it.
+
+    Examples
+    --------
     >>> faults()["warped board"].finding
     'board-warp'
     """

@@ -12,6 +12,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence
 from camviz.clinic.registry import WRONG_NUMBERS, Finding, Rng, finding
+from camviz.clinic.stamps import size_change
 from camviz.clinic.virtual import alone, changed, healthy
 from camviz.lenses import BrownConrady, Perspective
 
@@ -56,7 +57,8 @@ def _other_pictures(evidence: Evidence) -> Iterator[Finding]:
         if (grid.width, grid.height) != (width, height):
             sentence = (
                 f"{name}: the calibration is for images of {grid.width}×{grid.height}, "
-                f"the pictures have {width}×{height}."
+                f"the pictures have {width}×{height}, "
+                f"which {size_change((grid.width, grid.height), (width, height)).words}."
             )
             yield wrong_size.found(sentence, width / grid.width, "times", name)
 

@@ -22,6 +22,13 @@ __all__ = ["Diagnosis", "Shown", "Trouble", "diagnose", "prescription", "trouble
 def troubles() -> Mapping[str, Trouble]:
     """Every trouble by its name, in alphabetical order of the files.
 
+    Returns
+    -------
+    mapping of str to Trouble
+        One for each that a module of this package declares.
+
+    Examples
+    --------
     >>> troubles()["legacy pattern"].cause[:15]
     'a ChArUco board'
     """
@@ -31,13 +38,52 @@ def troubles() -> Mapping[str, Trouble]:
 
 
 def diagnose(shown: Shown, finding: str | None = None) -> tuple[Diagnosis, ...]:
-    """What of the board is not as described, as its pictures show it; or of that what is one finding alone."""
+    """What of a board is not as described, as its pictures show it.
+
+    Parameters
+    ----------
+    shown : Shown
+        The pictures, and the board as it was described.
+    finding : str, optional
+        Look only for what is this finding.
+
+    Returns
+    -------
+    tuple of Diagnosis
+        Each with the option that mends it; empty where the pictures show nothing.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from camviz.calibration import Board
+    >>> from camviz.calibration.boards.picture import whiteness
+    >>> board = Board(7, 5, 0.04, marker_size=0.03, dictionary="DICT_5X5_100")
+    >>> picture = (255 * whiteness(replace(board, legacy=True), 40, margin=1)).astype(np.uint8)
+    >>> [each.option for each in diagnose(Shown(board, {"a.png": picture}))]
+    ['--legacy']
+    """
     asked = [each for each in troubles().values() if finding in (None, each.finding)]
     return tuple(diagnosis for each in asked for diagnosis in each.diagnoses(shown))
 
 
 def prescription(diagnoses: Sequence[Diagnosis]) -> str:
-    """What they say, in one line that ends with the options to try; empty where there is none."""
+    """What diagnoses say, in one line that ends with the options to try.
+
+    Parameters
+    ----------
+    diagnoses : sequence of Diagnosis
+        Of one board.
+
+    Returns
+    -------
+    str
+        One line; empty where there is none.
+
+    Examples
+    --------
+    >>> prescription([Diagnosis("sides swapped", "a slip", "The board has 8×5 inner corners.", "--board 8x5")])
+    'The board has 8×5 inner corners: try --board 8x5.'
+    """
     if not diagnoses:
         return ""
     said = " ".join(each.sentence for each in diagnoses)

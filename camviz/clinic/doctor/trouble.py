@@ -13,9 +13,27 @@ Seen = tuple[str, str] | tuple[str, str, float, str]
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the pictures show, in one sentence, and the `option` of the commands that mends it.
+    """What the pictures show, in one sentence, and the option of the commands that mends it.
 
-    `trouble` is the name of the Trouble, `cause` what it comes from, `value` a number in `unit` that shows it.
+    Attributes
+    ----------
+    trouble : str
+        The name of the Trouble.
+    cause : str
+        What it comes from.
+    sentence : str
+        What the pictures show.
+    option : str
+        What mends it; "no …" for an option that is to be left out.
+    value : float, optional
+        A number that shows it.
+    unit : str
+        Of the value.
+
+    Examples
+    --------
+    >>> Diagnosis("sides swapped", "a slip", "The board has 8×5 inner corners.", "--board 8x5").option
+    '--board 8x5'
     """
 
     trouble: str
@@ -30,8 +48,23 @@ class Diagnosis:
 class Trouble:
     """One way in which a board is not as described.
 
-    `examine` gives a sentence, an option, and perhaps a number and its unit for what it sees, and nothing where it
-    sees nothing. An inspection has it under the id `finding`.
+    Parameters
+    ----------
+    name : str
+        Its name.
+    cause : str
+        What it comes from.
+    examine : callable
+        Takes Shown; gives a sentence, an option, and perhaps a number and its unit for what it sees, and nothing where
+        it sees nothing.
+    finding : str, optional
+        The id under which an inspection has it.
+
+    Examples
+    --------
+    >>> from camviz.clinic.doctor import troubles
+    >>> troubles()["wrong unit"].finding
+    'baseline-scale'
     """
 
     name: str
@@ -40,7 +73,18 @@ class Trouble:
     finding: str = "wrong-board"
 
     def diagnoses(self, shown: Shown) -> Iterable[Diagnosis]:
-        """What of this the pictures show."""
+        """What of this the pictures show.
+
+        Parameters
+        ----------
+        shown : Shown
+            The pictures, and the board as it was described.
+
+        Yields
+        ------
+        Diagnosis
+            Each with the option that mends it.
+        """
         for seen in self.examine(shown):
             yield Diagnosis(self.name, self.cause, *seen)
 
