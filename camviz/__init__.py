@@ -8,6 +8,12 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
+"""The version, as three numbers.
+
+>>> import camviz
+>>> camviz.__version__.count(".")
+2
+"""
 
 _HOME = {
     "Calibration": "camviz.calibration",
@@ -16,6 +22,7 @@ _HOME = {
     "Rig": "camviz.cameras",
     "explore": "camviz.widgets",
     "inspect": "camviz.widgets.inspection",
+    "join": "camviz.room.membership",
     "load": "camviz.files",
     "look_at": "camviz.cameras",
 }
@@ -38,7 +45,7 @@ _PARTS = (
 )
 
 __all__ = [
-    *("Calibration", "Camera", "Intrinsics", "Rig", "__version__", "explore", "inspect", "load", "look_at"),
+    *("Calibration", "Camera", "Intrinsics", "Rig", "__version__", "explore", "inspect", "join", "load", "look_at"),
     *_PARTS,
 ]
 

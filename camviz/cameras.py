@@ -11,15 +11,43 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.lenses import Lens, Perspective
-from camviz.lenses.base import Array, as_points, blocked_matmul, unit
+from camviz.lenses.base import Array, as_point, as_points, blocked_matmul, unit
 from camviz.poses import RigidTransform, Rotation
+
+__all__ = ["Camera", "Intrinsics", "Rig", "look_at", "rotate", "transform"]
 
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """The pixel grid behind a lens: u = fx x + skew y + cx, v = fy y + cy (Hartley & Zisserman 2004, eq. 6.10).
+    """The pixel grid behind a lens: u = fx x + skew y + cx, v = fy y + cy.
 
     All in pixels, centres at integers: the image spans -0.5 … width-0.5 and -0.5 … height-0.5.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the image in pixels.
+    fx, fy : float
+        Focal lengths in pixels.
+    cx, cy : float
+        Principal point in pixels.
+    skew : float, optional
+        In pixels; 0 where rows and columns are at right angles.
+
+    Raises
+    ------
+    ValueError
+        For a size that is no whole number, a focal length that is not positive, or a number that is not finite.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), eq. 6.10.
+
+    Examples
+    --------
+    >>> grid = Intrinsics(640, 480, fx=500, fy=500, cx=320, cy=240)
+    >>> grid.to_pixels([0.1, -0.2])  # 0.1 focal lengths to the right, 0.2 up
+    array([370., 140.])
     """
 
     width: int
@@ -46,7 +74,29 @@ class Intrinsics:
     def from_fov(cls, width: int, height: int, hfov_deg: float) -> Intrinsics:
         """Square pixels and a centred principal point, seeing `hfov_deg` from the left edge to the right one.
 
-        FOV = 2 atan(width / 2f): the field of a perspective lens. Raises ValueError outside (0, 180) degrees.
+        FOV = 2 atan(width / 2f): the field of a perspective lens.
+
+        Parameters
+        ----------
+        width, height : int
+            Size of the image in pixels.
+        hfov_deg : float
+            Horizontal field of view in degrees.
+
+        Returns
+        -------
+        Intrinsics
+            With fx = fy.
+
+        Raises
+        ------
+        ValueError
+            For a field of view outside (0, 180) degrees.
+
+        Examples
+        --------
+        >>> round(Intrinsics.from_fov(640, 480, 90).fx, 6)  # tan 45° = 1: half the width
+        320.0
         """
         if not 0 < hfov_deg < 180:
             raise ValueError(f"hfov_deg must lie between 0 and 180 degrees, got {hfov_deg}")
@@ -55,7 +105,32 @@ class Intrinsics:
 
     @classmethod
     def from_sensor(cls, width: int, height: int, focal_mm: float, pitch_um: float) -> Intrinsics:
-        """Square pixels `pitch_um` micrometres apart, `focal_mm` millimetres behind the lens, centred."""
+        """Square pixels and a centred principal point, from what a data sheet says.
+
+        Parameters
+        ----------
+        width, height : int
+            Size of the image in pixels.
+        focal_mm : float
+            Focal length in millimetres.
+        pitch_um : float
+            Distance of neighbouring pixels in micrometres.
+
+        Returns
+        -------
+        Intrinsics
+            With fx = fy.
+
+        Raises
+        ------
+        ValueError
+            For a pitch or a focal length that is not positive.
+
+        Examples
+        --------
+        >>> Intrinsics.from_sensor(1920, 1080, focal_mm=6, pitch_um=3).fx  # 6 mm / 3 µm
+        2000.0
+        """
         if not (isfinite(pitch_um) and pitch_um > 0):
             raise ValueError(f"pitch_um must be a positive distance in micrometres, got {pitch_um}")
         focal_length = focal_mm * 1000 / pitch_um
@@ -63,7 +138,30 @@ class Intrinsics:
 
     @classmethod
     def from_matrix(cls, K: ArrayLike, width: int, height: int) -> Intrinsics:
-        """From a 3×3 camera matrix [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]; ValueError for any other form."""
+        """From a camera matrix [[fx, skew, cx], [0, fy, cy], [0, 0, 1]].
+
+        Parameters
+        ----------
+        K : array_like (3, 3)
+            The camera matrix in pixels.
+        width, height : int
+            Size of the image in pixels.
+
+        Returns
+        -------
+        Intrinsics
+            With this K.
+
+        Raises
+        ------
+        ValueError
+            For a matrix of any other form.
+
+        Examples
+        --------
+        >>> Intrinsics.from_matrix([[500, 0, 320], [0, 510, 240], [0, 0, 1]], 640, 480).fy
+        510.0
+        """
         K = np.asarray(K, dtype=np.float64)
         if K.shape != (3, 3):
             raise ValueError(f"K must have shape (3, 3), got {K.shape}")
@@ -77,7 +175,23 @@ class Intrinsics:
         return np.array([[self.fx, self.skew, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
     def to_pixels(self, xy: ArrayLike) -> Array:
-        """Pixels (..., 2) of lens coordinates (..., 2)."""
+        """Pixels of lens coordinates.
+
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            Image points of the lens in focal lengths.
+
+        Returns
+        -------
+        array (..., 2)
+            Pixels.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+        """
         xy = as_points(xy, 2, "xy")
         x, y = xy[..., 0], xy[..., 1]
         uv = np.empty(xy.shape)
@@ -85,7 +199,23 @@ class Intrinsics:
         return uv
 
     def from_pixels(self, uv: ArrayLike) -> Array:
-        """Lens coordinates (..., 2) of pixels (..., 2)."""
+        """Lens coordinates of pixels: the inverse of `to_pixels`.
+
+        Parameters
+        ----------
+        uv : array_like (..., 2)
+            Pixels.
+
+        Returns
+        -------
+        array (..., 2)
+            Image points of the lens in focal lengths.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+        """
         uv = as_points(uv, 2, "uv")
         xy = np.empty(uv.shape)
         xy[..., 1] = (uv[..., 1] - self.cy) / self.fy
@@ -93,39 +223,133 @@ class Intrinsics:
         return xy
 
     def contains(self, uv: ArrayLike) -> np.ndarray:
-        """True where a pixel (..., 2) lies on the image; NaN does not."""
+        """Whether pixels lie on the image.
+
+        Parameters
+        ----------
+        uv : array_like (..., 2)
+            Pixels.
+
+        Returns
+        -------
+        array (...) of bool
+            True on the image; NaN does not lie on it.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+
+        Examples
+        --------
+        >>> Intrinsics.from_fov(640, 480, 90).contains([[-0.5, 0], [-0.6, 0], [np.nan, 0]])
+        array([ True, False, False])
+        """
         u, v = np.moveaxis(as_points(uv, 2, "uv"), -1, 0)
         return (u >= -0.5) & (u <= self.width - 0.5) & (v >= -0.5) & (v <= self.height - 0.5)
 
     def resized(self, width: int, height: int) -> Intrinsics:
-        """The same view sampled on another grid: f' = s f and, with centres at integers, c' = s c + (s - 1)/2."""
+        """The same view sampled on another grid: f' = s f and, with centres at integers, c' = s c + (s - 1)/2.
+
+        Parameters
+        ----------
+        width, height : int
+            Size of the other grid in pixels.
+
+        Returns
+        -------
+        Intrinsics
+            Of that size, with the same field of view.
+
+        Examples
+        --------
+        >>> Intrinsics(640, 480, 500, 500, 320, 240).resized(320, 240).cx  # 160 - 1/4, not 160
+        159.75
+        """
         sx, sy = width / self.width, height / self.height
         cx, cy = sx * self.cx + (sx - 1) / 2, sy * self.cy + (sy - 1) / 2
         return Intrinsics(width, height, sx * self.fx, sy * self.fy, cx, cy, sx * self.skew)
 
     def within(self, side: int) -> Intrinsics:
-        """The same view on the grid of its aspect whose longer side has `side` pixels, and the shorter at least one."""
+        """The same view on the grid of its aspect whose longer side has `side` pixels, and the shorter at least one.
+
+        Parameters
+        ----------
+        side : int
+            Pixels along the longer side.
+
+        Returns
+        -------
+        Intrinsics
+            The view resized.
+        """
         scale = side / max(self.width, self.height)
         return self.resized(max(1, round(scale * self.width)), max(1, round(scale * self.height)))
 
     def cropped(self, x0: int, y0: int, width: int, height: int) -> Intrinsics:
-        """The window whose first pixel was (x0, y0): only the principal point moves."""
+        """The window whose first pixel was (x0, y0): only the principal point moves.
+
+        Parameters
+        ----------
+        x0, y0 : int
+            Column and row in pixels of the window's upper left pixel.
+        width, height : int
+            Size of the window in pixels.
+
+        Returns
+        -------
+        Intrinsics
+            Of the window.
+        """
         return replace(self, width=width, height=height, cx=self.cx - x0, cy=self.cy - y0)
 
     def binned(self, factor: int) -> Intrinsics:
-        """Blocks of factor × factor pixels read as one; left-over columns and rows are dropped."""
+        """Blocks of factor × factor pixels read as one; left-over columns and rows are dropped.
+
+        Parameters
+        ----------
+        factor : int
+            Pixels along the side of a block.
+
+        Returns
+        -------
+        Intrinsics
+            Of the smaller image.
+
+        Raises
+        ------
+        ValueError
+            For a factor that is no whole number, or below 1.
+        """
         if int(factor) != factor or factor < 1:
             raise ValueError(f"factor must be a whole number, at least 1, got {factor}")
         width, height = self.width // factor, self.height // factor
         return self.cropped(0, 0, width * factor, height * factor).resized(width, height)
 
     def grid(self) -> Array:
-        """Every pixel centre, (height, width, 2)."""
+        """Every pixel centre.
+
+        Returns
+        -------
+        array (height, width, 2)
+            Pixels (u, v).
+        """
         u, v = np.meshgrid(np.arange(self.width, dtype=float), np.arange(self.height, dtype=float))
         return np.stack([u, v], axis=-1)
 
     def border(self, samples: int = 16) -> Array:
-        """The image's outline as pixels (4 * samples, 2), clockwise from the top left corner."""
+        """The image's outline, clockwise from the top left corner.
+
+        Parameters
+        ----------
+        samples : int, optional
+            Points along each side.
+
+        Returns
+        -------
+        array (4 * samples, 2)
+            Pixels.
+        """
         s = np.arange(samples) / samples
         u = np.concatenate([s, np.ones(samples), 1 - s, np.zeros(samples)]) * self.width - 0.5
         v = np.concatenate([np.zeros(samples), s, np.ones(samples), 1 - s]) * self.height - 0.5
@@ -134,7 +358,23 @@ class Intrinsics:
 
 @dataclass(frozen=True)
 class Camera:
-    """Intrinsics, a lens and a pose. `world_from_cam` says where the camera stands and looks."""
+    """Intrinsics, a lens and a pose.
+
+    Parameters
+    ----------
+    intrinsics : Intrinsics
+        The pixel grid.
+    lens : Lens, optional
+        Perspective unless given.
+    world_from_cam : RigidTransform, optional
+        Where the camera stands and looks, in metres; the origin, looking along z, unless given.
+
+    Examples
+    --------
+    >>> camera = Camera(Intrinsics.from_fov(641, 481, 90), world_from_cam=look_at((0, -2, -5), (0, 0, 0)))
+    >>> camera.project([0, 0, 0])  # what it looks at, in the middle
+    array([320., 240.])
+    """
 
     intrinsics: Intrinsics
     lens: Lens = field(default_factory=Perspective)
@@ -160,40 +400,150 @@ class Camera:
         return R, t
 
     def project(self, points_world: ArrayLike) -> Array:
-        """Pixels (..., 2) of world points (..., 3) in metres, K ∘ lens ∘ cam_from_world; NaN where there is none."""
+        """K ∘ lens ∘ cam_from_world: where points of the world appear in the picture.
+
+        Parameters
+        ----------
+        points_world : array_like (..., 3)
+            Points in metres.
+
+        Returns
+        -------
+        array (..., 2)
+            Pixels; NaN where a point has no image.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 3 coordinates.
+
+        References
+        ----------
+        Hartley & Zisserman (2004), section 6.1.
+
+        Examples
+        --------
+        >>> camera = Camera(Intrinsics.from_fov(641, 481, 90))  # f = 641/2, principal point (320, 240)
+        >>> camera.project([[0, 0, 2], [1, 0, 2], [0, 0, -2]])
+        array([[320.  , 240.  ],
+               [480.25, 240.  ],
+               [   nan,    nan]])
+        """
         R, t = self.extrinsics
         points_cam = blocked_matmul(as_points(points_world, 3, "points_world"), R.T) + t
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
     def unproject(self, uv: ArrayLike) -> Array:
-        """Unit rays (..., 3) in the world, from the centre through pixels (..., 2); NaN where there is no ray."""
+        """The rays through pixels.
+
+        Parameters
+        ----------
+        uv : array_like (..., 2)
+            Pixels.
+
+        Returns
+        -------
+        array (..., 3)
+            Unit rays in the world, from the camera's centre; NaN where there is no ray.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+
+        Examples
+        --------
+        >>> Camera(Intrinsics.from_fov(641, 481, 90)).unproject([320, 240])
+        array([0., 0., 1.])
+        """
         R, _ = self.extrinsics
         return blocked_matmul(self.lens.unproject(self.intrinsics.from_pixels(uv)), R)
 
     def rays(self) -> Array:
-        """The unit ray (height, width, 3) in the world of every pixel."""
+        """The ray of every pixel.
+
+        Returns
+        -------
+        array (height, width, 3)
+            Unit rays in the world; NaN where there is no ray.
+        """
         return self.unproject(self.intrinsics.grid())
 
     def sees(self, points_world: ArrayLike) -> np.ndarray:
-        """True where a world point (..., 3) has an image inside the picture."""
+        """Whether points of the world have an image inside the picture.
+
+        Parameters
+        ----------
+        points_world : array_like (..., 3)
+            Points in metres.
+
+        Returns
+        -------
+        array (...) of bool
+            True where the image lies inside the picture.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 3 coordinates.
+        """
         return self.intrinsics.contains(self.project(points_world))
 
     def frustum(self, near: float, far: float, samples: int = 16) -> tuple[Array, Array]:
-        """The rims of the viewed volume at distances `near` and `far` in metres: two outlines (n, 3) in the world.
+        """The rims of the viewed volume at two distances.
 
         Points of the image's border at equal distance *along the ray*, so the rims bend with the lens.
+
+        Parameters
+        ----------
+        near, far : float
+            Distances in metres.
+        samples : int, optional
+            Points along each side of the image.
+
+        Returns
+        -------
+        near_rim : array (4 * samples, 3)
+            Points in the world in metres, at the distance `near`.
+        far_rim : array (4 * samples, 3)
+            The same at `far`.
         """
         rays = self.unproject(self.intrinsics.border(samples))
         return self.centre + near * rays, self.centre + far * rays
 
     def at(self, world_from_cam: RigidTransform) -> Camera:
-        """The same camera, standing elsewhere."""
+        """The same camera, standing elsewhere.
+
+        Parameters
+        ----------
+        world_from_cam : RigidTransform
+            Its new pose.
+
+        Returns
+        -------
+        Camera
+            With the same intrinsics and lens.
+        """
         return replace(self, world_from_cam=world_from_cam)
 
 
 @dataclass(frozen=True)
 class Rig:
-    """Named cameras that keep their places relative to each other."""
+    """Named cameras that keep their places relative to each other.
+
+    Parameters
+    ----------
+    cameras : mapping of str to Camera
+        The cameras by name.
+
+    Examples
+    --------
+    >>> from camviz.poses import RigidTransform
+    >>> left = Camera(Intrinsics.from_fov(640, 480, 60))
+    >>> rig = Rig({"left": left, "right": left.at(RigidTransform.from_translation([0.1, 0, 0]))})
+    >>> rig.a_from_b("right", "left").translation  # the left camera is 0.1 m to the left of the right one
+    array([-0.1,  0. ,  0. ])
+    """
 
     cameras: Mapping[str, Camera]
 
@@ -201,19 +551,59 @@ class Rig:
         return iter(self.cameras.values())
 
     def __getitem__(self, name: str) -> Camera:
+        if name not in self.cameras:
+            raise KeyError(f"camera must be one of {', '.join(self.cameras)}, got {name!r}")
         return self.cameras[name]
 
     def a_from_b(self, a: str, b: str) -> RigidTransform:
-        """The transform that takes points in camera b's frame to camera a's; for a stereo pair, right_from_left."""
+        """The transform that takes points in camera b's frame to camera a's; for a stereo pair, right_from_left.
+
+        Parameters
+        ----------
+        a, b : str
+            Names of cameras.
+
+        Returns
+        -------
+        RigidTransform
+            In metres.
+
+        Raises
+        ------
+        KeyError
+            For a name that is none of the cameras'.
+        """
         return self[a].cam_from_world * self[b].world_from_cam
 
 
 def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> RigidTransform:
-    """The pose world_from_cam of a camera at `eye` (3,) that looks at `target` (3,) with its y axis towards `down`.
+    """The pose of a camera that looks at a point.
 
-    Raises ValueError when the view direction is undefined or runs along `down`.
+    Parameters
+    ----------
+    eye : array_like (3,)
+        Where the camera stands, in metres.
+    target : array_like (3,)
+        What it looks at, in metres.
+    down : array_like (3,), optional
+        The direction, of any unit, that its y axis leans towards; y of the world unless given.
+
+    Returns
+    -------
+    RigidTransform
+        world_from_cam.
+
+    Raises
+    ------
+    ValueError
+        Where the view direction is undefined or runs along `down`, and for other than 3 coordinates.
+
+    Examples
+    --------
+    >>> look_at(eye=(0, 0, 0), target=(3, 0, 0)).apply([0, 0, 1]).round(6)  # it looks along x
+    array([1., 0., 0.])
     """
-    eye, target, down = (np.asarray(v, dtype=float) for v in (eye, target, down))
+    eye, target, down = as_point(eye, "eye"), as_point(target, "target"), as_point(down, "down")
     forward = unit(target - eye)
     sideways = np.cross(unit(down), forward)
     if not np.linalg.norm(sideways) > 1e-9:  # NaN, or parallel but for rounding
@@ -224,11 +614,59 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> R
 
 
 def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
-    """Points (..., 3) taken by a rigid transform; scipy's `apply` takes only (n, 3)."""
+    """Points taken by a rigid transform; SciPy's `apply` takes only (n, 3).
+
+    Parameters
+    ----------
+    to_from : RigidTransform
+        One transform, in metres.
+    points : array_like (..., 3)
+        Points in metres.
+
+    Returns
+    -------
+    array (..., 3)
+        The same points in the other frame.
+
+    Raises
+    ------
+    ValueError
+        Where the last axis has not 3 coordinates.
+
+    Examples
+    --------
+    >>> from camviz.poses import RigidTransform
+    >>> transform(RigidTransform.from_translation([1, 0, 0]), [[[0, 0, 2]]])
+    array([[[1., 0., 2.]]])
+    """
     matrix = to_from.as_matrix()
     return blocked_matmul(as_points(points, 3, "points"), matrix[:3, :3].T) + matrix[:3, 3]
 
 
 def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:
-    """Vectors (..., 3) turned by a rotation."""
+    """Vectors turned by a rotation.
+
+    Parameters
+    ----------
+    rotation : Rotation
+        One rotation.
+    vectors : array_like (..., 3)
+        Vectors, of any unit.
+
+    Returns
+    -------
+    array (..., 3)
+        The turned vectors.
+
+    Raises
+    ------
+    ValueError
+        Where the last axis has not 3 coordinates.
+
+    Examples
+    --------
+    >>> from camviz.poses import Rotation
+    >>> rotate(Rotation.from_euler("y", 90, degrees=True), [0, 0, 1]).round(6)  # forwards turns to the right
+    array([1., 0., 0.])
+    """
     return blocked_matmul(as_points(vectors, 3, "vectors"), rotation.as_matrix().T)

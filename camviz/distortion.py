@@ -12,37 +12,142 @@ from camviz.lenses.base import Array, on_plane
 from camviz.lenses.roots import first_positive_root
 from camviz.poses import Rotation
 
+__all__ = [
+    "displacement",
+    "distort_maps",
+    "edge_of_field",
+    "fold_angle",
+    "fold_radius",
+    "ideal_image_radius",
+    "image_corner_radius",
+    "image_reach",
+    "is_rational",
+    "jacobian_determinant",
+    "pole_radius",
+    "remap",
+    "undistort_maps",
+    "undistorted_intrinsics",
+    "valid_region",
+    "weakest_denominator",
+]
+
 NEARLY_A_POLE = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
 WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more than stretch
 
 
 def fold_radius(lens: Lens) -> float:
-    """The ideal radius where a lens's radial equation turns back, unless a pole comes before it; else infinity.
+    """The ideal radius where a lens's radial equation turns back, unless a pole comes before it.
 
-    In the equation's own variable: r on the plane z = 1, or for Kannala-Brandt the angle θ in radians.
+    Parameters
+    ----------
+    lens : Lens
+        Any lens.
+
+    Returns
+    -------
+    float
+        In the equation's own variable: r in focal lengths on the plane z = 1, or for a fisheye the angle θ in radians;
+        infinity where it never turns back.
+
+    Examples
+    --------
+    >>> from camviz.lenses import BrownConrady
+    >>> round(fold_radius(BrownConrady(-1 / 3)), 6)  # 1 - 3 r²/3 = 0
+    1.0
     """
     return lens.fold.radius if lens.fold else inf
 
 
 def fold_angle(lens: Lens) -> float:
-    """The angle in radians between the axis and the ray at which a lens folds; infinity if it never does."""
+    """The angle between the axis and the ray at which a lens folds.
+
+    Parameters
+    ----------
+    lens : Lens
+        Any lens.
+
+    Returns
+    -------
+    float
+        In radians; infinity if it never folds.
+
+    Examples
+    --------
+    >>> from camviz.lenses import BrownConrady
+    >>> f"{np.degrees(fold_angle(BrownConrady(-1 / 3))):.0f}°"  # atan 1
+    '45°'
+    """
     return lens.fold.angle if lens.fold else inf
 
 
 def pole_radius(lens: Lens) -> float:
-    """The ideal radius where a rational polynomial is infinite, the first positive root of D(r²); infinity if none."""
+    """The ideal radius where a rational polynomial is infinite, the first positive root of D(r²).
+
+    Parameters
+    ----------
+    lens : Lens
+        Any lens.
+
+    Returns
+    -------
+    float
+        In focal lengths; infinity if there is none.
+
+    Examples
+    --------
+    >>> from camviz.lenses import BrownConrady
+    >>> pole_radius(BrownConrady(k4=-0.25))  # 1 - 0.25 r² = 0
+    2.0
+    """
     return sqrt(first_positive_root(lens.denominator.coef))
 
 
 def is_rational(lens: Lens) -> bool:
-    """True for a lens whose polynomial is divided by another, so that it may have a pole."""
+    """Whether a lens's polynomial is divided by another, so that it may have a pole.
+
+    Parameters
+    ----------
+    lens : Lens
+        Any lens.
+
+    Returns
+    -------
+    bool
+        True where it is divided.
+
+    Examples
+    --------
+    >>> from camviz.lenses import BrownConrady
+    >>> is_rational(BrownConrady(k1=0.1)), is_rational(BrownConrady(k1=0.1, k4=0.1))
+    (False, True)
+    """
     return bool(np.any(lens.denominator.coef[1:]))
 
 
 def weakest_denominator(lens: Lens, radius: float) -> tuple[float, float]:
-    """Where in 0 … `radius` the denominator D(r²) of a rational polynomial is smallest, and D there: (r, D).
+    """Where the denominator D(r²) of a rational polynomial is smallest.
 
-    A D far below 1 is a near-pole: the polynomial has no root there, yet throws the picture about. (0, 1) without D.
+    A D far below 1 is a near-pole: the polynomial has no root there, yet throws the picture about.
+
+    Parameters
+    ----------
+    lens : Lens
+        Any lens.
+    radius : float
+        How far to look, in focal lengths.
+
+    Returns
+    -------
+    r : float
+        Where in 0 … `radius` it is smallest, in focal lengths; 0 without a denominator.
+    D : float
+        The denominator there; 1 without one.
+
+    Examples
+    --------
+    >>> from camviz.lenses import BrownConrady
+    >>> weakest_denominator(BrownConrady(k4=-1, k5=0.5), radius=2)  # 1 - s + s²/2 is smallest at s = 1
+    (1.0, 0.5)
     """
     turns = lens.denominator.deriv().roots()
     turns = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0) & (turns.real < radius**2)]
@@ -52,7 +157,26 @@ def weakest_denominator(lens: Lens, radius: float) -> tuple[float, float]:
 
 
 def edge_of_field(lens: Lens, azimuth: ArrayLike) -> Array:
-    """The angle (...) in radians from the axis to the last ray with an image, in the directions `azimuth` (...)."""
+    """The angle from the axis to the last ray with an image.
+
+    Parameters
+    ----------
+    lens : Lens
+        Any lens.
+    azimuth : array_like (...)
+        Directions in radians, from x towards y.
+
+    Returns
+    -------
+    array (...)
+        Angles in radians.
+
+    Examples
+    --------
+    >>> from camviz.lenses import Orthographic
+    >>> np.degrees(edge_of_field(Orthographic(), [0, np.pi / 2])).round(6)
+    array([90., 90.])
+    """
     azimuth = np.asarray(azimuth, dtype=float)
     low, high = np.zeros(azimuth.shape), np.full(azimuth.shape, pi)
     for _ in range(44):
@@ -64,27 +188,101 @@ def edge_of_field(lens: Lens, azimuth: ArrayLike) -> Array:
 
 
 def image_corner_radius(intrinsics: Intrinsics) -> float:
-    """The distance in focal lengths from the principal point to the farthest corner pixel: a *distorted* radius."""
+    """The distance from the principal point to the farthest corner pixel: a *distorted* radius.
+
+    Parameters
+    ----------
+    intrinsics : Intrinsics
+        The image.
+
+    Returns
+    -------
+    float
+        In focal lengths.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Intrinsics
+    >>> image_corner_radius(Intrinsics(601, 801, 500, 500, cx=300, cy=400))  # √(300² + 400²) / 500
+    1.0
+    """
     corners = intrinsics.from_pixels(_rectangle(intrinsics, 1))
     return float(np.linalg.norm(corners, axis=-1).max())
 
 
 def ideal_image_radius(camera: Camera) -> float:
-    """The largest tan θ of the rays in front of the camera that arrive on the image's border; NaN if there are none."""
+    """The largest tan θ of the rays in front of the camera that arrive on the image's border.
+
+    Parameters
+    ----------
+    camera : Camera
+        With any lens.
+
+    Returns
+    -------
+    float
+        In focal lengths on the plane z = 1; NaN if there are none.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> ideal_image_radius(Camera(Intrinsics(601, 801, 500, 500, cx=300, cy=400)))  # of a perspective lens: the corner
+    1.0
+    """
     ideal = _ideal(camera, _rectangle(camera.intrinsics, 16))
     radii = np.linalg.norm(ideal, axis=-1)
     return float(radii[np.isfinite(radii)].max(initial=-inf)) if np.isfinite(radii).any() else np.nan
 
 
 def image_reach(camera: Camera) -> float:
-    """How far, in focal lengths on the plane z = 1, an undistorted picture of this camera asks; NaN where nowhere."""
+    """How far an undistorted picture of this camera asks the lens.
+
+    Parameters
+    ----------
+    camera : Camera
+        With any lens.
+
+    Returns
+    -------
+    float
+        In focal lengths on the plane z = 1; NaN where nowhere.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> image_reach(Camera(Intrinsics(601, 801, 500, 500, cx=300, cy=400)))
+    1.0
+    """
     return float(np.nanmax([ideal_image_radius(camera), image_corner_radius(camera.intrinsics)]))
 
 
 def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
-    """The determinant (...) of the map from ideal points (..., 2) on the plane z = 1 to the image; below 0 it mirrors.
+    """The determinant of the map from the plane z = 1 to the image; below 0 it mirrors.
 
     By the lens's own Jacobian: of `BrownConrady` exact, beyond its fold as well; of most others good to about 1e-9.
+
+    Parameters
+    ----------
+    lens : Lens
+        Any lens.
+    xy : array_like (..., 2)
+        Ideal points in focal lengths.
+
+    Returns
+    -------
+    array (...)
+        How many times as large an area becomes.
+
+    Raises
+    ------
+    ValueError
+        Where the last axis has not 2 coordinates.
+
+    Examples
+    --------
+    >>> from camviz.lenses import BrownConrady
+    >>> jacobian_determinant(BrownConrady(-1 / 3), [[0, 0], [1, 0], [1.2, 0]]).round(3)  # at 1 it folds
+    array([ 1.   ,  0.   , -0.229])
     """
     J = lens.jacobian(xy)
     with np.errstate(all="ignore"):
@@ -92,7 +290,35 @@ def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
 
 
 def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
-    """True for every `step_px`-th pixel, (rows, columns), at which a ray arrives."""
+    """At which pixels a ray arrives.
+
+    Parameters
+    ----------
+    camera : Camera
+        With any lens.
+    step_px : int, optional
+        Only every so many pixels are asked.
+
+    Returns
+    -------
+    array (rows, columns) of bool
+        True where a ray arrives.
+
+    Raises
+    ------
+    ValueError
+        For a step below 1.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.lenses import Orthographic
+    >>> camera = Camera(Intrinsics(401, 401, 100, 100, 200, 200), Orthographic())  # a disc of 100 pixels' radius
+    >>> float(valid_region(camera).mean().round(3))  # π 100² / 401²
+    0.195
+    """
+    if not step_px >= 1:
+        raise ValueError(f"step_px must be at least 1 pixel, got {step_px}")
     intrinsics = camera.intrinsics
     u, v = (np.arange(0, size, step_px, dtype=float) for size in (intrinsics.width, intrinsics.height))
     pixels = np.stack(np.meshgrid(u, v), axis=-1)
@@ -100,10 +326,40 @@ def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
 
 
 def displacement(camera: Camera, step_px: float) -> tuple[Array, Array]:
-    """Pixels of an undistorted grid (rows, columns, 2) and the vectors to where the lens puts them; NaN where nowhere.
+    """Where a lens puts the points of an undistorted grid.
 
-    The grid is `step_px` apart and centred on the image; the undistorted picture has the camera's own K.
+    The grid is centred on the image; the undistorted picture has the camera's own K.
+
+    Parameters
+    ----------
+    camera : Camera
+        With any lens.
+    step_px : float
+        Distance of neighbouring points in pixels.
+
+    Returns
+    -------
+    ideal : array (rows, columns, 2)
+        The grid in pixels.
+    moved : array (rows, columns, 2)
+        Vectors in pixels to where the lens puts the points; NaN where nowhere.
+
+    Raises
+    ------
+    ValueError
+        For a step that is not positive.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.lenses import BrownConrady
+    >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2))
+    >>> ideal, moved = displacement(camera, 100)
+    >>> ideal[2, 3], moved[2, 3]  # r = 0.5: -0.2 · 0.5³ · 200 px
+    (array([300., 200.]), array([-5.,  0.]))
     """
+    if not step_px > 0:
+        raise ValueError(f"step_px must be a positive number of pixels, got {step_px}")
     intrinsics = camera.intrinsics
     u, v = (_centred(size, step_px) for size in (intrinsics.width, intrinsics.height))
     ideal = np.stack(np.meshgrid(u, v), axis=-1)
@@ -114,10 +370,36 @@ def displacement(camera: Camera, step_px: float) -> tuple[Array, Array]:
 def undistort_maps(
     camera: Camera, target: Intrinsics, lens: Lens | None = None, target_from_cam: Rotation | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The pixel (map_x, map_y), each (height, width) float32, of a photograph that belongs at each pixel of `target`.
+    """Where in a photograph the pixels of an undistorted picture lie.
 
-    `target` is a picture by the same camera through another `lens` (perspective unless given), turned by
-    `target_from_cam`. The forward model is evaluated at every output pixel; NaN where the photograph shows nothing.
+    The forward model is evaluated at every output pixel.
+
+    Parameters
+    ----------
+    camera : Camera
+        Of the photograph.
+    target : Intrinsics
+        Of the picture by the same camera.
+    lens : Lens, optional
+        Of that picture; perspective unless given.
+    target_from_cam : Rotation, optional
+        How the picture is turned.
+
+    Returns
+    -------
+    map_x : array (height, width) of float32
+        Pixels u in the photograph, for `remap`; NaN where it shows nothing.
+    map_y : array (height, width) of float32
+        Pixels v.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.lenses import BrownConrady
+    >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2))
+    >>> map_x, map_y = undistort_maps(camera, camera.intrinsics)
+    >>> map_x[200, 300], map_y[200, 300]  # see `displacement`
+    (np.float32(295.0), np.float32(200.0))
     """
     rays = (lens or Perspective()).unproject(target.from_pixels(target.grid()))
     if target_from_cam is not None:
@@ -126,25 +408,95 @@ def undistort_maps(
 
 
 def distort_maps(camera: Camera, source: Intrinsics, lens: Lens | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The pixel (map_x, map_y), each float32, of an ideal picture `source` that belongs at each pixel of the camera.
+    """Where in an ideal picture the pixels of a camera lie: for showing it as the lens would have bent it.
 
-    For showing a photograph as the lens would have bent it; needs the inverse of the lens at every output pixel.
+    Needs the inverse of the lens at every output pixel.
+
+    Parameters
+    ----------
+    camera : Camera
+        Whose lens bends.
+    source : Intrinsics
+        Of the ideal picture.
+    lens : Lens, optional
+        Of the ideal picture; perspective unless given.
+
+    Returns
+    -------
+    map_x : array (height, width) of float32
+        Pixels u in the ideal picture, for `remap`; NaN where no ray arrives.
+    map_y : array (height, width) of float32
+        Pixels v.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.lenses import BrownConrady
+    >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2))
+    >>> distort_maps(camera, camera.intrinsics)[0][200, 295]  # the other way round
+    np.float32(300.0)
     """
     rays = camera.lens.unproject(camera.intrinsics.from_pixels(camera.intrinsics.grid()))
     return _maps(source.to_pixels((lens or Perspective()).project(rays)))
 
 
 def remap(image: np.ndarray, maps: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """The picture whose pixels lie at `maps` in `image`, bilinear; black where the maps are NaN or lead outside."""
+    """The picture whose pixels lie at `maps` in another, bilinear.
+
+    Parameters
+    ----------
+    image : array (height, width) or (height, width, 3)
+        Of any type that OpenCV takes, in any unit.
+    maps : tuple of array (rows, columns) of float32
+        map_x and map_y in pixels.
+
+    Returns
+    -------
+    array (rows, columns) or (rows, columns, 3)
+        Of the image's type; black where the maps are NaN or lead outside.
+
+    Examples
+    --------
+    >>> row = np.array([[0, 100, 200]], np.uint8)
+    >>> remap(row, (np.float32([[0.5, np.nan]]), np.float32([[0, 0]])))  # halfway between 0 and 100
+    array([[50,  0]], dtype=uint8)
+    """
     return cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
 
 def undistorted_intrinsics(camera: Camera, alpha: float) -> tuple[Intrinsics, tuple[int, int, int, int]]:
-    """Intrinsics, of the camera's size, for its undistorted picture, and the (x0, y0, width, height) without black.
+    """Intrinsics, of the camera's size, for its undistorted picture.
 
     alpha = 0 shows the largest upright rectangle without black borders, alpha = 1 every pixel of the photograph, and
-    between them the focal lengths and principal points are mixed (cv2.getOptimalNewCameraMatrix). Rays beyond a fold
-    or 80° from the axis are left out. Raises ValueError for alpha outside 0 … 1 and where no such rectangle exists.
+    between them the focal lengths and principal points are mixed, as in cv2.getOptimalNewCameraMatrix. Rays beyond a
+    fold or 80° from the axis are left out.
+
+    Parameters
+    ----------
+    camera : Camera
+        With any lens.
+    alpha : float
+        From 0 to 1.
+
+    Returns
+    -------
+    intrinsics : Intrinsics
+        Of the undistorted picture.
+    rectangle : tuple of int
+        x0, y0, width and height in pixels of what is not black.
+
+    Raises
+    ------
+    ValueError
+        For alpha outside 0 … 1 and where no such rectangle exists.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.lenses import BrownConrady
+    >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.05))
+    >>> [round(undistorted_intrinsics(camera, alpha)[0].fx) for alpha in (0, 1)]  # 200 / 1.059, 200 / 1.153
+    [189, 173]
     """
     if not 0 <= alpha <= 1:
         raise ValueError(f"alpha must lie between 0 (no black borders) and 1 (every pixel kept), got {alpha}")

@@ -10,6 +10,7 @@ on their path would cost every kernel 80 MB and a second.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, TypeGuard
 
@@ -22,7 +23,7 @@ from camviz.cameras import Camera, Rig, transform
 from camviz.draw.items import Face, Item, Line, camera_body
 from camviz.draw.shades import Shades
 from camviz.draw.solid import COLOURS
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform
 from camviz.scenes import Scene
 from camviz.scenes.surfaces import Mesh
@@ -39,9 +40,33 @@ Colours = NDArray[np.uint8]
 
 
 def camera(camera: Camera, depth: float = 0.3, *, colour: str = "blue") -> pyvista.PolyData:
-    """What a camera sees out to `depth` metres: its rim bends with the lens, a triangle marks its upper side.
+    """What a camera sees: its rim bends with the lens, a triangle marks its upper side.
 
-    `colour` is a name such as "blue" or "orange", or "#rrggbb".
+    Parameters
+    ----------
+    camera : Camera
+        Where it stands.
+    depth : float, optional
+        How far the volume reaches, in metres.
+    colour : str, optional
+        A name such as "blue" or "orange", or "#rrggbb".
+
+    Returns
+    -------
+    pyvista.PolyData
+        Lines and faces in metres.
+
+    Raises
+    ------
+    ValueError
+        For an unknown colour.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> mesh = camera(Camera(Intrinsics.from_fov(640, 480, 90)), depth=2)
+    >>> f"{mesh.bounds.x_min:.1f} … {mesh.bounds.x_max:.1f} m"  # 2 tan 45° to either side
+    '-2.0 … 2.0 m'
     """
     return joined(_item(item) for item in camera_body(camera, depth, colour=colour) if _drawn(item))
 
@@ -49,7 +74,30 @@ def camera(camera: Camera, depth: float = 0.3, *, colour: str = "blue") -> pyvis
 def rig(
     cameras: Rig | Calibration | Mapping[str, Camera], depth: float = 0.3, *, colour: str = "blue"
 ) -> pyvista.MultiBlock:
-    """The cameras of a rig or a calibration, each a block under its name. See `camera`."""
+    """The cameras of a rig or a calibration, each a block under its name.
+
+    Parameters
+    ----------
+    cameras : Rig, Calibration or mapping of str to Camera
+        Where they stand.
+    depth : float, optional
+        How far their volumes reach, in metres.
+    colour : str, optional
+        As of `camera`.
+
+    Returns
+    -------
+    pyvista.MultiBlock
+        Meshes of `camera`.
+
+    Examples
+    --------
+    >>> from camviz.poses import RigidTransform
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> one = Camera(Intrinsics.from_fov(640, 480, 90))
+    >>> rig({"left": one, "right": one.at(RigidTransform.from_translation([0.1, 0, 0]))}).keys()
+    ['left', 'right']
+    """
     import pyvista
 
     named = cameras if isinstance(cameras, Mapping) else cameras.cameras
@@ -59,6 +107,21 @@ def rig(
 def board(board: Board, world_from_board: RigidTransform | None = None) -> pyvista.PolyData:
     """A board with its squares, tags or circles, the first of its points at the board's origin.
 
+    Parameters
+    ----------
+    board : Board
+        What is drawn.
+    world_from_board : RigidTransform, optional
+        Where it is, in metres; the board's own frame unless given.
+
+    Returns
+    -------
+    pyvista.PolyData
+        Faces in metres.
+
+    Examples
+    --------
+    >>> from camviz.calibration import Board
     >>> board(Board(9, 6, 0.025)).n_cells  # squares: 10 by 7
     70
     """
@@ -75,9 +138,31 @@ def board(board: Board, world_from_board: RigidTransform | None = None) -> pyvis
 
 
 def boards(calibration: Calibration, camera: str = "") -> pyvista.MultiBlock:
-    """The board at every pose from which a camera, the first unless named, saw it; a block for each view.
+    """The board at every pose from which a camera saw it.
 
-    Raises ValueError where the calibration holds no board or no poses.
+    Parameters
+    ----------
+    calibration : Calibration
+        With a board and its poses.
+    camera : str, optional
+        The first unless named.
+
+    Returns
+    -------
+    pyvista.MultiBlock
+        A block for each view.
+
+    Raises
+    ------
+    ValueError
+        Where the calibration holds no board or no poses.
+
+    Examples
+    --------
+    >>> from camviz.clinic import virtual
+    >>> calibration = virtual.healthy(np.random.default_rng(1))
+    >>> boards(calibration).n_blocks == len(calibration.detections["camera"])
+    True
     """
     import pyvista
 
@@ -93,8 +178,26 @@ def boards(calibration: Calibration, camera: str = "") -> pyvista.MultiBlock:
 def scene(scene: Scene, detail: int = 128) -> pyvista.MultiBlock:
     """The surfaces of a scene with the colours of their pictures, each a block under its name and its place.
 
-    A surface is cut into about `detail` × `detail` quadrilaterals, so that its points carry its picture. The sky is
-    not among them.
+    A surface is cut finer, so that its points carry its picture. The sky is not among them.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is drawn.
+    detail : int, optional
+        About so many quadrilaterals along each side of a surface.
+
+    Returns
+    -------
+    pyvista.MultiBlock
+        Faces in metres.
+
+    Examples
+    --------
+    >>> from camviz.scenes import Rectangle, Scene, Texture
+    >>> wall = Rectangle((0, 0, 2), (4, 0, 0), (0, 3, 0), Texture.plain((0.2, 0.5, 0.2)), name="wall")
+    >>> scene(Scene([wall]), detail=8)[0].n_cells
+    64
     """
     import pyvista
 
@@ -104,8 +207,33 @@ def scene(scene: Scene, detail: int = 128) -> pyvista.MultiBlock:
 def residuals(calibration: Calibration, camera: str = "", *, scale: float = 100) -> pyvista.PolyData:
     """A line on the board for every used corner: from its place to where the detected corner seems to lie.
 
-    The lines are `scale` times as long as that, and coloured by the residual in pixels, which stands in the array
-    "pixels". Raises `Missing`, a ValueError, where the calibration holds no corners or poses.
+    The lines are coloured by the residual in pixels, which stands in the array "pixels".
+
+    Parameters
+    ----------
+    calibration : Calibration
+        With corners and poses.
+    camera : str, optional
+        The first unless named.
+    scale : float, optional
+        How many times as long as the residuals the lines are.
+
+    Returns
+    -------
+    pyvista.PolyData
+        Lines in metres.
+
+    Raises
+    ------
+    Missing
+        A ValueError, where the calibration holds no corners or poses.
+
+    Examples
+    --------
+    >>> from camviz.clinic import virtual
+    >>> calibration = virtual.healthy(np.random.default_rng(1))
+    >>> residuals(calibration).n_cells == calibration.used("camera").sum()
+    np.True_
     """
     seen = Observations.of(calibration, camera)
     world_from_board = calibration.cameras[seen.name].world_from_cam * seen.cam_from_board
@@ -124,15 +252,64 @@ def residuals(calibration: Calibration, camera: str = "", *, scale: float = 100)
 
 
 def points(positions: ArrayLike, colours: ArrayLike | None = None) -> pyvista.PolyData:
-    """A cloud of points (n, 3), with colours (n, 3), uint8 RGB, where they are given."""
-    positions = np.asarray(positions, dtype=float).reshape(-1, 3)
-    rgb = np.full((len(positions), 3), 120) if colours is None else np.asarray(colours).reshape(-1, 3)
+    """A cloud of points.
+
+    Parameters
+    ----------
+    positions : array_like (n, 3)
+        Points in metres.
+    colours : array_like (n, 3), optional
+        RGB, 0 to 255; grey unless given.
+
+    Returns
+    -------
+    pyvista.PolyData
+        Vertices in metres.
+
+    Raises
+    ------
+    ValueError
+        Where a position has not 3 coordinates, or colours are not one for each position.
+
+    Examples
+    --------
+    >>> points([[0, 0, 1], [0, 0, 2]], colours=[[255, 0, 0], [0, 0, 255]])["rgba"].tolist()
+    [[255, 0, 0, 255], [0, 0, 255, 255]]
+    """
+    positions = as_points(positions, 3, "positions").reshape(-1, 3)
+    rgb = np.full((len(positions), 3), 120) if colours is None else as_points(colours, 3, "colours").reshape(-1, 3)
+    if len(rgb) != len(positions):
+        raise ValueError(f"colours must be one for each of {len(positions)} positions, got {len(rgb)}")
     return _mesh(positions, np.column_stack([rgb, np.full(len(rgb), 255)]))
 
 
 def joined(meshes: Iterable[pyvista.PolyData]) -> pyvista.PolyData:
-    """Several meshes, such as the blocks of a scene, as one: for a file that holds one mesh, such as PLY."""
-    first, *others = meshes
+    """Several meshes as one: for a file that holds one mesh, such as PLY.
+
+    Parameters
+    ----------
+    meshes : iterable of pyvista.PolyData
+        At least one, such as the blocks of a scene.
+
+    Returns
+    -------
+    pyvista.PolyData
+        With the colours of all.
+
+    Raises
+    ------
+    ValueError
+        Without a mesh.
+
+    Examples
+    --------
+    >>> joined([points([[0, 0, 1]]), points([[0, 0, 2]])]).n_points
+    2
+    """
+    blocks = list(meshes)
+    if not blocks:
+        raise ValueError("meshes must be at least one, got none")
+    first, *others = blocks
     whole = first.append_polydata(*others)
     whole.set_active_scalars("rgba")
     return whole
@@ -155,7 +332,10 @@ def _item(item: Line | Face) -> pyvista.PolyData:
 
 
 def _colour(name: str, opacity: float) -> Sequence[int]:
-    return [*bytes.fromhex(COLOURS.get(name, name).removeprefix("#")), round(255 * opacity)]
+    rgb = COLOURS.get(name, name)
+    if not re.fullmatch("#[0-9a-fA-F]{6}", rgb):
+        raise ValueError(f"colour must be #rrggbb or one of {', '.join(COLOURS)}, got {name!r}")
+    return [*bytes.fromhex(rgb.removeprefix("#")), round(255 * opacity)]
 
 
 def _painted(mesh: Mesh, detail: int) -> pyvista.PolyData:

@@ -18,7 +18,7 @@ from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics, Rig, transform
 from camviz.distortion import displacement
 from camviz.draw.items import Line, camera_body
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, as_points
 from camviz.twoview.epipolar import epipolar_curve
 from camviz.views.clinic.observations import Observations
 
@@ -36,11 +36,39 @@ def residuals(
     scale: float = 100,
     **options: Any,
 ) -> Any:
-    """Arrows from every detected corner towards its projection, `scale` times as long as the residual.
+    """Arrows from every detected corner towards its projection.
 
-    Of the named camera or the first, of all views or of `view`, which counts from 1. Returns the axes. Raises
-    ValueError for a view that there is not, and `Missing`, a ValueError too, where the calibration holds no corners or
-    poses.
+    Parameters
+    ----------
+    calibration : Calibration
+        With corners and poses.
+    ax : Axes, optional
+        Where to draw; new ones unless given.
+    camera : str, optional
+        The first unless named.
+    view : int, optional
+        Counts from 1; all views unless given.
+    scale : float, optional
+        How many times as long as the residuals the arrows are.
+    **options
+        Go to `Axes.quiver`.
+
+    Returns
+    -------
+    Axes
+        In pixels.
+
+    Raises
+    ------
+    ValueError
+        For a view that there is not; as `Missing`, where the calibration holds no corners or poses.
+
+    Examples
+    --------
+    >>> from camviz.clinic import virtual
+    >>> calibration = virtual.healthy(np.random.default_rng(1))
+    >>> residuals(calibration).get_title() == f"residuals × 100, {calibration.rms('camera'):.3g} px RMS"
+    True
     """
     seen = Observations.of(calibration, camera)
     used = seen.used & _chosen(view, len(seen))[:, None]
@@ -52,9 +80,35 @@ def residuals(
 
 
 def coverage(calibration: Calibration, ax: Any = None, *, camera: str = "", **options: Any) -> Any:
-    """Every corner that the named camera, or the first, detected, a colour for each view. Returns the axes.
+    """Every corner that a camera detected, a colour for each view.
 
-    Raises `Missing`, a ValueError, where the calibration holds no corners.
+    Parameters
+    ----------
+    calibration : Calibration
+        With corners.
+    ax : Axes, optional
+        Where to draw; new ones unless given.
+    camera : str, optional
+        The first unless named.
+    **options
+        Go to `Axes.plot`.
+
+    Returns
+    -------
+    Axes
+        In pixels.
+
+    Raises
+    ------
+    Missing
+        A ValueError, where the calibration holds no corners.
+
+    Examples
+    --------
+    >>> from camviz.clinic import virtual
+    >>> calibration = virtual.healthy(np.random.default_rng(1))
+    >>> len(coverage(calibration, marker="+").lines) == len(calibration.detections["camera"])
+    True
     """
     seen = Observations.of(calibration, camera)
     ax = image_axes(seen.camera.intrinsics, ax)
@@ -67,7 +121,29 @@ def coverage(calibration: Calibration, ax: Any = None, *, camera: str = "", **op
 def distortion(camera: Camera, ax: Any = None, *, step_px: float | None = None, **options: Any) -> Any:
     """Arrows from where a perspective lens puts a point to where this lens does, with contours of their length.
 
-    The arrows start `step_px` apart, a sixteenth of the picture's width unless given. Returns the axes.
+    Parameters
+    ----------
+    camera : Camera
+        With any lens.
+    ax : Axes, optional
+        Where to draw; new ones unless given.
+    step_px : float, optional
+        Distance of neighbouring arrows in pixels; a sixteenth of the picture's width unless given.
+    **options
+        Go to `Axes.quiver`.
+
+    Returns
+    -------
+    Axes
+        In pixels.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.lenses import BrownConrady
+    >>> ax = distortion(Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2)), step_px=100)
+    >>> float(ax.collections[0].U.min().round(6))  # at (1, 0.5): -0.2 · 1.25 · 200 px
+    -50.0
     """
     k = camera.intrinsics
     ax = image_axes(k, ax)
@@ -80,11 +156,29 @@ def distortion(camera: Camera, ax: Any = None, *, step_px: float | None = None, 
 
 
 def radial(camera: Camera, ax: Any = None, *, relative: bool = False, **options: Any) -> Any:
-    """How far from the principal point a ray lands, in pixels, against its angle to the axis, out to the far corner.
+    """How far from the principal point a ray lands against its angle to the axis, out to the far corner.
 
-    With `relative`, how much farther than behind a perspective lens, which needs angles below 90°. Of a lens that is
-    not round, along the picture's x axis. Returns the axes.
+    Of a lens that is not round, along the picture's x axis.
 
+    Parameters
+    ----------
+    camera : Camera
+        With any lens.
+    ax : Axes, optional
+        Where to draw; new ones unless given.
+    relative : bool, optional
+        Draw how much farther than behind a perspective lens, which needs angles below 90°.
+    **options
+        Go to `Axes.plot`.
+
+    Returns
+    -------
+    Axes
+        Degrees, and pixels.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
     >>> ax = radial(Camera(Intrinsics.from_fov(640, 480, 90)), label="perspective")
     >>> degrees, pixels = ax.lines[0].get_data()
     >>> f"{degrees[-1]:.1f}° from the axis, {pixels[-1]:.0f} px from the principal point"
@@ -104,12 +198,42 @@ def radial(camera: Camera, ax: Any = None, *, relative: bool = False, **options:
 
 
 def epipolar(left: Camera, right: Camera, uv_left: ArrayLike, ax: Any = None, **options: Any) -> Any:
-    """The epipolar line in the right picture of every left pixel (n, 2), a colour for each; a curve if lenses bend it.
+    """The epipolar line in the right picture of every left pixel, a colour for each; a curve if lenses bend it.
 
-    Returns the axes, over which `ax.imshow` shows the right photograph.
+    `ax.imshow` shows the right photograph below it.
+
+    Parameters
+    ----------
+    left, right : Camera
+        In place.
+    uv_left : array_like (n, 2)
+        Pixels of the left picture.
+    ax : Axes, optional
+        Where to draw; new ones unless given.
+    **options
+        Go to `Axes.plot`.
+
+    Returns
+    -------
+    Axes
+        In pixels.
+
+    Raises
+    ------
+    ValueError
+        Where the last axis of `uv_left` has not 2 coordinates.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> from camviz.poses import RigidTransform
+    >>> left = Camera(Intrinsics.from_fov(640, 480, 90))
+    >>> ax = epipolar(left, left.at(RigidTransform.from_translation([0.1, 0, 0])), [(400, 100)])
+    >>> np.nanmax(np.abs(ax.lines[0].get_ydata() - 100)) < 1e-9  # side by side: along the same row
+    np.True_
     """
     ax = image_axes(right.intrinsics, ax)
-    for curve in epipolar_curve(left, right, np.reshape(uv_left, (-1, 2)), _DISTANCES):
+    for curve in epipolar_curve(left, right, as_points(uv_left, 2, "uv_left").reshape(-1, 2), _DISTANCES):
         ax.plot(*np.where(right.intrinsics.contains(curve)[:, None], curve, np.nan).T, **options)
     return ax
 
@@ -117,7 +241,36 @@ def epipolar(left: Camera, right: Camera, uv_left: ArrayLike, ax: Any = None, **
 def frusta(
     cameras: Camera | Rig | Calibration | Mapping[str, Camera], ax: Any = None, *, depth: float = 0.3, **options: Any
 ) -> Any:
-    """What cameras see out to `depth` metres, in space, a colour for each. Returns the axes, which are 3D."""
+    """What cameras see, in space, a colour for each.
+
+    Parameters
+    ----------
+    cameras : Camera, Rig, Calibration or mapping of str to Camera
+        Where they stand.
+    ax : Axes3D, optional
+        Where to draw; new ones unless given.
+    depth : float, optional
+        How far their volumes reach, in metres.
+    **options
+        Go to `Axes.plot`.
+
+    Returns
+    -------
+    Axes3D
+        In metres.
+
+    Raises
+    ------
+    ValueError
+        For axes that are not 3D.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> one = Camera(Intrinsics.from_fov(640, 480, 90))
+    >>> [line.get_label() for line in frusta({"left": one, "right": one}).lines]
+    ['left', 'right']
+    """
     ax = space_axes(ax)
     named = cameras if isinstance(cameras, Mapping) else getattr(cameras, "cameras", {"": cameras})
     for name, camera in named.items():
@@ -128,9 +281,35 @@ def frusta(
 
 
 def boards(calibration: Calibration, ax: Any = None, *, camera: str = "", **options: Any) -> Any:
-    """The outline of the board at every pose from which the named camera, or the first, saw it, in space.
+    """The outline of the board at every pose from which a camera saw it, in space.
 
-    Returns the axes, which are 3D. Raises `Missing`, a ValueError, where the calibration holds no corners or poses.
+    Parameters
+    ----------
+    calibration : Calibration
+        With corners and poses.
+    ax : Axes3D, optional
+        Where to draw; new ones unless given.
+    camera : str, optional
+        The first unless named.
+    **options
+        Go to `Axes.plot`.
+
+    Returns
+    -------
+    Axes3D
+        In metres.
+
+    Raises
+    ------
+    ValueError
+        For axes that are not 3D; as `Missing`, where the calibration holds no corners or poses.
+
+    Examples
+    --------
+    >>> from camviz.clinic import virtual
+    >>> calibration = virtual.healthy(np.random.default_rng(1))
+    >>> len(boards(calibration).lines) == len(calibration.detections["camera"])
+    True
     """
     seen, ax = Observations.of(calibration, camera), space_axes(ax)
     world_from_cam = calibration.cameras[seen.name].world_from_cam

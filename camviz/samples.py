@@ -282,7 +282,10 @@ def earth_map(width: int = 1024) -> Panorama:
     if data is None:
         return _garden_around(width, "No installed PyVista has the map of the earth; the garden takes its place.")
     small = cv2.resize(data, (width, width // 2), interpolation=cv2.INTER_AREA)
-    credit = "The map of the earth by day, 2k_earth_daymap.jpg, from PyVista's examples."
+    credit = (
+        "The map of the earth by day (2k_earth_daymap.jpg) by Solar System Scope, CC BY 4.0, made smaller; "
+        "the file is that of PyVista's examples."
+    )
     return Panorama(np.ascontiguousarray(small[..., ::-1]), True, credit)
 
 

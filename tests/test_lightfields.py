@@ -213,6 +213,12 @@ def test_refocusing_is_what_scipy_s_shifts_sum_up_to(disparity):
     np.testing.assert_allclose(refocus(field, disparity, mask), _by_hand(field.views, disparity, mask), atol=1e-6)
 
 
+def test_refocusing_takes_views_in_double_precision():
+    field = random_field()
+    twice_as_precise = LightField(field.views.astype(np.float64))
+    np.testing.assert_array_equal(refocus(twice_as_precise, 0.37), refocus(field, 0.37))
+
+
 @pytest.mark.parametrize("disparity", [0, 1, -2, 0.37, -1.5, 3.21])
 @pytest.mark.parametrize("shape", [(3, 4, 8, 10), (5, 5, 9, 7), (1, 1, 4, 4)])
 def test_the_fourier_slice_is_shift_and_sum(shape, disparity):
@@ -342,6 +348,12 @@ def test_the_exact_range_is_where_no_view_is_blurred_by_more_than_a_pixel():
     for bad in (-0.1, 1.1, np.nan):
         with pytest.raises(ValueError, match="width must lie between 0 and 1"):
             exact_range(BENCHMARK, bad)
+
+
+def test_openings_take_bytes_only():
+    camera = Camera(Intrinsics.from_fov(8, 6, 25))
+    with pytest.raises(ValueError, match=r"pinholes must hold views as sRGB bytes \(uint8\), got float32"):
+        Openings(photograph_field(picture_at(3.0), camera, 3, 3, 0.02, 4.0), picture_at(3.0), camera)
 
 
 def test_an_opening_wider_than_the_places_are_apart_is_refused():

@@ -1,7 +1,5 @@
 """Meshes for PyVista: their points lie where cameras, boards and scenes are, in the colours that these have."""
 
-import doctest
-
 import numpy as np
 import pytest
 from calibrations import BOARD, TRUE, bare, pair, poses, sick, single
@@ -90,10 +88,6 @@ def test_a_residual_of_its_own_length_ends_on_the_ray_of_the_detected_corner():
     np.testing.assert_allclose(np.diff(longer, axis=1), 10 * np.diff(ends, axis=1), atol=1e-5)
     with pytest.raises(Missing):
         meshes.residuals(bare())
-
-
-def test_the_examples_are_true():
-    assert doctest.testmod(meshes) == (0, 1)
 
 
 def test_points_keep_their_colours():

@@ -1,7 +1,5 @@
 """Plots on a reader's own axes: what is drawn lies where the mathematics puts it, in the reader's own style."""
 
-import doctest
-
 import cv2
 import matplotlib
 import numpy as np
@@ -144,10 +142,6 @@ def test_outlines_of_boards_are_as_large_as_boards():
 def test_flat_axes_are_refused_for_space():
     with pytest.raises(ValueError, match=r"ax must be 3D axes.*got 'rectilinear' axes"):
         plots.frusta(TRUE, plt.figure().add_subplot())
-
-
-def test_the_examples_are_true():
-    assert doctest.testmod(plots) == (0, 3)
 
 
 def test_the_style_is_the_readers():

@@ -46,6 +46,8 @@ def test_the_parallax_vanishes_at_the_stitching_distance_and_far_away_is_the_bas
     assert ring.parallax(1e4, np.inf) == pytest.approx(ring.baseline / 1e4, rel=1e-4)
     assert ring.parallax(4.0, 2.0) < 0 < ring.parallax(1.0, 2.0)
     assert np.isnan(ring.parallax(0.05, 2.0))
+    assert ring.parallax(np.inf, 2.0) == pytest.approx(-2 * np.arcsin(ring.baseline / 2 / 2.0))  # parallel rays
+    assert ring.parallax(np.inf, np.inf) == 0
 
 
 @pytest.mark.parametrize(("distance", "stitched"), [(0.8, 2.0), (2.0, 2.0), (5.0, 2.0), (1.0, np.inf)])

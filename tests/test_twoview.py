@@ -1,7 +1,5 @@
 """Facts about two views of one world, against OpenCV and against projection itself."""
 
-import doctest
-
 import cv2
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from two_views import LEFT_PIXELS, Equidistant, rigs, seen, stereo
 from camviz import twoview as tv
 from camviz.cameras import Camera
 from camviz.lenses.base import unit
-from camviz.twoview import plane
 
 
 @given(rigs, st.integers(0, 2**32))
@@ -191,8 +188,3 @@ def test_sampson_distance_is_the_correction_that_opencv_finds_to_first_order():
     moved_left, moved_right = cv2.correctMatches(F, uv_left[None], uv_right[None])
     moved = np.linalg.norm(np.concatenate([moved_left[0] - uv_left, moved_right[0] - uv_right], axis=1), axis=1)
     assert tv.sampson_distance(F, uv_left, uv_right) == pytest.approx(moved, rel=2e-3)
-
-
-def test_the_example_of_a_homography_is_true():
-    run = doctest.testmod(plane)
-    assert (run.attempted, run.failed) == (3, 0)

@@ -11,8 +11,8 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from camviz.colour.spaces import D65_XY, adaptation, from_chromaticity, tristimulus
-from camviz.colour.spectra import WAVELENGTHS_NM
-from camviz.lenses.base import Array
+from camviz.colour.spectra import WAVELENGTHS_NM, as_spectra
+from camviz.lenses.base import Array, as_points
 
 WHITE = from_chromaticity(D65_XY)
 WHITE.flags.writeable = False
@@ -20,19 +20,83 @@ _STEP_NM = WAVELENGTHS_NM[1] - WAVELENGTHS_NM[0]
 
 
 def response(light: ArrayLike, reflectance: ArrayLike, sensitivity: ArrayLike) -> Array:
-    """What the channels of a sensor (81, c) make of surfaces (..., 81) in a light (81,): (..., c).
+    """What the channels of a sensor make of surfaces in a light: Σ light · reflectance · sensitivity · Δλ.
 
-    Σ light · reflectance · sensitivity · Δλ, the sum that stands for the integral over wavelength. Linear, and in units
-    of the light's: divide by the response to a perfect white, reflectance 1, to have shares of it.
+    The sum stands for the integral over wavelength. Divide by the response to a perfect white to have shares of it.
+
+    Parameters
+    ----------
+    light : array_like (81,)
+        Its power at WAVELENGTHS_NM, in any unit.
+    reflectance : array_like (..., 81)
+        Shares 0 … 1; a single number is a grey.
+    sensitivity : array_like (81, c)
+        What each of c channels makes of a unit of power.
+
+    Returns
+    -------
+    array (..., c)
+        Linear, in the light's units times nanometres.
+
+    Raises
+    ------
+    ValueError
+        For other shapes.
+
+    References
+    ----------
+    Szeliski (2022), section 2.3.2.
+
+    Examples
+    --------
+    A grey card of 18 % gives 18 % of white's response in every channel:
+
+    >>> light, camera = illuminant("D65"), sensitivities("Nikon D5100")
+    >>> response(light, 0.18, camera) / response(light, 1.0, camera)
+    array([0.18, 0.18, 0.18])
     """
-    reaching = np.asarray(light, dtype=float) * np.asarray(reflectance, dtype=float)
-    return reaching @ np.asarray(sensitivity, dtype=float) * _STEP_NM
+    power = np.atleast_1d(np.asarray(light, dtype=float))
+    count = power.shape[-1]
+    reaching = power * as_spectra(reflectance, "reflectance", count)
+    return reaching @ as_channels(sensitivity, "sensitivity", count) * _STEP_NM
+
+
+def as_channels(values: ArrayLike, name: str, count: int) -> Array:
+    """What channels (count, c) make of each wavelength, as float64. ValueError for another shape."""
+    channels = np.asarray(values, dtype=float)
+    if channels.ndim != 2 or len(channels) != count:
+        raise ValueError(f"{name} must have shape ({count}, channels), got {channels.shape}")
+    return channels
 
 
 def seen(light: ArrayLike, reflectance: ArrayLike) -> Array:
-    """XYZ (..., 3) of surfaces (..., 81) as an eye sees them that has grown used to the light (81,), brought to D65.
+    """XYZ under D65 of surfaces as they look to an eye that has grown used to the light.
 
-    Adaptation is Bradford's. This is the truth that a camera's colours are held against.
+    This is the truth that a camera's colours are held against. Adaptation is Bradford's, as `adaptation` has it.
+
+    Parameters
+    ----------
+    light : array_like (81,)
+        Its power at WAVELENGTHS_NM, in any unit.
+    reflectance : array_like (..., 81)
+        Shares 0 … 1.
+
+    Returns
+    -------
+    array (..., 3)
+        XYZ; Y = 1 is a perfect white.
+
+    Raises
+    ------
+    ValueError
+        For other shapes.
+
+    Examples
+    --------
+    White paper looks white in a light bulb's light too:
+
+    >>> seen(illuminant("A"), np.ones(81)).round(3)
+    array([0.95 , 1.   , 1.089])
     """
     return tristimulus(light, reflectance) @ adaptation(tristimulus(light), WHITE).T
 
@@ -41,7 +105,28 @@ def seen(light: ArrayLike, reflectance: ArrayLike) -> Array:
 
 
 def neutral(rgb: ArrayLike) -> Array:
-    """The gains (3,) that make one colour (3,) grey and leave its green. ValueError where a channel is not above 0."""
+    """The gains that make one colour grey and leave its green.
+
+    Parameters
+    ----------
+    rgb : array_like (3,)
+        Linear.
+
+    Returns
+    -------
+    array (3,)
+        What to multiply red, green and blue by.
+
+    Raises
+    ------
+    ValueError
+        Where a channel is not above 0.
+
+    Examples
+    --------
+    >>> neutral((0.5, 1.0, 0.8))
+    array([2.  , 1.  , 1.25])
+    """
     rgb = np.asarray(rgb, dtype=float)
     if rgb.shape != (3,) or not (rgb > 0).all() or not np.isfinite(rgb).all():
         raise ValueError(f"rgb must be one colour with three channels above 0 to be made grey, got {rgb!r}")
@@ -49,16 +134,67 @@ def neutral(rgb: ArrayLike) -> Array:
 
 
 def grey_world(rgb: ArrayLike) -> Array:
-    """The gains (3,) that make the mean of all colours (..., 3) grey (Buchsbaum 1980)."""
-    return neutral(np.reshape(rgb, (-1, 3)).mean(axis=0))
+    """The gains that make the mean of all colours grey.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear.
+
+    Returns
+    -------
+    array (3,)
+        What to multiply red, green and blue by.
+
+    Raises
+    ------
+    ValueError
+        Where the mean of a channel is not above 0.
+
+    References
+    ----------
+    G. Buchsbaum, A spatial processor model for object colour perception, J. Franklin Inst. 310 (1980).
+
+    Examples
+    --------
+    The mean of these two colours is (0.4, 0.6, 0.25):
+
+    >>> grey_world([(0.2, 0.4, 0.1), (0.6, 0.8, 0.4)])
+    array([1.5, 1. , 2.4])
+    """
+    return neutral(as_points(rgb, 3, "rgb").reshape(-1, 3).mean(axis=0))
 
 
 def white_patch(rgb: ArrayLike, percentile: float = 100) -> Array:
-    """The gains (3,) that make the brightest of each channel of (..., 3) equal (Land & McCann 1971).
+    """The gains that make the brightest values of the three channels equal.
 
-    A `percentile` below 100 leaves out the few brightest, which may be highlights that are cut off.
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear.
+    percentile : float
+        Below 100 it leaves out the few brightest, which may be highlights that are cut off.
+
+    Returns
+    -------
+    array (3,)
+        What to multiply red, green and blue by.
+
+    Raises
+    ------
+    ValueError
+        Where the brightest of a channel is not above 0.
+
+    References
+    ----------
+    E. H. Land and J. J. McCann, Lightness and retinex theory, J. Opt. Soc. Am. 61 (1971).
+
+    Examples
+    --------
+    >>> white_patch([(0.2, 0.4, 0.1), (0.5, 0.8, 0.4)])
+    array([1.6, 1. , 2. ])
     """
-    return neutral(np.percentile(np.reshape(rgb, (-1, 3)), percentile, axis=0))
+    return neutral(np.percentile(as_points(rgb, 3, "rgb").reshape(-1, 3), percentile, axis=0))
 
 
 def from_white_xy(xy: ArrayLike, xyz_from_raw: ArrayLike) -> Array:
@@ -74,10 +210,34 @@ def from_white_xy(xy: ArrayLike, xyz_from_raw: ArrayLike) -> Array:
 
 
 def fit_matrix(rgb: ArrayLike, target: ArrayLike, keep: tuple[ArrayLike, ArrayLike] | None = None) -> Array:
-    """The M (3, 3) with the least Σ |M rgb − target|² over colours (n, 3) and their targets (n, 3).
+    """The matrix M that takes colours to their targets with the least Σ ‖M rgb − target‖².
 
-    `keep` is a colour and its target, each (3,), that M must take to each other exactly, such as white: the rest is
-    then fitted in the directions that leave it alone. ValueError unless there are three colours that are independent.
+    Parameters
+    ----------
+    rgb, target : array_like (n, 3)
+        Linear colours and what they should become.
+    keep : pair of array_like (3,), optional
+        A colour and its target that M must take to each other exactly, such as white. The rest is then fitted in the
+        directions that leave it alone.
+
+    Returns
+    -------
+    array (3, 3)
+        M acts on columns: for arrays (..., 3) use `rgb @ M.T`.
+
+    Raises
+    ------
+    ValueError
+        Unless `rgb` holds three independent colours, and `target` has its shape; for a black to keep.
+
+    Examples
+    --------
+    Colours that a matrix made give it back:
+
+    >>> M = np.array([[1.5, -0.3, -0.2], [-0.2, 1.4, -0.2], [0.0, -0.4, 1.4]])
+    >>> rgb = np.random.default_rng(0).random((24, 3))
+    >>> np.allclose(fit_matrix(rgb, rgb @ M.T), M)
+    True
     """
     colours, targets = (np.asarray(values, dtype=float) for values in (rgb, target))
     if colours.ndim != 2 or colours.shape[1:] != (3,) or targets.shape != colours.shape:
@@ -86,7 +246,9 @@ def fit_matrix(rgb: ArrayLike, target: ArrayLike, keep: tuple[ArrayLike, ArrayLi
         raise ValueError(f"rgb must hold three independent colours, got {len(colours)} of rank below 3")
     if keep is None:
         return np.linalg.lstsq(colours, targets, rcond=None)[0].T
-    white, white_target = (np.asarray(values, dtype=float) for values in keep)
+    white, white_target = (as_points(values, 3, "keep") for values in keep)
+    if not white.any():
+        raise ValueError("keep must begin with a colour that is not black: a matrix takes black to black")
     through = np.outer(white_target, white) / (white @ white)  # takes white to its target, all across it to nothing
     across = np.linalg.svd(white[None])[2][1:]  # (2, 3): the directions in which M is still free
     free = np.linalg.lstsq(colours @ across.T, targets - colours @ through.T, rcond=None)[0]
@@ -97,13 +259,46 @@ def fit_matrix(rgb: ArrayLike, target: ArrayLike, keep: tuple[ArrayLike, ArrayLi
 
 
 def metamer(reflectance: ArrayLike, alike: ArrayLike, apart: ArrayLike, smoothness: int = 14) -> Array:
-    """Another reflectance (81,) in 0 … 1 to which `alike` (81, c) answers as before and `apart` (81, d) does not.
+    """Another reflectance that looks alike to one set of channels and different to another.
 
-    Both are sensitivities times the light. Among smooth changes, sums of `smoothness` cosines, those that `alike`
-    cannot notice form a null space (Wyszecki's metameric blacks); taken is the direction in it, and then the longest
-    step in 0 … 1, that `apart` notices most. Where it notices none, the reflectance comes back unchanged.
+    Among smooth changes, those that `alike` cannot notice form a null space, the metameric blacks. Taken is the
+    direction in it, and then the longest step within 0 … 1, that `apart` notices most.
+
+    Parameters
+    ----------
+    reflectance : array_like (81,)
+        Shares 0 … 1.
+    alike, apart : array_like (81, c), (81, d)
+        Sensitivities times the light, in any unit: `alike` answers as before, `apart` does not.
+    smoothness : int
+        How many cosines the changes are sums of.
+
+    Returns
+    -------
+    array (81,)
+        Shares 0 … 1; the reflectance unchanged where `apart` notices nothing.
+
+    Raises
+    ------
+    ValueError
+        For other shapes.
+
+    References
+    ----------
+    G. Wyszecki and W. S. Stiles, Color Science (2nd ed. 1982), chapter 3.
+
+    Examples
+    --------
+    It looks like grey in daylight, and under a light bulb it is redder and bluer:
+
+    >>> daylight, bulb = (illuminant(name)[:, None] * observer() for name in ("D65", "A"))
+    >>> grey = np.full(81, 0.4)
+    >>> other = metamer(grey, alike=daylight, apart=bulb)
+    >>> (other @ daylight / (grey @ daylight)).round(2), (other @ bulb / (grey @ bulb)).round(2)
+    (array([1., 1., 1.]), array([1.16, 0.98, 1.12]))
     """
-    start, equal, unequal = (np.asarray(values, dtype=float) for values in (reflectance, alike, apart))
+    start = np.atleast_1d(np.asarray(reflectance, dtype=float))
+    equal, unequal = as_channels(alike, "alike", len(start)), as_channels(apart, "apart", len(start))
     grid = (np.arange(len(start)) + 0.5) * np.pi / len(start)
     cosines = np.cos(np.arange(smoothness)[:, None] * grid)
     blacks = scipy.linalg.null_space((cosines @ equal).T).T @ cosines

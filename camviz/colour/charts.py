@@ -24,9 +24,23 @@ _FULL = 250  # a channel whose median is at least this was cut off
 
 @dataclass(frozen=True, eq=False)
 class FoundChart:
-    """A chart in a photograph: `patches` (24, 4, 2) are the corners of each patch's inner part, in pixels, and `rgb`
-    (24, 3) its median colour in linear light 0 … 1, in the chart's order. `clipped` are the numbers of patches that
-    are overexposed."""
+    """A chart of 24 patches in a photograph, as `find_chart` found it.
+
+    Attributes
+    ----------
+    patches : array (24, 4, 2)
+        The corners of each patch's inner part, in pixels.
+    rgb : array (24, 3)
+        Each patch's median colour, linear light 0 … 1, in the chart's order.
+    clipped : tuple of int
+        The numbers of the patches that are overexposed.
+
+    Examples
+    --------
+    >>> found = FoundChart(np.zeros((24, 4, 2)), np.full((24, 3), 0.2), clipped=(18,))
+    >>> found.rgb[18], found.clipped
+    (array([0.2, 0.2, 0.2]), (18,))
+    """
 
     patches: Array
     rgb: Array
@@ -34,12 +48,36 @@ class FoundChart:
 
 
 def find_chart(picture: NDArray[np.uint8]) -> FoundChart:
-    """The chart in a photograph (height, width, 3), uint8 sRGB, at any angle, by OpenCV's detector (`cv2.mcc`).
+    """The 24-patch chart in a photograph, at any angle, by OpenCV's detector (`cv2.mcc`).
 
     The detector takes other things for charts, and misses charts beside such things. So the whole picture is searched
-    and then parts of it, and what is found must have the chart's colours but for a 3×3 matrix. ValueError saying what
-    to do where none is found, and for an array of another kind.
+    and then parts of it, and what is found must have the chart's colours but for a 3×3 matrix.
+
+    Parameters
+    ----------
+    picture : array (height, width, 3)
+        sRGB bytes, uint8.
+
+    Returns
+    -------
+    FoundChart
+        Where its patches are, and their colours.
+
+    Raises
+    ------
+    ValueError
+        Where no chart is found, saying what to do; and for an array of another kind.
+
+    Examples
+    --------
+    >>> from camviz.colour.charts import painted, published_srgb
+    >>> from camviz.scenes import to_display
+    >>> chart = to_display(np.pad(painted(published_srgb()), ((60, 60), (60, 60), (0, 0))))
+    >>> found = find_chart(chart)
+    >>> bool(np.abs(found.rgb - published_srgb().clip(0, 1)).max() < 0.01)  # as painted, but for rounding to bytes
+    True
     """
+    picture = np.asarray(picture)
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
         raise ValueError(f"picture must be uint8 (height, width, 3), got {picture.dtype} {picture.shape}")
     for corner, part in _parts(picture):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from camviz.colour.balance import WHITE, fit_matrix, neutral, response, seen
 from camviz.colour.spaces import SRGB_FROM_XYZ, delta_e_2000, from_srgb, to_lab, to_srgb
 from camviz.colour.spectra import illuminant, reflectances, sensitivities, srgb_primaries
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, as_points
 from camviz.scenes.light import to_encoded, to_linear
 
 
@@ -77,11 +77,42 @@ def xyz_from_raw(camera: str) -> Array:
 
 
 def developed(raw: ArrayLike, gains: ArrayLike, matrix: ArrayLike, *, encoded: bool = False) -> Array:
-    """Linear sRGB (..., 3) of raw colours (..., 3): the gains (3,), then the matrix (3, 3).
+    """Linear sRGB of raw colours: the gains, then the matrix.
 
-    With `encoded` both act on values that the screen's curve has bent already, which is the common mistake.
+    Parameters
+    ----------
+    raw : array_like (..., 3)
+        What the sensor counted, linear.
+    gains : array_like (3,)
+        Factors of white balance.
+    matrix : array_like (3, 3)
+        From the balanced raw colour to sRGB; it acts on columns.
+    encoded : bool
+        Whether both act on values that the screen's curve has bent already, which is the common mistake.
+
+    Returns
+    -------
+    array (..., 3)
+        Linear; values outside 0 … 1 are kept, unless `encoded`.
+
+    Raises
+    ------
+    ValueError
+        For raw colours of another shape.
+
+    References
+    ----------
+    Szeliski (2022), section 2.3.2.
+
+    Examples
+    --------
+    Gains turn a grey card's raw colour grey, but not once the curve has bent it:
+
+    >>> raw, gains = (0.1, 0.2, 0.16), (2, 1, 1.25)
+    >>> developed(raw, gains, np.eye(3)), developed(raw, gains, np.eye(3), encoded=True).round(2)
+    (array([0.2, 0.2, 0.2]), array([0.45, 0.2 , 0.26]))
     """
-    values = to_encoded(np.asarray(raw, dtype=float)) if encoded else np.asarray(raw, dtype=float)
+    values = to_encoded(as_points(raw, 3, "raw")) if encoded else as_points(raw, 3, "raw")
     result = values * np.asarray(gains, dtype=float) @ np.asarray(matrix, dtype=float).T
     return np.asarray(to_linear(np.clip(result, 0, 1)) if encoded else result, dtype=np.float64)
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.colour.spectra import observer
-from camviz.lenses.base import Array
+from camviz.colour.spectra import as_spectra, observer
+from camviz.lenses.base import Array, as_points
 
 D65_XY = (0.3127, 0.3290)  # the white of sRGB (IEC 61966-2-1:1999)
 D50_XY = (0.3457, 0.3585)  # the white of ICC profiles (ISO 22028-1:2016)
@@ -25,20 +25,71 @@ _KNEE, _SLOPE = 216 / 24389, 24389 / 27  # where L* leaves its cube root for a s
 
 
 def tristimulus(light: ArrayLike, reflectance: ArrayLike = 1.0) -> Array:
-    """XYZ (..., 3) of surfaces of reflectance (..., 81) in a light of power (..., 81); Y = 1 is perfect white.
+    """XYZ of surfaces in a light: X = k Σ light · reflectance · x̄, and so on, with k = 1 / Σ light · ȳ.
 
-    X = k Σ light · reflectance · x̄ with k = 1 / Σ light · ȳ, and so on (CIE 15:2004, 7.1).
+    Parameters
+    ----------
+    light : array_like (..., 81)
+        Its power at WAVELENGTHS_NM, in any unit.
+    reflectance : array_like (..., 81)
+        Shares 0 … 1; by default a perfect white.
+
+    Returns
+    -------
+    array (..., 3)
+        Y = 1 is a perfect white.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    CIE 15:2004, Colorimetry, section 7.1.
+
+    Examples
+    --------
+    The white of D65 has X = 0.9504 and Z = 1.0888 (CIE):
+
+    >>> tristimulus(illuminant("D65")).round(4)
+    array([0.9504, 1.    , 1.0888])
     """
-    light, bars = np.asarray(light, dtype=float), observer()
-    return (light * np.asarray(reflectance, dtype=float)) @ bars / (light @ bars[:, 1:2])
+    light, bars = as_spectra(light, "light"), observer()
+    return (light * as_spectra(reflectance, "reflectance")) @ bars / (light @ bars[:, 1:2])
 
 
 # Chromaticity ---------------------------------------------------------------------------------------------------------
 
 
 def chromaticity(xyz: ArrayLike) -> Array:
-    """CIE (x, y) (..., 2) of XYZ (..., 3); NaN for black, which has none."""
-    xyz = np.asarray(xyz, dtype=float)
+    """CIE (x, y) of XYZ.
+
+    Parameters
+    ----------
+    xyz : array_like (..., 3)
+        XYZ on any scale.
+
+    Returns
+    -------
+    array (..., 2)
+        x = X / (X + Y + Z), y = Y / (X + Y + Z); NaN for black, which has none.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    CIE 15:2004, Colorimetry, section 7.
+
+    Examples
+    --------
+    >>> chromaticity(tristimulus(illuminant("D65"))).round(4)
+    array([0.3127, 0.329 ])
+    """
+    xyz = as_points(xyz, 3, "xyz")
     total = xyz.sum(axis=-1, keepdims=True)
     return np.divide(xyz[..., :2], total, out=np.full((*xyz.shape[:-1], 2), np.nan), where=total != 0)
 
@@ -68,39 +119,176 @@ for _matrix in (XYZ_FROM_SRGB, SRGB_FROM_XYZ):
 
 
 def to_srgb(xyz: ArrayLike) -> Array:
-    """Linear sRGB (..., 3) of XYZ (..., 3) under D65. Outside 0 … 1 lies what no sRGB screen can show."""
-    return np.asarray(xyz, dtype=float) @ SRGB_FROM_XYZ.T
+    """Linear sRGB of XYZ under D65.
+
+    Parameters
+    ----------
+    xyz : array_like (..., 3)
+        XYZ; Y = 1 is white.
+
+    Returns
+    -------
+    array (..., 3)
+        Linear; outside 0 … 1 lies what no sRGB screen can show. `camviz.scenes.to_encoded` has the curve.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    IEC 61966-2-1:1999.
+
+    Examples
+    --------
+    No screen can show this green, for its blue would be below 0:
+
+    >>> to_srgb((0.3, 0.6, 0.05)).round(2)
+    array([ 0.02,  0.84, -0.05])
+    """
+    return as_points(xyz, 3, "xyz") @ SRGB_FROM_XYZ.T
 
 
 def from_srgb(rgb: ArrayLike) -> Array:
-    """XYZ (..., 3) under D65 of linear sRGB (..., 3)."""
-    return np.asarray(rgb, dtype=float) @ XYZ_FROM_SRGB.T
+    """XYZ under D65 of linear sRGB: the inverse of `to_srgb`.
+
+    Parameters
+    ----------
+    rgb : array_like (..., 3)
+        Linear, 1 is full.
+
+    Returns
+    -------
+    array (..., 3)
+        Y = 1 is white.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    IEC 61966-2-1:1999.
+
+    Examples
+    --------
+    Red's share of white's brightness is 21 %:
+
+    >>> from_srgb((1, 0, 0)).round(4)
+    array([0.4124, 0.2126, 0.0193])
+    """
+    return as_points(rgb, 3, "rgb") @ XYZ_FROM_SRGB.T
 
 
 # CIELAB and colour difference -----------------------------------------------------------------------------------------
 
 
 def to_lab(xyz: ArrayLike, white: ArrayLike) -> Array:
-    """CIELAB (..., 3), L* a* b*, of XYZ (..., 3) beside a white (3,) of XYZ (CIE 15:2004, 8.2.1)."""
-    t = np.asarray(xyz, dtype=float) / np.asarray(white, dtype=float)
+    """CIELAB of XYZ beside a white.
+
+    Parameters
+    ----------
+    xyz : array_like (..., 3)
+        XYZ on the white's scale.
+    white : array_like (3,)
+        XYZ of what looks white.
+
+    Returns
+    -------
+    array (..., 3)
+        L* (0 black … 100 white), a*, b*.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    CIE 15:2004, Colorimetry, section 8.2.1.
+
+    Examples
+    --------
+    Middle grey, L* = 50, reflects 18.4 % of the light:
+
+    >>> white = np.array([0.9505, 1, 1.089])
+    >>> to_lab(0.1842 * white, white).round(2)
+    array([50.,  0.,  0.])
+    """
+    t = as_points(xyz, 3, "xyz") / as_points(white, 3, "white")
     x, y, z = np.moveaxis(np.where(t > _KNEE, np.cbrt(t), (_SLOPE * t + 16) / 116), -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 
 def from_lab(lab: ArrayLike, white: ArrayLike) -> Array:
-    """XYZ (..., 3) of CIELAB (..., 3): the inverse of `to_lab`."""
-    lightness, a, b = np.moveaxis(np.asarray(lab, dtype=float), -1, 0)
+    """XYZ of CIELAB beside a white: the inverse of `to_lab`.
+
+    Parameters
+    ----------
+    lab : array_like (..., 3)
+        CIELAB's L*, a*, b*.
+    white : array_like (3,)
+        XYZ of what looks white.
+
+    Returns
+    -------
+    array (..., 3)
+        On the white's scale.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    CIE 15:2004, Colorimetry, section 8.2.1.
+
+    Examples
+    --------
+    >>> from_lab((50, 0, 0), (1, 1, 1)).round(4)  # ((50 + 16) / 116)³
+    array([0.1842, 0.1842, 0.1842])
+    """
+    lightness, a, b = np.moveaxis(as_points(lab, 3, "lab"), -1, 0)
     y = (lightness + 16) / 116
     f = np.stack([y + a / 500, y, y - b / 200], axis=-1)
     return np.where(f**3 > _KNEE, f**3, (116 * f - 16) / _SLOPE) * np.asarray(white, dtype=float)
 
 
 def delta_e_2000(lab1: ArrayLike, lab2: ArrayLike) -> Array:
-    """ΔE2000 (...) between two CIELAB colours (..., 3): about 1 is the least that an eye sees side by side.
+    """ΔE2000 between two CIELAB colours: about 1 is the least that an eye sees side by side.
 
-    After G. Sharma, W. Wu and E. N. Dalal, The CIEDE2000 color-difference formula, Color Res. Appl. 30 (2005).
+    Parameters
+    ----------
+    lab1, lab2 : array_like (..., 3)
+        CIELAB's L*, a*, b*.
+
+    Returns
+    -------
+    array (...)
+        0 for equal colours.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    G. Sharma, W. Wu and E. N. Dalal, The CIEDE2000 color-difference formula: implementation notes, supplementary test
+    data, and mathematical observations, Color Res. Appl. 30 (2005).
+
+    Examples
+    --------
+    The first pair of the paper's table:
+
+    >>> delta_e_2000((50, 2.6772, -79.7751), (50, 0, -82.7485)).round(4)
+    np.float64(2.0425)
     """
-    (l1, a1, b1), (l2, a2, b2) = (np.moveaxis(np.asarray(lab, dtype=float), -1, 0) for lab in (lab1, lab2))
+    l1, a1, b1 = np.moveaxis(as_points(lab1, 3, "lab1"), -1, 0)
+    l2, a2, b2 = np.moveaxis(as_points(lab2, 3, "lab2"), -1, 0)
     stretch = 1.5 - 0.5 * _share(np.hypot(a1, b1) / 2 + np.hypot(a2, b2) / 2)  # of a*, for greys
     (c1, h1), (c2, h2) = _polar(stretch * a1, b1), _polar(stretch * a2, b2)
     turn = np.where(c1 * c2 == 0, 0, (h2 - h1 + 180) % 360 - 180)
@@ -153,13 +341,42 @@ under D65, and XYZ itself, which is the wrong place."""
 
 
 def adaptation(white_from: ArrayLike, white_to: ArrayLike, method: str = "Bradford") -> Array:
-    """The matrix (3, 3) that takes XYZ seen beside one white (3,) to XYZ that look alike beside another (3,).
+    """The matrix that takes XYZ seen beside one white to XYZ that look alike beside another.
 
-    M⁻¹ diag(M white_to / M white_from) M, each channel of M scaled by itself (von Kries 1902). ValueError for a method
-    that is not one of ADAPTATIONS.
+    M⁻¹ diag(M white_to / M white_from) M: each channel of M is scaled by itself, as von Kries proposed.
+
+    Parameters
+    ----------
+    white_from, white_to : array_like (3,)
+        Their XYZ.
+    method : {"Bradford", "von Kries", "XYZ"}
+        Which channels M makes: see ADAPTATIONS.
+
+    Returns
+    -------
+    array (3, 3)
+        It acts on columns.
+
+    Raises
+    ------
+    ValueError
+        For a method that is not one of ADAPTATIONS, and for other shapes.
+
+    References
+    ----------
+    K. M. Lam, Metamerism and colour constancy, PhD thesis, University of Bradford (1985).
+
+    Examples
+    --------
+    From D65 to the D50 of ICC profiles:
+
+    >>> adaptation((0.95047, 1, 1.08883), (0.96422, 1, 0.82521)).round(3)
+    array([[ 1.048,  0.023, -0.05 ],
+           [ 0.03 ,  0.99 , -0.017],
+           [-0.009,  0.015,  0.752]])
     """
     if method not in ADAPTATIONS:
         raise ValueError(f"method must be one of {', '.join(ADAPTATIONS)}, got {method!r}")
     m = ADAPTATIONS[method]
-    gains = (m @ np.asarray(white_to, dtype=float)) / (m @ np.asarray(white_from, dtype=float))
-    return np.linalg.solve(m, gains[:, None] * m)
+    gains = (m @ as_points(white_to, 3, "white_to")) / (m @ as_points(white_from, 3, "white_from"))
+    return np.asarray(np.linalg.solve(m, gains[:, None] * m), dtype=np.float64)

@@ -13,9 +13,14 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, as_points
 
 WAVELENGTHS_NM = np.arange(380.0, 781.0, 5.0)
+"""The wavelengths (81,) of all spectra here, in nanometres: 380 … 780 in steps of 5; read-only.
+
+>>> len(WAVELENGTHS_NM), WAVELENGTHS_NM[[0, 1, -1]].tolist()
+(81, [380.0, 385.0, 780.0])
+"""
 WAVELENGTHS_NM.flags.writeable = False
 
 ILLUMINANTS = ("A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3")
@@ -32,7 +37,24 @@ _HOTTEST_DAYLIGHT = 25000.0
 
 
 def observer() -> Array:
-    """The colour-matching functions x̄, ȳ, z̄ (81, 3) of the CIE 1931 standard observer, 2°."""
+    """The colour-matching functions x̄, ȳ, z̄ of the CIE's standard observer of 2°.
+
+    Returns
+    -------
+    array (81, 3)
+        At WAVELENGTHS_NM; read-only.
+
+    References
+    ----------
+    CIE 1931 standard colorimetric observer, as tabulated in CIE 015:2018.
+
+    Examples
+    --------
+    The eye is most sensitive at 555 nm:
+
+    >>> WAVELENGTHS_NM[observer()[:, 1].argmax()]
+    np.float64(555.0)
+    """
     nm, bars = whole_observer()
     return bars[(nm >= WAVELENGTHS_NM[0]) & (nm <= WAVELENGTHS_NM[-1])]
 
@@ -45,17 +67,71 @@ def whole_observer() -> tuple[Array, Array]:
 
 
 def illuminant(name: str) -> Array:
-    """The relative power (81,) of one of ILLUMINANTS. ValueError for any other name."""
+    """The spectrum of a CIE illuminant.
+
+    Parameters
+    ----------
+    name : {"A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3"}
+        A light bulb, daylights, fluorescent lamps, a white LED.
+
+    Returns
+    -------
+    array (81,)
+        Relative power at WAVELENGTHS_NM; read-only.
+
+    Raises
+    ------
+    ValueError
+        For any other name.
+
+    References
+    ----------
+    CIE 015:2018, Colorimetry.
+
+    Examples
+    --------
+    A light bulb has far more red than blue, daylight does not:
+
+    >>> red, blue = WAVELENGTHS_NM == 650, WAVELENGTHS_NM == 450
+    >>> [float((illuminant(name)[red] / illuminant(name)[blue])[0].round(1)) for name in ("A", "D65")]
+    [5.0, 0.7]
+    """
     _require(name, ILLUMINANTS, "illuminant")
     names, values = _table("illuminants")
     return values[:, names.index(name)]
 
 
 def sensitivities(camera: str) -> Array:
-    """What each channel, red, green and blue, of one of CAMERAS makes of each wavelength (81, 3).
+    """What each channel of a camera, red, green and blue, makes of each wavelength.
 
     They are responses to power, not to photons: quantum efficiency times wavelength. A camera's channels are published
     with a peak of 1 each, so their levels against each other are not known.
+
+    Parameters
+    ----------
+    camera : {"Nikon D5100", "Sigma SD1 Merrill", "CIE observer"}
+        The last is no camera: one that sees exactly as the eye.
+
+    Returns
+    -------
+    array (81, 3)
+        At WAVELENGTHS_NM; read-only.
+
+    Raises
+    ------
+    ValueError
+        For any other name.
+
+    References
+    ----------
+    M. M. Darrodi et al., Reference data set for camera spectral sensitivity estimation, J. Opt. Soc. Am. A 32 (2015).
+
+    Examples
+    --------
+    Where red, green and blue peak, in nm:
+
+    >>> WAVELENGTHS_NM[sensitivities("Nikon D5100").argmax(axis=0)]
+    array([595., 530., 460.])
     """
     _require(camera, CAMERAS, "camera")
     return _table(CAMERAS[camera])[1] if CAMERAS[camera] else observer()
@@ -67,7 +143,24 @@ def patch_names() -> tuple[str, ...]:
 
 
 def reflectances() -> Array:
-    """The share of light (24, 81) that each patch of the chart reflects at each wavelength."""
+    """The share of light that each patch of the 24-patch chart reflects at each wavelength.
+
+    Returns
+    -------
+    array (24, 81)
+        Row by row of the chart, at WAVELENGTHS_NM; the last six patches are grey, from white to black.
+
+    References
+    ----------
+    N. Ohta, The basis of color reproduction engineering (1997), the same numbers as in ISO 17321-1:2012.
+
+    Examples
+    --------
+    How bright the six grey patches are beside a perfect white:
+
+    >>> tristimulus(illuminant("D65"), reflectances())[18:, 1].round(2)
+    array([0.89, 0.58, 0.36, 0.2 , 0.09, 0.03])
+    """
     return _table("chart")[1].T
 
 
@@ -90,9 +183,35 @@ def gel(strength: float) -> Array:
 
 
 def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
-    """The relative power (..., wavelengths) of glowing black bodies of `kelvin` (...), 100 at 560 nm (Planck's law).
+    """The spectra of glowing black bodies, by Planck's law.
 
-    ValueError unless every `kelvin` is above 0.
+    Parameters
+    ----------
+    kelvin : array_like (...)
+        Temperatures above 0, in kelvin.
+    wavelengths_nm : array_like (n,)
+        In nanometres; by default WAVELENGTHS_NM.
+
+    Returns
+    -------
+    array (..., n)
+        Relative power, 100 at 560 nm.
+
+    Raises
+    ------
+    ValueError
+        Unless every temperature is above 0.
+
+    References
+    ----------
+    CIE 015:2018, Colorimetry, with c2 = 0.014388 m K.
+
+    Examples
+    --------
+    Wien's law puts the peak of 5000 K at 2.898e6 nm K / 5000 K = 580 nm:
+
+    >>> WAVELENGTHS_NM[planckian(5000).argmax()]
+    np.float64(580.0)
     """
     hot, nm = np.asarray(kelvin, dtype=float)[..., None], np.asarray(wavelengths_nm, dtype=float)
     if not (hot > 0).all():
@@ -102,9 +221,35 @@ def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> 
 
 
 def daylight(kelvin: float) -> Array:
-    """The relative power (81,) of daylight of a correlated colour temperature, 100 at 560 nm (CIE 015:2018).
+    """The spectrum of daylight of a correlated colour temperature.
 
-    The CIE rounds the two weights to three decimals; these are not rounded. ValueError outside 4000 … 25000 K.
+    The CIE rounds the weights of its two components to three decimals; these are not rounded.
+
+    Parameters
+    ----------
+    kelvin : float
+        4000 … 25000 K.
+
+    Returns
+    -------
+    array (81,)
+        Relative power at WAVELENGTHS_NM, 100 at 560 nm.
+
+    Raises
+    ------
+    ValueError
+        For a temperature outside 4000 … 25000 K.
+
+    References
+    ----------
+    CIE 015:2018, Colorimetry, after D. B. Judd, D. L. MacAdam and G. Wyszecki, J. Opt. Soc. Am. 54 (1964).
+
+    Examples
+    --------
+    D65 is daylight of 6504 K:
+
+    >>> chromaticity(tristimulus(daylight(6504))).round(4)
+    array([0.3127, 0.329 ])
     """
     x, y = daylight_xy(kelvin)
     share = 0.0241 + 0.2562 * x - 0.7341 * y
@@ -150,6 +295,12 @@ def _rows(name: str) -> tuple[tuple[str, ...], Array]:
     values = np.array(rows, dtype=float)
     values.flags.writeable = False
     return tuple(names[1:]), values
+
+
+def as_spectra(values: ArrayLike, name: str, count: int = len(WAVELENGTHS_NM)) -> Array:
+    """Values (..., count), one for each wavelength, or one for all, as float64. ValueError for another shape."""
+    spectra = np.asarray(values, dtype=float)
+    return spectra if spectra.ndim == 0 else as_points(spectra, count, name)
 
 
 def _require(name: str, known: Collection[str], what: str) -> None:

@@ -35,6 +35,11 @@ LENSES: dict[str, type[Lens]] = {  # the pinhole first, the others by their file
     re.sub("(?<=[a-z])(?=[A-Z])", "_", lens.__name__).lower(): lens
     for lens in sorted(_found(), key=lambda lens: lens is not Perspective)
 }
+"""Every lens by its class's name in small letters.
+
+>>> LENSES["double_sphere"].parameters()
+('xi', 'alpha')
+"""
 globals().update({lens.__name__: lens for lens in LENSES.values()})
 
 __all__ = ["LENSES", "Lens", "calibration_models", "same_lenses", "spelled"]
@@ -42,17 +47,63 @@ __all__ += [lens.__name__ for lens in LENSES.values()]
 
 
 def spelled(program: str) -> list[tuple[type[Lens], Spelling]]:
-    """The lenses that a program has, each with its spelling there."""
+    """The lenses that a program has, and how it writes them.
+
+    Parameters
+    ----------
+    program : str
+        The name of a format, such as "kalibr".
+
+    Returns
+    -------
+    list of (type of Lens, Spelling)
+        A lens may have several spellings; none for a program that is not known.
+
+    Examples
+    --------
+    >>> [(lens.__name__, spelling.model) for lens, spelling in spelled("ros")][:2]
+    [('BrownConrady', 'plumb_bob'), ('BrownConrady', 'rational_polynomial')]
+    """
     return [(lens, each) for lens in LENSES.values() for each in lens.spellings if each.program == program]
 
 
 def calibration_models() -> dict[str, tuple[type[Lens], CalibrationModel]]:
-    """The models that can be calibrated, by name, each with its lens."""
+    """The models that can be calibrated, by name, each with its lens.
+
+    Returns
+    -------
+    dict of str to (type of Lens, CalibrationModel)
+        By the names that `camviz calibrate --model` takes.
+
+    Examples
+    --------
+    >>> lens, model = calibration_models()["fisheye"]
+    >>> lens.__name__, model.parameters
+    ('KannalaBrandt', 'k1 k2 k3 k4')
+    """
     return {each.name: (lens, each) for lens in LENSES.values() for each in lens.calibrations}
 
 
 def same_lenses(lens: Lens) -> Iterator[tuple[Lens, float]]:
-    """The same lens under other names, each with the factor from this one's focal lengths to that one's."""
+    """The same lens under other names.
+
+    Parameters
+    ----------
+    lens : Lens
+        The lens to be written otherwise.
+
+    Yields
+    ------
+    other : Lens
+        A lens of another class with the same image, up to its scale.
+    factor : float
+        From this lens's focal lengths to the other's.
+
+    Examples
+    --------
+    >>> list(same_lenses(BrownConrady()))  # nothing but 0: a perspective lens
+    [(Perspective(), 1.0)]
+    """
     yield from lens.same_as()
     for other in LENSES.values():
         if other.plain is type(lens):

@@ -36,6 +36,15 @@ class Lens(ABC):
 
     A subclass is a frozen dataclass whose fields are its parameters. It writes its two equations, `image` and `ray`,
     on coordinates (n,), and declares the rest where the default does not hold.
+
+    Examples
+    --------
+    >>> from camviz.lenses import Equidistant
+    >>> fisheye = Equidistant()  # r = θ: a ray to the side, at 90°, lands at π/2
+    >>> fisheye.project([1, 0, 0]).round(4)
+    array([1.5708, 0.    ])
+    >>> fisheye.unproject([np.pi / 2, 0]).round(4)
+    array([1., 0., 0.])
     """
 
     spellings: ClassVar[tuple[Spelling, ...]] = ()
@@ -48,20 +57,80 @@ class Lens(ABC):
     may_mirror: ClassVar[bool] = False  # true where part of the image may be mirrored without a radial fold
 
     def project(self, points_cam: ArrayLike) -> Array:
-        """Image points (..., 2) in focal lengths of camera-frame points (..., 3), any unit; NaN where there is none."""
+        """The images of camera-frame points.
+
+        Parameters
+        ----------
+        points_cam : array_like (..., 3)
+            Points or rays, of any unit: only their directions count.
+
+        Returns
+        -------
+        array (..., 2)
+            Image points in focal lengths; NaN where there is none.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 3 coordinates.
+        """
         return blockwise(self.image, as_points(points_cam, 3, "points_cam"), 2)
 
     def unproject(self, xy: ArrayLike) -> Array:
-        """Unit rays (..., 3) of image points (..., 2) in focal lengths; NaN where no ray arrives."""
+        """The rays of image points.
+
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            Image points in focal lengths.
+
+        Returns
+        -------
+        array (..., 3)
+            Unit rays; NaN where no ray arrives.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+        """
         return blockwise(self._unit_ray, as_points(xy, 2, "xy"), 3)
 
     @abstractmethod
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
-        """The image coordinates of camera-frame points."""
+        """The equation from directions to the image, on coordinates; readers ask `project`.
+
+        Parameters
+        ----------
+        x, y, z : array (n,)
+            Coordinates of camera-frame points, of any unit.
+
+        Returns
+        -------
+        x : array (n,)
+            Image coordinates in focal lengths, to the right.
+        y : array (n,)
+            The same downwards.
+        """
 
     @abstractmethod
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """A ray, of any length, of image coordinates."""
+        """The equation from the image to directions, on coordinates; readers ask `unproject`.
+
+        Parameters
+        ----------
+        x, y : array (n,)
+            Image coordinates in focal lengths.
+
+        Returns
+        -------
+        x : array (n,)
+            To the right, of a ray of any length.
+        y : array (n,)
+            Downwards.
+        z : array (n,)
+            Forwards.
+        """
 
     def _unit_ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         x, y, z = self.ray(x, y)
@@ -72,11 +141,25 @@ class Lens(ABC):
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:
-        """The names of the lens's own parameters."""
+        """The names of the lens's own parameters.
+
+        Returns
+        -------
+        tuple of str
+            In the order of the constructor.
+        """
         return tuple(each.name for each in fields(cls))  # type: ignore[arg-type]
 
     def same_as(self) -> Iterator[tuple[Lens, float]]:
-        """The same lens under other names, each with the factor from this one's focal lengths to that one's."""
+        """The same lens under names that this class itself knows; `same_lenses` knows all.
+
+        Yields
+        ------
+        other : Lens
+            A lens of another class with the same image, up to its scale.
+        factor : float
+            From this lens's focal lengths to the other's.
+        """
         if self.plain is not None and self == type(self)():
             yield self.plain(), 1.0
 
@@ -105,24 +188,75 @@ class Lens(ABC):
     # Its derivatives. A lens with a closed form overrides the central differences here.
 
     def project_unchecked(self, rays: Array) -> Array:
-        """Image points (..., 2) of rays (..., 3), also beyond a fold if the equation goes on there: quicker to ask."""
+        """As `project`, also beyond a fold if the equation goes on there: quicker to ask.
+
+        Parameters
+        ----------
+        rays : array (..., 3)
+            Rays, of any unit.
+
+        Returns
+        -------
+        array (..., 2)
+            Image points in focal lengths.
+        """
         return self.project(rays)
 
     def jacobian(self, xy: ArrayLike) -> Array:
-        """The derivative (..., 2, 2) of the map from points (..., 2) of the plane z = 1 to the image, good to 1e-9."""
+        """The derivative of the map from the plane z = 1 to the image, good to 1e-9.
+
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            Points of the plane z = 1 in focal lengths.
+
+        Returns
+        -------
+        array (..., 2, 2)
+            ∂image/∂xy, without unit.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+        """
         xy = as_points(xy, 2, "xy")
         step = 6e-6 * (1 + np.linalg.norm(xy, axis=-1))[..., None, None] * np.eye(2)
         ahead, behind = (self.project(on_plane(xy[..., None, :] + sign * step)) for sign in (1, -1))
         return np.swapaxes((ahead - behind) / (2 * step.max(axis=-1, keepdims=True)), -1, -2)
 
     def ray_jacobian(self, rays: Array) -> Array:
-        """∂xy/∂ray, (..., 2, 3), at unit rays (..., 3)."""
+        """The derivative ∂xy/∂ray.
+
+        Parameters
+        ----------
+        rays : array (..., 3)
+            Unit rays.
+
+        Returns
+        -------
+        array (..., 2, 3)
+            In focal lengths.
+        """
         moved = STEP * np.eye(3)
         columns = [(self.project_unchecked(rays + to) - self.project_unchecked(rays - to)) / (2 * STEP) for to in moved]
         return np.stack(columns, axis=-1)
 
     def parameter_jacobian(self, name: str, rays: Array) -> Array:
-        """∂xy/∂name, (..., 2), at unit rays (..., 3); from one side at the end of what the parameter may be."""
+        """The derivative ∂xy/∂name; from one side at the end of what the parameter may be.
+
+        Parameters
+        ----------
+        name : str
+            One of `parameters()`.
+        rays : array (..., 3)
+            Unit rays.
+
+        Returns
+        -------
+        array (..., 2)
+            In focal lengths per unit of the parameter.
+        """
         value = getattr(self, name)
         step = STEP * max(1.0, abs(value))
         lower, higher = self._with(name, value - step), self._with(name, value + step)
@@ -185,6 +319,14 @@ def as_points(values: ArrayLike, size: int, name: str) -> Array:
     if points.ndim == 0 or points.shape[-1] != size:
         raise ValueError(f"{name} must have shape (..., {size}), got {points.shape}")
     return points
+
+
+def as_point(values: ArrayLike, name: str, size: int = 3) -> Array:
+    """`values` as float64 (size,). Raises ValueError naming `name` for any other shape."""
+    point = np.asarray(values, dtype=np.float64)
+    if point.shape != (size,):
+        raise ValueError(f"{name} must have shape ({size},), got {point.shape}")
+    return point
 
 
 def on_plane(xy: Array) -> Array:

@@ -27,14 +27,41 @@ CLOSE = 1e-13  # focal lengths, relative beyond 1: how well an inverse must retu
 
 @dataclass(frozen=True)
 class BrownConrady(Lens):
-    """From the ideal (x, y) = (X/Z, Y/Z), with r² = x² + y², to the distorted
+    """OpenCV's polynomial: radial, tangential, rational, thin prism and tilt.
 
-    x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²) + s1 r² + s2 r⁴
-    y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + p1 (r² + 2 y²) + 2 p2 x y + s3 r² + s4 r⁴
+    From the ideal (x, y) = (X/Z, Y/Z), with r² = x² + y², to the distorted
 
-    and from there onto a sensor tilted by τx and τy radians (OpenCV's calib3d; Brown 1971). A polynomial folds: only
-    rays in front of the camera have an image, and only if the way to them from the axis meets neither the fold of the
-    radial part, nor its pole, nor a Jacobian determinant of 0 (`valid`).
+        x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²) + s1 r² + s2 r⁴
+        y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶)/(1 + k4 r² + k5 r⁴ + k6 r⁶) + p1 (r² + 2 y²) + 2 p2 x y + s3 r² + s4 r⁴
+
+    and from there onto a sensor tilted by τx and τy. A polynomial folds: only rays in front of the camera have an
+    image, and only if the way to them from the axis meets neither the fold of the radial part, nor its pole, nor a
+    Jacobian determinant of 0 (`valid`).
+
+    Parameters
+    ----------
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 : float, optional
+        Coefficients of lengths in focal lengths, in OpenCV's order.
+    tau_x, tau_y : float, optional
+        Tilt of the sensor in radians.
+
+    Raises
+    ------
+    ValueError
+        For a coefficient that is not a finite number, and for a tilt outside -π/2 … π/2.
+
+    References
+    ----------
+    D. C. Brown, *Close-range camera calibration*, Photogrammetric Engineering 37 (1971). OpenCV's documentation of
+    calib3d.
+
+    Examples
+    --------
+    >>> barrel = BrownConrady(k1=-0.2)
+    >>> barrel.project([0.5, 0, 1])  # 0.5 (1 - 0.2 · 0.25)
+    array([0.475, 0.   ])
+    >>> f"{barrel.fold_radius:.3f}"  # 1 - 3 · 0.2 r² = 0
+    '1.291'
     """
 
     k1: float = 0.0
@@ -131,7 +158,28 @@ class BrownConrady(Lens):
 
     @classmethod
     def from_coefficients(cls, coefficients: Iterable[float]) -> "BrownConrady":
-        """From 4, 5, 8, 12 or 14 coefficients in OpenCV's order; ValueError for any other number of them."""
+        """From a list of coefficients, as OpenCV and ROS write them.
+
+        Parameters
+        ----------
+        coefficients : iterable of float
+            4, 5, 8, 12 or 14 numbers: k1, k2, p1, p2, k3 and so on, in OpenCV's order.
+
+        Returns
+        -------
+        BrownConrady
+            With 0 for what is left out.
+
+        Raises
+        ------
+        ValueError
+            For any other number of coefficients.
+
+        Examples
+        --------
+        >>> BrownConrady.from_coefficients([-0.3, 0.1, 0, 0, 0.02]).k3
+        0.02
+        """
         values = [float(value) for value in np.ravel(np.asarray(coefficients, dtype=float))]
         if len(values) not in (4, 5, 8, 12, 14):
             raise ValueError(f"coefficients must be 4, 5, 8, 12 or 14 numbers, got {len(values)}")
@@ -144,17 +192,60 @@ class BrownConrady(Lens):
     # The polynomial itself, without regard to its domain: how it folds can be looked at.
 
     def radial(self, r: ArrayLike) -> Array:
-        """g(r) = r N(r²)/D(r²), the distorted radius of an ideal one."""
+        """g(r) = r N(r²)/D(r²), the distorted radius of an ideal one.
+
+        Parameters
+        ----------
+        r : array_like (...)
+            Ideal radii in focal lengths.
+
+        Returns
+        -------
+        array (...)
+            Distorted radii in focal lengths, beyond the fold as well.
+        """
         r = np.asarray(r, dtype=float)
         with np.errstate(all="ignore"):
             return r * self._ratio(r * r)
 
     def distort(self, xy: ArrayLike) -> Array:
-        """Distorted points (..., 2) of ideal points (..., 2), beyond the fold as well."""
+        """Distorted points of ideal ones, beyond the fold as well.
+
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            Ideal points in focal lengths.
+
+        Returns
+        -------
+        array (..., 2)
+            Distorted points in focal lengths.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+        """
         return blockwise(self._distort, as_points(xy, 2, "xy"), 2)
 
     def jacobian(self, xy: ArrayLike) -> Array:
-        """The derivative (..., 2, 2) of `distort` at ideal points (..., 2)."""
+        """The derivative of `distort`, exact.
+
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            Ideal points in focal lengths.
+
+        Returns
+        -------
+        array (..., 2, 2)
+            ∂x'y'/∂xy, without unit.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+        """
         xy = as_points(xy, 2, "xy")
         bent = blockwise(lambda x, y: self._bend_and_derivatives(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
         with np.errstate(all="ignore"):
@@ -203,7 +294,23 @@ class BrownConrady(Lens):
         return sqrt(first_positive_root(self.denominator.coef))
 
     def valid(self, xy: ArrayLike) -> np.ndarray:
-        """True where an ideal point (..., 2) has an image that it shares with no other point of the domain."""
+        """Whether ideal points have an image that they share with no other point of the domain.
+
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            Ideal points in focal lengths.
+
+        Returns
+        -------
+        array (...) of bool
+            True inside the domain.
+
+        Raises
+        ------
+        ValueError
+            Where the last axis has not 2 coordinates.
+        """
         xy = as_points(xy, 2, "xy")
         return blockwise(lambda x, y: (self._valid(x, y),), xy, 1)[..., 0] > 0
 
@@ -218,7 +325,20 @@ class BrownConrady(Lens):
         return x, y, np.ones_like(x)
 
     def bend(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Distorted coordinates (n,) of ideal ones (n,); NaN outside the domain."""
+        """Distorted coordinates of ideal ones.
+
+        Parameters
+        ----------
+        x, y : array (n,)
+            Ideal coordinates in focal lengths.
+
+        Returns
+        -------
+        x : array (n,)
+            Distorted coordinates in focal lengths; NaN outside the domain.
+        y : array (n,)
+            The same downwards.
+        """
         valid = self._valid(x, y)
         x, y = self._distort(x, y)
         if not valid.all():
@@ -226,7 +346,20 @@ class BrownConrady(Lens):
         return x, y
 
     def straighten(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Ideal coordinates (n,) of distorted ones (n,), by Newton's method; NaN where there are none."""
+        """Ideal coordinates of distorted ones, by Newton's method.
+
+        Parameters
+        ----------
+        x, y : array (n,)
+            Distorted coordinates in focal lengths.
+
+        Returns
+        -------
+        x : array (n,)
+            Ideal coordinates in focal lengths; NaN where there are none.
+        y : array (n,)
+            The same downwards.
+        """
         u, v = self._untilt(x, y)
         within = u * u + v * v <= self._rim[1].max() ** 2
         x, y = np.full((2, len(u)), np.nan)

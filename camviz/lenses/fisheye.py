@@ -1,4 +1,4 @@
-"""The classical fisheyes: lenses that see only the angle θ between a ray and the axis (Kingslake 1989, ch. 6)."""
+"""The classical fisheyes: lenses that see only the angle θ between a ray and the axis."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -48,7 +48,17 @@ class Fisheye(Lens):
 
 @dataclass(frozen=True)
 class Equidistant(Fisheye):
-    """r = θ: equal angles, equal distances."""
+    """r = θ: equal angles, equal distances.
+
+    References
+    ----------
+    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+
+    Examples
+    --------
+    >>> Equidistant().radial(np.radians([30, 90, 180])).round(4)  # as many radians
+    array([0.5236, 1.5708, 3.1416])
+    """
 
     spellings = (
         Spelling("colmap", "SIMPLE_FISHEYE", "f cx cy", number=14),
@@ -65,7 +75,17 @@ class Equidistant(Fisheye):
 
 @dataclass(frozen=True)
 class Equisolid(Fisheye):
-    """r = 2 sin(θ/2): equal solid angles, equal areas."""
+    """r = 2 sin(θ/2): equal solid angles, equal areas.
+
+    References
+    ----------
+    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+
+    Examples
+    --------
+    >>> round(float(Equisolid().radial(np.pi / 2)), 4)  # half a sphere of 2π sr: a disc of area 2π
+    1.4142
+    """
 
     examples = (Example("", (), 180),)
 
@@ -78,7 +98,18 @@ class Equisolid(Fisheye):
 
 @dataclass(frozen=True)
 class Orthographic(Fisheye):
-    """r = sin θ: the hemisphere seen from far above; nothing beyond 90°."""
+    """r = sin θ: the hemisphere seen from far above; nothing beyond 90°.
+
+    References
+    ----------
+    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+
+    Examples
+    --------
+    >>> Orthographic().project([[1, 0, 1], [1, 0, -1]]).round(4)  # sin 45°, and a ray backwards
+    array([[0.7071, 0.    ],
+           [   nan,    nan]])
+    """
 
     examples = (Example("", (), 90),)
 
@@ -95,7 +126,17 @@ class Orthographic(Fisheye):
 
 @dataclass(frozen=True)
 class Stereographic(Fisheye):
-    """r = 2 tan(θ/2): circles on the sphere stay circles."""
+    """r = 2 tan(θ/2): circles on the sphere stay circles.
+
+    References
+    ----------
+    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+
+    Examples
+    --------
+    >>> round(float(Stereographic().radial(np.pi / 2)), 4)  # 2 tan 45°
+    2.0
+    """
 
     spellings = (Spelling("mrcal", "LENSMODEL_STEREOGRAPHIC", "fx fy cx cy"),)
     examples = (Example("", (), 180),)
@@ -120,7 +161,28 @@ class Stereographic(Fisheye):
 
 @dataclass(frozen=True)
 class FieldOfView(Fisheye):
-    """r = atan(2 tan θ tan(ω/2)) / ω, continued behind 90° by atan2 (Devernay & Faugeras 2001, eq. 13); 0 < ω < π."""
+    """r = atan(2 tan θ tan(ω/2)) / ω, continued behind 90° by atan2.
+
+    Parameters
+    ----------
+    omega : float
+        ω, the field of view of an ideal fisheye in radians, between 0 and π.
+
+    Raises
+    ------
+    ValueError
+        For an angle outside (0, π).
+
+    References
+    ----------
+    F. Devernay & O. Faugeras, *Straight lines have to be straight*, Machine Vision and Applications 13 (2001), eq. 13.
+
+    Examples
+    --------
+    >>> lens = FieldOfView(omega=1.0)
+    >>> round(float(lens.radial(np.arctan(1 / (2 * np.tan(0.5))))), 4)  # atan 1 / ω
+    0.7854
+    """
 
     omega: float
 

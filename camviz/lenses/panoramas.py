@@ -11,9 +11,19 @@ from camviz.lenses.declarations import Example, Spelling
 
 @dataclass(frozen=True)
 class Equirectangular(Lens):
-    """(x, y) = (longitude, latitude) in radians: atan2(X, Z) and, downwards, atan2(Y, √(X² + Z²)) (Snyder 1987, p. 90).
+    """(x, y) = (longitude, latitude) in radians: atan2(X, Z) and, downwards, atan2(Y, √(X² + Z²)).
 
     It sees everything. The two poles, images of a whole line each, are given the longitude 0.
+
+    References
+    ----------
+    J. P. Snyder, *Map Projections: A Working Manual*, USGS Professional Paper 1395 (1987), p. 90.
+
+    Examples
+    --------
+    >>> Equirectangular().project([[1, 0, 0], [0, 1, 0]]).round(4)  # to the right 90°; down 90°
+    array([[1.5708, 0.    ],
+           [0.    , 1.5708]])
     """
 
     spellings = (
@@ -36,9 +46,19 @@ class Equirectangular(Lens):
 
 @dataclass(frozen=True)
 class Cylindrical(Lens):
-    """x = atan2(X, Z) in radians, y = Y / √(X² + Z²): upright lines stay straight (Szeliski 2022, eq. 8.42).
+    """x = atan2(X, Z) in radians, y = Y / √(X² + Z²): upright lines stay straight.
 
     It sees all but straight up and straight down.
+
+    References
+    ----------
+    Szeliski (2022), eq. 8.42.
+
+    Examples
+    --------
+    >>> Cylindrical().project([[3, 2, 4], [3, -2, 4]]).round(4)  # one upright line: x = atan(3/4), y = ±2/5
+    array([[ 0.6435,  0.4   ],
+           [ 0.6435, -0.4   ]])
     """
 
     spellings = (Spelling("metashape", "cylindrical", "fx fy cx cy skew"),)

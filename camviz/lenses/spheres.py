@@ -15,11 +15,33 @@ from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
 @dataclass(frozen=True)
 class UnifiedSphere(Lens):
-    """(x, y) = (X, Y) / (Z + ξ D) with D = |(X, Y, Z)|, then distorted by k1 k2 p1 p2 (Mei & Rives 2007, sec. II.B).
+    """(x, y) = (X, Y) / (Z + ξ D) with D = ‖(X, Y, Z)‖, then distorted by k1 k2 p1 p2.
 
     The point goes to the unit sphere and is seen from ξ behind its centre: ξ = 0 is a pinhole, ξ = 1 the stereographic
-    projection at half its focal length and the parabolic mirror. The same lens written with α (Usenko et al. 2018,
-    sec. 3.1) has ξ = α/(1 - α) and the focal length f = γ (1 - α): see `from_alpha`.
+    projection at half its focal length and the parabolic mirror. The same lens written with α has ξ = α/(1 - α) and the
+    focal length f = γ (1 - α): see `from_alpha`.
+
+    Parameters
+    ----------
+    xi : float
+        ξ, at least 0.
+    k1, k2, p1, p2 : float, optional
+        Coefficients of `BrownConrady`.
+
+    Raises
+    ------
+    ValueError
+        For a ξ below 0, and for a parameter that is not a finite number.
+
+    References
+    ----------
+    C. Mei & P. Rives, *Single view point omnidirectional camera calibration from planar grids*, ICRA (2007), sec. II.B.
+    With α: V. Usenko, N. Demmel & D. Cremers, *The double sphere camera model*, 3DV (2018), sec. 3.1.
+
+    Examples
+    --------
+    >>> UnifiedSphere(xi=1).project([3, 0, 4])  # 3 / (4 + 5)
+    array([0.33333333, 0.        ])
     """
 
     xi: float
@@ -58,7 +80,30 @@ class UnifiedSphere(Lens):
 
     @classmethod
     def from_alpha(cls, alpha: float) -> "UnifiedSphere":
-        """ξ = α/(1 - α) for 0 ≤ α < 1. Its focal lengths are γ = f/(1 - α): the intrinsics must be divided as well."""
+        """The lens written with α: ξ = α/(1 - α).
+
+        Its focal lengths are γ = f/(1 - α): the intrinsics must be divided as well.
+
+        Parameters
+        ----------
+        alpha : float
+            At least 0 and below 1.
+
+        Returns
+        -------
+        UnifiedSphere
+            Without distortion.
+
+        Raises
+        ------
+        ValueError
+            For another α.
+
+        Examples
+        --------
+        >>> UnifiedSphere.from_alpha(0.5).xi
+        1.0
+        """
         check_range("alpha", alpha, 0 <= alpha < 1, "at least 0 and below 1")
         return cls(alpha / (1 - alpha))
 
@@ -110,9 +155,28 @@ class UnifiedSphere(Lens):
 
 @dataclass(frozen=True)
 class ExtendedUnified(Lens):
-    """(x, y) = (X, Y) / (α D + (1 - α) Z) with D² = β (X² + Y²) + Z² (Khomutenko et al. 2016, eq. 11).
+    """(x, y) = (X, Y) / (α D + (1 - α) Z) with D² = β (X² + Y²) + Z²: an ellipsoid in place of the sphere.
 
-    0 ≤ α ≤ 1 and β > 0: an ellipsoid in place of the sphere.
+    Parameters
+    ----------
+    alpha : float
+        α, between 0 and 1.
+    beta : float
+        β, above 0.
+
+    Raises
+    ------
+    ValueError
+        For an α or a β outside its range.
+
+    References
+    ----------
+    B. Khomutenko, G. Garcia & P. Martinet, *An enhanced unified camera model*, IEEE RA-L 1 (2016), eq. 11.
+
+    Examples
+    --------
+    >>> ExtendedUnified(alpha=0.5, beta=1).project([3, 0, 4])  # 3 / (0.5 · 5 + 0.5 · 4)
+    array([0.66666667, 0.        ])
     """
 
     alpha: float
@@ -155,9 +219,30 @@ class ExtendedUnified(Lens):
 
 @dataclass(frozen=True)
 class DoubleSphere(Lens):
-    """(x, y) = (X, Y) / (α D₂ + (1 - α) (ξ D₁ + Z)) (Usenko et al. 2018, eq. 40-45), -1 < ξ ≤ 1 and 0 ≤ α ≤ 1.
+    """(x, y) = (X, Y) / (α D₂ + (1 - α) (ξ D₁ + Z)).
 
-    D₁ = |(X, Y, Z)| and D₂ = |(X, Y, ξ D₁ + Z)|: onto one sphere, then onto another, ξ further on.
+    D₁ = ‖(X, Y, Z)‖ and D₂ = ‖(X, Y, ξ D₁ + Z)‖: onto one sphere, then onto another, ξ further on.
+
+    Parameters
+    ----------
+    xi : float
+        ξ, above -1 and at most 1.
+    alpha : float
+        α, between 0 and 1.
+
+    Raises
+    ------
+    ValueError
+        For a ξ or an α outside its range.
+
+    References
+    ----------
+    V. Usenko, N. Demmel & D. Cremers, *The double sphere camera model*, 3DV (2018), eq. 40-45.
+
+    Examples
+    --------
+    >>> DoubleSphere(xi=0, alpha=0.5).project([3, 0, 4])  # with ξ = 0 one sphere: 3 / (0.5 · 5 + 0.5 · 4)
+    array([0.66666667, 0.        ])
     """
 
     xi: float

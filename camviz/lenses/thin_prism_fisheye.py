@@ -17,12 +17,33 @@ _EQUIDISTANT = Equidistant()
 
 @dataclass(frozen=True)
 class ThinPrismFisheye(Lens):
-    """With (u, v) the image of an equidistant lens and θ² = u² + v², (Schöps et al. 2017, "ETH3D")
+    """COLMAP's and ETH3D's fisheye: equal angles first, then a polynomial of them.
 
-    x = u (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) + 2 p1 u v + p2 (θ² + 2 u²) + sx1 θ²
-    y = v (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) + p1 (θ² + 2 v²) + 2 p2 u v + sy1 θ²
+    With (u, v) the image of an equidistant lens and θ² = u² + v²,
+
+        x = u (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) + 2 p1 u v + p2 (θ² + 2 u²) + sx1 θ²
+        y = v (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) + p1 (θ² + 2 v²) + 2 p2 u v + sy1 θ²
 
     as far as the polynomial does not fold on the way from the axis.
+
+    Parameters
+    ----------
+    k1, k2, p1, p2, k3, k4, sx1, sy1 : float, optional
+        Coefficients of the angle θ in radians.
+
+    Raises
+    ------
+    ValueError
+        For a coefficient that is not a finite number.
+
+    References
+    ----------
+    T. Schöps et al., *A multi-view stereo benchmark with high-resolution images and multi-camera videos*, CVPR (2017).
+
+    Examples
+    --------
+    >>> ThinPrismFisheye(k1=0.1).project([1, 0, 0]).round(4)  # θ = π/2: θ (1 + 0.1 θ²)
+    array([1.9584, 0.    ])
     """
 
     k1: float = 0.0

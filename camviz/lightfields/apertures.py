@@ -7,14 +7,44 @@ import numpy as np
 from camviz.lenses.base import Array
 
 APERTURES = ("full", "round", "half", "ring", "pinhole")
+"""The names that `aperture` knows.
+
+>>> APERTURES
+('full', 'round', 'half', 'ring', 'pinhole')
+"""
 
 
 def aperture(shape: str, rows: int, columns: int, v: int | None = None, u: int | None = None) -> Array:
-    """A mask (rows, columns) of ones and zeros, by name.
+    """A mask of ones and zeros: which views of a grid take part in a picture.
 
-    "full" is every view; "round" those within the grid's inscribed ellipse, "ring" the outer part of these; "half"
-    the left half, the middle column included; "pinhole" the single view (v, u), by default that of the middle.
-    ValueError for another name, or a view that is not there.
+    Parameters
+    ----------
+    shape : {"full", "round", "half", "ring", "pinhole"}
+        "full" is every view; "round" those within the grid's inscribed ellipse, and "ring" the outer part of these;
+        "half" the left half, the middle column included; "pinhole" a single view.
+    rows, columns : int
+        Of the grid.
+    v, u : int, optional
+        The row and column of the single view; by default those of the middle.
+
+    Returns
+    -------
+    array (rows, columns)
+        1.0 for a view that takes part, 0.0 for the others.
+
+    Raises
+    ------
+    ValueError
+        For another name, or a view that is not there.
+
+    Examples
+    --------
+    >>> aperture("ring", 5, 5).astype(int)
+    array([[0, 1, 1, 1, 0],
+           [1, 0, 0, 0, 1],
+           [1, 0, 0, 0, 1],
+           [1, 0, 0, 0, 1],
+           [0, 1, 1, 1, 0]])
     """
     if shape not in APERTURES:
         raise ValueError(f"shape must be one of {', '.join(APERTURES)}, got {shape!r}")

@@ -15,17 +15,42 @@ from camviz.scenes.light import to_linear
 
 @dataclass(frozen=True, eq=False)
 class LightField:
-    """Views (v, u, height, width, 3) from a grid of places in the plane of a lens, or of an array of cameras.
-
-    Axes: v counts the places downwards and u to the right, as one looks at the scene; then the rows and columns of
-    each view. Floating point views are linear light 0 … 1, uint8 views are sRGB bytes. The places are `baseline`
-    metres apart in both directions, and the middle of the grid is the middle of the aperture. `focal_length`, in
-    pixels, is the distance from lens to image over the pitch of the pixels. All views show a point at
-    `focus_distance` metres in the same pixel; inf where they are not sheared. What is unknown is NaN.
+    """Views from a grid of places in the plane of a lens, or of an array of cameras.
 
     A point at depth z moves by its *disparity* d = baseline · focal_length · (1/z − 1/focus_distance) pixels to the
     left for each step of u to the right, and up for each step of v down. It is positive for what is nearer than the
-    focus: u_left − u_right, as in stereo.
+    focus: u_left − u_right, as in stereo. The middle of the grid is the middle of the aperture.
+
+    Parameters
+    ----------
+    views : array (v, u, height, width, 3)
+        v counts the places downwards and u to the right, as one looks at the scene; then the rows and columns of each
+        view. Floating point views are linear light 0 … 1, uint8 views are sRGB bytes.
+    baseline : float
+        From place to place in both directions, in metres; NaN where unknown.
+    focal_length : float
+        From lens to image in pixels; NaN where unknown.
+    focus_distance : float
+        All views show a point at this depth, in metres, in the same pixel; inf where they are not sheared.
+
+    Raises
+    ------
+    ValueError
+        For views of another shape or kind, and a baseline, focal length or focus distance that is not positive.
+
+    References
+    ----------
+    M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; Szeliski (2022), section
+    14.3.
+
+    Examples
+    --------
+    Here baseline · focal_length is 6 m px, so a point at 1 m moves by 6 (1/1 − 1/2) pixels a view:
+
+    >>> views = np.zeros((9, 9, 48, 64, 3), np.uint8)
+    >>> field = LightField(views, baseline=0.005, focal_length=1200, focus_distance=2.0)
+    >>> field.disparity([1, 2, 4])
+    array([ 3. ,  0. , -1.5])
     """
 
     views: NDArray[Any] = field(repr=False)
@@ -57,39 +82,97 @@ class LightField:
 
     @property
     def height(self) -> int:
+        """Of a view, in pixels."""
         return self.views.shape[2]
 
     @property
     def width(self) -> int:
+        """Of a view, in pixels."""
         return self.views.shape[3]
 
     def steps(self) -> tuple[Array, Array]:
-        """How many baselines each place is below (rows,) and to the right (columns,) of the grid's middle."""
+        """How many baselines each place is below and to the right of the grid's middle.
+
+        Returns
+        -------
+        down : array (rows,)
+            Negative above the middle.
+        right : array (columns,)
+            Negative to the left of the middle.
+        """
         return _centred(self.rows), _centred(self.columns)
 
     def light(self, v: int, u: int) -> NDArray[np.floating]:
-        """One view (height, width, 3) as linear light; v and u count from 0."""
+        """One view as linear light.
+
+        Parameters
+        ----------
+        v, u : int
+            Its row and column in the grid, from 0.
+
+        Returns
+        -------
+        array (height, width, 3)
+            Linear, 0 … 1.
+        """
         view = self.views[v, u]
         return to_linear(view) if view.dtype == np.uint8 else np.asarray(view)
 
     def disparity(self, depth: ArrayLike) -> Array:
-        """Pixels (...) by which a point at `depth` (...) metres moves from one view to the next: its slope."""
+        """By how much points at a depth move from one view to the next: their slope.
+
+        Parameters
+        ----------
+        depth : array_like (...)
+            In metres, along the optical axis.
+
+        Returns
+        -------
+        array (...)
+            In pixels a view; positive for what is nearer than the focus.
+        """
         with np.errstate(divide="ignore"):
             return self.baseline * self.focal_length * (1 / np.asarray(depth, dtype=float) - 1 / self.focus_distance)
 
     def depth(self, disparity: ArrayLike) -> Array:
-        """Depth (...) in metres of what moves by `disparity` (...) pixels; NaN where it would be beyond infinity."""
+        """Where points are that move by a disparity: the inverse of `disparity`.
+
+        Parameters
+        ----------
+        disparity : array_like (...)
+            In pixels a view.
+
+        Returns
+        -------
+        array (...)
+            In metres; NaN where it would be beyond infinity.
+        """
         d = np.asarray(disparity, dtype=float)
         inverse = d / (self.baseline * self.focal_length) + 1 / self.focus_distance
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(inverse >= 0, 1 / np.abs(inverse), np.nan)
 
     def alpha(self, disparity: ArrayLike, pixel_pitch: float) -> Array:
-        """Ng's α (...): how far behind the lens the film of a refocused picture lies, over how far the sensor does.
+        """Ng's α: how far behind the lens the film of a refocused picture lies, over how far the sensor does.
 
         With image distances F and αF, 1 − 1/α = F (1/z − 1/z_focus), and F = focal_length · pixel_pitch; so
-        1 − 1/α = disparity · pixel_pitch / baseline: the slope is straight in 1/α, not in α (Ng 2005).
-        `pixel_pitch` is in metres. NaN where no film would do.
+        1 − 1/α = disparity · pixel_pitch / baseline: the slope is straight in 1/α, not in α.
+
+        Parameters
+        ----------
+        disparity : array_like (...)
+            In pixels a view.
+        pixel_pitch : float
+            In metres.
+
+        Returns
+        -------
+        array (...)
+            A ratio, 1 at the focus; NaN where no film would do.
+
+        References
+        ----------
+        R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
         """
         over = 1 - np.asarray(disparity, dtype=float) * pixel_pitch / self.baseline
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -33,16 +33,48 @@ def read_folder(
 ) -> LightField:
     """The light field in a folder of pictures, as sRGB bytes.
 
-    Three layouts are known. The 4D Light Field Benchmark (Honauer et al. 2016): input_Cam000.png … row by row, and
-    parameters.cfg, which gives baseline, focal length and focus distance. The Stanford Light Field Archive:
-    out_ROW_COLUMN_y_x_.png; the places in the names have no unit that holds for all, and in some sets x falls from
-    left to right, which turns the sign of every disparity. Any other pictures: in the order of their names, row by
-    row, in a square, or in `rows` rows: 1 for a camera moved along a ruler.
+    Three layouts are known. The 4D Light Field Benchmark: `input_Cam000.png` … row by row, and parameters.cfg, which
+    gives baseline, focal length and focus distance. The Stanford Light Field Archive: `out_ROW_COLUMN_y_x_.png`; the
+    places in the names have no unit that holds for all, and in some sets x falls from left to right, which turns the
+    sign of every disparity. Any other pictures are taken in the order of their names, row by row.
 
-    `width` makes the views smaller. `baseline` and `focus_distance` in metres and `focal_length` in pixels of the
-    views as returned are what the folder itself does not tell. Raises ValueError in one sentence for a folder that is
-    not there or empty, a view that is missing or cannot be read, views of different sizes, a number of views that
-    makes no grid.
+    Parameters
+    ----------
+    path : str or Path
+        The folder.
+    rows : int, optional
+        How many rows of views the other pictures make, 1 for a camera moved along a ruler; by default they make a
+        square.
+    width : int, optional
+        Makes the views smaller: so many pixels wide.
+    baseline, focal_length, focus_distance : float
+        As of `LightField`, the focal length in pixels of the views as returned: what the folder does not tell itself.
+
+    Returns
+    -------
+    LightField
+        With uint8 views.
+
+    Raises
+    ------
+    ValueError
+        For a folder that is not there or empty, a view that is missing or cannot be read, views of different sizes, or
+        a number of views that makes no grid.
+
+    References
+    ----------
+    K. Honauer et al., A dataset and evaluation methodology for depth estimation on 4D light fields, ACCV 2016.
+
+    Examples
+    --------
+    Three pictures from along a ruler, made up:
+
+    >>> import cv2
+    >>> for place in range(3):
+    ...     assert cv2.imwrite(f"IMG_{place}.png", np.zeros((48, 64, 3), np.uint8))
+    >>> field = read_folder(".", rows=1, baseline=0.01)
+    >>> field.rows, field.columns, field.width, field.height
+    (1, 3, 64, 48)
     """
     folder = Path(path)
     if not folder.is_dir():

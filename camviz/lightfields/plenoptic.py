@@ -14,19 +14,70 @@ Pixels = NDArray[Any]
 
 
 def to_microlens_image(views: Pixels) -> Pixels:
-    """The sensor (height · v, width · u, ...) behind the microlenses, from views (v, u, height, width, ...).
+    """The sensor behind the microlenses of a plenoptic camera, from its views.
 
     Under the microlens (x, y) lie the pixels that look through it at every place of the main lens. As with any camera
     the picture is shown turned by 180°: that puts both the scene and each small image of the main lens upright.
+
+    Parameters
+    ----------
+    views : array (v, u, height, width, ...)
+        Of any kind of number.
+
+    Returns
+    -------
+    array (height · v, width · u, ...)
+        The same numbers in another order.
+
+    Raises
+    ------
+    ValueError
+        For views of another shape.
+
+    References
+    ----------
+    R. Ng et al., Light field photography with a hand-held plenoptic camera, Stanford CTSR 2005-02.
+
+    Examples
+    --------
+    Two views, 1 and 2, of two pixels each lie next to each other under two microlenses:
+
+    >>> to_microlens_image(np.array([[[[1, 1]], [[2, 2]]]]))
+    array([[1, 2, 1, 2]])
     """
-    v, u, height, width = views.shape[:4]
+    v, u, height, width = grid_of(views)
     return np.moveaxis(views, (2, 0, 3, 1), (0, 1, 2, 3)).reshape(height * v, width * u, *views.shape[4:])
 
 
 def from_microlens_image(sensor: Pixels, rows: int, columns: int) -> Pixels:
-    """The sub-aperture views (rows, columns, height, width, ...): pixel (v, u) from under every microlens.
+    """The views from the sensor behind microlenses: pixel (v, u) from under every one of them.
 
-    Raises ValueError when the sensor does not hold a whole number of microlenses of rows × columns pixels.
+    Parameters
+    ----------
+    sensor : array (height · rows, width · columns, ...)
+        Of any kind of number.
+    rows, columns : int
+        Pixels under a microlens.
+
+    Returns
+    -------
+    array (rows, columns, height, width, ...)
+        The same numbers in another order.
+
+    Raises
+    ------
+    ValueError
+        When the sensor does not hold a whole number of microlenses.
+
+    References
+    ----------
+    R. Ng et al., Light field photography with a hand-held plenoptic camera, Stanford CTSR 2005-02.
+
+    Examples
+    --------
+    >>> from_microlens_image(np.array([[1, 2, 1, 2]]), rows=1, columns=2)
+    array([[[[1, 1]],
+            [[2, 2]]]])
     """
     height, width = _divided(sensor, rows, columns, "microlenses of {} × {} pixels")
     split = sensor.reshape(height, rows, width, columns, *sensor.shape[2:])
@@ -34,27 +85,111 @@ def from_microlens_image(sensor: Pixels, rows: int, columns: int) -> Pixels:
 
 
 def to_mosaic(views: Pixels) -> Pixels:
-    """The views side by side, as one picture (v · height, u · width, ...)."""
-    v, u, height, width = views.shape[:4]
+    """The views side by side, as one picture.
+
+    Parameters
+    ----------
+    views : array (v, u, height, width, ...)
+        Of any kind of number.
+
+    Returns
+    -------
+    array (v · height, u · width, ...)
+        The same numbers in another order.
+
+    Raises
+    ------
+    ValueError
+        For views of another shape.
+
+    Examples
+    --------
+    >>> to_mosaic(np.array([[[[1, 1]], [[2, 2]]]]))
+    array([[1, 1, 2, 2]])
+    """
+    v, u, height, width = grid_of(views)
     return np.swapaxes(views, 1, 2).reshape(v * height, u * width, *views.shape[4:])
 
 
 def from_mosaic(picture: Pixels, rows: int, columns: int) -> Pixels:
-    """The views (rows, columns, height, width, ...) of a picture that holds them side by side."""
+    """The views of a picture that holds them side by side.
+
+    Parameters
+    ----------
+    picture : array (rows · height, columns · width, ...)
+        Of any kind of number.
+    rows, columns : int
+        Of the grid of views.
+
+    Returns
+    -------
+    array (rows, columns, height, width, ...)
+        The same numbers in another order.
+
+    Raises
+    ------
+    ValueError
+        When the picture cannot be divided so.
+
+    Examples
+    --------
+    >>> from_mosaic(np.array([[1, 1, 2, 2]]), rows=1, columns=2)
+    array([[[[1, 1]],
+            [[2, 2]]]])
+    """
     height, width = _divided(picture, rows, columns, "a grid of {} × {} views")
     return np.swapaxes(picture.reshape(rows, height, columns, width, *picture.shape[2:]), 1, 2)
 
 
 def epipolar_plane_image(views: Pixels, row: int, v: int | None = None) -> Pixels:
-    """The slice (u, width, ...) of views (v, u, height, width, ...) at one row of pixels and one row of views.
+    """The slice of a light field at one row of pixels and one row of views, in which every point is a straight line.
 
-    A point is a straight line in it: for every step of u it moves by its disparity to the left. By default `v` is the
-    row in the middle. Transpose the views' axes, (1, 0, 3, 2), for the upright ones.
+    For every step of u the point moves by its disparity to the left. Transpose the views' axes, (1, 0, 3, 2), for the
+    upright slices.
+
+    Parameters
+    ----------
+    views : array (v, u, height, width, ...)
+        Of any kind of number.
+    row : int
+        Of pixels.
+    v : int, optional
+        The row of views; by default that in the middle.
+
+    Returns
+    -------
+    array (u, width, ...)
+        One row for each view.
+
+    References
+    ----------
+    R. C. Bolles, H. H. Baker and D. H. Marimont, Epipolar-plane image analysis, Int. J. Comput. Vis. 1 (1987).
+
+    Examples
+    --------
+    A point that moves by two pixels a view:
+
+    >>> views = np.zeros((1, 3, 1, 7), int)
+    >>> views[0, [0, 1, 2], 0, [5, 3, 1]] = 1
+    >>> epipolar_plane_image(views, row=0)
+    array([[0, 0, 0, 0, 0, 1, 0],
+           [0, 0, 0, 1, 0, 0, 0],
+           [0, 1, 0, 0, 0, 0, 0]])
     """
     return views[views.shape[0] // 2 if v is None else v, :, row]
 
 
+def grid_of(views: Pixels) -> tuple[int, int, int, int]:
+    """v, u, height and width of views. ValueError where they have fewer axes."""
+    if views.ndim < 4:
+        raise ValueError(f"views must have shape (v, u, height, width, ...), got {views.shape}")
+    v, u, height, width = views.shape[:4]
+    return v, u, height, width
+
+
 def _divided(picture: Pixels, rows: int, columns: int, what: str) -> tuple[int, int]:
+    if picture.ndim < 2:
+        raise ValueError(f"a picture must have shape (height, width, ...), got {picture.shape}")
     height, width = picture.shape[:2]
     if rows < 1 or columns < 1 or height % rows or width % columns:
         raise ValueError(f"a picture of {width} × {height} pixels is not made of {what.format(columns, rows)}")

@@ -12,16 +12,49 @@ Floats = NDArray[np.float32]
 
 
 def disparity_by_sweep(field: LightField, disparities: ArrayLike, window: int = 5) -> Floats:
-    """Disparity (height, width) of what the middle of the aperture sees: the shear at which the views agree best.
+    """Disparity of what the middle of the aperture sees: the shear at which the views agree best.
 
-    Tries each of `disparities` (n,), evenly spaced, n ≥ 3. The cost of one is the variance over the views of the
-    sheared light, averaged over `window` × `window` pixels; a parabola through the least and its neighbours goes
-    between the steps. Light is compared in the fourth root, nearer to how it is seen and to its noise.
-    Raises ValueError for fewer than three disparities, or unevenly spaced ones.
+    The cost of a shear is the variance over the sheared views, averaged over a window; a parabola through the least
+    cost and its neighbours goes between the steps. Light is compared in the fourth root, nearer to how it is seen and
+    to its noise.
+
+    Parameters
+    ----------
+    field : LightField
+        The views.
+    disparities : array_like (n,)
+        What is tried, in pixels a view: evenly spaced, n ≥ 3.
+    window : int
+        Pixels along each side, odd.
+
+    Returns
+    -------
+    array (height, width)
+        In pixels a view, float32.
+
+    Raises
+    ------
+    ValueError
+        For fewer than three disparities, unevenly spaced ones, and an even window.
+
+    References
+    ----------
+    Szeliski (2022), section 12.1.2, plane sweep.
+
+    Examples
+    --------
+    A pattern that moves by one pixel a view:
+
+    >>> import cv2
+    >>> pattern = cv2.GaussianBlur(np.random.default_rng(0).random((32, 32, 3)), (0, 0), 2)
+    >>> views = [[np.roll(pattern, (1 - v, 1 - u), (0, 1)) for u in range(3)] for v in range(3)]
+    >>> float(np.median(disparity_by_sweep(LightField(np.array(views)), [-2, -1, 0, 1, 2])).round(2))
+    1.0
     """
     tried = np.asarray(disparities, dtype=float)
     if tried.ndim != 1 or len(tried) < 3 or not np.allclose(np.diff(tried, 2), 0, atol=1e-9):
         raise ValueError(f"disparities must be at least three evenly spaced numbers, got {tried.tolist()}")
+    _require_window(window)
     grey = _grey(field)
     costs = np.stack([cv2.blur(_variance(grey, field, d), (window, window)) for d in tried])
     best = np.clip(costs.argmin(axis=0), 1, len(tried) - 2)
@@ -33,17 +66,56 @@ def disparity_by_sweep(field: LightField, disparities: ArrayLike, window: int = 
 
 
 def disparity_by_structure(field: LightField, start: ArrayLike = 0.0, window: int = 5) -> tuple[Floats, Floats]:
-    """Disparity (height, width) by the direction of the lines in epipolar-plane images, and how far to trust it, 0 … 1.
+    """Disparity by the direction of the lines in epipolar-plane images, and how far to trust it.
 
     With L(x, u) = g(x + d u), L_u = d L_x. The structure tensor's eigenvector gives d = tan(½ atan2(2 J_xu, J_xx −
-    J_uu)), where J_xx = Σ L_x², J_xu = Σ L_x L_u, J_uu = Σ L_u² over a window of `window` × `window` pixels and both
-    directions; its coherence is the trust (Wanner and Goldlücke 2014). Trustworthy within half a pixel of
-    `start`, a number: shear the field there first. It takes the three views around the middle in each direction.
+    J_uu)), where J_xx = Σ L_x², J_xu = Σ L_x L_u, J_uu = Σ L_u² over a window and both directions; its coherence is the
+    trust. It takes the three views around the middle in each direction.
+
+    Parameters
+    ----------
+    field : LightField
+        The views, at least 3 × 3.
+    start : array_like (), scalar
+        In pixels a view: shear the field there first, for the answer is good within half a pixel of it.
+    window : int
+        Pixels along each side, odd.
+
+    Returns
+    -------
+    disparity : array (height, width)
+        In pixels a view, float32.
+    trust : array (height, width)
+        0 … 1.
+
+    Raises
+    ------
+    ValueError
+        For a field of fewer than 3 × 3 views, and an even window.
+
+    References
+    ----------
+    S. Wanner and B. Goldlücke, Variational light field analysis for disparity estimation and super-resolution, IEEE
+    Trans. Pattern Anal. Mach. Intell. 36 (2014).
+
+    Examples
+    --------
+    A pattern that moves by one pixel a view:
+
+    >>> import cv2
+    >>> pattern = cv2.GaussianBlur(np.random.default_rng(0).random((32, 32, 3)), (0, 0), 2)
+    >>> views = [[np.roll(pattern, (1 - v, 1 - u), (0, 1)) for u in range(3)] for v in range(3)]
+    >>> disparity, trust = disparity_by_structure(LightField(np.array(views)), start=1)
+    >>> float(np.median(disparity).round(2)), float(np.median(trust).round(1))
+    (1.0, 1.0)
     """
     grey, steps = _grey(field), [round(len(step) // 2) for step in field.steps()]
     v, u = steps
     if min(field.rows, field.columns) < 3:
         raise ValueError(f"the structure tensor needs 3 × 3 views, got {field.rows} × {field.columns}")
+    _require_window(window)
+    if np.ndim(start):
+        raise ValueError(f"start must be a single disparity, got shape {np.shape(start)}")
     shear = float(np.asarray(start))
     look = lambda dv, du: _shifted(grey[v + dv, u + du], shear * du, shear * dv)  # noqa: E731
     row, column = [look(0, i) for i in (-1, 0, 1)], [look(i, 0) for i in (-1, 0, 1)]
@@ -56,6 +128,11 @@ def disparity_by_structure(field: LightField, start: ArrayLike = 0.0, window: in
     spread = np.hypot(jxx - juu, 2 * jxu)
     coherence = np.divide(spread, jxx + juu, out=np.zeros_like(spread), where=jxx + juu > 1e-9)
     return (shear + np.tan(0.5 * np.arctan2(2 * jxu, jxx - juu))).astype(np.float32), coherence**2
+
+
+def _require_window(window: int) -> None:
+    if window < 1 or window % 2 == 0:
+        raise ValueError(f"window must be an odd number of pixels, at least 1, got {window}")
 
 
 def _grey(field: LightField) -> Floats:

@@ -11,13 +11,39 @@ from camviz.mosaics.demosaicing import bayer_mosaic, by_differences, demosaic
 from camviz.mosaics.patterns import GREEN, Pattern
 
 BY_DIFFERENCES = ("edge-aware", "Menon")
-"""The algorithms whose red and blue are green plus an interpolated difference; to the others green makes no odds."""
+"""The algorithms whose red and blue are green plus an interpolated difference; to the others green makes no odds.
+
+>>> BY_DIFFERENCES
+('edge-aware', 'Menon')
+"""
 
 
 def green_windows(values: ArrayLike, pattern: Pattern) -> Array:
-    """The windows (n, 5, 5) of a Bayer mosaic around its n red and blue pixels, row by row, mirrored at the border.
+    """The windows of a Bayer mosaic around its red and blue pixels, mirrored at the border.
 
-    ValueError for other patterns.
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light, at least 4 × 4.
+    pattern : Pattern
+        One of BAYER.
+
+    Returns
+    -------
+    array (n, 5, 5)
+        Linear light, row by row of the n red and blue pixels.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape, and for other patterns.
+
+    Examples
+    --------
+    Half of the pixels miss green:
+
+    >>> green_windows(np.zeros((6, 8)), BAYER["RGGB"]).shape
+    (24, 5, 5)
     """
     measured = bayer_mosaic(values, pattern)
     around = cv2.copyMakeBorder(measured, 2, 2, 2, 2, cv2.BORDER_REFLECT_101)
@@ -26,13 +52,44 @@ def green_windows(values: ArrayLike, pattern: Pattern) -> Array:
 
 
 def with_green(values: ArrayLike, pattern: Pattern, green: ArrayLike, algorithm: str = "edge-aware") -> Array:
-    """The picture (height, width, 3) of a Bayer mosaic with `green` (n,) at the pixels that `green_windows` names.
+    """The picture of a Bayer mosaic whose green was guessed elsewhere.
 
-    Red and blue are made as `algorithm` makes them: green plus the interpolated differences red − green and
-    blue − green for "edge-aware" and "Menon", from the mosaic alone for the others. ValueError for other patterns.
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light, at least 4 × 4.
+    pattern : Pattern
+        One of BAYER.
+    green : array_like (n,)
+        Linear light at the pixels that `green_windows` names, in its order.
+    algorithm : {"edge-aware", "Menon", "nearest", "bilinear", "Malvar"}
+        Red and blue are made as it makes them: green plus the interpolated differences red − green and blue − green for
+        those of BY_DIFFERENCES, from the mosaic alone for the others.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape, another number of `green`, and other patterns.
+
+    Examples
+    --------
+    Of a grey picture, true green makes all three colours true:
+
+    >>> plate, pattern = zone_plate(32), BAYER["RGGB"]
+    >>> green = plate[~pattern.mask(GREEN, 32, 32), GREEN]
+    >>> np.allclose(with_green(mosaic(plate, pattern), pattern, green), plate)
+    True
     """
     plane = bayer_mosaic(values, pattern).copy()
-    plane[~pattern.mask(GREEN, *plane.shape)] = green
+    missing = ~pattern.mask(GREEN, *plane.shape)
+    if np.shape(green) != (missing.sum(),):
+        raise ValueError(f"green must be one number for each of {missing.sum()} pixels, got shape {np.shape(green)}")
+    plane[missing] = green
     if algorithm in BY_DIFFERENCES:
         return by_differences(values, pattern, plane)
     picture = demosaic(values, pattern, algorithm)

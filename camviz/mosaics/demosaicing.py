@@ -36,19 +36,110 @@ _THREE = np.full((1, 3), 1 / 3)
 
 
 def nearest(values: ArrayLike, pattern: Pattern) -> Array:
-    """Every missing colour copied from the nearest pixel that measured it."""
+    """Every missing colour copied from the nearest pixel that measured it.
+
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light.
+    pattern : Pattern
+        Any one.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape.
+
+    References
+    ----------
+    Szeliski (2022), section 10.3.1.
+
+    Examples
+    --------
+    >>> nearest([[0.1, 0.2], [0.3, 0.4]], BAYER["RGGB"])[..., RED]
+    array([[0.1, 0.1],
+           [0.1, 0.1]])
+    """
     measured = as_mosaic(values)
     return _in_rgb({c: measured[_nearest_pixels(pattern, c, *measured.shape)] for c in pattern.present})
 
 
 def bilinear(values: ArrayLike, pattern: Pattern) -> Array:
-    """Every missing colour as the mean of the pixels around that measured it, weighted by their nearness."""
+    """Every missing colour as the mean of the pixels around that measured it, weighted by their nearness.
+
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light.
+    pattern : Pattern
+        Any one.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape.
+
+    References
+    ----------
+    Szeliski (2022), section 10.3.1.
+
+    Examples
+    --------
+    A black-and-white edge gets a coloured fringe:
+
+    >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
+    >>> bilinear(mosaic(edge, BAYER["RGGB"]), BAYER["RGGB"])[4, 3:6]
+    array([[0.5 , 0.  , 0.  ],
+           [1.  , 0.75, 0.5 ],
+           [1.  , 1.  , 1.  ]])
+    """
     measured = as_mosaic(values)
     return _in_rgb({channel: _spread(measured, pattern, channel) for channel in pattern.present})
 
 
 def malvar(values: ArrayLike, pattern: Pattern) -> Array:
-    """Bilinear interpolation corrected by the second derivative of the measured colour (Malvar, He and Cutler 2004)."""
+    """Bilinear interpolation corrected by the second derivative of the measured colour.
+
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light, at least 4 × 4.
+    pattern : Pattern
+        One of BAYER.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape, and for other patterns.
+
+    References
+    ----------
+    H. S. Malvar, L. He and R. Cutler, High-quality linear interpolation for demosaicing of Bayer-patterned color
+    images, ICASSP 2004.
+
+    Examples
+    --------
+    The fringe that `bilinear` makes at an edge is weaker:
+
+    >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
+    >>> malvar(mosaic(edge, BAYER["RGGB"]), BAYER["RGGB"])[4, 4]
+    array([1.    , 0.875 , 0.6875])
+    """
     measured = bayer_mosaic(values, pattern)
     green, beside, below, across = (_filtered(measured, one) for one in (_GREEN, _BESIDE, _BESIDE.T, _ACROSS))
     planes = np.stack([measured] * 3)
@@ -64,7 +155,34 @@ def malvar(values: ArrayLike, pattern: Pattern) -> Array:
 def edge_aware(values: ArrayLike, pattern: Pattern) -> Array:
     """Green along the edge, not across it; then bilinear interpolation of red − green and blue − green.
 
-    The choice for green is that of J. F. Hamilton and J. E. Adams (US patent 5,629,734, 1997).
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light, at least 4 × 4.
+    pattern : Pattern
+        One of BAYER.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape, and for other patterns.
+
+    References
+    ----------
+    J. F. Hamilton and J. E. Adams, US patent 5,629,734 (1997), for the choice of green.
+
+    Examples
+    --------
+    An upright edge comes back without a fringe:
+
+    >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
+    >>> np.allclose(edge_aware(mosaic(edge, BAYER["RGGB"]), BAYER["RGGB"]), edge)
+    True
     """
     measured = bayer_mosaic(values, pattern)
     by_rows, by_columns = _green_both_ways(measured, pattern)
@@ -82,7 +200,38 @@ def by_differences(values: ArrayLike, pattern: Pattern, green: Array) -> Array:
 
 
 def menon(values: ArrayLike, pattern: Pattern) -> Array:
-    """Green both ways, and afterwards the way that left the smoother colours; then refined (Menon et al. 2007)."""
+    """Green both ways, and afterwards the way that left the smoother colours; then refined.
+
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light, at least 4 × 4.
+    pattern : Pattern
+        One of BAYER.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape, and for other patterns.
+
+    References
+    ----------
+    D. Menon, S. Andriani and G. Calvagno, Demosaicing with directional filtering and a posteriori decision, IEEE Trans.
+    Image Process. 16 (2007).
+
+    Examples
+    --------
+    An upright edge comes back without a fringe:
+
+    >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
+    >>> np.allclose(menon(mosaic(edge, BAYER["RGGB"]), BAYER["RGGB"]), edge)
+    True
+    """
     measured = bayer_mosaic(values, pattern)
     by_rows, by_columns = _green_both_ways(measured, pattern)
     along_rows = _changes(measured - by_rows) <= _changes((measured - by_columns).T).T
@@ -96,19 +245,48 @@ def menon(values: ArrayLike, pattern: Pattern) -> Array:
 
 
 def opencv(values: NDArray[np.uint8] | NDArray[np.uint16], pattern: Pattern, method: str = "bilinear") -> NDArray:
-    """OpenCV's demosaicing of a Bayer mosaic (height, width), as RGB of the same integer type.
+    """OpenCV's demosaicing of a Bayer mosaic.
 
-    `method` is "bilinear", "EA" (edge-aware in green only) or "VNG" (uint8 only). OpenCV's older names are shifted by
-    one pixel: its `COLOR_BayerBG2RGB` is for RGGB. The names used here spell the tile.
+    OpenCV's older names are shifted by one pixel: its `COLOR_BayerBG2RGB` is for RGGB. The names used here spell the
+    tile.
+
+    Parameters
+    ----------
+    values : array (height, width)
+        A mosaic of linear light as uint8 or uint16.
+    pattern : Pattern
+        One of BAYER.
+    method : {"bilinear", "EA", "VNG"}
+        "EA" is edge-aware in green only; "VNG" takes uint8 only.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light, of the same integer type.
+
+    Raises
+    ------
+    ValueError
+        For another method or pattern, and for values of another kind.
+
+    Examples
+    --------
+    Where only the red pixels measured light, the picture is red:
+
+    >>> values = np.zeros((6, 6), np.uint8)
+    >>> values[::2, ::2] = 255
+    >>> np.unique(opencv(values, BAYER["RGGB"]).reshape(-1, 3), axis=0)
+    array([[255,   0,   0]], dtype=uint8)
     """
     suffixes = {"bilinear": "", "EA": "_EA", "VNG": "_VNG"}
     kinds = ("uint8",) if method == "VNG" else ("uint8", "uint16")
     _require_bayer(pattern)
     if method not in suffixes:
         raise ValueError(f"method must be one of {', '.join(suffixes)}, got {method!r}")
-    if np.ndim(values) != 2 or values.dtype.name not in kinds:
-        raise ValueError(f"values must be {' or '.join(kinds)} (height, width), got {values.dtype} {values.shape}")
-    return cv2.cvtColor(values, getattr(cv2, f"COLOR_Bayer{pattern.letters.replace(' ', '')}2RGB{suffixes[method]}"))
+    measured: NDArray = np.asarray(values)
+    if measured.ndim != 2 or measured.dtype.name not in kinds:
+        raise ValueError(f"values must be {' or '.join(kinds)} (height, width), got {measured.dtype} {measured.shape}")
+    return cv2.cvtColor(measured, getattr(cv2, f"COLOR_Bayer{pattern.letters.replace(' ', '')}2RGB{suffixes[method]}"))
 
 
 ALGORITHMS: dict[str, Callable[[ArrayLike, Pattern], Array]] = {
@@ -118,11 +296,49 @@ ALGORITHMS: dict[str, Callable[[ArrayLike, Pattern], Array]] = {
     "edge-aware": edge_aware,
     "Menon": menon,
 }
+"""The algorithms of `demosaic` by name, from the simplest to the best.
+
+>>> list(ALGORITHMS)
+['nearest', 'bilinear', 'Malvar', 'edge-aware', 'Menon']
+"""
 ANY_PATTERN = ("nearest", "bilinear")
+"""The names of the algorithms that take any pattern; the others take Bayer's.
+
+>>> ANY_PATTERN
+('nearest', 'bilinear')
+"""
 
 
 def demosaic(values: ArrayLike, pattern: Pattern, algorithm: str = "Menon") -> Array:
-    """The picture (height, width, 3) by one of ALGORITHMS. ValueError where it cannot do the pattern."""
+    """A picture from a mosaic, by interpolating what was not measured.
+
+    Parameters
+    ----------
+    values : array_like (height, width)
+        A mosaic of linear light.
+    pattern : Pattern
+        The filters.
+    algorithm : {"nearest", "bilinear", "Malvar", "edge-aware", "Menon"}
+        One of ALGORITHMS.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light; values below 0 and above 1 are not cut off.
+
+    Raises
+    ------
+    ValueError
+        For another algorithm, a mosaic of another shape, and a pattern that the algorithm cannot do.
+
+    Examples
+    --------
+    How near to the truth they come on the finest detail, in dB:
+
+    >>> plate, pattern = zone_plate(128), BAYER["RGGB"]
+    >>> {name: round(psnr(demosaic(mosaic(plate, pattern), pattern, name), plate)) for name in ("bilinear", "Menon")}
+    {'bilinear': 12, 'Menon': 21}
+    """
     if algorithm not in ALGORITHMS:
         raise ValueError(f"algorithm must be one of {', '.join(ALGORITHMS)}, got {algorithm!r}")
     return ALGORITHMS[algorithm](values, pattern)

@@ -9,7 +9,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.lenses.base import Array
 
-RED, GREEN, BLUE, WHITE = range(4)
+RED = 0
+"""The channel red, of a `Pattern` and of a picture (height, width, 3).
+
+>>> np.array([0.9, 0.5, 0.1])[RED]
+np.float64(0.9)
+"""
+GREEN = 1
+"""The channel green, of a `Pattern` and of a picture (height, width, 3).
+
+>>> np.array([0.9, 0.5, 0.1])[GREEN]
+np.float64(0.5)
+"""
+BLUE = 2
+"""The channel blue, of a `Pattern` and of a picture (height, width, 3).
+
+>>> np.array([0.9, 0.5, 0.1])[BLUE]
+np.float64(0.1)
+"""
+WHITE = 3
+"""The channel of a pixel without a filter, of a `Pattern`.
+
+>>> RGBW.share(WHITE)
+0.5
+"""
 LETTERS = "RGBW"
 
 Rows = tuple[tuple[int, ...], ...]
@@ -19,7 +42,23 @@ Rows = tuple[tuple[int, ...], ...]
 class Pattern:
     """A colour filter array: a tile of channels that repeats across the sensor, from its upper left pixel.
 
-    `tile` holds rows of RED, GREEN, BLUE and WHITE; a WHITE pixel has no filter (it is also called panchromatic).
+    Parameters
+    ----------
+    name : str
+        For readers.
+    tile : tuple of tuple of int
+        Rows of RED, GREEN, BLUE and WHITE; a WHITE pixel has no filter (it is also called panchromatic).
+
+    Raises
+    ------
+    ValueError
+        For rows of different lengths, and for other channels.
+
+    Examples
+    --------
+    >>> Pattern("stripes", ((RED, GREEN, BLUE),)).channels(2, 5)
+    array([[0, 1, 2, 0, 1],
+           [0, 1, 2, 0, 1]], dtype=uint8)
     """
 
     name: str
@@ -34,7 +73,25 @@ class Pattern:
 
     @classmethod
     def spelled(cls, name: str, rows: str) -> Pattern:
-        """The pattern whose tile is written as letters, its rows separated by blanks: "RG GB"."""
+        """The pattern whose tile is written as letters.
+
+        Parameters
+        ----------
+        name : str
+            For readers.
+        rows : str
+            The tile's rows with blanks between them: "RG GB".
+
+        Returns
+        -------
+        Pattern
+            With that tile.
+
+        Raises
+        ------
+        ValueError
+            For letters other than R, G, B and W, and rows of different lengths.
+        """
         if not rows.split() or set(rows) - set(LETTERS + " "):
             raise ValueError(f"rows must be written with the letters {', '.join(LETTERS)} and blanks, got {rows!r}")
         return cls(name, tuple(tuple(LETTERS.index(letter) for letter in row) for row in rows.split()))
@@ -46,10 +103,12 @@ class Pattern:
 
     @property
     def height(self) -> int:
+        """Of the tile, in pixels."""
         return len(self.tile)
 
     @property
     def width(self) -> int:
+        """Of the tile, in pixels."""
         return len(self.tile[0])
 
     @property
@@ -59,27 +118,72 @@ class Pattern:
 
     @property
     def is_bayer(self) -> bool:
-        """Whether it is one of the four phases of Bayer's array (US patent 3,971,065, 1976)."""
+        """Whether it is one of the four phases of Bayer's array."""
         return self.tile in {pattern.tile for pattern in BAYER.values()}
 
     def share(self, channel: int) -> float:
-        """The share of pixels that measure a channel, 0…1."""
+        """The share of pixels that measure a channel.
+
+        Parameters
+        ----------
+        channel : int
+            RED, GREEN, BLUE or WHITE.
+
+        Returns
+        -------
+        float
+            0 … 1.
+        """
         return sum(row.count(channel) for row in self.tile) / (self.height * self.width)
 
     def channels(self, height: int, width: int) -> NDArray[np.uint8]:
-        """The channel (height, width) that each pixel of a sensor measures."""
+        """The channel that each pixel of a sensor measures.
+
+        Parameters
+        ----------
+        height, width : int
+            Of the sensor, in pixels.
+
+        Returns
+        -------
+        array (height, width)
+            RED, GREEN, BLUE or WHITE, uint8.
+        """
         tile = np.array(self.tile, dtype=np.uint8)
         repeats = (-(-height // self.height), -(-width // self.width))
         return np.tile(tile, repeats)[:height, :width]
 
     def mask(self, channel: int, height: int, width: int) -> NDArray[np.bool_]:
-        """Whether each pixel (height, width) measures the channel."""
+        """Whether each pixel of a sensor measures a channel.
+
+        Parameters
+        ----------
+        channel : int
+            RED, GREEN, BLUE or WHITE.
+        height, width : int
+            Of the sensor, in pixels.
+
+        Returns
+        -------
+        array (height, width)
+            True where it does.
+        """
         return self.channels(height, width) == channel
 
     def cropped(self, x0: int, y0: int) -> Pattern:
-        """The pattern of a mosaic whose first `x0` columns and `y0` rows were cut off.
+        """The pattern of a mosaic whose first columns and rows were cut off.
 
         An odd number changes the phase of a Bayer array: RGGB without its first column is GRBG.
+
+        Parameters
+        ----------
+        x0, y0 : int
+            How many columns, and how many rows.
+
+        Returns
+        -------
+        Pattern
+            One of PATTERNS where the tile is known.
         """
         rolled = np.roll(np.array(self.tile), (-y0, -x0), axis=(0, 1))
         tile = tuple(tuple(int(channel) for channel in row) for row in rolled)
@@ -88,10 +192,37 @@ class Pattern:
 
 
 def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
-    """What a sensor under the pattern measures (height, width) of a picture (height, width, 3) in linear light.
+    """What a sensor under a pattern measures of a picture: one channel a pixel.
 
     A white pixel answers (R + G + B)/3: all channels are scaled so that white light reads the same in each. (On a real
-    sensor it gathers about three times as many photons, which is why it is there.) ValueError for another shape.
+    sensor it gathers about three times as many photons, which is why it is there.)
+
+    Parameters
+    ----------
+    picture : array_like (height, width, 3)
+        Linear light.
+    pattern : Pattern
+        The filters.
+
+    Returns
+    -------
+    array (height, width)
+        Linear light; float32 if the picture is, otherwise float64.
+
+    Raises
+    ------
+    ValueError
+        For a picture of another shape.
+
+    References
+    ----------
+    Szeliski (2022), section 2.3.2, color filter arrays.
+
+    Examples
+    --------
+    >>> mosaic([[(1, 2, 3), (4, 5, 6)], [(7, 8, 9), (10, 11, 12)]], BAYER["RGGB"])
+    array([[ 1.,  5.],
+           [ 8., 12.]])
     """
     light = as_picture(picture)
     measured = np.empty(light.shape[:2], light.dtype)
@@ -103,7 +234,31 @@ def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
 
 
 def in_colour(values: ArrayLike, pattern: Pattern) -> Array:
-    """A mosaic (height, width) as a picture (height, width, 3): each pixel in its filter's colour, white ones grey."""
+    """A mosaic as a picture: each pixel in its filter's colour, white ones grey.
+
+    Parameters
+    ----------
+    values : array_like (height, width)
+        Linear light, as `mosaic` gives it.
+    pattern : Pattern
+        The filters.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light.
+
+    Raises
+    ------
+    ValueError
+        For a mosaic of another shape.
+
+    Examples
+    --------
+    >>> in_colour([[0.1, 0.2], [0.3, 0.4]], BAYER["RGGB"])[0]  # red, and green
+    array([[0.1, 0. , 0. ],
+           [0. , 0.2, 0. ]])
+    """
     measured = as_mosaic(values)
     seen = pattern.channels(*measured.shape)
     return measured[..., None] * np.vstack([np.eye(3), np.ones(3)])[seen]
@@ -127,8 +282,33 @@ def as_mosaic(values: ArrayLike) -> Array:
 
 
 BAYER = {name: Pattern.spelled(name, f"{name[:2]} {name[2:]}") for name in ("RGGB", "BGGR", "GRBG", "GBRG")}
-XTRANS = Pattern.spelled("X-Trans", "GGRGGB GGBGGR BRGRBG GGBGGR GGRGGB RBGBRG")  # Fujifilm, 2012
-RGBW = Pattern.spelled("RGBW", "GWRW WGWR BWGW WBWG")  # Kodak's TRUESENSE Sparse (Compton and Hamilton, US 8,139,130)
+"""The four phases of Bayer's array by their tiles (B. E. Bayer, US patent 3,971,065, 1976).
+
+>>> list(BAYER), BAYER["RGGB"].letters
+(['RGGB', 'BGGR', 'GRBG', 'GBRG'], 'RG GB')
+"""
+XTRANS = Pattern.spelled("X-Trans", "GGRGGB GGBGGR BRGRBG GGBGGR GGRGGB RBGBRG")
+"""Fujifilm's array (2012), in which every row and every column holds all three colours.
+
+>>> round(XTRANS.share(GREEN), 3)  # 20 of 36
+0.556
+"""
+RGBW = Pattern.spelled("RGBW", "GWRW WGWR BWGW WBWG")
+"""Kodak's TRUESENSE Sparse array (J. T. Compton and J. F. Hamilton, US patent 8,139,130), half of it without filters.
+
+>>> RGBW.letters
+'GWRW WGWR BWGW WBWG'
+"""
 MONOCHROME = Pattern.spelled("monochrome", "W")
+"""A sensor without colour filters.
+
+>>> MONOCHROME.share(WHITE)
+1.0
+"""
 
 PATTERNS = {pattern.name: pattern for pattern in (*BAYER.values(), XTRANS, RGBW, MONOCHROME)}
+"""Every pattern here by its name.
+
+>>> list(PATTERNS)
+['RGGB', 'BGGR', 'GRBG', 'GBRG', 'X-Trans', 'RGBW', 'monochrome']
+"""

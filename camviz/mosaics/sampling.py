@@ -18,10 +18,22 @@ from camviz.mosaics.patterns import BLUE, GREEN, RED, Pattern, as_picture
 
 @dataclass(frozen=True)
 class Carrier:
-    """A frequency (fu, fv) at which a grey grating moves the means of the channels' pixels as a colour would.
+    """A frequency at which a grey grating moves the means of the channels' pixels as a colour would.
 
-    `colour` (R, G, B) is what the grating's crest, of height 1 on the first pixel, adds to the mean of each channel's
-    pixels; its imaginary part belongs to a grating moved by a quarter of its period.
+    Parameters
+    ----------
+    fu, fv : float
+        In cycles per pixel, along u (right) and v (down).
+    colour : tuple of complex
+        What the grating's crest, of height 1 on the first pixel, adds to the means of the red, green and blue pixels;
+        its imaginary part belongs to a grating moved by a quarter of its period.
+
+    Examples
+    --------
+    Stripes one pixel wide fall on all red pixels of a Bayer array, and miss all blue ones:
+
+    >>> round(Carrier(0.5, 0.0, (1, 0, -1)).strength, 3)  # √2
+    1.414
     """
 
     fu: float
@@ -36,12 +48,31 @@ class Carrier:
 
 @lru_cache(maxsize=16)
 def carriers(pattern: Pattern) -> tuple[Carrier, ...]:
-    """The frequencies that a pattern mistakes for colour, the strongest first, one of f and −f; none without colours.
+    """The frequencies that a pattern mistakes for colour.
 
     The spectrum of a mosaic holds that of the picture's brightness and, moved to these frequencies, those of its
     colours; so fine detail that lies there is taken for colour. A grating at f shows as false colour of the frequency
-    f − carrier. (D. Alleysson, S. Süsstrunk and J. Hérault, "Linear demosaicing inspired by the human visual system",
-    IEEE Transactions on Image Processing 14 (2005); for any tile, from its discrete Fourier transform.)
+    f − carrier. For any tile they follow from its discrete Fourier transform.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        The filters.
+
+    Returns
+    -------
+    tuple of Carrier
+        The strongest first, one of f and −f; none for a pattern without colours.
+
+    References
+    ----------
+    D. Alleysson, S. Süsstrunk and J. Hérault, Linear demosaicing inspired by the human visual system, IEEE Trans. Image
+    Process. 14 (2005).
+
+    Examples
+    --------
+    >>> [(one.fu, one.fv) for one in carriers(BAYER["RGGB"])]
+    [(0.5, 0.5), (0.5, 0.0), (0.0, 0.5)]
     """
     if not {RED, GREEN, BLUE} <= set(pattern.present):
         return ()
@@ -63,10 +94,34 @@ def _folded(frequency: float) -> float:
 
 @lru_cache(maxsize=4)
 def zone_plate(size: int = 256, highest: float = 0.5) -> Array:
-    """Grey rings (size, size, 3) in linear light, ever finer from the middle to `highest` cycles/pixel at the sides.
+    """Grey rings, ever finer from the middle outwards, on which every frequency is found at one place.
 
-    On it the frequency (fu, fv) is found at one place, (fu, fv) · size / (2 highest) from the middle. Each pixel takes
-    the mean over its area, as a sensor's pixel does; read-only.
+    The frequency (fu, fv), in cycles per pixel, lies (fu, fv) · size / (2 highest) pixels from the middle. Each pixel
+    takes the mean over its area, as a sensor's pixel does.
+
+    Parameters
+    ----------
+    size : int
+        Width and height in pixels, at least 8.
+    highest : float
+        The frequency at the middles of the sides, in cycles per pixel.
+
+    Returns
+    -------
+    array (size, size, 3)
+        Linear light 0 … 1; read-only.
+
+    Raises
+    ------
+    ValueError
+        For a smaller size, or a highest frequency that is not above 0.
+
+    Examples
+    --------
+    White in the middle, and black √128 pixels beside it, where 128 · 0.5 / 128 makes half a turn:
+
+    >>> zone_plate(128)[64, [64, 75], 0].round(1)
+    array([1., 0.])
     """
     if size < 8 or not highest > 0:
         raise ValueError(f"size must be at least 8 pixels and highest above 0, got {size} and {highest}")
@@ -81,12 +136,41 @@ def zone_plate(size: int = 256, highest: float = 0.5) -> Array:
 
 
 def low_pass(picture: ArrayLike, spots_px: float) -> NDArray[np.float32]:
-    """The picture (height, width, 3) behind a birefringent filter: each point becomes four spots, `spots_px` apart.
+    """A picture behind a birefringent filter: each point becomes four spots.
 
     Two plates of quartz do this, one splitting the light to the right and left, one up and down. What is left of a
-    frequency is cos(π d fu) cos(π d fv), nothing at 1/(2d): with d = 1 nothing at the carriers of Bayer's pattern.
-    (J. E. Greivenkamp, "Color dependent optical prefilter for the suppression of aliasing artifacts", Applied Optics 29
-    (1990).) The picture is taken as mirrored at its borders, and as having no detail finer than its pixels.
+    frequency is cos(π d fu) cos(π d fv), nothing at 1/(2d): with d = 1 nothing at the carriers of Bayer's pattern. The
+    picture is taken as mirrored at its borders, and as having no detail finer than its pixels.
+
+    Parameters
+    ----------
+    picture : array_like (height, width, 3)
+        Linear light.
+    spots_px : float
+        How far apart the spots are, d, in pixels; 0 for no filter.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light, float32.
+
+    Raises
+    ------
+    ValueError
+        For a picture of another shape, or a distance below 0.
+
+    References
+    ----------
+    J. E. Greivenkamp, Color dependent optical prefilter for the suppression of aliasing artifacts, Appl. Opt. 29
+    (1990).
+
+    Examples
+    --------
+    Of a grating of 1/4 cycle per pixel, cos(π/4) = 71 % is left:
+
+    >>> grating = np.cos(np.pi * (np.arange(8) + 0.5) / 2)[None, :, None] * np.ones(3)
+    >>> (low_pass(grating, spots_px=1) / grating)[0, :3, 0].round(2)
+    array([0.71, 0.71, 0.71])
     """
     light = as_picture(picture).astype(np.float32)
     if not spots_px >= 0:

@@ -16,36 +16,137 @@ from camviz.lenses.base import Array
 
 
 def free_space(distance_mm: float) -> Array:
-    """[[1, d], [0, 1]]: a ray gains height by its slope."""
+    """The matrix of a way through one medium, [[1, d], [0, 1]]: a ray gains height by its slope.
+
+    Parameters
+    ----------
+    distance_mm : float
+        Along the axis.
+
+    Returns
+    -------
+    array (2, 2)
+        It acts on rays (height in mm, slope).
+
+    References
+    ----------
+    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
+
+    Examples
+    --------
+    >>> free_space(10) @ [1, 0.1]  # 1 mm high, rising by 1 in 10
+    array([2. , 0.1])
+    """
     return np.array([[1.0, distance_mm], [0.0, 1.0]])
 
 
 def ideal_lens(focal_mm: float) -> Array:
-    """[[1, 0], [-1/f, 1]]: a ray loses slope in proportion to its height."""
+    """The matrix of a thin lens, [[1, 0], [-1/f, 1]]: a ray loses slope in proportion to its height.
+
+    Parameters
+    ----------
+    focal_mm : float
+        The focal length, negative for a lens that spreads light.
+
+    Returns
+    -------
+    array (2, 2)
+        It acts on rays (height in mm, slope).
+
+    Raises
+    ------
+    ValueError
+        For a focal length of 0.
+
+    References
+    ----------
+    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
+
+    Examples
+    --------
+    Parallel light meets the axis one focal length behind the lens:
+
+    >>> (free_space(50) @ ideal_lens(50) @ [10, 0]).round(9) + 0
+    array([ 0. , -0.2])
+    """
+    if focal_mm == 0:
+        raise ValueError("focal_mm must be a focal length other than 0")
     return np.array([[1.0, 0.0], [-1 / focal_mm, 1.0]])
 
 
 def refraction(radius_mm: float, before: float, after: float) -> Array:
-    """Snell's law for small angles at a sphere of radius R, positive where its centre lies behind it."""
+    """The matrix of a spherical surface: Snell's law for small angles.
+
+    Parameters
+    ----------
+    radius_mm : float
+        Of the sphere, positive where its centre lies behind the surface, infinite for a flat one.
+    before, after : float
+        The refractive indices on its two sides.
+
+    Returns
+    -------
+    array (2, 2)
+        It acts on rays (height in mm, slope).
+
+    Raises
+    ------
+    ValueError
+        For a radius of 0.
+
+    References
+    ----------
+    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
+
+    Examples
+    --------
+    Behind a surface of 50 mm, in glass, parallel light meets after n R / (n - 1) = 150 mm:
+
+    >>> (free_space(150) @ refraction(50, before=1.0, after=1.5) @ [3, 0]).round(9) + 0
+    array([ 0.  , -0.02])
+    """
+    if radius_mm == 0:
+        raise ValueError("radius_mm must be a radius other than 0, infinite for a flat surface")
     return np.array([[1.0, 0.0], [(before - after) / (radius_mm * after), before / after]])
 
 
 @dataclass(frozen=True)
 class Prescription:
-    """A lens as its designer writes it: one row of `surfaces` for each surface, in the light's order.
+    """A lens as its designer writes it, surface by surface, traced with 2 × 2 matrices near the axis.
 
-    A row is (radius of curvature, distance to the next surface, refractive index behind it), in mm; a radius of
-    infinity is flat, index 1 is air, and the distance behind the last surface is not used. Raises ValueError for
-    other rows.
+    Parameters
+    ----------
+    name : str
+        For readers.
+    surfaces : tuple of tuple of float
+        A row for each surface, in the light's order: radius of curvature in mm, distance to the next surface in mm, and
+        refractive index behind it. An infinite radius is flat, index 1 is air; the last distance is not used.
+
+    Raises
+    ------
+    ValueError
+        For other rows, a radius of 0, and an index below 1.
+
+    References
+    ----------
+    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
+
+    Examples
+    --------
+    A flat side and one of 50 mm radius, in glass of index 1.5, have f = R / (n - 1) = 100 mm:
+
+    >>> lens = Prescription("plano-convex", ((50, 5, 1.5), (np.inf, 0, 1.0)))
+    >>> round(lens.focal_mm, 6), round(lens.back_focal_mm, 3)  # f less 5 mm / n
+    (100.0, 96.667)
     """
 
     name: str
     surfaces: tuple[tuple[float, float, float], ...]
 
     def __post_init__(self) -> None:
+        if not self.surfaces or any(len(row) != 3 for row in self.surfaces):
+            raise ValueError(f"surfaces must be rows of radius, distance and index, got {self.surfaces}")
         table = np.array(self.surfaces, dtype=float)
-        if table.ndim != 2 or table.shape[1] != 3:
-            raise ValueError(f"surfaces must be rows of radius, distance and index, got shape {table.shape}")
         if (table[:, 0] == 0).any() or not (table[:, 2] >= 1).all():
             raise ValueError(f"surfaces must have radii other than 0 and indices of at least 1, got {self.surfaces}")
 
@@ -86,8 +187,22 @@ class Prescription:
         return self.length_mm + self.back_focal_mm - self.focal_mm
 
     def trace(self, height_mm: ArrayLike, slope: ArrayLike, reach_mm: float = 0.0) -> tuple[Array, Array]:
-        """Rays through the lens: places z (n,) along the axis, and heights (n, ...) there, from `reach_mm` before the
-        first surface, where they are given, to the back focal point."""
+        """Rays through the lens, to the back focal point.
+
+        Parameters
+        ----------
+        height_mm, slope : array_like (...)
+            Heights in mm and slopes, as ratios, of the rays where they start.
+        reach_mm : float
+            Where they start: so far before the first surface.
+
+        Returns
+        -------
+        z : array (n,)
+            Places along the axis in mm, 0 at the first surface.
+        heights : array (n, ...)
+            The rays' heights there in mm.
+        """
         rays = np.stack(np.broadcast_arrays(np.asarray(height_mm, float), np.asarray(slope, float)))
         flat, z, before = rays.reshape(2, -1), [-reach_mm, 0.0], 1.0
         heights = [flat[0]]
@@ -114,7 +229,11 @@ COOKE_TRIPLET = Prescription(
     ),
 )
 """The triplet form of H. D. Taylor (1893) as the 50 mm sample lens that optical design programs ship ("Cooke 40 degree
-field", designed for 550 nm)."""
+field", designed for 550 nm).
+
+>>> round(COOKE_TRIPLET.focal_mm, 2), len(COOKE_TRIPLET.surfaces)
+(50.0, 6)
+"""
 
 TELEPHOTO = Prescription(
     "Telephoto lens, 600 mm f/5.6",
@@ -134,4 +253,8 @@ TELEPHOTO = Prescription(
     ),
 )
 """United States patent 4,113,357, example 1 (Nikon, 600 mm f/5.6, internal focusing); its indices to three decimals,
-and so focal lengths to one per cent."""
+and so focal lengths to one per cent. It is shorter than its focal length:
+
+>>> round(TELEPHOTO.focal_mm), round(TELEPHOTO.length_mm + TELEPHOTO.back_focal_mm)
+(605, 444)
+"""

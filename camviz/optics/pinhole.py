@@ -13,45 +13,190 @@ from scipy.special import j0
 
 from camviz.lenses.base import Array
 
-GREEN_NM = 550.0  # where daylight and the eye's sensitivity are both strong
-AIRY = 2.44  # diameter of the first dark ring, in λ f / d: twice the first zero of J1 over π (Airy 1835)
+GREEN_NM = 550.0
+"""A wavelength in nanometres at which daylight and the eye's sensitivity are both strong.
+
+>>> GREEN_NM
+550.0
+"""
+AIRY = 2.44
+"""The diameter of the first dark ring, in λ f / d: twice the first zero of J1 over π (Airy 1835).
+
+>>> from scipy.special import jn_zeros
+>>> round(2 * float(jn_zeros(1, 1)[0]) / np.pi, 2) == AIRY == 2.44
+True
+"""
 
 # The best hole is d = c sqrt(f λ); what c is depends on what "sharp" is taken to mean.
-BALANCE = AIRY**0.5  # 1.56: the hole is as wide as its Airy disc
-RAYLEIGH = 1.9  # Lord Rayleigh, "On pin-hole photography", Philosophical Magazine 31 (1891)
-YOUNG = 2.0  # M. Young, "Pinhole optics", Applied Optics 10 (1971): f = radius² / λ
+BALANCE = AIRY**0.5
+"""The hole is as wide as its Airy disc: d² = 2.44 f λ.
+
+>>> round(BALANCE, 2)
+1.56
+"""
+RAYLEIGH = 1.9
+"""Lord Rayleigh, On pin-hole photography, Philosophical Magazine 31 (1891).
+
+>>> best_hole_mm(100, constant=RAYLEIGH).round(2)
+np.float64(0.45)
+"""
+YOUNG = 2.0
+"""M. Young, Pinhole optics, Applied Optics 10 (1971): f = radius² / λ, a Fresnel number of 1.
+
+>>> round(fresnel_number(best_hole_mm(100, constant=YOUNG), 100), 6)
+np.float64(1.0)
+"""
 
 
 def geometric_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, object_mm: ArrayLike = np.inf) -> Array:
-    """Diameter of the hole's shadow of a point: d (Z + f) / Z, by similar triangles."""
+    """The diameter of the hole's shadow of a point: d (Z + f) / Z, by similar triangles.
+
+    Parameters
+    ----------
+    diameter_mm : array_like (...)
+        Of the hole in mm, d.
+    focal_mm : array_like (...)
+        From the hole to the wall in mm, f.
+    object_mm : array_like (...)
+        From the hole to the point in mm, Z.
+
+    Returns
+    -------
+    array (...)
+        In mm.
+
+    Examples
+    --------
+    >>> geometric_blur_mm(0.5, focal_mm=100, object_mm=[1000, np.inf])
+    array([0.55, 0.5 ])
+    """
     return np.asarray(diameter_mm) * (1 + np.asarray(focal_mm) / np.asarray(object_mm))
 
 
 def diffraction_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, wavelength_nm: float = GREEN_NM) -> Array:
-    """Diameter of the Airy disc: 2.44 λ f / d (Airy 1835; Born & Wolf 1999, section 8.5.2)."""
+    """The diameter of the Airy disc: 2.44 λ f / d.
+
+    Parameters
+    ----------
+    diameter_mm : array_like (...)
+        Of the hole in mm, d.
+    focal_mm : array_like (...)
+        From the hole to the wall in mm, f.
+    wavelength_nm : float
+        λ.
+
+    Returns
+    -------
+    array (...)
+        In mm.
+
+    References
+    ----------
+    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
+
+    Examples
+    --------
+    A hole half as wide blurs twice as much:
+
+    >>> diffraction_blur_mm([0.4, 0.2], focal_mm=100, wavelength_nm=500).round(3)  # 2.44 · 0.0005 · 100 / 0.4
+    array([0.305, 0.61 ])
+    """
     return AIRY * wavelength_nm * 1e-6 * np.asarray(focal_mm) / np.asarray(diameter_mm)
 
 
 def pinhole_blur_mm(
     diameter_mm: ArrayLike, focal_mm: ArrayLike, object_mm: ArrayLike = np.inf, wavelength_nm: float = GREEN_NM
 ) -> Array:
-    """Diameter of the image of a point: shadow and Airy disc added in squares.
+    """The diameter of the image of a point: shadow and Airy disc added in squares.
 
     A rule of thumb for the circle that holds the share of light an Airy disc does, 84 %; `pinhole_spread` is exact.
+
+    Parameters
+    ----------
+    diameter_mm : array_like (...)
+        Of the hole in mm.
+    focal_mm : array_like (...)
+        From the hole to the wall in mm.
+    object_mm : array_like (...)
+        From the hole to the point in mm.
+    wavelength_nm : float
+        Of the light.
+
+    Returns
+    -------
+    array (...)
+        In mm.
+
+    Examples
+    --------
+    Neither the narrow nor the wide hole is the sharpest:
+
+    >>> pinhole_blur_mm([0.1, best_hole_mm(100), 1.0], focal_mm=100).round(2)
+    array([1.35, 0.52, 1.01])
     """
     shadow = geometric_blur_mm(diameter_mm, focal_mm, object_mm)
     return np.hypot(shadow, diffraction_blur_mm(diameter_mm, focal_mm, wavelength_nm))
 
 
 def best_hole_mm(focal_mm: ArrayLike, wavelength_nm: float = GREEN_NM, constant: float = BALANCE) -> Array:
-    """Diameter c sqrt(f λ) of the sharpest hole for distant objects; with c = BALANCE, `pinhole_blur_mm` is least."""
+    """The diameter of the sharpest hole for distant objects: c sqrt(f λ).
+
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        From the hole to the wall in mm, f.
+    wavelength_nm : float
+        λ.
+    constant : float
+        c: with BALANCE, `pinhole_blur_mm` is least; RAYLEIGH and YOUNG are other ideas of what is sharp.
+
+    Returns
+    -------
+    array (...)
+        In mm.
+
+    References
+    ----------
+    M. Young, Pinhole optics, Applied Optics 10 (1971).
+
+    Examples
+    --------
+    >>> best_hole_mm(100).round(2), best_hole_mm(400).round(2)  # four times as far, twice as wide
+    (np.float64(0.37), np.float64(0.73))
+    """
     return constant * np.sqrt(np.asarray(focal_mm) * wavelength_nm * 1e-6)
 
 
 def fresnel_number(
     diameter_mm: float, focal_mm: float, object_mm: float = np.inf, wavelength_nm: float = GREEN_NM
 ) -> float:
-    """a² (1/f + 1/Z) / λ: how many half wavelengths the way past the hole's rim, of radius a, is the longer one."""
+    """How many half wavelengths longer the way past the hole's rim is: a² (1/f + 1/Z) / λ.
+
+    Parameters
+    ----------
+    diameter_mm : float
+        Of the hole, 2a.
+    focal_mm : float
+        From the hole to the wall, f.
+    object_mm : float
+        From the hole to the point, Z.
+    wavelength_nm : float
+        λ.
+
+    Returns
+    -------
+    float
+        Far above 1 the image is the hole's shadow, far below an Airy disc.
+
+    References
+    ----------
+    M. Young, Pinhole optics, Applied Optics 10 (1971).
+
+    Examples
+    --------
+    >>> round(fresnel_number(1.0, focal_mm=100, wavelength_nm=500), 6)  # 0.25 / (100 · 0.0005)
+    5.0
+    """
     return (diameter_mm / 2) ** 2 * (1 / focal_mm + 1 / object_mm) / (wavelength_nm * 1e-6)
 
 
@@ -62,10 +207,39 @@ def pinhole_spread(
     object_mm: float = np.inf,
     wavelength_nm: float = GREEN_NM,
 ) -> Array:
-    """Light per mm² (...) at `radius_mm` (...) from the middle of a point's image; over the whole wall it sums to 1.
+    """Light per mm² beside the middle of a point's image, by Fresnel diffraction at a round hole.
 
-    Fresnel diffraction at a round hole (Born & Wolf 1999, section 8.8.1): a shadow for a wide hole, an Airy disc for a
-    narrow one, and between them fringes. One wavelength, small angles.
+    A shadow for a wide hole, an Airy disc for a narrow one, and between them fringes. One wavelength, small angles.
+
+    Parameters
+    ----------
+    radius_mm : array_like (...)
+        From the middle in mm.
+    diameter_mm : float
+        Of the hole.
+    focal_mm : float
+        From the hole to the wall.
+    object_mm : float
+        From the hole to the point.
+    wavelength_nm : float
+        Of the light.
+
+    Returns
+    -------
+    array (...)
+        Shares of the light per mm²: over the whole wall they sum to 1.
+
+    References
+    ----------
+    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.8.1.
+
+    Examples
+    --------
+    At a Fresnel number of 1 the middle is four times as bright as the plain shadow, at 2 it is dark:
+
+    >>> holes = best_hole_mm(100) * np.array([2, 8**0.5]) / BALANCE
+    >>> [float((pinhole_spread(0, d, 100) * np.pi * (d / 2) ** 2).round(3)) for d in holes]
+    [4.0, 0.0]
     """
     radius, scale = np.asarray(radius_mm, dtype=float), wavelength_nm * 1e-6 * focal_mm
     zones = fresnel_number(diameter_mm, focal_mm, object_mm, wavelength_nm)
@@ -87,10 +261,50 @@ def pinhole_kernel(
     wavelength_nm: float = GREEN_NM,
     many: float = 12.0,
 ) -> Array:
-    """The image of a point on pixels `pitch_mm` apart, (n, n) with n odd, summing to 1.
+    """The image of a point on pixels, to blur a picture with.
 
     Beyond a Fresnel number of `many`, where the fringes are too fine to see, it is the plain shadow.
+
+    Parameters
+    ----------
+    pitch_mm : float
+        From pixel to pixel.
+    diameter_mm : float
+        Of the hole.
+    focal_mm : float
+        From the hole to the wall.
+    object_mm : float
+        From the hole to the point.
+    wavelength_nm : float
+        Of the light.
+    many : float
+        A Fresnel number.
+
+    Returns
+    -------
+    array (n, n)
+        Shares of the light that sum to 1; n is odd.
+
+    Raises
+    ------
+    ValueError
+        For a pitch, diameter or focal length that is not above 0.
+
+    References
+    ----------
+    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.8.1.
+
+    Examples
+    --------
+    A shadow of 8 mm on pixels of 0.5 mm; each holds 0.25 / (16 π) of the light:
+
+    >>> kernel = pinhole_kernel(0.5, diameter_mm=8, focal_mm=100)
+    >>> kernel.shape, kernel[8, 8].round(4)
+    ((17, 17), np.float64(0.005))
     """
+    for name, length in (("pitch_mm", pitch_mm), ("diameter_mm", diameter_mm), ("focal_mm", focal_mm)):
+        if not length > 0:
+            raise ValueError(f"{name} must be a length above 0 mm, got {length}")
     shadow = float(geometric_blur_mm(diameter_mm, focal_mm, object_mm))
     airy = float(diffraction_blur_mm(diameter_mm, focal_mm, wavelength_nm))
     plain = fresnel_number(diameter_mm, focal_mm, object_mm, wavelength_nm) > many
@@ -111,18 +325,81 @@ def pinhole_kernel(
 
 
 def f_number(diameter_mm: ArrayLike, focal_mm: ArrayLike) -> Array:
-    """N = f / d."""
+    """The f-number N = f / d.
+
+    Parameters
+    ----------
+    diameter_mm : array_like (...)
+        Of the hole or the aperture in mm.
+    focal_mm : array_like (...)
+        From the hole to the wall, or the focal length.
+
+    Returns
+    -------
+    array (...)
+        A ratio.
+
+    Examples
+    --------
+    >>> f_number(0.5, 100)
+    np.float64(200.0)
+    """
     return np.asarray(focal_mm) / np.asarray(diameter_mm)
 
 
 def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: ArrayLike) -> Array:
-    """Light gathered from a sunlit scene, relative to a correct exposure at ISO 100: ∝ t d² / f².
+    """Light gathered from a sunlit scene, relative to a correct exposure at ISO 100: in proportion to t d² / f².
 
     By photographers' "sunny 16" rule, f/16 and 1/100 s are correct.
+
+    Parameters
+    ----------
+    diameter_mm : array_like (...)
+        Of the hole or the aperture in mm, d.
+    focal_mm : array_like (...)
+        From the hole to the wall, or the focal length, f.
+    exposure_s : array_like (...)
+        In seconds, t.
+
+    Returns
+    -------
+    array (...)
+        A ratio, 1 where the exposure is correct.
+
+    Examples
+    --------
+    A pinhole of f/200 takes (200/16)² as long:
+
+    >>> sunny_exposure(0.5, 100, exposure_s=(200 / 16) ** 2 / 100)
+    np.float64(1.0)
     """
     return 100 * np.asarray(exposure_s) * (16 / f_number(diameter_mm, focal_mm)) ** 2
 
 
 def field_of_view_deg(width_mm: ArrayLike, distance_mm: ArrayLike) -> Any:
-    """2 atan(width / 2v): the angle a wall or sensor of that width sees through a hole or thin lens at distance v."""
+    """The angle that a wall or a sensor sees through a hole or thin lens: 2 atan(width / 2v).
+
+    Parameters
+    ----------
+    width_mm : array_like (...)
+        Of the wall or sensor in mm.
+    distance_mm : array_like (...)
+        From the hole or lens to it in mm, v.
+
+    Returns
+    -------
+    array (...)
+        In degrees.
+
+    References
+    ----------
+    Szeliski (2022), section 2.1.4.
+
+    Examples
+    --------
+    A lens of 50 mm on a sensor 36 mm wide:
+
+    >>> field_of_view_deg(36, 50).round(1)
+    np.float64(39.6)
+    """
     return np.degrees(2 * np.arctan2(np.asarray(width_mm), 2 * np.asarray(distance_mm)))

@@ -15,22 +15,87 @@ from camviz.optics.pinhole import GREEN_NM
 
 
 def image_distance_mm(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
-    """v = 1 / (1/f - 1/u), Gauss's lens equation: where the image of an object at u lies.
+    """Where the image of an object lies: v = 1 / (1/f - 1/u), Gauss's lens equation.
 
-    An object inside the focal length has no real image: v is negative, the place from which its light seems to come.
-    At u = f it is infinite.
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        The focal length f.
+    object_mm : array_like (...)
+        From the object to the lens in mm, u.
+
+    Returns
+    -------
+    array (...)
+        In mm behind the lens. Inside the focal length it is negative, the place from which the light seems to come; at
+        u = f it is infinite.
+
+    References
+    ----------
+    E. Hecht, Optics (5th ed. 2017), chapter 5; Szeliski (2022), section 2.2.3.
+
+    Examples
+    --------
+    >>> image_distance_mm(50, [100, 50, 25])
+    array([100.,  inf, -50.])
     """
     with np.errstate(divide="ignore"):
         return np.divide(1.0, 1 / np.asarray(focal_mm, dtype=float) - 1 / np.asarray(object_mm, dtype=float))
 
 
 def object_distance_mm(focal_mm: ArrayLike, image_mm: ArrayLike) -> Array:
-    """u = 1 / (1/f - 1/v): what a sensor at v sees sharp. The equation is its own inverse."""
+    """What a sensor at a distance sees sharp: u = 1 / (1/f - 1/v). The lens equation is its own inverse.
+
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        The focal length f.
+    image_mm : array_like (...)
+        From the lens to the sensor in mm, v.
+
+    Returns
+    -------
+    array (...)
+        In mm before the lens.
+
+    References
+    ----------
+    E. Hecht, Optics (5th ed. 2017), chapter 5.
+
+    Examples
+    --------
+    A lens of 50 mm moved forward by 5 mm:
+
+    >>> object_distance_mm(50, 55).round(6)
+    np.float64(550.0)
+    """
     return image_distance_mm(focal_mm, image_mm)
 
 
 def magnification(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
-    """m = v / u = f / (u - f): the image is m times as large as the object, and upside down."""
+    """How many times as large as the object its image is: m = v / u = f / (u - f); it is upside down.
+
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        The focal length f.
+    object_mm : array_like (...)
+        From the object to the lens in mm, u.
+
+    Returns
+    -------
+    array (...)
+        A ratio; 1 is life size.
+
+    References
+    ----------
+    E. Hecht, Optics (5th ed. 2017), chapter 5.
+
+    Examples
+    --------
+    >>> magnification(50, [100, 5050])
+    array([1.  , 0.01])
+    """
     f = np.asarray(focal_mm, dtype=float)
     with np.errstate(divide="ignore"):
         return f / (np.asarray(object_mm, dtype=float) - f)
@@ -39,25 +104,112 @@ def magnification(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
 def circle_of_confusion_mm(
     focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, object_mm: ArrayLike
 ) -> Array:
-    """Diameter f² / (N (s - f)) · |u - s| / u of the disc that a point at u makes while the lens is focused at s.
+    """The diameter of the disc that a point out of focus makes: f² / (N (s - f)) · abs(u - s) / u.
 
     By similar triangles: the cone behind the lens is f/N wide there, and a point where the sensor cuts it at v(u).
-    A lens focused at infinity, s = inf, makes a disc of f² / (N u). ValueError for a focus inside the focal length.
+
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        The focal length f.
+    f_number : array_like (...)
+        N, a ratio.
+    focus_mm : array_like (...)
+        What the lens is focused at in mm, s; infinity, too.
+    object_mm : array_like (...)
+        From the point to the lens in mm, u.
+
+    Returns
+    -------
+    array (...)
+        In mm.
+
+    Raises
+    ------
+    ValueError
+        For a focus inside the focal length.
+
+    References
+    ----------
+    S. F. Ray, Applied Photographic Optics (3rd ed. 2002); Szeliski (2022), section 2.2.3.
+
+    Examples
+    --------
+    A lens of 50 mm at f/2, focused at 2 m; the middle one is 2500 / (2 · 1950) · 1/2 mm:
+
+    >>> circle_of_confusion_mm(50, 2, focus_mm=2000, object_mm=[2000, 4000, np.inf]).round(3)
+    array([0.   , 0.321, 0.641])
     """
     f, s = _focused(focal_mm, focus_mm)
     return f**2 / np.asarray(f_number) * np.abs(1 / s - 1 / np.asarray(object_mm, dtype=float)) / (1 - f / s)
 
 
 def hyperfocal_mm(focal_mm: ArrayLike, f_number: ArrayLike, circle_mm: ArrayLike) -> Array:
-    """H = f² / (N c) + f: focused there, everything from H/2 to infinity is blurred by no more than c."""
+    """The nearest focus that keeps infinity sharp: H = f² / (N c) + f.
+
+    Focused there, everything from H/2 to infinity is blurred by no more than c.
+
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        The focal length f.
+    f_number : array_like (...)
+        N, a ratio.
+    circle_mm : array_like (...)
+        The widest disc that passes for sharp in mm, c.
+
+    Returns
+    -------
+    array (...)
+        In mm.
+
+    References
+    ----------
+    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
+
+    Examples
+    --------
+    >>> hyperfocal_mm(50, 10, circle_mm=0.025).round(6)  # 2500 / 0.25 + 50
+    np.float64(10050.0)
+    """
     f = np.asarray(focal_mm, dtype=float)
     return f**2 / (np.asarray(f_number) * np.asarray(circle_mm)) + f
 
 
 def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
-    """s (H - f) / (H + s - 2f): nearer than this, a point is blurred by more than c.
+    """Where sharpness begins: s (H - f) / (H + s - 2f); nearer than this, a point is blurred by more than c.
 
-    A lens focused at infinity has its limit at H - f. ValueError for a focus inside the focal length.
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        The focal length f.
+    f_number : array_like (...)
+        N, a ratio.
+    focus_mm : array_like (...)
+        What the lens is focused at in mm, s; infinity, too.
+    circle_mm : array_like (...)
+        The widest disc that passes for sharp in mm, c.
+
+    Returns
+    -------
+    array (...)
+        In mm.
+
+    Raises
+    ------
+    ValueError
+        For a focus inside the focal length.
+
+    References
+    ----------
+    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
+
+    Examples
+    --------
+    Focused at H = 10.05 m, from H/2 on; focused at infinity, from H - f on:
+
+    >>> near_limit_mm(50, 10, focus_mm=[10050, np.inf], circle_mm=0.025).round(6)
+    array([ 5025., 10000.])
     """
     f, s = _focused(focal_mm, focus_mm)
     H = hyperfocal_mm(f, f_number, circle_mm)
@@ -65,9 +217,39 @@ def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike,
 
 
 def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
-    """s (H - f) / (H - s): farther than this, a point is blurred by more than c; infinite from s = H on.
+    """Where sharpness ends: s (H - f) / (H - s); farther than this, a point is blurred by more than c.
 
-    ValueError for a focus inside the focal length.
+    Parameters
+    ----------
+    focal_mm : array_like (...)
+        The focal length f.
+    f_number : array_like (...)
+        N, a ratio.
+    focus_mm : array_like (...)
+        What the lens is focused at in mm, s.
+    circle_mm : array_like (...)
+        The widest disc that passes for sharp in mm, c.
+
+    Returns
+    -------
+    array (...)
+        In mm; infinite from s = H on.
+
+    Raises
+    ------
+    ValueError
+        For a focus inside the focal length.
+
+    References
+    ----------
+    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
+
+    Examples
+    --------
+    With H = 10.05 m, 5025 · 10000 / 5025 mm, and no end:
+
+    >>> far_limit_mm(50, 10, focus_mm=[5025, 10051], circle_mm=0.025).round(6)
+    array([10000.,    inf])
     """
     f, s = _focused(focal_mm, focus_mm)
     H = hyperfocal_mm(f, f_number, circle_mm)
@@ -76,23 +258,84 @@ def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, 
 
 
 def working_f_number(f_number: ArrayLike, magnification: ArrayLike) -> Array:
-    """N (1 + m): the ratio of the image's distance to the aperture's width, which is what the sensor sees."""
+    """The image's distance over the aperture's width, which is what the sensor sees: N (1 + m).
+
+    Parameters
+    ----------
+    f_number : array_like (...)
+        N, a ratio.
+    magnification : array_like (...)
+        m, a ratio.
+
+    Returns
+    -------
+    array (...)
+        A ratio.
+
+    References
+    ----------
+    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
+
+    Examples
+    --------
+    At life size it is twice as large:
+
+    >>> working_f_number(2.8, 1)
+    np.float64(5.6)
+    """
     return np.asarray(f_number) * (1 + np.asarray(magnification))
 
 
 def airy_radius_um(working_f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM) -> Array:
-    """1.22 λ N_w in micrometres: the first dark ring around a point's image (Airy 1835; Born & Wolf 1999, 8.5.2).
+    """The first dark ring around a point's image: 1.22 λ N_w.
 
-    N_w is the working f-number, N (1 + m), which the function `working_f_number` gives. For a lens focused far away it
-    is the f-number N itself. At life size, m = 1, the disc is twice as large.
+    Parameters
+    ----------
+    working_f_number : array_like (...)
+        N_w = N (1 + m), a ratio, which the function `working_f_number` gives; far away it is the f-number N itself.
+    wavelength_nm : array_like (...)
+        λ in nanometres.
+
+    Returns
+    -------
+    array (...)
+        Its radius in micrometres.
+
+    References
+    ----------
+    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
+
+    Examples
+    --------
+    >>> airy_radius_um(8, wavelength_nm=500).round(2)  # 1.22 · 0.5 · 8
+    np.float64(4.88)
     """
     return 1.22e-3 * np.asarray(wavelength_nm) * np.asarray(working_f_number)
 
 
 def relative_illumination(angle_rad: ArrayLike) -> Array:
-    """cos⁴ θ: the light that reaches the sensor θ from the axis, where on the axis it is 1.
+    """The light that reaches the sensor beside the axis, where on the axis it is 1: cos⁴ θ.
 
     The thin lens seen aslant is smaller (cos θ), farther away (cos² θ), and lights the sensor aslant (cos θ).
+
+    Parameters
+    ----------
+    angle_rad : array_like (...)
+        θ, from the axis, in radians.
+
+    Returns
+    -------
+    array (...)
+        A share, 0 … 1.
+
+    References
+    ----------
+    Szeliski (2022), section 2.2.3.
+
+    Examples
+    --------
+    >>> relative_illumination(np.radians([0, 30, 45])).round(4)
+    array([1.    , 0.5625, 0.25  ])
     """
     return np.cos(angle_rad) ** 4
 

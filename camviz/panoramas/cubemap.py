@@ -34,10 +34,19 @@ _INSIDE = 1 - 1e-12  # a ray along an edge of the cube stays inside its face, no
 
 
 class Layout(Enum):
-    """Where the faces lie: the column and row of each, in the order of FACES.
+    """Where the faces of a cube map lie.
 
     CROSS is the cube unfolded around its front, four faces wide and three high, every joint of up and down with the
-    front whole; STRIP is all six in a row. A layout's value is its columns, its rows and those places.
+    front whole; STRIP is all six in a row: front, right, back, left, up, down.
+
+    Examples
+    --------
+    Faces are counted in that order, -1 is a gap:
+
+    >>> Layout.CROSS.faces
+    array([[-1,  4, -1, -1],
+           [ 3,  0,  1,  2],
+           [-1,  5, -1, -1]])
     """
 
     CROSS = (4, 3, ((1, 1), (2, 1), (3, 1), (0, 1), (1, 0), (1, 2)))
@@ -45,15 +54,17 @@ class Layout(Enum):
 
     @property
     def columns(self) -> int:
+        """How many faces wide it is."""
         return self.value[0]
 
     @property
     def rows(self) -> int:
+        """How many faces high it is."""
         return self.value[1]
 
     @property
     def places(self) -> NDArray[np.intp]:
-        """Columns and rows (6, 2)."""
+        """The column and row of each face (6, 2)."""
         return np.array(self.value[2])
 
     @property
@@ -66,10 +77,29 @@ class Layout(Enum):
 
 @dataclass(frozen=True)
 class Cubemap(Lens):
-    """The faces of a cube around the camera, as perspective pictures of 90° each (Greene 1986).
+    """The faces of a cube around the camera, as perspective pictures of 90° each: a lens with gaps in its image.
 
     Its image is measured in focal lengths, half the side of a face; the origin is the middle of the front face. A gap
-    of the layout has no ray; every direction has an image. On an edge of the cube the first of FACES is taken.
+    of the layout has no ray; every direction has an image. On an edge of the cube the first face of the layout's order
+    is taken.
+
+    Parameters
+    ----------
+    layout : Layout
+        Where the faces lie.
+
+    References
+    ----------
+    N. Greene, Environment mapping and other applications of world projections, IEEE Comput. Graph. Appl. 6 (1986).
+
+    Examples
+    --------
+    The middles of the front, the right and the lower face:
+
+    >>> Cubemap().project([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    array([[0., 0.],
+           [2., 0.],
+           [0., 2.]])
     """
 
     layout: Layout = Layout.CROSS
@@ -104,14 +134,67 @@ class Cubemap(Lens):
 
 
 def cubemap_camera(side: int, layout: Layout = Layout.CROSS) -> Camera:
-    """The camera whose picture is a whole cube map with faces of `side` × `side` pixels."""
+    """The camera whose picture is a whole cube map.
+
+    Parameters
+    ----------
+    side : int
+        Of a face, in pixels.
+    layout : Layout
+        Where the faces lie.
+
+    Returns
+    -------
+    Camera
+        At the origin, its front looking along z.
+
+    Raises
+    ------
+    ValueError
+        For a side that is no whole number, or below 1.
+
+    References
+    ----------
+    N. Greene, Environment mapping and other applications of world projections, IEEE Comput. Graph. Appl. 6 (1986).
+
+    Examples
+    --------
+    Straight ahead is the middle of the second face in the second row, to the right of it what is at right angles:
+
+    >>> cubemap_camera(100).project([[0, 0, 1], [1, 0, 0]])
+    array([[149.5, 149.5],
+           [249.5, 149.5]])
+    """
     f, (column, row) = side / 2, layout.places[0].tolist()
     cx, cy = (column * side + (side - 1) / 2, row * side + (side - 1) / 2)
     return Camera(Intrinsics(layout.columns * side, layout.rows * side, f, f, cx, cy), Cubemap(layout))
 
 
 def face_camera(face: str, side: int) -> Camera:
-    """The perspective camera of 90° that takes one of FACES; ValueError naming them for any other word."""
+    """The perspective camera of 90° that takes one face of a cube map.
+
+    Parameters
+    ----------
+    face : {"front", "right", "back", "left", "up", "down"}
+        Where it looks.
+    side : int
+        In pixels.
+
+    Returns
+    -------
+    Camera
+        At the origin.
+
+    Raises
+    ------
+    ValueError
+        For any other word, naming these.
+
+    Examples
+    --------
+    >>> face_camera("up", 101).project([0, -1, 0])  # y points down
+    array([50., 50.])
+    """
     if face not in FACES:
         raise ValueError(f"face must be one of {', '.join(FACES)}, got {face!r}")
     turn = Rotation.from_matrix(_AXES[FACES.index(face)].T)

@@ -32,10 +32,35 @@ def eccentricity(xi: float) -> float:
 
 @dataclass(frozen=True)
 class Mirror:
-    """A conic turned about its axis, x² + y² = 2 p s - (1 - e²) s², s metres below its top, as far as its rim.
+    """A curved mirror: a conic turned about its axis, x² + y² = 2 p s - (1 - e²) s², s metres below its top.
 
-    `eccentricity` e is 0 for a sphere, 1 for a paraboloid, more for a hyperboloid; `curvature_radius` p that of its
-    top, in metres, and `rim` the distance of its edge from the axis. The focus is the origin, the top p/(1 + e) above.
+    The origin is its focus; z runs from there towards the camera, with the top p/(1 + e) above.
+
+    Parameters
+    ----------
+    eccentricity : float
+        e: 0 for a sphere, 1 for a paraboloid, more for a hyperboloid.
+    curvature_radius : float
+        p, of its top, in metres.
+    rim : float
+        The distance of its edge from the axis, in metres.
+
+    Raises
+    ------
+    ValueError
+        For an eccentricity below 0, and a radius or rim that is not positive.
+
+    References
+    ----------
+    S. Baker and S. K. Nayar, A theory of single-viewpoint catadioptric image formation, Int. J. Comput. Vis. 35 (1999).
+
+    Examples
+    --------
+    A paraboloid of p = 4 cm is x² / 2p = 1.125 cm deep at a rim of 3 cm:
+
+    >>> mirror = Mirror(eccentricity=1, curvature_radius=0.04, rim=0.03)
+    >>> mirror.top, mirror.depth(0.03)
+    (0.02, array(0.01125))
     """
 
     eccentricity: float
@@ -52,31 +77,66 @@ class Mirror:
 
     @property
     def top(self) -> float:
-        """z of the mirror's point on the axis."""
+        """z of the mirror's point on the axis, in metres."""
         return self.curvature_radius / (1 + self.eccentricity)
 
     @property
     def second_focus(self) -> float:
-        """z of the other focus, where a perspective camera must stand: infinity, an orthographic one, at e = 1."""
+        """z of the other focus in metres, where a perspective camera must stand; at e = 1 it is infinite, for an
+        orthographic one.
+        """
         e = self.eccentricity
         if e < 1:
             raise ValueError(f"eccentricity must be at least 1 for a second focus in front of the mirror, got {e}")
         return 2 * self.curvature_radius * e / (e * e - 1) if e > 1 else inf
 
     def depth(self, radius: ArrayLike) -> Array:
-        """How far below the top (...) the surface is at distances (...) from the axis; NaN where it is not."""
+        """How far below the top the surface is.
+
+        Parameters
+        ----------
+        radius : array_like (...)
+            Distances from the axis in metres.
+
+        Returns
+        -------
+        array (...)
+            In metres; NaN where there is no mirror.
+        """
         radius, p = np.asarray(radius, dtype=float), self.curvature_radius
         with np.errstate(invalid="ignore"):
             root = np.sqrt(p * p - (1 - self.eccentricity**2) * radius**2)
         return np.where(radius <= self.rim, radius**2 / (p + root), np.nan)
 
     def normal(self, points: ArrayLike) -> Array:
-        """Unit normals (..., 3) at points (..., 3) of the surface, outwards: half the gradient of the quadric."""
+        """The surface's normals, outwards: half the gradient of the quadric.
+
+        Parameters
+        ----------
+        points : array_like (..., 3)
+            Of the surface, in metres.
+
+        Returns
+        -------
+        array (..., 3)
+            Unit vectors.
+        """
         x, y, z = np.moveaxis(as_points(points, 3, "points"), -1, 0)
         return unit(np.stack([x, y, self.curvature_radius - (1 - self.eccentricity**2) * (self.top - z)], axis=-1))
 
     def intersect(self, origins: Array, directions: Array) -> Array:
-        """The points (..., 3) where rays from `origins` along `directions`, (..., 3) each, meet it first; else NaN."""
+        """Where rays meet the mirror first.
+
+        Parameters
+        ----------
+        origins, directions : array (..., 3)
+            In metres; the directions of any length.
+
+        Returns
+        -------
+        array (..., 3)
+            Points in metres; NaN where a ray misses.
+        """
         shape = 1 - self.eccentricity**2
         start, step = self.top - origins[..., 2], -directions[..., 2]
         a = np.sum(directions[..., :2] ** 2, axis=-1) + shape * step**2
@@ -94,10 +154,37 @@ class Mirror:
 
 @dataclass(frozen=True)
 class Catadioptric:
-    """A camera on the axis of a mirror, at z = `distance` metres from its focus; at infinity it is orthographic.
+    """A camera that looks into a curved mirror, on the mirror's axis, traced ray by ray.
 
-    Image points are (x, y)/z of the camera; for an orthographic camera x and y in metres. All rays it sees pass, when
-    prolonged, through one point only where the camera stands in the mirror's other focus (Baker & Nayar 1999).
+    All rays it sees pass, when prolonged, through one point only where the camera stands in the mirror's other focus.
+    Image points are (x, y)/z of the camera; of an orthographic one x and y in metres. They are not mirrored: left and
+    right are swapped back.
+
+    Parameters
+    ----------
+    mirror : Mirror
+        Its focus is the origin.
+    distance : float
+        The camera is at z = `distance` metres; at infinity it is orthographic.
+
+    Raises
+    ------
+    ValueError
+        For a camera that is not above the mirror's top.
+
+    References
+    ----------
+    S. Baker and S. K. Nayar, A theory of single-viewpoint catadioptric image formation, Int. J. Comput. Vis. 35 (1999);
+    C. Geyer and K. Daniilidis, A unifying theory for central panoramic systems and practical implications, ECCV 2000.
+
+    Examples
+    --------
+    A paraboloid shows the horizon at the radius p, and what it shows comes straight from its focus:
+
+    >>> camera = Catadioptric.central(Mirror(eccentricity=1, curvature_radius=0.04))
+    >>> points, directions = camera.trace([0.04, 0])
+    >>> points.round(6), directions.round(6)
+    (array([0.04, 0.  , 0.  ]), array([1., 0., 0.]))
     """
 
     mirror: Mirror
@@ -109,19 +196,46 @@ class Catadioptric:
 
     @classmethod
     def central(cls, mirror: Mirror) -> Catadioptric:
-        """With the camera in the mirror's second focus, so that there is a single viewpoint."""
+        """With the camera in the mirror's second focus, so that there is a single viewpoint.
+
+        Parameters
+        ----------
+        mirror : Mirror
+            A paraboloid or a hyperboloid.
+
+        Returns
+        -------
+        Catadioptric
+            With a perspective camera, or with an orthographic one for a paraboloid.
+
+        Raises
+        ------
+        ValueError
+            For an eccentricity below 1.
+        """
         return cls(mirror, mirror.second_focus)
 
     def moved(self, metres: float) -> Catadioptric:
-        """With the camera so much farther from the mirror."""
+        """With the camera farther from the mirror.
+
+        Parameters
+        ----------
+        metres : float
+            By how much.
+
+        Returns
+        -------
+        Catadioptric
+            Of the same mirror.
+        """
         return replace(self, distance=self.distance + metres)
 
     @property
     def unified(self) -> tuple[float, float]:
         """ξ and the scale that `UnifiedSphere(xi).project` must be multiplied by, for a camera in the second focus.
 
-        ξ = 2e/(1 + e²) and (e² - 1)/(e² + 1); a paraboloid has 1 and its p (Geyer & Daniilidis 2000; Barreto & Araujo
-        2001). Raises ValueError for a camera that stands elsewhere, whose rays no such lens describes.
+        ξ = 2e/(1 + e²) and (e² - 1)/(e² + 1), after Geyer and Daniilidis; a paraboloid has 1 and its p. A camera that
+        stands elsewhere, whose rays no such lens describes, is refused with a ValueError.
         """
         e = self.mirror.eccentricity
         if self.distance != self.mirror.second_focus:
@@ -129,7 +243,20 @@ class Catadioptric:
         return 2 * e / (1 + e * e), (e * e - 1) / (e * e + 1) if e > 1 else self.mirror.curvature_radius
 
     def before(self, xy: ArrayLike) -> tuple[Array, Array]:
-        """The camera's own rays to image points (..., 2): where they start and unit directions, (..., 3) each."""
+        """The camera's own rays to image points, before the mirror.
+
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            In focal lengths; of an orthographic camera in metres.
+
+        Returns
+        -------
+        starts : array (..., 3)
+            In metres.
+        directions : array (..., 3)
+            Unit vectors.
+        """
         xy = as_points(xy, 2, "xy")
         back = -np.ones_like(xy[..., :1])
         if isfinite(self.distance):
@@ -139,9 +266,19 @@ class Catadioptric:
         return starts, np.concatenate([0 * xy, back], axis=-1)
 
     def trace(self, xy: ArrayLike) -> tuple[Array, Array]:
-        """The rays seen at image points (..., 2): where they leave the mirror, and unit directions, (..., 3) each.
+        """The rays seen at image points: where they leave the mirror, by the law of reflection d - 2 (d·n) n.
 
-        The law of reflection, d - 2 (d·n) n, at the point where the camera's ray meets the mirror; NaN where it misses.
+        Parameters
+        ----------
+        xy : array_like (..., 2)
+            In focal lengths; of an orthographic camera in metres.
+
+        Returns
+        -------
+        points : array (..., 3)
+            Where the rays leave the mirror, in metres; NaN where there is none.
+        directions : array (..., 3)
+            Unit vectors; NaN where there is none.
         """
         starts, directions = self.before(xy)
         points = self.mirror.intersect(starts, directions)
@@ -149,15 +286,34 @@ class Catadioptric:
         return points, directions - 2 * np.sum(directions * normals, axis=-1, keepdims=True) * normals
 
     def rim(self) -> float:
-        """The radius of the image of the mirror's rim."""
+        """The radius of the image of the mirror's rim.
+
+        Returns
+        -------
+        float
+            In focal lengths; of an orthographic camera in metres.
+        """
         below = float(self.mirror.depth(self.mirror.rim))
         away = self.distance - self.mirror.top + below
         return self.mirror.rim / away if isfinite(self.distance) else self.mirror.rim
 
     def caustic(self, xs: ArrayLike) -> Array:
-        """Where neighbouring rays of one plane through the axis cross, (n, 2): radius and z, at image radii (n,).
+        """Where neighbouring rays of one plane through the axis cross: the envelope of the reflected rays, prolonged.
 
-        The envelope of the reflected rays, prolonged: one point for a central camera (Swaminathan et al. 2006).
+        Parameters
+        ----------
+        xs : array_like (n,)
+            Image radii, in focal lengths or metres.
+
+        Returns
+        -------
+        array (n, 2)
+            Radius and z in metres; one point for a central camera.
+
+        References
+        ----------
+        R. Swaminathan, M. D. Grossberg and S. K. Nayar, Non-single viewpoint catadioptric cameras: geometry and
+        analysis, Int. J. Comput. Vis. 66 (2006).
         """
         xs = np.asarray(xs, dtype=float)
         h = 1e-5 * np.abs(xs).max()
@@ -171,7 +327,18 @@ class Catadioptric:
         return points[..., ::2], directions[..., ::2]
 
     def best_viewpoint(self, xs: ArrayLike) -> float:
-        """z of the point on the axis that is nearest, by least squares, to the rays seen at image radii (n,)."""
+        """The point on the axis that is nearest, by least squares, to the rays that are seen.
+
+        Parameters
+        ----------
+        xs : array_like (n,)
+            Image radii, in focal lengths or metres.
+
+        Returns
+        -------
+        float
+            Its z in metres.
+        """
         points, directions = self._meridian(np.asarray(xs, dtype=float))
         sine, off = directions[:, 0], _cross(points, directions)  # the distance from (0, z) is |off + z sine|
         return float(-np.nansum(off * sine) / np.nansum(sine * sine))

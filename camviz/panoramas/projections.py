@@ -19,8 +19,24 @@ from camviz.panoramas.cubemap import FACES, Layout, cubemap_camera, face_camera
 class Projection:
     """A kind of picture: how it is made for a size and a field of view, and what is usual.
 
-    `hfov_deg` is the usual horizontal field in degrees, `widest_deg` the widest, itself allowed where `closed`; where
-    the field cannot be chosen, `widest_deg` is 0. `aspect` is the usual width : height.
+    Attributes
+    ----------
+    make : callable
+        Makes the camera of a width and height in pixels and a field in degrees.
+    hfov_deg : float
+        The usual horizontal field.
+    widest_deg : float
+        The widest field; 0 where the field cannot be chosen.
+    closed : bool
+        Whether the widest itself is allowed.
+    aspect : float
+        The usual width : height.
+
+    Examples
+    --------
+    >>> fisheye = projection("fisheye:equidistant")
+    >>> fisheye.hfov_deg, fisheye.widest_deg
+    (180, 360)
     """
 
     make: Callable[[int, int, float], Camera]
@@ -30,7 +46,25 @@ class Projection:
     aspect: float
 
     def camera(self, width: int, height: int, hfov_deg: float | None = None) -> Camera:
-        """The camera of that size, looking ahead. Raises ValueError saying which sizes and fields it takes."""
+        """The camera of a size, looking ahead.
+
+        Parameters
+        ----------
+        width, height : int
+            In pixels.
+        hfov_deg : float, optional
+            The horizontal field; by default the usual one.
+
+        Returns
+        -------
+        Camera
+            At the origin.
+
+        Raises
+        ------
+        ValueError
+            For a size or field that it does not take, saying which it does.
+        """
         if hfov_deg is None:
             return self.make(width, height, self.hfov_deg)
         if not self.widest_deg:
@@ -42,7 +76,31 @@ class Projection:
 
 
 def projection(name: str) -> Projection:
-    """The projection of that name; ValueError with the names there are, and the nearest, for any other."""
+    """The projection of a name.
+
+    Parameters
+    ----------
+    name : str
+        "perspective", "equirectangular", "cylindrical", "fisheye:equidistant", "fisheye:equisolid",
+        "fisheye:stereographic", "fisheye:orthographic", "cube", "cube:strip", or a face of the cube such as "cube:up".
+
+    Returns
+    -------
+    Projection
+        What makes its cameras.
+
+    Raises
+    ------
+    ValueError
+        With the names there are, and the nearest, for any other.
+
+    Examples
+    --------
+    A fisheye's half field of 90° reaches the edge of its picture, at 180 - 0.5:
+
+    >>> projection("fisheye:equidistant").camera(180, 180).project([0, 1, 0]).round(6)
+    array([ 89.5, 179.5])
+    """
     if name not in PROJECTIONS:
         near = get_close_matches(name, [*PROJECTIONS, *_ENDINGS], n=1, cutoff=0.6)
         meant = f" (did you mean {_ENDINGS.get(near[0], near[0])}?)" if near else ""

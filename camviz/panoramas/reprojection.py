@@ -33,19 +33,50 @@ _KINDS = ("uint8", "uint16", "int16", "float32", "float64")
 def reproject(
     picture: ArrayLike, source: Camera, target: Camera, *, nothing: ArrayLike | None = NOTHING, antialias: bool = True
 ) -> Picture:
-    """The picture (height, width) or (height, width, 1 to 4 channels) that `target` takes of what `source` took.
+    """The picture that one camera would take of what another one in the same place took.
 
     Every pixel's ray is followed from `target` into `source`, whose picture is interpolated there, bilinear, in the
     picture's own values. Of the poses only the directions count: the scene is taken to be far away. A panorama that
     goes all the way round is joined at ±180° and across its poles, a cube map along its edges.
 
-    Where a pixel of the target covers several of the source (`covered`), n × n samples spread evenly over it are
-    averaged, n being how many it covers along a side, rounded, at most FINEST. That is the box filter of the new
-    pixel; without `antialias` one sample is taken at its centre.
+    Where a pixel of the target covers several of the source, n × n samples spread evenly over it are averaged, n being
+    how many it covers along a side, rounded, at most 16. That is the box filter of the new pixel.
 
-    A pixel without a ray, or whose ray `source` does not see, is `nothing`: a share of full scale (1 for floats), one
-    or one for each channel. With None the result has one channel more, alpha: 0 there, full elsewhere.
-    Raises ValueError for a picture that is not of the source's size, or of a kind that cannot be interpolated.
+    Parameters
+    ----------
+    picture : array_like (height, width) or (height, width, channels)
+        What `source` took, 1 to 4 channels of any unit, as integers of up to 16 bits or floats.
+    source, target : Camera
+        Whose picture it is, and whose is wanted.
+    nothing : array_like () or (channels,), optional
+        What a pixel shows that has no ray, or whose ray `source` does not see: a share of full scale (1 for floats).
+        With None the result has one channel more, alpha: 0 there, full elsewhere.
+    antialias : bool
+        Without it one sample is taken at the centre of each pixel.
+
+    Returns
+    -------
+    array (height, width) or (height, width, channels)
+        Of the target's size and the picture's kind.
+
+    Raises
+    ------
+    ValueError
+        For a picture that is not of the source's size, or of a kind that cannot be interpolated.
+
+    References
+    ----------
+    Szeliski (2022), sections 3.6.1 and 8.2.6.
+
+    Examples
+    --------
+    A panorama whose right half is white, seen straight ahead:
+
+    >>> panorama = np.zeros((180, 360))
+    >>> panorama[:, 180:] = 1
+    >>> reproject(panorama, equirectangular_camera(360, 180), window(4, 2, hfov_deg=90))
+    array([[0., 0., 1., 1.],
+           [0., 0., 1., 1.]])
     """
     pixels = _checked(np.asarray(picture), source.intrinsics)
     full = float(np.iinfo(pixels.dtype).max) if pixels.dtype.kind in "iu" else 1.0
@@ -72,9 +103,35 @@ def reproject(
 def window(
     width: int, height: int, hfov_deg: float, *, yaw_deg: float = 0, pitch_deg: float = 0, roll_deg: float = 0
 ) -> Camera:
-    """A virtual pan-tilt-zoom camera: perspective, `hfov_deg` wide, turned to the right, then up, then clockwise.
+    """A virtual pan-tilt-zoom camera: perspective, turned to the right, then up, then clockwise.
 
     The axes are those of the frustum view: Y X Z, each in the frame turned so far.
+
+    Parameters
+    ----------
+    width, height : int
+        In pixels.
+    hfov_deg : float
+        Its horizontal field, between 0 and 180 degrees.
+    yaw_deg, pitch_deg, roll_deg : float
+        To the right, up and clockwise, in degrees.
+
+    Returns
+    -------
+    Camera
+        At the origin.
+
+    Raises
+    ------
+    ValueError
+        For a field outside (0, 180) degrees.
+
+    Examples
+    --------
+    Turned by 90° its middle sees what lies to the right:
+
+    >>> window(640, 480, hfov_deg=60, yaw_deg=90).project([1, 0, 0])
+    array([319.5, 239.5])
     """
     return Camera(Intrinsics.from_fov(width, height, hfov_deg), world_from_cam=turned(yaw_deg, pitch_deg, roll_deg))
 
@@ -86,7 +143,37 @@ def turned(yaw_deg: float, pitch_deg: float, roll_deg: float) -> RigidTransform:
 
 
 def equirectangular_camera(width: int, height: int) -> Camera:
-    """The camera whose picture is the whole sphere: longitude -180° … 180° over the width, the poles at both edges."""
+    """The camera whose picture is the whole sphere.
+
+    Longitudes -180° … 180° lie over the width, and the poles at both edges.
+
+    Parameters
+    ----------
+    width, height : int
+        In pixels; twice as wide as high for square pixels.
+
+    Returns
+    -------
+    Camera
+        At the origin.
+
+    Raises
+    ------
+    ValueError
+        For a width or height that is no whole number, or below 1.
+
+    References
+    ----------
+    Szeliski (2022), section 8.2.6.
+
+    Examples
+    --------
+    One pixel a degree: what lies at right angles is 90 pixels beside the middle:
+
+    >>> equirectangular_camera(360, 180).project([[0, 0, 1], [1, 0, 0]])
+    array([[179.5,  89.5],
+           [269.5,  89.5]])
+    """
     pixels = Intrinsics(width, height, width / (2 * pi), height / pi, (width - 1) / 2, (height - 1) / 2)
     return Camera(pixels, Equirectangular())
 

@@ -17,10 +17,39 @@ from camviz.scenes.rays import Floats
 
 @dataclass(frozen=True)
 class Ring:
-    """`cameras` alike, evenly spaced on a level circle of `radius` metres around the origin, looking outwards.
+    """A ring of cameras that look outwards, evenly spaced on a level circle around the origin.
 
-    The first looks `turn` radians to the right of z. Each shows what lies nearest its own direction, and `overlap`
-    (0 … 1) of the way into its neighbours' parts.
+    Each shows what lies nearest its own direction, and, with an overlap, a part of what its neighbours show.
+
+    Parameters
+    ----------
+    cameras : int
+        How many, at least 2.
+    radius : float
+        Of the circle, in metres.
+    overlap : float
+        How far a camera's picture reaches into its neighbours' parts, 0 … 1 of the way.
+    turn : float
+        The first camera looks so many radians to the right of z.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 2 cameras, a radius below 0, an overlap outside 0 … 1 and a turn that is not finite.
+
+    References
+    ----------
+    Szeliski (2022), section 8.3.2, for parallax in stitched pictures.
+
+    Examples
+    --------
+    Six cameras on a circle of 10 cm are 10 cm from each other. Stitched for infinity, they show a point at 10 m twice,
+    0.01 rad apart:
+
+    >>> from math import inf
+    >>> ring = Ring(6, radius=0.1)
+    >>> round(ring.baseline, 3), ring.parallax(10, stitched=inf).round(3)
+    (0.1, np.float64(0.01))
     """
 
     cameras: int
@@ -50,7 +79,7 @@ class Ring:
 
     @property
     def centres(self) -> Array:
-        """Where the cameras are, (n, 3)."""
+        """Where the cameras are, (n, 3) in metres."""
         return self.radius * _towards(self.turn + 2 * self.half_angle * np.arange(self.cameras))
 
     @property
@@ -59,12 +88,36 @@ class Ring:
         return np.sort((self.turn + self.half_angle * (2 * np.arange(self.cameras) + 1) + pi) % (2 * pi) - pi)
 
     def nearest(self, longitudes: ArrayLike) -> NDArray[np.intp]:
-        """Which camera (...) looks most nearly at longitudes (...)."""
+        """Which camera looks most nearly at a longitude.
+
+        Parameters
+        ----------
+        longitudes : array_like (...)
+            In radians, to the right of z.
+
+        Returns
+        -------
+        array (...)
+            Numbers of cameras, from 0.
+        """
         turns = self._turns(longitudes)
         return np.rint(turns).astype(np.intp) % self.cameras
 
     def second(self, longitudes: ArrayLike) -> tuple[NDArray[np.intp], Array]:
-        """The next nearest camera (...), and its share (...) of the picture: half at a seam, 0 beyond the overlap."""
+        """The next nearest camera, and its share of the picture.
+
+        Parameters
+        ----------
+        longitudes : array_like (...)
+            In radians, to the right of z.
+
+        Returns
+        -------
+        camera : array (...)
+            Numbers of cameras, from 0.
+        share : array (...)
+            Half at a seam, 0 beyond the overlap.
+        """
         turns = self._turns(longitudes)
         off = turns - np.rint(turns)  # ±½ at the seams
         other = (np.rint(turns) + np.where(off < 0, -1, 1)).astype(np.intp) % self.cameras
@@ -77,24 +130,54 @@ class Ring:
         return (np.asarray(longitudes, dtype=float) - self.turn) / (2 * self.half_angle)
 
     def parallax(self, distance: ArrayLike, stitched: float) -> Array:
-        """How far apart (...) in radians a panorama shows the two images of a point straight out at a seam.
+        """How far apart a panorama shows the two images of a point straight out at a seam, level with the ring.
 
-        The point is level with the ring, `distance` (...) metres from its centre; the panorama is stitched for
-        `stitched` metres, which may be infinite. A camera α = π/n to the side sees the point ψ off the seam,
-        tan ψ = r sin α / (Z - r cos α); its ray crosses the circle of radius S at φ = ψ - asin(Z sin ψ / S). Of two
-        cameras: 2φ, about b (1/Z - 1/S) far away. Positive where the images are crossed, nearer than S.
+        A camera α = π/n to the side sees the point ψ off the seam, tan ψ = r sin α / (Z - r cos α); its ray crosses the
+        circle of radius S at φ = ψ - asin(Z sin ψ / S). Of two cameras: 2φ, about b (1/Z - 1/S) far away.
+
+        Parameters
+        ----------
+        distance : array_like (...)
+            Z, from the ring's centre in metres.
+        stitched : float
+            S, the distance in metres that the panorama is stitched for, which may be infinite.
+
+        Returns
+        -------
+        array (...)
+            In radians; positive where the images are crossed, nearer than S; NaN inside the ring.
+
+        Raises
+        ------
+        ValueError
+            Where S is not beyond the ring.
         """
         if not stitched > self.radius:
             raise ValueError(f"stitched must be beyond the ring, {self.radius:g} m, got {stitched}")
         Z, side = np.asarray(distance, dtype=float), self.radius * np.sin(self.half_angle)
-        ahead = np.where(self.radius < Z, Z - self.radius * np.cos(self.half_angle), np.nan)
-        psi = np.arctan2(side, ahead)
-        return 2 * (psi - np.arcsin(Z * np.sin(psi) / stitched))
+        Z = np.where(self.radius < Z, Z, np.nan)
+        ahead = Z - self.radius * np.cos(self.half_angle)
+        off_seam = side / np.hypot(side / Z, 1 - self.radius * np.cos(self.half_angle) / Z)  # Z sin ψ, for Z = ∞ too
+        return 2 * (np.arctan2(side, ahead) - np.arcsin(off_seam / stitched))
 
     def rays(self, directions: ArrayLike, stitched: float, camera: ArrayLike | None = None) -> tuple[Array, Array]:
-        """For directions (..., 3) from the middle, the rays that stand in for them: origins and unit directions.
+        """The rays of cameras that stand in for rays from the middle.
 
-        From a `camera` (...), the nearest where none is named, towards the point that is `stitched` metres out.
+        Parameters
+        ----------
+        directions : array_like (..., 3)
+            Unit vectors from the middle.
+        stitched : float
+            The rays go to the points that lie so many metres out.
+        camera : array_like (...), optional
+            Numbers of cameras; by default the nearest.
+
+        Returns
+        -------
+        origins : array (..., 3)
+            In metres.
+        directions : array (..., 3)
+            Unit vectors.
         """
         directions = np.asarray(directions, dtype=float)
         nearest = self.nearest(np.arctan2(directions[..., 0], directions[..., 2]))
@@ -102,9 +185,21 @@ class Ring:
         return np.broadcast_to(starts, directions.shape), unit(directions - starts / stitched)
 
     def panorama(self, scene: Scene, pixels: Intrinsics, stitched: float = inf) -> Floats:
-        """The scene (height, width, 3), linear light, in equirectangular pixels, stitched for a distance in metres.
+        """The panorama of a scene; where cameras overlap, their pictures are faded into each other.
 
-        `pixels.fx` is the number of pixels per radian. Where cameras overlap, their pictures are faded into each other.
+        Parameters
+        ----------
+        scene : Scene
+            What is photographed.
+        pixels : Intrinsics
+            Equirectangular pixels; fx is their number per radian.
+        stitched : float
+            The distance in metres that it is stitched for.
+
+        Returns
+        -------
+        array (height, width, 3)
+            Linear light, float32.
         """
         angles = pixels.from_pixels(pixels.grid()).reshape(-1, 2)
         directions = Equirectangular().unproject(angles)

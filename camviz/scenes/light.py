@@ -10,7 +10,29 @@ SKYLIGHT = 0.42  # the share of light that comes from everywhere, and reaches th
 
 
 def to_linear(encoded: ArrayLike) -> NDArray[np.floating]:
-    """Linear light 0…1, any shape, of sRGB values 0…1, or of sRGB bytes 0…255 as float32 (IEC 61966-2-1:1999, 5.2)."""
+    """Linear light of sRGB values: what the screen's curve makes of them.
+
+    Parameters
+    ----------
+    encoded : array_like, any shape
+        sRGB values 0 … 1, or uint8 bytes 0 … 255.
+
+    Returns
+    -------
+    array, any shape
+        Linear, 0 … 1; float32 for bytes.
+
+    References
+    ----------
+    IEC 61966-2-1:1999, section 5.2.
+
+    Examples
+    --------
+    Half of the values is a fifth of the light:
+
+    >>> to_linear([0.0, 0.5, 1.0]).round(3)
+    array([0.   , 0.214, 1.   ])
+    """
     c = np.asarray(encoded)
     if c.dtype == np.uint8:
         return to_linear(np.arange(256) / 255).astype(np.float32)[c]
@@ -18,13 +40,55 @@ def to_linear(encoded: ArrayLike) -> NDArray[np.floating]:
 
 
 def to_encoded(linear: ArrayLike) -> Array:
-    """sRGB values 0…1 of linear light 0…1, any shape: the inverse of `to_linear`."""
+    """sRGB values of linear light: the inverse of `to_linear`.
+
+    Parameters
+    ----------
+    linear : array_like, any shape
+        Linear light 0 … 1.
+
+    Returns
+    -------
+    array, any shape
+        0 … 1.
+
+    References
+    ----------
+    IEC 61966-2-1:1999, section 5.2.
+
+    Examples
+    --------
+    A grey card of 18 % is not far from the middle of the values:
+
+    >>> to_encoded(0.18).round(3)  # 1.055 · 0.18^(1/2.4) - 0.055
+    np.float64(0.461)
+    """
     c = np.asarray(linear, dtype=np.float64)
     return np.where(c <= 0.0031308, 12.92 * c, 1.055 * np.maximum(c, 0) ** (1 / 2.4) - 0.055)
 
 
 def to_display(radiance: ArrayLike) -> NDArray[np.uint8]:
-    """sRGB bytes of linear radiance, any shape; 1 is white, what is brighter is cut off, and NaN is black."""
+    """sRGB bytes of linear radiance.
+
+    Parameters
+    ----------
+    radiance : array_like, any shape
+        Linear; 1 is white, what is brighter is cut off, and NaN is black.
+
+    Returns
+    -------
+    array, any shape
+        0 … 255, uint8.
+
+    References
+    ----------
+    IEC 61966-2-1:1999, section 5.2.
+
+    Examples
+    --------
+    >>> to_display([0, 0.18, 1, 2, np.nan])
+    array([  0, 118, 255, 255,   0], dtype=uint8)
+    """
     steps = np.multiply(radiance, _STEPS - 1, dtype=np.float32)
     np.fmin(np.fmax(steps, 0, out=steps), _STEPS - 1, out=steps)
     steps += 0.5

@@ -30,23 +30,58 @@ NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Surfaces under a sky, best listed near to far: then hidden ones cost no time.
+    """Surfaces under a sky, for a tracer that photographs them through any lens.
 
-    The sky is an equirectangular texture infinitely far away, its texels square, its middle towards +z and its first
-    row straight up. Where it ends before the nadir, its last row goes on.
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+        Best listed near to far: then hidden ones cost no time.
+    sky : Texture
+        Infinitely far away and equirectangular, its texels square, its middle towards +z and its first row straight up.
+        Where it ends before the nadir, its last row goes on.
+
+    Examples
+    --------
+    A wall 2 m ahead, and nothing above it but the sky:
+
+    >>> scene = Scene([Rectangle((-1, -1, 2), (2, 0, 0), (0, 2, 0), Texture.plain((1, 1, 1)))])
+    >>> light, distance = scene.trace((0, 0, 0), [(0, 0, 1), (0, -1, 0)])
+    >>> distance
+    array([ 2., nan], dtype=float32)
     """
 
     surfaces: Sequence[Surface]
     sky: Texture = field(default_factory=lambda: Texture.plain((0.62, 0.72, 0.82)))
 
     def trace(self, origins: ArrayLike, directions: ArrayLike, spread: float = 0.0) -> tuple[Floats, Floats]:
-        """Follow rays from `origins` along unit `directions`, (..., 3) each, to the nearest surface.
+        """Follow rays to the nearest surface.
 
-        Returns linear light (..., 3) and the distance along the ray (...) in metres, both float32. A ray that meets
-        nothing shows the sky at distance NaN; a NaN direction is no ray: NEUTRAL grey, NaN. `spread` is the angle in
-        radians between neighbouring rays, over which textures are averaged (Amanatides 1984, "Ray tracing with
-        cones"); 0 averages nothing. Raises ValueError for directions that are not of unit length and for origins that
-        are not finite.
+        A ray that meets nothing shows the sky. A direction that is NaN is no ray, and shows a neutral grey.
+
+        Parameters
+        ----------
+        origins : array_like (..., 3)
+            In metres.
+        directions : array_like (..., 3)
+            Unit vectors.
+        spread : float
+            The angle in radians between neighbouring rays, over which textures are averaged; 0 averages nothing.
+
+        Returns
+        -------
+        light : array (..., 3)
+            Linear, float32.
+        distance : array (...)
+            Along the ray in metres, float32; NaN where it meets nothing.
+
+        Raises
+        ------
+        ValueError
+            For directions that are not of unit length, and for origins that are not finite.
+
+        References
+        ----------
+        J. Amanatides, Ray tracing with cones, SIGGRAPH 1984.
         """
         origins, directions = as_points(origins, 3, "origins"), as_points(directions, 3, "directions")
         shape = np.broadcast_shapes(origins.shape, directions.shape)
@@ -73,7 +108,22 @@ class Scene:
         return batched(self.surfaces)
 
     def follow(self, rays: Rays, spread: float) -> tuple[Floats, Floats]:
-        """As `trace` does, for rays in tiles: light (height, width, 3) and distance (height, width)."""
+        """As `trace` does, for rays in tiles.
+
+        Parameters
+        ----------
+        rays : Rays
+            Gathered in tiles of neighbours.
+        spread : float
+            The angle in radians between neighbouring rays.
+
+        Returns
+        -------
+        light : array (height, width, 3)
+            Linear, float32.
+        distance : array (height, width)
+            In metres, float32.
+        """
         depth = np.full(rays.directions[0].size, np.inf, dtype=np.float32)
         light = np.empty((depth.size, LIGHT), dtype=np.float32)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -121,19 +171,58 @@ class Scene:
         return self.sky.sample(s, r, spread * rows / np.pi)
 
     def outlines(self) -> Wireframe:
-        """The same scene as lines, each named after its surface."""
+        """The same scene as lines.
+
+        Returns
+        -------
+        Wireframe
+            Each line named after its surface.
+        """
         lines = [(line, surface.name) for surface in self.surfaces for line in surface.outline()]
         return Wireframe(tuple(line for line, _ in lines), tuple(name for _, name in lines))
 
     def faces(self) -> tuple[Mesh, ...]:
-        """The same scene as meshes for a solid renderer; the sky is not among them."""
+        """The same scene for a solid renderer.
+
+        Returns
+        -------
+        tuple of Mesh
+            One for each surface; the sky is not among them.
+        """
         return tuple(surface.mesh() for surface in self.surfaces)
 
 
 def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
-    """The picture (height, width, 3) that the camera takes, linear light, float32.
+    """The picture that a camera takes of a scene, as light.
 
-    With `supersample` = n each pixel is the mean of n × n rays. Raises ValueError unless n is a whole number ≥ 1.
+    Parameters
+    ----------
+    scene : Scene
+        What is photographed.
+    camera : Camera
+        With any lens.
+    supersample : int
+        n: each pixel is the mean of n × n rays.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light, float32.
+
+    Raises
+    ------
+    ValueError
+        Unless n is a whole number of at least 1.
+
+    Examples
+    --------
+    A white wall that fills the middle two of four columns:
+
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> wall = Rectangle((-1, -2, 2), (2, 0, 0), (0, 4, 0), Texture.plain((1, 1, 1)))
+    >>> render(Scene([wall], sky=Texture.plain((0, 0, 0))), Camera(Intrinsics.from_fov(4, 2, 90)))[..., 0]
+    array([[0., 1., 1., 0.],
+           [0., 1., 1., 0.]], dtype=float32)
     """
     if int(supersample) != supersample or supersample < 1:
         raise ValueError(f"supersample must be a whole number, at least 1, got {supersample}")
@@ -148,7 +237,27 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
 
 
 def snapshot(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
-    """The picture (height, width, 3) that the camera takes as sRGB bytes: to_display(render(scene, camera))."""
+    """The picture that a camera takes of a scene, for the screen: to_display(render(scene, camera)).
+
+    Parameters
+    ----------
+    scene : Scene
+        What is photographed.
+    camera : Camera
+        With any lens.
+
+    Returns
+    -------
+    array (height, width, 3)
+        sRGB bytes, uint8.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> sky = Scene([], sky=Texture.plain((0, 0.2, 1)))
+    >>> snapshot(sky, Camera(Intrinsics.from_fov(4, 2, 90)))[0, 0]
+    array([  0,  51, 255], dtype=uint8)
+    """
     picture = np.empty((camera.intrinsics.height, camera.intrinsics.width, 3), dtype=np.uint8)
     for block, seen in _traced(scene, camera):
         picture[block] = to_display(seen)

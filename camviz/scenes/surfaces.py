@@ -19,10 +19,28 @@ from camviz.scenes.texture import Texture
 
 @dataclass(frozen=True)
 class Mesh:
-    """A surface as quadrilaterals: vertices (n, 3) in metres, quads (m, 4) of their indices.
+    """A surface as quadrilaterals, for a solid renderer.
 
-    `uv` (n, 2) places the vertices on the texture's picture, u to the right and v upwards; `shade` is the light that
-    the surface receives.
+    Attributes
+    ----------
+    name : str
+        What it belongs to.
+    vertices : array (n, 3)
+        In metres.
+    quads : array (m, 4)
+        Indices of vertices.
+    uv : array (n, 2)
+        Places of the vertices on the texture's picture, as shares of it: u to the right and v upwards.
+    texture : Texture
+        What lies on it.
+    shade : float
+        The light that it receives, 1 for full light.
+
+    Examples
+    --------
+    >>> wall = Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), Texture.plain((1, 0, 0))).mesh()
+    >>> wall.vertices.shape, wall.quads.tolist(), wall.rgb
+    ((4, 3), [[0, 1, 2, 3]], (255, 0, 0))
     """
 
     name: str
@@ -34,12 +52,12 @@ class Mesh:
 
     @property
     def picture(self) -> NDArray[np.uint8]:
-        """sRGB bytes (height, width, 3), for a renderer with textures."""
+        """sRGB bytes (height, width, 3) of the shaded texture, for a renderer with textures."""
         return to_display(to_linear(np.arange(256) / 255) * self.shade)[self.texture.photograph]
 
     @property
     def rgb(self) -> tuple[int, int, int]:
-        """The picture's mean, 0…255, for a renderer without them."""
+        """The mean of the picture, 0 … 255, for a renderer without textures."""
         red, green, blue = to_display(self.texture.mean * self.shade).tolist()
         return red, green, blue
 
@@ -74,11 +92,33 @@ class Surface(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Rectangle:
-    """The parallelogram corner + s across + r down, 0 ≤ s, r ≤ 1, seen from both sides; metres.
+class Rectangle(Surface):
+    """The parallelogram corner + s across + r down, 0 ≤ s, r ≤ 1, seen from both sides.
 
-    Its texture's first row lies along `across`, and fits `repeats` times along either edge. `shade` is the light it
-    receives: 1 for full light. Raises ValueError when the two edges span no area.
+    Parameters
+    ----------
+    corner, across, down : array (3,)
+        In metres; the first row of the texture lies along `across`.
+    texture : Texture
+        What lies on it.
+    shade : float
+        The light that it receives, 1 for full light.
+    repeats : tuple of float
+        How many times the texture fits along either edge.
+    name : str
+        What it belongs to, in drawings.
+
+    Raises
+    ------
+    ValueError
+        When the two edges span no area, or are not three finite numbers each.
+
+    Examples
+    --------
+    A wall in front of a camera at the origin shows its picture the right way round; its normal points at the viewer:
+
+    >>> Rectangle((-1, -1, 2), (2, 0, 0), (0, 2, 0), Texture.plain((1, 1, 1))).normal + 0
+    array([ 0.,  0., -1.])
     """
 
     corner: Array
@@ -140,10 +180,37 @@ class Rectangle:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
-    """The endless horizontal plane y = `height` (y points down), its texture repeated every `tile` metres.
+class Ground(Surface):
+    """The endless horizontal plane y = `height`, which fades into the air's colour with the distance.
 
-    With the distance d it takes on the colour of the air, linear RGB `haze`: a share 1 - exp(-d / `sight`) of it.
+    Parameters
+    ----------
+    height : float
+        In metres; y points down.
+    texture : Texture
+        What lies on it.
+    tile : float
+        The texture is repeated every so many metres.
+    haze : array_like (3,)
+        The colour of the air, linear RGB. At a distance d the ground has a share 1 - exp(-d / `sight`) of it.
+    sight : float
+        In metres.
+    name : str
+        What it belongs to, in drawings.
+
+    Raises
+    ------
+    ValueError
+        For a tile or a sight that is not positive.
+
+    Examples
+    --------
+    White ground at a distance of its sight in black air: 1/e = 0.37 of it is seen.
+
+    >>> ground = Ground(1.0, Texture.plain((1, 1, 1)), haze=(0, 0, 0), sight=2.0)
+    >>> light, distance = Scene([ground]).trace((0, 0, 0), (0, 0.5, 0.75**0.5))
+    >>> light.round(2), distance.round(6)
+    (array([0.37, 0.37, 0.37], dtype=float32), np.float32(2.0))
     """
 
     height: float
@@ -196,10 +263,30 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
-    """A ball around `centre` (3,) with `radius`, in metres, under an equirectangular texture.
+class Sphere(Surface):
+    """A ball under an equirectangular texture.
 
-    The texture's middle faces -z, towards a camera at the origin; its first row is the pole -y, the top.
+    Parameters
+    ----------
+    centre : array (3,)
+        In metres.
+    radius : float
+        In metres.
+    texture : Texture
+        Its middle faces -z, towards a camera at the origin; its first row is the pole -y, the top.
+    name : str
+        What it belongs to, in drawings.
+
+    Raises
+    ------
+    ValueError
+        For a radius that is not positive, and a centre that is not three finite numbers.
+
+    Examples
+    --------
+    >>> ball = Sphere((0, 0, 3), 1.0, Texture.plain((1, 1, 1)))
+    >>> Scene([ball]).trace((0, 0, 0), (0, 0, 1))[1]
+    array(2., dtype=float32)
     """
 
     centre: Array
@@ -240,10 +327,30 @@ class Sphere:
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
-    """An upright tube, open at both ends: it stands on `foot` (3,), `height` high, with `radius`; metres.
+class Column(Surface):
+    """An upright tube, open at both ends.
 
-    The middle of its texture faces -z, the first row is at the top.
+    Parameters
+    ----------
+    foot : array (3,)
+        The middle of its lower end, in metres.
+    height, radius : float
+        In metres.
+    texture : Texture
+        Its middle faces -z, its first row is at the top.
+    name : str
+        What it belongs to, in drawings.
+
+    Raises
+    ------
+    ValueError
+        For a height or radius that is not positive, and a foot that is not three finite numbers.
+
+    Examples
+    --------
+    >>> post = Column((0, 1, 3), height=2.0, radius=0.5, texture=Texture.plain((1, 1, 1)))
+    >>> Scene([post]).trace((0, 0, 0), (0, 0, 1))[1]
+    array(2.5, dtype=float32)
     """
 
     foot: Array
@@ -263,7 +370,13 @@ class Column:
         return self.foot - [0, self.height, 0]
 
     def bounding_spheres(self) -> tuple[Ball, ...]:
-        """One above the other, at most four: a single one would be far wider than a thin column."""
+        """Balls one above the other, at most four: a single one would be far wider than a thin column.
+
+        Returns
+        -------
+        tuple
+            For each its centre (3,) in metres, its radius, and no normal.
+        """
         count = int(np.clip(self.height / (2 * self.radius), 1, 4))
         radius = float(np.hypot(self.height / (2 * count), self.radius))
         at = (np.arange(count) + 0.5) / count
@@ -305,10 +418,40 @@ def box(
     tile: float | None = None,
     name: str = "box",
 ) -> tuple[Rectangle, ...]:
-    """The four walls and the lid of a box that stands on `foot` (3,), the middle of its floor, lit by the sun.
+    """The four walls and the lid of a box, lit by the sun.
 
-    `size` is its width, height and depth in metres before it is turned by `yaw` radians about the vertical, clockwise
-    as seen from above. The texture covers each side once, or repeats every `tile` metres.
+    Parameters
+    ----------
+    foot : array_like (3,)
+        The middle of its floor, in metres.
+    size : array_like (3,)
+        Width, height and depth in metres, before it is turned.
+    texture : Texture
+        It covers each side once, or repeats.
+    yaw : float
+        The turn about the vertical in radians, clockwise as seen from above.
+    tile : float, optional
+        The texture repeats every so many metres.
+    name : str
+        What it belongs to, in drawings.
+
+    Returns
+    -------
+    tuple of Rectangle
+        Front, right, back and left side, and the lid.
+
+    Raises
+    ------
+    ValueError
+        For a foot or size that is not three finite numbers.
+
+    Examples
+    --------
+    The sun is high and to the left, so that the lid is brighter than the front, and the right side is in the shade:
+
+    >>> sides = box((0, 1, 4), (1, 1, 1), Texture.plain((1, 1, 1)))
+    >>> [round(side.shade, 2) for side in sides]
+    [0.71, 0.42, 0.42, 0.7, 0.84]
     """
     foot, (width, height, depth) = _vector(foot, "foot"), _vector(size, "size")
     cos, sin = np.cos(yaw), np.sin(yaw)

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.base import as_points
 from camviz.scenes.light import to_display, to_linear
 
 Floats = NDArray[np.float32]
@@ -18,12 +19,34 @@ _FULL = 65535  # linear light 0…1 is kept in 16 bits: half the memory of float
 
 
 class Texture:
-    """A picture on a surface: linear light 0…1, or sRGB bytes, (height, width, 3), looked up by s (to the right) and
-    r (down), 0…1.
+    """A picture on a surface, averaged beforehand so that far away it does not flicker.
 
-    It keeps halved copies of itself down to a single texel, side by side in one mosaic, and mixes the two whose texels
-    come nearest to the distance between rays (Williams 1983, "Pyramidal parametrics"). With `repeat` it tiles the
-    plane; otherwise its border goes on for ever. Raises ValueError for any other shape.
+    It is looked up by s (to the right) and r (down), 0 … 1. It keeps halved copies of itself down to a single texel,
+    and mixes the two whose texels come nearest to the distance between rays.
+
+    Parameters
+    ----------
+    light : array_like (height, width, 3)
+        Linear light 0 … 1, or sRGB bytes.
+    repeat : bool
+        Whether it tiles the plane; otherwise its border goes on for ever.
+
+    Raises
+    ------
+    ValueError
+        For any other shape.
+
+    References
+    ----------
+    L. Williams, Pyramidal parametrics, SIGGRAPH 1983.
+
+    Examples
+    --------
+    Black and white texels, from near and from far:
+
+    >>> texture, where = Texture([[(0, 0, 0), (1, 1, 1)]]), np.array([0.25, 0.75], np.float32)
+    >>> [texture.sample(where, where, texels)[:, 0].round(2).tolist() for texels in (0, 100)]
+    [[0.0, 1.0], [0.5, 0.5]]
     """
 
     def __init__(self, light: ArrayLike, repeat: bool = False) -> None:
@@ -37,8 +60,24 @@ class Texture:
 
     @classmethod
     def plain(cls, rgb: ArrayLike) -> Texture:
-        """One colour, sRGB 0…1."""
-        return cls(to_linear(rgb).reshape(1, 1, 3))
+        """One colour everywhere.
+
+        Parameters
+        ----------
+        rgb : array_like (3,)
+            sRGB 0 … 1.
+
+        Returns
+        -------
+        Texture
+            Of a single texel.
+
+        Raises
+        ------
+        ValueError
+            For another shape.
+        """
+        return cls(to_linear(as_points(rgb, 3, "rgb")).reshape(1, 1, 3))
 
     @property
     def is_plain(self) -> bool:
@@ -51,7 +90,20 @@ class Texture:
         return to_display(self._mosaic[: self.height, : self.width, :3].astype(np.float32) / _FULL)
 
     def sample(self, s: Floats, r: Floats, texels: Floats | float = 0.0) -> Floats:
-        """Linear light (n, LIGHT) at s, r (n,), for rays that lie `texels` of the finest copy apart."""
+        """Light at places on the texture.
+
+        Parameters
+        ----------
+        s, r : array (n,)
+            To the right and down, shares of the picture.
+        texels : array (n,) or float
+            How many texels of the finest copy the rays lie apart.
+
+        Returns
+        -------
+        array (n, 4)
+            Linear light, and a fourth number that means nothing.
+        """
         top = self._places.shape[1] - 1
         texels = np.maximum(np.multiply(texels, _SOFTNESS, dtype=np.float32), 1)
         level = np.atleast_1d(np.minimum(np.log2(texels), np.float32(top)))

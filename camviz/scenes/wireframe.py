@@ -12,9 +12,28 @@ from camviz.lenses.base import Array, as_points
 
 @dataclass(frozen=True, eq=False)
 class Wireframe:
-    """Polylines (n, 3) in metres, each with a name that says what it belongs to ("ground", "house", ...).
+    """Lines in space, for drawings of the world that the tracer photographs.
 
-    Raises ValueError when there are not as many names as lines, or a line is not (n, 3).
+    Parameters
+    ----------
+    lines : tuple of array (n, 3)
+        Polylines in metres.
+    names : tuple of str
+        What each line belongs to: "ground", "house", ...
+
+    Raises
+    ------
+    ValueError
+        When there are not as many names as lines, or a line is not (n, 3).
+
+    Examples
+    --------
+    Two drawings added:
+
+    >>> beam = Wireframe((np.array([[0, 0, 1], [1, 0, 1]]),), ("beam",))
+    >>> mast = Wireframe((np.array([[0, 0, 1], [0, -1, 1]]),), ("mast",))
+    >>> [name for name, line in beam + mast]
+    ['beam', 'mast']
     """
 
     lines: tuple[Array, ...]
@@ -23,7 +42,11 @@ class Wireframe:
     def __post_init__(self) -> None:
         if len(self.lines) != len(self.names):
             raise ValueError(f"names must be one for each of {len(self.lines)} lines, got {len(self.names)}")
-        object.__setattr__(self, "lines", tuple(as_points(line, 3, "lines") for line in self.lines))
+        lines = tuple(as_points(line, 3, "lines") for line in self.lines)
+        for line in lines:
+            if line.ndim != 2:
+                raise ValueError(f"each of lines must have shape (n, 3), got {line.shape}")
+        object.__setattr__(self, "lines", lines)
 
     def __iter__(self) -> Iterator[tuple[str, Array]]:
         return iter(zip(self.names, self.lines, strict=True))
@@ -32,14 +55,38 @@ class Wireframe:
         return Wireframe(self.lines + other.lines, self.names + other.names)
 
     def only(self, *names: str) -> Wireframe:
-        """The lines with these names."""
+        """The lines with some names.
+
+        Parameters
+        ----------
+        *names : str
+            Those that are kept.
+
+        Returns
+        -------
+        Wireframe
+            The others are left out.
+        """
         kept = [(name, line) for name, line in self if name in names]
         return Wireframe(tuple(line for _, line in kept), tuple(name for name, _ in kept))
 
     def subdivided(self, max_length: float) -> Wireframe:
-        """The same lines with points no more than `max_length` metres apart, so that a lens can bend them.
+        """The same lines with more points, so that a lens can bend them; all corners are kept.
 
-        All corners are kept. Raises ValueError unless max_length is positive.
+        Parameters
+        ----------
+        max_length : float
+            Points are no more than so many metres apart.
+
+        Returns
+        -------
+        Wireframe
+            With the same names.
+
+        Raises
+        ------
+        ValueError
+            Unless `max_length` is positive.
         """
         if not max_length > 0:
             raise ValueError(f"max_length must be a positive length in metres, got {max_length}")

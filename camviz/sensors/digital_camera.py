@@ -35,11 +35,31 @@ class Channels(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One photograph, step by step.
+    """One photograph, step by step; `balanced` and `picture` are developed when asked for.
 
-    `light` (height, width, 3): the scene's linear light, 1 for a white wall. `illuminance_lux`, of that shape: what
-    arrives on the sensor. `photons` (height, width): what is expected behind each pixel's own filter. `exposure`: the
-    sensor's steps from there on. `raw`: the digital numbers. `balanced` and `picture` are developed when asked for.
+    Attributes
+    ----------
+    camera : DigitalCamera
+        That took it.
+    exposure_s : float
+        In seconds.
+    light : array (height, width, 3)
+        The scene's linear light, 1 for a white wall.
+    illuminance_lux : array (height, width, 3)
+        What arrives on the sensor.
+    photons : array (height, width)
+        What is expected behind each pixel's own filter.
+    exposure : Exposure
+        The sensor's steps from there on.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera
+    >>> from camviz import Intrinsics
+    >>> camera = DigitalCamera(Camera(Intrinsics.from_fov(8, 6, 10)))
+    >>> shot = camera.take(np.ones((6, 8, 3)), camera.white_exposure_s(), np.random.default_rng(0))
+    >>> shot.raw.shape, shot.picture.shape
+    ((6, 8), (6, 8, 3))
     """
 
     camera: DigitalCamera
@@ -67,12 +87,55 @@ class Shot:
 
 @dataclass(frozen=True)
 class DigitalCamera:
-    """A camera with a lens of f-number N, a sensor of `pitch_um` pixels, and colour filters.
+    """A camera with a lens, a sensor and colour filters: from a scene's light to the numbers, and out as a picture.
 
-    Where the scene's linear light is 1 it is a white, matt wall under `scene_lux` of light with the spectrum of
-    `illuminant`. A scene has three colours of light and no spectra: its red, green and blue are taken to be what the
-    filters of the camera named `filters` (after `camviz.colour`) let through. Their peaks are published as equal, so a
-    filter is taken to pass all at its peak, where the sensor's quantum efficiency, a single figure or a curve, applies.
+    Where the scene's linear light is 1 it is a white, matt wall. A scene has three colours of light and no spectra: its
+    red, green and blue are taken to be what the filters let through. Their peaks are published as equal, so a filter is
+    taken to pass all at its peak, where the sensor's quantum efficiency, a single figure or a curve, applies.
+
+    Parameters
+    ----------
+    camera : Camera
+        Where it stands and looks, its lens and its pixels.
+    sensor : Sensor
+        Behind the filters.
+    pitch_um : float
+        From pixel to pixel.
+    f_number : float
+        Of the lens, N.
+    transmittance : float
+        The share of light that the lens lets through, above 0 and at most 1.
+    pattern : Pattern
+        Of the filters.
+    filters : str
+        One of the cameras that `camviz.colour.sensitivities` knows.
+    illuminant : str
+        One of the lights that `camviz.colour.illuminant` knows.
+    scene_lux : float
+        On the white wall.
+    temperature_c : float
+        Of the sensor.
+    demosaicing : str
+        One of `camviz.mosaics.ALGORITHMS`.
+
+    Raises
+    ------
+    ValueError
+        For a pitch, f-number or light that is not positive, and a transmittance outside 0 … 1.
+
+    References
+    ----------
+    EMVA Standard 1288, release 4.0 linear (2021), for the sensor; Szeliski (2022), section 2.3, for the chain.
+
+    Examples
+    --------
+    10 000 lux on a white wall are π L T / (4 N²) = 10 000 · 0.9 / 64 lux on the sensor:
+
+    >>> from camviz.cameras import Camera
+    >>> from camviz import Intrinsics
+    >>> camera = DigitalCamera(Camera(Intrinsics.from_fov(9, 7, 60)), f_number=4, transmittance=0.9)
+    >>> float(camera.illuminance_lux(np.ones((7, 9, 3), np.float32))[3, 4, 0])
+    140.625
     """
 
     camera: Camera
@@ -96,11 +159,48 @@ class DigitalCamera:
             raise ValueError(f"transmittance must be a share above 0 and at most 1, got {self.transmittance}")
 
     def shoot(self, scene: Scene, exposure_s: float, rng: np.random.Generator, supersample: int = 1) -> Shot:
-        """Photograph the scene; each pixel's light is the mean of supersample² rays."""
+        """Photograph a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            What is photographed.
+        exposure_s : float
+            In seconds.
+        rng : numpy.random.Generator
+            Draws the noise.
+        supersample : int
+            Each pixel's light is the mean of supersample² rays.
+
+        Returns
+        -------
+        Shot
+            Every step of it.
+        """
         return self.take(render(scene, self.camera, supersample), exposure_s, rng)
 
     def take(self, light: ArrayLike, exposure_s: float, rng: np.random.Generator) -> Shot:
-        """The photograph of a picture of linear light (height, width, 3), as `render` traces it."""
+        """Photograph a picture of light, as `render` traces it.
+
+        Parameters
+        ----------
+        light : array_like (height, width, 3)
+            Linear, 1 for a white wall.
+        exposure_s : float
+            In seconds.
+        rng : numpy.random.Generator
+            Draws the noise.
+
+        Returns
+        -------
+        Shot
+            Every step of it.
+
+        Raises
+        ------
+        ValueError
+            For light that has not the camera's size.
+        """
         linear = np.asarray(light, dtype=np.float32)
         pixels = self.camera.intrinsics
         if linear.shape != (pixels.height, pixels.width, 3):
@@ -111,7 +211,18 @@ class DigitalCamera:
         return Shot(self, exposure_s, linear, lux, photons, exposure)
 
     def illuminance_lux(self, light: Floats) -> Floats:
-        """E = π L T cos⁴θ / (4 N²) on the sensor, with π L = light · scene_lux for a matt surface."""
+        """The light on the sensor: E = π L T cos⁴θ / (4 N²), with π L = light · scene_lux for a matt surface.
+
+        Parameters
+        ----------
+        light : array (height, width, 3)
+            Linear, 1 for a white wall.
+
+        Returns
+        -------
+        array (height, width, 3)
+            In lux, float32.
+        """
         on_axis = self.scene_lux * self.transmittance / (4 * self.f_number**2)
         return light * (np.float32(on_axis) * self._falloff)[..., None]
 
@@ -136,13 +247,35 @@ class DigitalCamera:
         return gathered * photons, gathered * electrons
 
     def white_exposure_s(self, share: float = 0.8) -> float:
-        """The exposure at which a white wall on the axis fills this share of saturation in the fullest channel."""
+        """The exposure at which a white wall on the axis fills the fullest channel to a share of saturation.
+
+        Parameters
+        ----------
+        share : float
+            0 … 1.
+
+        Returns
+        -------
+        float
+            In seconds.
+        """
         lux = self.scene_lux * self.transmittance / (4 * self.f_number**2)
         fullest = self.channels.electrons[list(self.pattern.present)].max()
         return float(share * self.sensor.saturation_e / (lux * self.pitch_um**2 * fullest))
 
     def developed(self, raw: ArrayLike) -> Array:
-        """Linear light (height, width, 3) of raw numbers (height, width): offset off, white balanced, demosaiced."""
+        """Linear light of raw numbers: offset off, white balanced, demosaiced.
+
+        Parameters
+        ----------
+        raw : array_like (height, width)
+            In DN.
+
+        Returns
+        -------
+        array (height, width, 3)
+            Linear; 1 where the fullest channel saturates.
+        """
         electrons = (np.asarray(raw, dtype=float) - self.sensor.offset_dn) / self.sensor.gain_dn_per_e
         balance = (self._balance / self.sensor.saturation_e)[self.pattern.channels(*electrons.shape)]
         return demosaic(electrons * balance, self.pattern, self.demosaicing)

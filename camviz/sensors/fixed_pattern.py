@@ -12,7 +12,21 @@ from camviz.sensors.counting import Floats
 
 @dataclass(frozen=True, eq=False)
 class FixedPattern:
-    """One specimen's deviations, (height, width) each: `gain` without a unit (PRNU), `offset_e` in electrons (DSNU)."""
+    """What differs from pixel to pixel of one specimen, the same in every frame.
+
+    Attributes
+    ----------
+    gain : array (height, width)
+        PRNU: a factor about 1.
+    offset_e : array (height, width)
+        DSNU, in electrons.
+
+    Examples
+    --------
+    >>> pattern = Sensor(prnu=0.01, dsnu_e=3).pattern(200, 200)
+    >>> pattern.gain.std().round(3), pattern.offset_e.std().round(1)
+    (np.float32(0.01), np.float32(3.0))
+    """
 
     gain: Floats
     offset_e: Floats

@@ -38,10 +38,41 @@ FIGURES = (
 
 @dataclass(frozen=True)
 class Measurement(Readings):
-    """The EMVA figures of levels of rising brightness.
+    """A sensor's gain, noise, saturation, patterns and dark current, measured from its frames alone.
 
-    The attributes are the standard's estimates, trusted or not; NaN where there is none. `judged` holds
-    those that can be trusted, bounds for the others, and `why` they are withheld; `figures` the trusted values alone.
+    The attributes are the standard's estimates, trusted or not; NaN where there is none. `judged` holds those that can
+    be trusted, bounds for the others, and `why` they are withheld; `figures` the trusted values alone.
+
+    Parameters
+    ----------
+    levels : tuple of Level
+        Two or more, of rising brightness.
+    bright, dark : Stack, optional
+        Statistics of many frames of one exposure, for the fixed patterns.
+    step : float
+        The difference of neighbouring digital numbers: 1, but 16 where 12 bits were stored in the upper bits of 16.
+    flicker_counts : bool
+        Whether a change of the light between the two frames of a pair counts as noise, as it did in release 3 of the
+        standard, and no longer does in release 4.0.
+
+    Raises
+    ------
+    ValueError
+        With fewer than two levels, where none is brighter than the dark, or where all are saturated.
+
+    References
+    ----------
+    EMVA Standard 1288, release 4.0 linear (2021).
+
+    Examples
+    --------
+    Frames of a simulated sensor give its gain and efficiency back:
+
+    >>> sensor, rng = Sensor(quantum_efficiency=0.5, gain_dn_per_e=0.4), np.random.default_rng(0)
+    >>> frames = lambda photons: [sensor.expose(np.full((99, 99), photons), 0.01, 20, rng).dn for _ in range(2)]
+    >>> found = Measurement(tuple(Level.of(0.01, frames(n), frames(0), n) for n in range(2000, 20000, 2000)))
+    >>> round(found.gain_dn_per_e, 2), round(found.quantum_efficiency, 2)
+    (0.4, 0.5)
     """
 
     # Gain and quantum efficiency --------------------------------------------------------------------------------------
@@ -113,7 +144,18 @@ class Measurement(Readings):
     # What follows -----------------------------------------------------------------------------------------------------
 
     def snr(self, electrons: ArrayLike) -> Array:
-        """Signal to noise at these mean electrons per pixel, patterns left out: μ_e / sqrt(σ_d² + 1/(12 K²) + μ_e)."""
+        """Signal to noise of one pixel, patterns left out: μ_e / sqrt(σ_d² + 1/(12 K²) + μ_e).
+
+        Parameters
+        ----------
+        electrons : array_like (...)
+            The mean signal μ_e in electrons.
+
+        Returns
+        -------
+        array (...)
+            A ratio.
+        """
         mean = np.asarray(electrons, dtype=float)
         return mean / np.sqrt((self.dark_noise_dn / self.gain_dn_per_e) ** 2 + mean)
 
@@ -162,9 +204,13 @@ class Measurement(Readings):
         return found if found > 0 else nan
 
     def pattern_split(self) -> dict[str, dict[str, float]]:
-        """DSNU (electrons) and PRNU (fractions) as row, column and pixel parts; empty without stacks.
+        """DSNU and PRNU as row, column and pixel parts.
 
-        A part whose variance came out below zero, which chance does where there is none, is 0.
+        Returns
+        -------
+        dict
+            "dsnu_e" in electrons and "prnu" in fractions, each a dictionary of the parts; empty without stacks. A part
+            whose variance came out below zero, which chance does where there is none, is 0.
         """
         if not (self.bright and self.dark):
             return {}
@@ -183,13 +229,29 @@ class Measurement(Readings):
         return judged(self.estimates)
 
     def figures(self) -> dict[str, float]:
-        """The EMVA figures by name, fractions and decibels (20 log10); NaN where these frames cannot tell one.
+        """The EMVA figures that can be trusted.
 
         A figure is told where the truth lies within 3 % of it (DSNU, PRNU 5 %; 0.26 dB), even if chance is at four
         standard errors.
+
+        Returns
+        -------
+        dict of float
+            By name, fractions and decibels (20 log10); NaN where these frames cannot tell one.
         """
         return {name: self.judged[name].value for name in FIGURES}
 
     def why(self, name: str) -> str:
-        """Why the figure of this name is withheld, one clause; "" for one that is told."""
+        """Why a figure is withheld.
+
+        Parameters
+        ----------
+        name : str
+            Of the figure.
+
+        Returns
+        -------
+        str
+            One clause; "" for a figure that is told.
+        """
         return self.judged[name].why

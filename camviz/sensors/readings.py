@@ -24,7 +24,29 @@ SURELY = 5.0  # standard deviations
 
 @dataclass(frozen=True)
 class Level:
-    """One exposure: a pair of bright and a pair of dark frames, and the photons per pixel (NaN where unknown)."""
+    """One exposure of a photon transfer: a pair of bright and a pair of dark frames.
+
+    Parameters
+    ----------
+    exposure_s : float
+        In seconds.
+    bright, dark : Pair
+        Statistics of two frames each; `of` makes them.
+    photons : float
+        Per pixel; NaN where unknown.
+
+    References
+    ----------
+    EMVA Standard 1288, release 4.0 linear (2021).
+
+    Examples
+    --------
+    Half the mean square of the frames' difference is the noise of one frame:
+
+    >>> level = Level.of(0.01, bright=[[[10, 12]], [[12, 10]]], dark=[[[2, 2]], [[2, 2]]])
+    >>> level.bright.mean, level.bright.variance, level.dark.variance
+    (11.0, 2.0, 0.0)
+    """
 
     exposure_s: float
     bright: Pair
@@ -35,7 +57,30 @@ class Level:
     def of(
         cls, exposure_s: float, bright: Sequence[ArrayLike], dark: Sequence[ArrayLike], photons: float = nan
     ) -> Level:
-        """The level of two bright and two dark frames (height, width)."""
+        """The level of two bright and two dark frames.
+
+        Parameters
+        ----------
+        exposure_s : float
+            In seconds.
+        bright, dark : sequence of array_like (height, width)
+            Two frames each, in DN.
+        photons : float
+            Per pixel; NaN where unknown.
+
+        Returns
+        -------
+        Level
+            With the statistics of the frames.
+
+        Raises
+        ------
+        ValueError
+            Unless there are two frames of each kind, of one shape.
+        """
+        for name, frames in (("bright", bright), ("dark", dark)):
+            if len(frames) != 2:
+                raise ValueError(f"{name} must be two frames, got {len(frames)}")
         return cls(exposure_s, pair(*bright), pair(*dark), photons)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera
-from camviz.lenses.base import Array
+from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform
 from camviz.scenes.scene import Scene
 
@@ -25,7 +25,23 @@ FORGOTTEN = 1e-7  # the share of a charge below which the trail that it leaves i
 
 @dataclass(frozen=True, eq=False)
 class CcdRegister:
-    """A bucket brigade: charge still on the area (height, width), in the register (width,), and read so far."""
+    """A bucket brigade at one moment: where all the charge is.
+
+    Attributes
+    ----------
+    area : array (height, width)
+        Electrons still on the light-sensitive area.
+    register : array (width,)
+        Electrons in the register.
+    read : array (n,)
+        Electrons read so far.
+
+    Examples
+    --------
+    >>> halted = bucket_brigade([[1, 2], [3, 4]], ticks=1)
+    >>> halted.area.sum() + halted.register.sum() + halted.read.sum()  # none is lost
+    np.float64(10.0)
+    """
 
     area: Array
     register: Array
@@ -33,10 +49,36 @@ class CcdRegister:
 
 
 def bucket_brigade(electrons: ArrayLike, ticks: int) -> CcdRegister:
-    """The brigade after the amplifier has read `ticks` pixels: rows shift into the register, which shifts along.
+    """The brigade of a CCD after the amplifier has read some pixels: rows shift into the register, which shifts along.
 
-    A row enters the register when the one before has been read out, all with perfect transfer. Raises ValueError for
-    fewer than 0 or more than height · width ticks.
+    A row enters the register when the one before has been read out, all with perfect transfer.
+
+    Parameters
+    ----------
+    electrons : array_like (height, width)
+        Charges in electrons; row 0 is the first to be read.
+    ticks : int
+        How many pixels have been read.
+
+    Returns
+    -------
+    CcdRegister
+        Where all the charge is.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 0 or more than height · width ticks.
+
+    References
+    ----------
+    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 1.
+
+    Examples
+    --------
+    >>> bucket_brigade([[1, 2], [3, 4]], ticks=3)
+    CcdRegister(area=array([[0., 0.],
+           [0., 0.]]), register=array([4., 0.]), read=array([1., 2., 3.]))
     """
     charge = _charge(electrons)
     height, width = charge.shape
@@ -52,10 +94,40 @@ def bucket_brigade(electrons: ArrayLike, ticks: int) -> CcdRegister:
 
 
 def transferred(electrons: ArrayLike, efficiency: float, overscan: int = 0) -> Array:
-    """Charges (height + overscan, width) as they reach the register, when each shift moves only `efficiency` of them.
+    """Charges as they reach the register, when each shift leaves some behind.
 
     Row i needs n = i + 1 shifts; what is left behind k times comes k rows later, a share C(n+k-1, k) c^n (1-c)^k: the
-    negative binomial law. `overscan` further shifts, of empty rows, show the trail of the last row.
+    negative binomial law.
+
+    Parameters
+    ----------
+    electrons : array_like (height, width)
+        Charges in electrons; row 0 is the first to be read.
+    efficiency : float
+        The share of a charge that a shift moves, c, above 0.5 and at most 1.
+    overscan : int
+        Further shifts, of empty rows, that show the trail of the last row.
+
+    Returns
+    -------
+    array (height + overscan, width)
+        In electrons.
+
+    Raises
+    ------
+    ValueError
+        For an efficiency outside (0.5, 1].
+
+    References
+    ----------
+    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 5.
+
+    Examples
+    --------
+    A trail of 0.9 · 0.1^k behind a single charge:
+
+    >>> transferred([[1000], [0], [0]], efficiency=0.9)[:, 0].round(6)
+    array([900.,  90.,   9.])
     """
     charge = _charge(electrons)
     if not 0.5 < efficiency <= 1:
@@ -74,10 +146,40 @@ def transferred(electrons: ArrayLike, efficiency: float, overscan: int = 0) -> A
 
 
 def smeared(electrons: ArrayLike, exposure_s: float, row_shift_s: float) -> Array:
-    """Charges when light still falls while rows shift: each row passes, for `row_shift_s`, under every row's light.
+    """Charges when light still falls while the rows of a CCD shift: each row passes under every row's light.
 
     q + t_shift/t_exposure · (sum of its column): half of it gathered on the way in, half on the way out. That is a CCD
     without a shutter or a shielded storage; the stripe runs through the whole column of anything bright.
+
+    Parameters
+    ----------
+    electrons : array_like (height, width)
+        Charges in electrons.
+    exposure_s : float
+        In seconds.
+    row_shift_s : float
+        How long a row stays under the next one's light, in seconds.
+
+    Returns
+    -------
+    array (height, width)
+        In electrons.
+
+    Raises
+    ------
+    ValueError
+        For times below zero, and an exposure of no time.
+
+    References
+    ----------
+    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 5.
+
+    Examples
+    --------
+    With shifts a hundredth of the exposure long, a lamp adds 1 % of its charge to its whole column:
+
+    >>> smeared([[0], [1000], [0]], exposure_s=0.01, row_shift_s=0.0001)[:, 0]
+    array([  10., 1010.,   10.])
     """
     charge = _charge(electrons)
     for name, value in (("exposure_s", exposure_s), ("row_shift_s", row_shift_s)):
@@ -93,7 +195,35 @@ def bloomed(electrons: ArrayLike, full_well_e: float) -> Array:
     """Charges when full wells spill along their columns, half of the surplus either way, until there is room.
 
     Channel stops keep columns apart; what reaches the column's end is lost. An anti-blooming drain instead is `fill`.
+
+    Parameters
+    ----------
+    electrons : array_like (height, width)
+        Charges in electrons.
+    full_well_e : float
+        What a well holds.
+
+    Returns
+    -------
+    array (height, width)
+        In electrons.
+
+    Raises
+    ------
+    ValueError
+        For a full well that is not above 0.
+
+    References
+    ----------
+    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 4.
+
+    Examples
+    --------
+    >>> bloomed([[0], [0], [100], [0], [0]], full_well_e=40)[:, 0]
+    array([ 0., 30., 40., 30.,  0.])
     """
+    if not full_well_e > 0:
+        raise ValueError(f"full_well_e must be above 0 electrons, got {full_well_e}")
     charge = _charge(electrons)
     surplus = np.maximum(charge - full_well_e, 0)
     held = charge - surplus
@@ -111,17 +241,62 @@ def bloomed(electrons: ArrayLike, full_well_e: float) -> Array:
 
 
 def row_times(height: int, row_s: float, exposure_s: float = 0.0) -> Array:
-    """When each of `height` rows is in the middle of its exposure, in seconds; row 0 begins at 0.
+    """When each row of a rolling shutter is in the middle of its exposure; row 0 begins at 0.
 
-    A global shutter is the case row_s = 0.
+    Parameters
+    ----------
+    height : int
+        How many rows.
+    row_s : float
+        From one row to the next, in seconds; 0 is a global shutter.
+    exposure_s : float
+        In seconds.
+
+    Returns
+    -------
+    array (height,)
+        In seconds.
+
+    Examples
+    --------
+    >>> row_times(4, row_s=0.001, exposure_s=0.010)
+    array([0.005, 0.006, 0.007, 0.008])
     """
     return exposure_s / 2 + row_s * np.arange(height, dtype=np.float64)
 
 
 def rolling_rays(camera: Camera, poses: RigidTransform) -> tuple[Array, Array]:
-    """Origins (height, 1, 3) and unit directions (height, width, 3) of a camera's rays, each row at its own pose.
+    """A camera's rays, each row at its own pose.
 
-    `poses` holds one world_from_cam for each row.
+    Parameters
+    ----------
+    camera : Camera
+        Its own pose does not count.
+    poses : RigidTransform
+        One world_from_cam for each row.
+
+    Returns
+    -------
+    origins : array (height, 1, 3)
+        In metres.
+    directions : array (height, width, 3)
+        Unit vectors; NaN where there is no ray.
+
+    Raises
+    ------
+    ValueError
+        Unless there is one pose for each row.
+
+    Examples
+    --------
+    A camera that glides to the right at 1 m/s, rows 0.1 s apart:
+
+    >>> from camviz.cameras import Camera
+    >>> from camviz import Intrinsics
+    >>> camera = Camera(Intrinsics.from_fov(4, 3, 90))
+    >>> origins, directions = rolling_rays(camera, gliding(camera, (1, 0, 0))(row_times(3, row_s=0.1)))
+    >>> origins[:, 0, 0]
+    array([0. , 0.1, 0.2])
     """
     matrices = poses.as_matrix()
     height = camera.intrinsics.height
@@ -136,10 +311,51 @@ def rolling_rays(camera: Camera, poses: RigidTransform) -> tuple[Array, Array]:
 def rolling_picture(
     scene: Scene, camera: Camera, motion: Callable[[Array], RigidTransform], row_s: float, exposure_s: float = 0.0
 ) -> NDArray[np.float32]:
-    """The picture (height, width, 3), linear light, of a moving camera whose rows are exposed one after the other.
+    """The picture of a moving camera whose rows are exposed one after the other.
 
-    `motion` gives the poses world_from_cam at times (n,) in seconds. Each row is traced at the middle of its exposure,
-    so the picture is distorted and not blurred.
+    Each row is traced at the middle of its exposure, so the picture is distorted and not blurred.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is photographed.
+    camera : Camera
+        Its own pose does not count.
+    motion : callable
+        Gives the poses world_from_cam at times (n,) in seconds.
+    row_s : float
+        From one row to the next, in seconds.
+    exposure_s : float
+        In seconds.
+
+    Returns
+    -------
+    array (height, width, 3)
+        Linear light, float32.
+
+    Raises
+    ------
+    ValueError
+        Unless the motion gives one pose for each row.
+
+    References
+    ----------
+    E. Ringaby and P.-E. Forssén, Efficient video rectification and stabilisation for cell-phones, Int. J. Comput. Vis.
+    96 (2012).
+
+    Examples
+    --------
+    An upright edge leans when the camera glides to the left, by f / z · 0.5 m = 1 pixel a row:
+
+    >>> from camviz.cameras import Camera
+    >>> from camviz import Intrinsics
+    >>> from camviz.scenes import Rectangle, Scene, Texture
+    >>> wall = Rectangle((0, -9, 2), (9, 0, 0), (0, 18, 0), Texture.plain((1, 1, 1)))
+    >>> scene, camera = Scene([wall], sky=Texture.plain((0, 0, 0))), Camera(Intrinsics.from_fov(8, 3, 90))
+    >>> rolling_picture(scene, camera, gliding(camera, (-1, 0, 0)), row_s=0.5)[..., 0]
+    array([[0., 0., 0., 0., 1., 1., 1., 1.],
+           [0., 0., 0., 0., 0., 1., 1., 1.],
+           [0., 0., 0., 0., 0., 0., 1., 1.]], dtype=float32)
     """
     poses = motion(row_times(camera.intrinsics.height, row_s, exposure_s))
     origins, directions = rolling_rays(camera, poses)
@@ -148,8 +364,35 @@ def rolling_picture(
 
 
 def gliding(camera: Camera, velocity_m_per_s: ArrayLike) -> Callable[[Array], RigidTransform]:
-    """The motion of a camera that starts where it stands, and moves with that velocity (3,) in the world."""
-    velocity = np.asarray(velocity_m_per_s, dtype=float)
+    """The motion of a camera that starts where it stands, and moves with a constant velocity.
+
+    Parameters
+    ----------
+    camera : Camera
+        Where it starts and looks.
+    velocity_m_per_s : array_like (3,)
+        In the world, in metres per second.
+
+    Returns
+    -------
+    callable
+        Gives the poses world_from_cam at times (n,) in seconds.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera
+    >>> from camviz import Intrinsics
+    >>> motion = gliding(Camera(Intrinsics.from_fov(4, 3, 90)), (0, 0, 2))
+    >>> motion(np.array([0, 0.5])).translation
+    array([[0., 0., 0.],
+           [0., 0., 1.]])
+    """
+    velocity = as_points(velocity_m_per_s, 3, "velocity_m_per_s")
     start, rotation = camera.centre, camera.world_from_cam.rotation
 
     def motion(times: Array) -> RigidTransform:

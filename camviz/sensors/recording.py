@@ -34,7 +34,15 @@ _LAYOUT = (
 
 
 class RecordingError(ValueError):
-    """Frames that cannot be measured; the message is one sentence that says which and why."""
+    """Frames that cannot be measured; the message is one sentence that says which and why.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> read_recording(Path("nowhere"))
+    Traceback (most recent call last):
+    camviz.sensors.recording.RecordingError: nowhere: there is no such folder or descriptor file.
+    """
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,30 @@ class Shot:
 
 @dataclass(frozen=True)
 class Recording:
-    """All shots of a camera at one setting: pairs for the photon transfer, and at most one stack of either kind."""
+    """All shots of a camera at one setting: pairs for the photon transfer, and at most one stack of either kind.
+
+    Attributes
+    ----------
+    source : Path
+        The folder or descriptor file.
+    pairs : tuple of Shot
+        Two frames of one light each.
+    bright_stack, dark_stack : Shot, optional
+        Many frames of one light.
+    release : float
+        Of the standard that the data were taken for.
+    size : tuple of int, optional
+        Width and height in pixels, where they were said.
+
+    Examples
+    --------
+    >>> from math import nan
+    >>> from pathlib import Path
+    >>> from camviz.sensors.recording import Shot
+    >>> shot = Shot(exposure_s=0.01, photons=nan, frames=(Path("bright_10_0.png"), Path("bright_10_1.png")))
+    >>> Recording(Path("."), pairs=(shot,)).with_photons_per_ms(200).pairs[0].photons
+    2000.0
+    """
 
     source: Path
     pairs: tuple[Shot, ...]
@@ -62,7 +93,18 @@ class Recording:
     size: tuple[int, int] | None = field(default=None)  # width, height, where it was said
 
     def with_photons_per_ms(self, photons_per_ms: float) -> Recording:
-        """The same with the light known: photons per pixel and millisecond of exposure."""
+        """The same with the light known.
+
+        Parameters
+        ----------
+        photons_per_ms : float
+            Per pixel and millisecond of exposure.
+
+        Returns
+        -------
+        Recording
+            Its dark shots stay dark.
+        """
 
         def lit(shot: Shot) -> Shot:
             return shot if shot.dark else replace(shot, photons=photons_per_ms * shot.exposure_s * 1000)
@@ -71,8 +113,39 @@ class Recording:
         return replace(self, pairs=tuple(map(lit, self.pairs)), bright_stack=stack)
 
 
-def read_recording(path: Path) -> Recording:
-    """The recording in a folder, or that a descriptor file lists. RecordingError in one sentence."""
+def read_recording(path: str | Path) -> Recording:
+    """The recording in a folder, or that a descriptor file lists.
+
+    In a folder: bright_<exposure ms>_0.png, bright_<exposure ms>_1.png, dark_<exposure ms>_0.png and …_1.png, PNG or
+    TIFF; where an exposure has more than two frames of a kind, these are also its stack. A descriptor is one of the
+    emva1288 project, `.txt`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder or the descriptor file.
+
+    Returns
+    -------
+    Recording
+        Its frames are not yet read.
+
+    Raises
+    ------
+    RecordingError
+        In one sentence, for what is not there, is not complete or has another name.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cv2
+    >>> Path("ten_ms").mkdir()
+    >>> for name in ("bright_10_0", "bright_10_1", "dark_10_0", "dark_10_1"):
+    ...     assert cv2.imwrite(f"ten_ms/{name}.png", np.zeros((8, 8), np.uint16))
+    >>> [(shot.exposure_s, shot.dark) for shot in read_recording(Path("ten_ms")).pairs]
+    [(0.01, False), (0.01, True)]
+    """
+    path = Path(path)
     if path.is_file():
         return _described(path)
     if not path.is_dir():
@@ -87,7 +160,42 @@ def read_recording(path: Path) -> Recording:
 
 
 def measure(recording: Recording) -> Measurement:
-    """Read all the frames, one shot at a time, and measure. RecordingError in one sentence."""
+    """Read all the frames of a recording, one shot at a time, and measure.
+
+    Parameters
+    ----------
+    recording : Recording
+        As `read_recording` gives it.
+
+    Returns
+    -------
+    Measurement
+        Of the camera.
+
+    Raises
+    ------
+    RecordingError
+        In one sentence, for frames that cannot be read or measured.
+
+    References
+    ----------
+    EMVA Standard 1288, release 4.0 linear (2021).
+
+    Examples
+    --------
+    A simulated camera of 0.4 DN per electron, 1 to 8 ms:
+
+    >>> from pathlib import Path
+    >>> import cv2
+    >>> from itertools import product
+    >>> sensor, rng, folder = Sensor(gain_dn_per_e=0.4), np.random.default_rng(0), Path("one_to_eight_ms")
+    >>> folder.mkdir()
+    >>> for ms, number, (kind, photons) in product(range(1, 9), (0, 1), (("bright", 1500), ("dark", 0))):
+    ...     frame = sensor.expose(np.full((64, 64), photons * ms), ms / 1000, 20, rng).dn
+    ...     assert cv2.imwrite(f"{folder}/{kind}_{ms}_{number}.png", frame)
+    >>> round(measure(read_recording(folder)).gain_dn_per_e, 1)
+    0.4
+    """
     reader = _Reader(recording.size)
     darks = {shot.exposure_s: _pair(shot, reader) for shot in recording.pairs if shot.dark}
     levels = []

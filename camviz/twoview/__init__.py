@@ -1,6 +1,6 @@
 """Two-view geometry: what one picture says about another. After Hartley & Zisserman (2004), parts II and III.
 
-Everything takes and gives arrays and `Camera`s. Left and right are named as in a stereo rig, but any two views will do.
+Everything takes and gives arrays and cameras. Left and right are named as in a stereo rig, but any two views will do.
 """
 
 from camviz.twoview.epipolar import (

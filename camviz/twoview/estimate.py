@@ -9,15 +9,46 @@ from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation
-from camviz.twoview.epipolar import sampson_distance, to_homogeneous
+from camviz.twoview.epipolar import sampson_distance, singular_values, to_homogeneous
 from camviz.twoview.triangulate import ray_distances
 
 
 def eight_point(uv_left: ArrayLike, uv_right: ArrayLike, normalised: bool = True) -> Array:
-    """F (3, 3) of 8 or more corresponding pixels (n, 2), of unit norm (Hartley & Zisserman 2004, algorithm 11.1).
+    """The fundamental matrix of 8 or more pairs of pixels, by the eight-point algorithm.
 
-    `normalised=False` leaves out Hartley's normalisation, to show what it is for. Pairs with a NaN are left out.
-    Raises ValueError for fewer than 8 pairs, and where they leave F undetermined (all points on one plane, say).
+    Parameters
+    ----------
+    uv_left, uv_right : array_like (n, 2)
+        Corresponding pixels; pairs with a NaN are left out.
+    normalised : bool
+        False leaves out Hartley's normalisation, to show what it is for.
+
+    Returns
+    -------
+    array (3, 3)
+        Of rank 2 and unit norm, its largest entry positive.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 8 pairs, and where they leave F undetermined (all points on one plane, say).
+
+    References
+    ----------
+    Hartley & Zisserman (2004), algorithm 11.1.
+
+    Examples
+    --------
+    Without noise it satisfies every pair:
+
+    >>> from camviz.poses import RigidTransform, Rotation
+    >>> from camviz import Camera, Intrinsics
+    >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
+    >>> right = left.at(RigidTransform.from_components([0.5, 0.1, 0], Rotation.from_rotvec([0, -0.1, 0])))
+    >>> points = np.random.default_rng(0).uniform((-1, -1, 3), (1, 1, 6), (20, 3))
+    >>> x, y = left.project(points), right.project(points)
+    >>> float(sampson_distance(eight_point(x, y), x, y).max().round(6))
+    0.0
     """
     uv_left, uv_right = _pairs(uv_left, uv_right)
     T_left, T_right = np.eye(3), np.eye(3)
@@ -28,9 +59,38 @@ def eight_point(uv_left: ArrayLike, uv_right: ArrayLike, normalised: bool = True
 
 
 def linear_fundamental(uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
-    """The F (3, 3) of unit norm with the least Σ (x_rightᵀ F x_left)² over 8 or more pairs (n, 2) (section 11.1).
+    """The F with the least Σ (x_rightᵀ F x_left)².
 
-    Nothing makes its rank 2 yet: its epipolar lines do not quite meet. Raises ValueError as `eight_point`.
+    Nothing makes its rank 2 yet: its epipolar lines do not quite meet.
+
+    Parameters
+    ----------
+    uv_left, uv_right : array_like (n, 2)
+        8 or more pairs of corresponding pixels; pairs with a NaN are left out.
+
+    Returns
+    -------
+    array (3, 3)
+        Of unit norm, its largest entry positive.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 8 pairs, and where they leave F undetermined.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 11.1.
+
+    Examples
+    --------
+    Of pixels that are off by half a pixel it has rank 3:
+
+    >>> rng = np.random.default_rng(0)
+    >>> left = rng.uniform(0, 500, (20, 2))
+    >>> right = left + np.c_[rng.uniform(-50, 0, 20), rng.normal(0, 0.5, 20)]
+    >>> bool(np.linalg.svd(linear_fundamental(left, right))[1][2] > 1e-9)
+    True
     """
     uv_left, uv_right = _pairs(uv_left, uv_right)
     x_left, x_right = to_homogeneous(uv_left), to_homogeneous(uv_right)
@@ -43,8 +103,39 @@ def linear_fundamental(uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
 
 
 def normalising_transform(uv: ArrayLike) -> Array:
-    """T (3, 3) that takes the centroid of pixels (n, 2) to 0 and their mean distance from it to √2 (section 4.4.4)."""
+    """The transform that takes the centroid of pixels to 0 and their mean distance from it to √2.
+
+    Parameters
+    ----------
+    uv : array_like (n, 2)
+        In pixels.
+
+    Returns
+    -------
+    array (3, 3)
+        It acts on homogeneous pixels.
+
+    Raises
+    ------
+    ValueError
+        For points that coincide, and another shape.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 4.4.4.
+
+    Examples
+    --------
+    The corners of a square of 200 pixels lie 100 √2 from its middle:
+
+    >>> normalising_transform([[0, 0], [200, 0], [200, 200], [0, 200]]).round(6)
+    array([[ 0.01,  0.  , -1.  ],
+           [ 0.  ,  0.01, -1.  ],
+           [ 0.  ,  0.  ,  1.  ]])
+    """
     uv = as_points(uv, 2, "uv")
+    if uv.ndim != 2:
+        raise ValueError(f"uv must have shape (n, 2), got {uv.shape}")
     centroid = uv.mean(axis=0)
     mean_distance = np.linalg.norm(uv - centroid, axis=1).mean()
     if not mean_distance > 0:
@@ -54,14 +145,64 @@ def normalising_transform(uv: ArrayLike) -> Array:
 
 
 def nearest_rank_two(F: ArrayLike) -> Array:
-    """The matrix (3, 3) of rank 2 nearest to F in Frobenius norm: its smallest singular value set to 0."""
-    U, s, Vt = np.linalg.svd(np.asarray(F, dtype=float))
+    """The matrix of rank 2 nearest to F in Frobenius norm: its smallest singular value set to 0.
+
+    Parameters
+    ----------
+    F : array_like (3, 3)
+        A matrix on any scale.
+
+    Returns
+    -------
+    array (3, 3)
+        A fundamental matrix, on the scale of F.
+
+    Raises
+    ------
+    ValueError
+        For another shape, and numbers that are not finite.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 11.1.1.
+
+    Examples
+    --------
+    >>> nearest_rank_two(np.diag([3, 2, 1])).diagonal().round(9)
+    array([3., 2., 0.])
+    """
+    U, s, Vt = singular_values(F, "F")
     return U @ np.diag([s[0], s[1], 0]) @ Vt
 
 
 def nearest_essential(E: ArrayLike) -> Array:
-    """The essential matrix (3, 3) nearest to E: two equal singular values and a zero (section 11.7.3)."""
-    U, s, Vt = np.linalg.svd(np.asarray(E, dtype=float))
+    """The essential matrix nearest to E in Frobenius norm: two equal singular values and a zero.
+
+    Parameters
+    ----------
+    E : array_like (3, 3)
+        A matrix on any scale.
+
+    Returns
+    -------
+    array (3, 3)
+        An essential matrix, on the scale of E.
+
+    Raises
+    ------
+    ValueError
+        For another shape, and numbers that are not finite.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 11.7.3.
+
+    Examples
+    --------
+    >>> nearest_essential(np.diag([2, 1, 0.1])).diagonal().round(9)
+    array([1.5, 1.5, 0. ])
+    """
+    U, s, Vt = singular_values(E, "E")
     return U @ np.diag([(s[0] + s[1]) / 2, (s[0] + s[1]) / 2, 0]) @ Vt
 
 
@@ -73,14 +214,59 @@ def ransac_fundamental(
     confidence: float = 0.999,
     max_samples: int = 5000,
 ) -> tuple[Array, np.ndarray]:
-    """F (3, 3) of the pairs (n, 2) that agree on one, and the mask (n,) of those pairs (algorithm 11.4).
+    """The fundamental matrix of the pairs that agree on one, and which these are.
 
-    A pair agrees when its Sampson distance is below `threshold_px` pixels. Samples of 8 pairs are drawn until one free
-    of outliers has come with probability `confidence` (eq. 4.18). Raises ValueError where no 8 pairs agree.
+    A pair agrees when its Sampson distance is below the threshold. Samples of 8 pairs are drawn until one free of
+    outliers has come with a probability of `confidence`.
+
+    Parameters
+    ----------
+    uv_left, uv_right : array_like (n, 2)
+        Pairs in pixels, some of them wrong; a pair with a NaN agrees with none.
+    threshold_px : float
+        In pixels.
+    rng : numpy.random.Generator
+        Draws the samples.
+    confidence : float
+        Between 0 and 1.
+    max_samples : int
+        The most samples.
+
+    Returns
+    -------
+    F : array (3, 3)
+        Of unit norm, fitted to all pairs that agreed with the best sample.
+    agrees : array (n,)
+        True for pairs that agree with F.
+
+    Raises
+    ------
+    ValueError
+        Where no 8 pairs agree, and for a confidence outside (0, 1).
+
+    References
+    ----------
+    Hartley & Zisserman (2004), algorithm 11.4 and eq. 4.18.
+
+    Examples
+    --------
+    Of 20 pairs the first 5 are off by 30 pixels:
+
+    >>> from camviz.poses import RigidTransform, Rotation
+    >>> from camviz import Camera, Intrinsics
+    >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
+    >>> right = left.at(RigidTransform.from_components([0.5, 0.1, 0], Rotation.from_rotvec([0, -0.1, 0])))
+    >>> points = np.random.default_rng(0).uniform((-1, -1, 3), (1, 1, 6), (20, 3))
+    >>> matched = right.project(points) + np.where(np.arange(20) < 5, 30, 0)[:, None]
+    >>> F, agrees = ransac_fundamental(left.project(points), matched, 1.0, np.random.default_rng(1))
+    >>> np.flatnonzero(~agrees)
+    array([0, 1, 2, 3, 4])
     """
-    uv_left, uv_right = as_points(uv_left, 2, "uv_left"), as_points(uv_right, 2, "uv_right")
-    known = np.flatnonzero(np.isfinite(uv_left).all(axis=-1) & np.isfinite(uv_right).all(axis=-1))
+    if not 0 < confidence < 1:
+        raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
     _pairs(uv_left, uv_right)
+    uv_left, uv_right = np.asarray(uv_left, dtype=float), np.asarray(uv_right, dtype=float)
+    known = np.flatnonzero(np.isfinite(uv_left).all(axis=-1) & np.isfinite(uv_right).all(axis=-1))
     best, needed, drawn = np.zeros(len(uv_left), dtype=bool), max_samples, 0
     while drawn < needed:
         drawn += 1
@@ -107,11 +293,39 @@ def _samples_needed(inlier_share: float, confidence: float) -> int:
 
 
 def decompose_essential(E: ArrayLike) -> list[RigidTransform]:
-    """The four motions right_from_left = [R | t], |t| = 1, that have the essential matrix ±E (3, 3) (Result 9.19).
+    """The four motions that have the essential matrix ±E.
 
     E = U diag(1, 1, 0) Vᵀ: R is U W Vᵀ or U Wᵀ Vᵀ, t is the last column of U or its opposite. `recover_pose` chooses.
+
+    Parameters
+    ----------
+    E : array_like (3, 3)
+        The essential matrix, on any scale.
+
+    Returns
+    -------
+    list of RigidTransform
+        right_from_left = [R | t] with ‖t‖ = 1.
+
+    Raises
+    ------
+    ValueError
+        Where E has not two singular values above zero.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), result 9.19.
+
+    Examples
+    --------
+    A step to the right, to the left, and both with half a turn about the baseline:
+
+    >>> from camviz.poses import RigidTransform
+    >>> motions = decompose_essential(essential(RigidTransform.from_translation([-1, 0, 0])))
+    >>> sorted((float(each.translation[0].round()), float(each.rotation.magnitude().round(2))) for each in motions)
+    [(-1.0, 0.0), (-1.0, 3.14), (1.0, 0.0), (1.0, 3.14)]
     """
-    U, s, Vt = np.linalg.svd(np.asarray(E, dtype=float))
+    U, s, Vt = singular_values(E, "E")
     if not s[1] > 0:
         raise ValueError(f"E must have two equal singular values and a zero, got {s.tolist()}")
     U, Vt = U * np.sign(np.linalg.det(U)), Vt * np.sign(np.linalg.det(Vt))
@@ -121,13 +335,40 @@ def decompose_essential(E: ArrayLike) -> list[RigidTransform]:
 
 
 def recover_pose(E: ArrayLike, rays_left: ArrayLike, rays_right: ArrayLike) -> RigidTransform:
-    """right_from_left with |t| = 1: of E's four motions, the one with most points in front of both cameras.
+    """Of E's four motions, the one with most points in front of both cameras.
 
-    `rays_left` and `rays_right` are corresponding unit rays (n, 3), each in its own camera's frame, through any lens:
-    `camera.lens.unproject(camera.intrinsics.from_pixels(uv))`. Raises ValueError where two motions have equally many.
+    Parameters
+    ----------
+    E : array_like (3, 3)
+        The essential matrix, on any scale.
+    rays_left, rays_right : array_like (n, 3)
+        Corresponding unit rays, each in its own camera's frame, through any lens:
+        `camera.lens.unproject(camera.intrinsics.from_pixels(uv))`.
+
+    Returns
+    -------
+    RigidTransform
+        right_from_left with ‖t‖ = 1.
+
+    Raises
+    ------
+    ValueError
+        Where two motions have equally many.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 9.6.3.
+
+    Examples
+    --------
+    >>> from camviz.poses import RigidTransform
+    >>> points, step = np.array([[0, 0, 4], [1, 0, 5], [0, 1, 3.0]]), np.array([-1, 0, 0])
+    >>> rays = [seen / np.linalg.norm(seen, axis=1)[:, None] for seen in (points, points + step)]
+    >>> recover_pose(essential(RigidTransform.from_translation(step)), *rays).translation.round(9) + 0
+    array([-1.,  0.,  0.])
     """
     motions = decompose_essential(E)
-    in_front = [(ray_distances(motion, rays_left, rays_right) > 0).all(axis=-1).sum() for motion in motions]
+    in_front = [int((ray_distances(motion, rays_left, rays_right) > 0).all(axis=-1).sum()) for motion in motions]
     runner_up, winner = np.argsort(in_front, kind="stable")[-2:]
     if in_front[winner] == in_front[runner_up]:
         raise ValueError(f"the points do not tell E's four motions apart: in front of both cameras lie {in_front}")

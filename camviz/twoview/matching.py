@@ -12,6 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from camviz.lenses.base import Array
 
 METHODS = ("SGM", "BM", "SGM + WLS")
+"""The matchers that `disparity` knows.
+
+>>> METHODS
+('SGM', 'BM', 'SGM + WLS')
+"""
 _UNIQUE = 5  # per cent by which the best match must beat the second best
 _SPECKLE = (100, 2)  # patches of fewer pixels, of disparities that differ by no more than this, are taken out
 _SMOOTHNESS, _EDGES = 800.0, 1.0  # of the filter: λ, and the grey levels over 255 that count as an edge, times 100
@@ -25,17 +30,52 @@ def disparity(
     disparities: int = 64,
     block_size: int = 5,
 ) -> NDArray[np.float32]:
-    """d = u_left − u_right (height, width) in pixels of the left picture's pixels; NaN where no match was found.
+    """The disparity d = u_left − u_right of every pixel of a rectified pair, by OpenCV's matchers.
 
-    `left` and `right` are a rectified pair, uint8 RGB (height, width, 3) or grey (height, width). d is sought from 0 to
-    `disparities` − 1, so that the first `disparities` columns have none. Methods: "BM", block matching by the sum of
-    absolute differences (Konolige 1998); "SGM", semi-global matching (Hirschmüller 2008); "SGM + WLS", the same in both
-    directions, filtered along the left picture's edges by weighted least squares (Min et al. 2014), which fills holes.
-    Raises ValueError for pictures of different sizes, and for what OpenCV does not take.
+    d is sought from 0 to `disparities` − 1, so that the first `disparities` columns have none. "BM" is block matching
+    by the sum of absolute differences (Konolige); "SGM" semi-global matching (Hirschmüller); "SGM + WLS" the same in
+    both directions, filtered along the left picture's edges by weighted least squares (Min), which fills holes.
+
+    Parameters
+    ----------
+    left, right : array (height, width) or (height, width, 3)
+        A rectified pair, grey or sRGB, uint8.
+    method : {"SGM", "BM", "SGM + WLS"}
+        One of METHODS.
+    disparities : int
+        A multiple of 16, less than the width.
+    block_size : int
+        Odd, in pixels; at least 5 for "BM".
+
+    Returns
+    -------
+    array (height, width)
+        In pixels of the left picture, float32; NaN where no match was found.
+
+    Raises
+    ------
+    ValueError
+        For pictures of different sizes, and for what OpenCV does not take.
+
+    References
+    ----------
+    K. Konolige, Small vision systems: hardware and implementation, Robotics Research (1998); H. Hirschmüller, Stereo
+    processing by semiglobal matching and mutual information, IEEE Trans. Pattern Anal. Mach. Intell. 30 (2008); D. Min
+    et al., Fast global image smoothing based on weighted least squares, IEEE Trans. Image Process. 23 (2014).
+
+    Examples
+    --------
+    Noise that was moved by 7 pixels:
+
+    >>> left = np.random.default_rng(0).integers(0, 256, (48, 96), dtype=np.uint8)
+    >>> np.nanmedian(disparity(left, np.roll(left, -7, axis=1), disparities=16))
+    np.float32(7.0)
     """
-    if left.shape[:2] != right.shape[:2] or left.dtype != np.uint8 or right.dtype != np.uint8:
+    left, right = np.asarray(left), np.asarray(right)
+    are_pictures = all(one.dtype == np.uint8 and (one.ndim == 2 or one.shape[2:] == (3,)) for one in (left, right))
+    if not are_pictures or left.shape[:2] != right.shape[:2]:
         raise ValueError(
-            f"left and right must be uint8 pictures of one size, got {left.dtype} {left.shape} "
+            f"left and right must be uint8 pictures of one size, RGB or grey, got {left.dtype} {left.shape} "
             f"and {right.dtype} {right.shape}"
         )
     if method not in METHODS:
@@ -56,10 +96,24 @@ def disparity(
 
 @dataclass(frozen=True)
 class MatchingScore:
-    """How disparities compare with the true ones, over the `compared` pixels whose truth is known.
+    """How disparities compare with the true ones.
 
-    `missing` is the share without a disparity, `bad` the share that has none or one that is off by more than the
-    threshold, and `mean_error` the mean |d − d_true| in pixels of those that have one.
+    Attributes
+    ----------
+    compared : int
+        Pixels whose truth is known; the rest are shares of them.
+    missing : float
+        The share without a disparity.
+    bad : float
+        The share that has none, or one that is off by more than the threshold.
+    mean_error : float
+        The mean distance from the truth in pixels, of those that have one.
+
+    Examples
+    --------
+    >>> score = MatchingScore(compared=200, missing=0.25, bad=0.5, mean_error=0.8)
+    >>> round(score.compared * (score.bad - score.missing))  # how many are wrong
+    50
     """
 
     compared: int
@@ -69,10 +123,36 @@ class MatchingScore:
 
 
 def matching_score(disparity: ArrayLike, truth: ArrayLike, threshold: float = 1.0) -> MatchingScore:
-    """The score of disparities (...) against true ones (...) in pixels, NaN = none and not known.
+    """The score of disparities against true ones; a missing pixel counts as bad.
 
-    The bad-pixel rate is that of Scharstein & Szeliski (2002, eq. 2), with missing pixels counted as bad. Its shares
-    are NaN where nothing can be compared.
+    Parameters
+    ----------
+    disparity, truth : array_like (...)
+        In pixels; NaN = none, and not known.
+    threshold : float
+        In pixels: what is off by more is bad.
+
+    Returns
+    -------
+    MatchingScore
+        Its shares are NaN where nothing can be compared.
+
+    Raises
+    ------
+    ValueError
+        For two different shapes.
+
+    References
+    ----------
+    D. Scharstein and R. Szeliski, A taxonomy and evaluation of dense two-frame stereo correspondence algorithms, Int.
+    J. Comput. Vis. 47 (2002), eq. 2.
+
+    Examples
+    --------
+    One right, one off by half a pixel, one missing, and one wrong:
+
+    >>> matching_score([1, 2, np.nan, 9], [1, 2.5, 3, 5])
+    MatchingScore(compared=4, missing=0.25, bad=0.5, mean_error=1.5)
     """
     found, true = np.asarray(disparity, dtype=float), np.asarray(truth, dtype=float)
     if found.shape != true.shape:
@@ -90,12 +170,42 @@ def matching_score(disparity: ArrayLike, truth: ArrayLike, threshold: float = 1.
 
 
 def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tolerance: float = 1.0) -> Array:
-    """The left disparities (height, width), NaN where the right picture's disagree by more than `tolerance` pixels.
+    """The left disparities on which both pictures agree.
 
     Pixel u of the left row says that its partner is u − d; the partner's own disparity must lead back. It does not for
-    points that only one camera sees, nor for most wrong matches. Both are positive for points in front of the cameras.
+    points that only one camera sees, nor for most wrong matches.
+
+    Parameters
+    ----------
+    disparity_left, disparity_right : array_like (height, width)
+        In pixels, both positive for points in front of the cameras.
+    tolerance : float
+        In pixels.
+
+    Returns
+    -------
+    array (height, width)
+        In pixels; NaN where they disagree by more.
+
+    Raises
+    ------
+    ValueError
+        For two different shapes.
+
+    References
+    ----------
+    Szeliski (2022), section 12.4.1.
+
+    Examples
+    --------
+    The last pixel's partner, three to the left, says 1:
+
+    >>> left_right_check([[np.nan, 1, 1, 3]], [[1, 1, 3, 3]])
+    array([[nan,  1.,  1., nan]])
     """
     found, back = np.asarray(disparity_left, dtype=float), np.asarray(disparity_right, dtype=float)
+    if found.shape != back.shape or found.ndim < 1:
+        raise ValueError(f"the two disparities must have one shape (height, width), got {found.shape} and {back.shape}")
     u = np.arange(found.shape[-1]) - found
     inside = (u > -0.5) & (u < found.shape[-1] - 0.5)
     partner = np.take_along_axis(back, np.where(inside, np.rint(u), 0).astype(int), axis=-1)

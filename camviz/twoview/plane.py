@@ -13,11 +13,31 @@ UNDETERMINED = 1e-10  # of the largest singular value: below this is rounding
 
 
 def homography(xy: ArrayLike, uv: ArrayLike) -> Array:
-    """H (3, 3) with H[2, 2] = 1 from points (n, 2) of a plane to pixels (n, 2), by DLT on normalised coordinates.
+    """The homography from points of a plane to pixels, by DLT on normalised coordinates: λ (u, v, 1)ᵀ = H (x, y, 1)ᵀ.
 
-    λ (u, v, 1)ᵀ = H (x, y, 1)ᵀ. Points with a NaN are left out. Raises ValueError for fewer than four points, or when
-    they leave H undetermined (Hartley & Zisserman 2004, algorithm 4.2).
+    Parameters
+    ----------
+    xy : array_like (n, 2)
+        Points of the plane in any unit, or of another picture of it in pixels.
+    uv : array_like (n, 2)
+        Their pixels; a pair with a NaN is left out.
 
+    Returns
+    -------
+    array (3, 3)
+        H, with H[2, 2] = 1.
+
+    Raises
+    ------
+    ValueError
+        For fewer than four points, or when they leave H undetermined.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), algorithm 4.2.
+
+    Examples
+    --------
     >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     >>> H = homography(square, 100 * square + [20, 30])
     >>> np.allclose(H, [[100, 0, 20], [0, 100, 30], [0, 0, 1]])

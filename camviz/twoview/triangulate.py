@@ -14,10 +14,44 @@ from camviz.twoview.epipolar import from_homogeneous, projection_matrix
 
 
 def triangulate(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
-    """World points (..., 3) nearest to the rays of pixels uvs[i] (..., 2) of cameras[i], under any lens.
+    """World points nearest to the rays of pixels, under any lens.
 
-    Minimises the sum of squared distances to the rays: for two views, the midpoint of their common perpendicular.
-    NaN where the rays are parallel (a point at infinity), diverge (they meet behind a camera), or do not exist.
+    It minimises the sum of squared distances to the rays: for two views, the point is the midpoint of their common
+    perpendicular.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        2 or more, in different places.
+    uvs : array_like (cameras, ..., 2)
+        uvs[i] are pixels of cameras[i].
+
+    Returns
+    -------
+    array (..., 3)
+        In metres; NaN where the rays are parallel (a point at infinity), diverge (they meet behind a camera), or do not
+        exist.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 2 cameras, cameras all in one place, and pixels that are not one array for each camera.
+
+    References
+    ----------
+    Szeliski (2022), section 11.2.4.
+
+    Examples
+    --------
+    A disparity of 10 pixels, with f = 500 and B = 0.1 m, is f B / d = 5 m away:
+
+    >>> from camviz.cameras import Camera
+    >>> from camviz.poses import RigidTransform
+    >>> from camviz import Intrinsics
+    >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
+    >>> right = left.at(RigidTransform.from_translation([0.1, 0, 0]))
+    >>> triangulate([left, right], [[320, 240], [310, 240]]).round(6) + 0
+    array([0., 0., 5.])
     """
     uvs = _views(cameras, uvs)
     rays = _rays(cameras, uvs)
@@ -30,10 +64,40 @@ def triangulate(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
 
 
 def triangulate_linear(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
-    """World points (..., 3) by the direct linear transform on perspective cameras (section 12.2): A X = 0.
+    """World points by the direct linear transform on perspective cameras: A X = 0.
 
-    NaN and ValueError as `triangulate`, and ValueError for any lens but Perspective. It minimises no distance in
-    particular; `refine_points` does.
+    It minimises no distance in particular; `refine_points` does.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        2 or more, in different places, with perspective lenses.
+    uvs : array_like (cameras, ..., 2)
+        uvs[i] are pixels of cameras[i].
+
+    Returns
+    -------
+    array (..., 3)
+        In metres; NaN as of `triangulate`.
+
+    Raises
+    ------
+    ValueError
+        As of `triangulate`, and for any lens that bends.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 12.2.
+
+    Examples
+    --------
+    >>> from camviz.cameras import Camera
+    >>> from camviz.poses import RigidTransform
+    >>> from camviz import Intrinsics
+    >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
+    >>> right = left.at(RigidTransform.from_translation([0.1, 0, 0]))
+    >>> triangulate_linear([left, right], [[320, 240], [310, 240]]).round(6) + 0
+    array([0., 0., 5.])
     """
     uvs = _views(cameras, uvs)
     P = np.stack([projection_matrix(camera) for camera in cameras])
@@ -46,10 +110,45 @@ def triangulate_linear(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
 
 
 def refine_points(cameras: Sequence[Camera], uvs: ArrayLike, points_world: ArrayLike, steps: int = 20) -> Array:
-    """World points (..., 3) moved to the least sum of squared reprojection errors, under any lens.
+    """World points moved to the least sum of squared reprojection errors, under any lens, by Gauss–Newton.
 
-    Gauss–Newton from `points_world` (..., 3), say from `triangulate` (the optimum of section 12.5, by iteration). NaN
-    where it has not settled to 1e-7 of the point's distance after `steps`.
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        2 or more, in different places.
+    uvs : array_like (cameras, ..., 2)
+        uvs[i] are pixels of cameras[i].
+    points_world : array_like (..., 3)
+        Where to begin, in metres, say from `triangulate`.
+    steps : int
+        At most so many.
+
+    Returns
+    -------
+    array (..., 3)
+        In metres; NaN where a point has not settled to 1e-7 of its distance.
+
+    Raises
+    ------
+    ValueError
+        As of `triangulate`.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 12.5, whose optimum it finds by iteration.
+
+    Examples
+    --------
+    Rows that differ by 1 pixel are met half way, by 0.5 pixels in either picture:
+
+    >>> from camviz.cameras import Camera
+    >>> from camviz.poses import RigidTransform
+    >>> from camviz import Intrinsics
+    >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
+    >>> right = left.at(RigidTransform.from_translation([0.1, 0, 0]))
+    >>> point = refine_points([left, right], [[320, 240], [310, 241]], points_world=[0, 0, 4.9])
+    >>> left.project(point).round(3), right.project(point).round(3)
+    (array([320. , 240.5]), array([310. , 240.5]))
     """
     uvs, points = _views(cameras, uvs), as_points(points_world, 3, "points_world")
     centre = np.mean([camera.centre for camera in cameras], axis=0)
@@ -64,10 +163,37 @@ def refine_points(cameras: Sequence[Camera], uvs: ArrayLike, points_world: Array
 
 
 def ray_distances(right_from_left: RigidTransform, rays_left: ArrayLike, rays_right: ArrayLike) -> Array:
-    """Distances (..., 2) along the left and the right ray (..., 3) to where the two come nearest to each other.
+    """Distances along two rays to where they come nearest to each other.
 
-    Rays are unit vectors, each in its own camera's frame. A negative distance lies behind its camera; parallel rays
-    give inf or NaN.
+    Parameters
+    ----------
+    right_from_left : RigidTransform
+        Between the two cameras' frames, in any unit of length.
+    rays_left, rays_right : array_like (..., 3)
+        Unit vectors, each in its own camera's frame.
+
+    Returns
+    -------
+    array (..., 2)
+        Along the left and the right ray, in the transform's unit; negative behind a camera, inf or NaN for parallel
+        rays.
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+
+    References
+    ----------
+    Szeliski (2022), section 11.2.4.
+
+    Examples
+    --------
+    A ray straight ahead, and one from 1 m to the right that leans by 45° to the left:
+
+    >>> from camviz.poses import RigidTransform
+    >>> ray_distances(RigidTransform.from_translation([-1, 0, 0]), [0, 0, 1], np.array([-1, 0, 1]) / 2**0.5)
+    array([1.        , 1.41421356])
     """
     # Normal equations of  λ_right b − λ_left a = t  with a = R r_left, b = r_right
     a, b = rotate(right_from_left.rotation, rays_left), as_points(rays_right, 3, "rays_right")
