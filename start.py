@@ -3,6 +3,7 @@
     python start.py                 open the lessons in JupyterLab
     python start.py --light         the same without VTK, 600 MB smaller: 3D is drawn as wireframes
     python start.py test            run the tests: the package's, and every lesson from top to bottom
+    python start.py site            build the site, every lesson with it, in build/site
     python start.py COMMAND ...     any other command of camviz, such as: doctor, show FILE
 
 --light may stand before a command, too; what is installed already is not taken away.
@@ -22,10 +23,10 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 STAMP = VENV / "camviz-setup.txt"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-READER, TESTER = ROOT / "requirements.lock", ROOT / "requirements-test.lock"
+READER, SITE, TESTER = (ROOT / f"requirements{what}.lock" for what in ("", "-site", "-test"))
 SOLID = ("pyvista", "vtk")  # what --light leaves out
-LARGER = ("light", "reader", "test")  # each holds the one before
-SIZE = {"light": "0.7 GB", "reader": "1.3 GB", "test": "1.9 GB"}
+LARGER = ("light", "reader", "site", "test")  # each holds the one before
+SIZE = {"light": "0.7 GB", "reader": "1.3 GB", "site": "1.4 GB", "test": "1.9 GB"}
 TESTS = ("-m", "pytest", "-n", "auto", "--dist", "loadscope")
 
 
@@ -35,15 +36,17 @@ def main(words):
         return 0
     light = words[:1] == ["--light"]
     words = words[light:]
-    testing = words[:1] == ["test"]
-    set_up("test" if testing else "light" if light else "reader")
-    if testing:
+    special = words[0] if words and words[0] in ("site", "test") else ""
+    set_up(special or ("light" if light else "reader"))
+    if special == "test":
         return run(PYTHON, *TESTS, *words[1:], cwd=ROOT)
+    if special == "site":
+        return run(PYTHON, ROOT / "website/build.py", *words[1:], cwd=ROOT)
     return run(PYTHON, "-m", "camviz", *(words or ["lab"]))
 
 
 def set_up(what):
-    """Make .venv hold what the locks say for "light", "reader" or "test"; at once and offline when it already does."""
+    """Make .venv hold what the locks say for one of LARGER; at once and offline when it already does."""
     held = STAMP.read_text().split() if STAMP.exists() else []
     current = held[:1] == [fingerprint()]
     if current and LARGER.index(held[1]) >= LARGER.index(what):
@@ -70,7 +73,7 @@ def set_up(what):
 def locked(what):
     """The locks of what is to be installed; for "light" a copy of the reader's without what draws solid 3D."""
     if what != "light":
-        return [READER, TESTER] if what == "test" else [READER]
+        return [READER, SITE, TESTER][: LARGER.index(what)]
     entries = re.split(r"\n(?=\S)", READER.read_text())
     light = VENV / "light.lock"
     light.write_text("\n".join(each for each in entries if each.split("==")[0] not in SOLID))
@@ -88,7 +91,7 @@ def make_venv():
 
 def fingerprint():
     """What the installation depends on: the lock, the package's metadata, this Python and this place."""
-    parts = [(ROOT / name).read_bytes() for name in (READER.name, TESTER.name, "pyproject.toml")]
+    parts = [(ROOT / name).read_bytes() for name in (READER.name, SITE.name, TESTER.name, "pyproject.toml")]
     parts += [sys.version.encode(), sys.base_prefix.encode(), str(ROOT).encode()]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()
 

@@ -1,0 +1,249 @@
+"""The built site in a real browser: every pane moves, every page is whole, and nobody else is asked for anything.
+
+`python start.py site` builds it before; CAMVIZ_SITE names another folder than build/site.
+"""
+
+import os
+import re
+import threading
+from collections.abc import Iterator
+from functools import partial
+from html import unescape
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from axe_playwright_python.base import AXE_SCRIPT
+from laboratory import ROOT
+from playwright.sync_api import Browser, Page
+
+from camviz.course.questions import predict_questions, quiz_questions
+
+pytestmark = pytest.mark.browser
+
+SITE = Path(os.environ.get("CAMVIZ_SITE", ROOT / "build/site"))
+LESSONS = sorted(path.stem for path in (ROOT / "lessons").glob("*.ipynb"))
+HANDS = (Path(__file__).with_name("hands.js")).read_text(encoding="utf-8")
+WAITING = tuple(f": {name} changes nothing" for name in ("hold", "dolly_zoom", "scale"))  # alone: they need another
+REPORTS = SITE / "engineers/reports"  # each a whole page in one file, as camviz inspect writes it
+READ = ("index", "learn", "search", "docs/clinic", "about", "docs/glossary", "api/index", "lessons/05_distortion")
+SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
+ADDRESS = re.compile(r'<[a-z][^<>]*?\s(?:href|src)="([^"]*)"')
+LOADED = re.compile(r'<(?:script|img|iframe|link)[^<>]*?\s(?:src|href)="([^"]*)"')
+AXE = """async () => {
+  const { violations } = await axe.run(document, { resultTypes: ["violations"], preload: false });
+  return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 160)}`));
+}"""
+TO_BOTH_ENDS = """async () => {
+  const wrong = [], panes = [...document.querySelectorAll(".camviz-recorded")];
+  let changed = 0;
+  for (const pane of panes) {
+    pane.scrollIntoView();
+    for (let i = 0; i < 400 && !pane.dataset.live; i++) await hands.pause(25);
+    const root = pane.querySelector(".camviz-explorer");
+    if (!root) { wrong.push(`${pane.ariaLabel} stands still`); continue; }
+    await hands.settled(root);
+    for (const name of hands.controls(root)) {
+      const before = await hands.picture(root);
+      let other = false;
+      for (const end of [0, 1]) {
+        hands.move(root, name, end);
+        await hands.settled(root);
+        other ||= (await hands.picture(root)) !== before;
+        if (hands.error(root)) wrong.push(`${pane.ariaLabel}, ${name} at ${end}: ${hands.error(root)}`);
+      }
+      hands.reset(root);
+      await hands.settled(root);
+      changed += other;
+      if (!other) wrong.push(`${pane.ariaLabel}: ${name} changes nothing`);
+    }
+  }
+  return { panes: panes.length, changed, wrong };
+}"""
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_: object) -> None:
+        """Nothing."""
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    if not (SITE / "index.html").exists():
+        pytest.fail(f"{SITE} has no index.html: build the site first, by python start.py site")
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(SITE)))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+class Watched:
+    """A page, what it complains of, and whom it asks for what."""
+
+    def __init__(self, browser: Browser, address: str, **options) -> None:
+        self.page: Page = browser.new_page(**options)
+        self.address = address
+        self.complaints: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("response", lambda got: self.complaints.append(got.url) if got.status >= 400 else None)
+
+    def open(self, way: str) -> Page:
+        self.page.goto(f"{self.address}/{way}.html")
+        return self.page
+
+    @property
+    def strangers(self) -> list[str]:
+        """What was asked of anybody else."""
+        return [url for url in self.asked if not url.startswith((self.address, "data:", "blob:"))]
+
+
+@pytest.fixture
+def watched(browser: Browser, address: str) -> Iterator[Watched]:
+    one = Watched(browser, address, viewport={"width": 1280, "height": 900})
+    yield one
+    one.page.close()
+    assert one.complaints == []
+    assert one.strangers == []
+
+
+@pytest.mark.parametrize("way", ["index", *(f"lessons/{name}" for name in LESSONS)])
+def test_every_control_of_every_pane_goes_to_both_ends(watched: Watched, way: str) -> None:
+    page = watched.open(way)
+    page.evaluate(HANDS)
+    page.mouse.move(5, 5)
+    done = page.evaluate(TO_BOTH_ENDS)
+    assert [one for one in done["wrong"] if not one.endswith(WAITING)] == []
+    assert done["panes"] >= 1
+
+
+@pytest.mark.parametrize("way", READ)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_is_without_fault_for_axe(watched: Watched, way: str, scheme: str) -> None:
+    watched.page.emulate_media(color_scheme=scheme)
+    page = watched.open(way)
+    page.wait_for_timeout(300)
+    page.evaluate(AXE_SCRIPT)
+    assert page.evaluate(AXE) == []
+
+
+def test_a_phone_scrolls_no_page_sideways(browser: Browser, address: str) -> None:
+    phone = Watched(browser, address, viewport={"width": 375, "height": 812}, has_touch=True)
+    for way in (*READ, *(f"lessons/{name}" for name in LESSONS)):
+        page = phone.open(way)
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= 375, way
+    phone.page.close()
+
+
+def test_an_answer_is_replied_to_kept_and_cleared(watched: Watched) -> None:
+    page = watched.open("lessons/05_distortion")
+    question = predict_questions("05")[0]
+    wrong = 1 - question.answer if question.answer < 2 else 0
+    card = page.locator(".camviz-question", has_text="Predict").first
+    card.locator("input").nth(wrong).check()
+    card.get_by_role("button", name="Commit").click()
+    assert "Not this one." in card.inner_text()
+    page.reload()
+    assert "You answered this earlier." in card.inner_text()
+    page.goto(f"{watched.address}/learn.html")
+    shown = page.locator('.lesson-progress[data-lesson="05"]')
+    total = len(predict_questions("05")) + len(quiz_questions("05"))
+    assert shown.inner_text() == f"1 of {total} questions answered"
+    page.get_by_role("button", name="Clear my answers").click()
+    assert shown.inner_text() == ""
+    page.goto(f"{watched.address}/lessons/05_distortion.html")
+    assert "You answered this earlier." not in card.inner_text()
+
+
+def test_a_quiz_before_and_after_the_lesson_ends_with_looking_back(watched: Watched) -> None:
+    page = watched.open("lessons/05_distortion")
+    for title, form in (("What do you think now?", "A"), ("Exit quiz", "B")):
+        quiz = page.locator(".camviz-question", has_text=title).first
+        for number, question in enumerate(quiz_questions("05", form)):
+            card = quiz.locator(".camviz-card").nth(number)
+            card.locator("input").nth(question.answer).check()
+            card.get_by_role("button", name="Commit").click()
+            assert ("Correct." in card.inner_text()) == (form == "B")
+    count = len(quiz_questions("05"))
+    assert f"{count} of {count} right at the first try." in quiz.inner_text()
+    assert f"Before the lesson: {len(quiz_questions('05', 'A'))} of" in quiz.inner_text()
+
+
+def test_a_term_shows_its_sentence_to_pointer_and_keyboard(watched: Watched) -> None:
+    page = watched.open("lessons/05_distortion")
+    term = page.locator("a.term").first
+    term.hover()
+    page.locator(".term-card").wait_for()
+    page.keyboard.press("Escape")
+    assert page.locator(".term-card").count() == 0
+    term.focus()
+    page.locator(".term-card").wait_for()
+
+
+def test_without_scripts_a_lesson_has_stills_and_folded_replies(browser: Browser, address: str) -> None:
+    page = browser.new_context(java_script_enabled=False).new_page()
+    page.goto(f"{address}/lessons/05_distortion.html")
+    stills = page.locator(".camviz-recorded img")
+    assert stills.count() >= 6
+    assert all(stills.nth(i).get_attribute("alt") for i in range(stills.count()))
+    reply = page.locator(".camviz-folded details").first
+    assert not reply.locator("blockquote").is_visible()
+    reply.locator("summary").click()
+    assert reply.locator("blockquote").is_visible()
+    page.close()
+
+
+def test_a_printed_lesson_has_pictures_and_no_solution(watched: Watched) -> None:
+    page = watched.open("lessons/05_distortion")
+    page.emulate_media(media="print")
+    assert page.locator(".camviz-solution").count() >= 4
+    assert not any(one.is_visible() for one in page.locator(".camviz-solution, .camviz-exercise details").all())
+    assert page.locator(".camviz-recorded").first.is_visible()
+
+
+def test_a_site_opened_as_a_file_moves_too(browser: Browser) -> None:
+    page = browser.new_page()
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto((SITE / "index.html").as_uri())
+    page.mouse.move(5, 5)
+    page.locator('.camviz-recorded[data-live="true"]').wait_for()
+    page.goto((SITE / "lessons/05_distortion.html").as_uri())
+    page.locator(".camviz-question").first.wait_for()
+    assert complaints == []
+    page.close()
+
+
+def test_search_finds_a_lesson_by_a_word(watched: Watched) -> None:
+    watched.page.goto(f"{watched.address}/search.html?q=pincushion")
+    watched.page.locator('#search-results a[href*="05_distortion"]').first.wait_for()
+
+
+def test_no_link_within_the_site_is_broken() -> None:
+    pages = {path: re.sub(SCRIPT, "", path.read_text(encoding="utf-8")) for path in SITE.rglob("*.html")}
+    names = {path: set(re.findall(r'\sid="([^"]*)"', text)) for path, text in pages.items()}
+    broken = []
+    for path, text in pages.items():
+        for address in set(re.findall(ADDRESS, text)):
+            link = urlsplit(unescape(address))
+            if link.scheme:
+                assert link.scheme in ("https", "http", "mailto", "data"), address
+                continue
+            target = (path.parent / unquote(link.path)).resolve() if link.path else path
+            lost = bool(link.fragment) and unquote(link.fragment) not in names.get(target, {unquote(link.fragment)})
+            if lost or not target.exists():
+                broken.append(f"{path.relative_to(SITE)}: {address}")
+    assert broken == []
+
+
+def test_the_site_keeps_its_budget() -> None:
+    """Whole at most 200 MB; a page's words at most 600 kB, a report's apart; no page loads anything of another host."""
+    assert sum(path.stat().st_size for path in SITE.rglob("*") if path.is_file()) <= 200e6
+    for path in SITE.rglob("*.html"):
+        assert path.stat().st_size <= 600e3 or path.parent == REPORTS, path
+        loaded = re.findall(LOADED, re.sub(SCRIPT, "", path.read_text(encoding="utf-8")))
+        assert [one for one in loaded if urlsplit(one).netloc] == [], path

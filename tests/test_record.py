@@ -1,0 +1,231 @@
+"""A recording holds what the kernel would have answered, within its budget, and says what does not fit."""
+
+import json
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import anywidget
+import numpy as np
+import pytest
+import traitlets
+
+from camviz.draw.picture import Picture, jpeg
+from camviz.record import Axis, Budget, BudgetError, Recording, Widget, record
+from camviz.record.packing import Images, Pack
+from camviz.record.panes import Explored
+from camviz.views.base import View, choice, slider, switch
+from camviz.views.readout import ReadoutView
+from camviz.widgets import explore
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+from smallest import Smallest
+
+
+@dataclass(frozen=True)
+class Toy(View):
+    """A view whose picture says its state, with a photograph of each size; it refuses sizes above 8."""
+
+    title = "Toy"
+    size: float = slider(1.0, 0, 10, 0.5)
+    height: float = slider(0.0, 0, 1, 0.01)
+    colour: str = choice("red", "blue", "green")
+    lit: bool = switch(True)
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        if self.size > 8:
+            raise ValueError("size must be at most 8")
+        words = f"size {self.size:g}, height {self.height:g}, {self.colour}, {self.lit}"
+        body = '<rect x="0" y="0" width="300" height="200" data-drag="size"/><image href="attached:photo"/>'
+        body += f'<text x="5" y="20" class="label">{words}</text><text x="5" y="38">below</text>'
+        photo = jpeg(np.full((8, 8, 3), int(20 * self.size), np.uint8))
+        return Picture.whole(body, 300, 200, "Toy", words, {"photo": photo})
+
+    def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
+        return self.but(size=min(max(self.size + dx / 30, 0.0), 10.0))
+
+
+def content(made: Recording) -> dict[str, Any]:
+    """What the pack holds."""
+    text = (made.folder / made.pack).read_text(encoding="utf-8")
+    return json.loads(re.fullmatch(r'camvizRecorded\("[^"]+",(.*)\);\n', text, re.DOTALL)[1])
+
+
+def unpacked(value: Any, pieces: list[str], unit: float) -> Any:
+    """What was packed, in tiles of that many picture units a CSS pixel."""
+    if isinstance(value, list):
+        return [unpacked(one, pieces, unit) for one in value]
+    if not isinstance(value, dict):
+        return value
+    if "$text" in value:
+        runs = value["$text"]
+        return "".join("".join(pieces[at : at + count]) for at, count in zip(runs[::2], runs[1::2], strict=True))
+    if "$joined" in value:
+        return "".join(unpacked(value["$joined"], pieces, unit))
+    if "$tile" in value:
+        fitting = [text for at, text in zip(value["units"], value["texts"], strict=True) if at <= unit]
+        return unpacked(fitting[-1], pieces, unit)
+    if "$image" in value:
+        return value["$image"]
+    return {name: unpacked(one, pieces, unit) for name, one in value.items()}
+
+
+def states(made: Recording, unit: float = 1.0) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """Each recorded position, as its values, and its frame."""
+    held = content(made)
+    first = {axis["name"]: axis["first"] for axis in held["axes"]}
+    found = []
+    for sheet in held["sheets"]:
+        grid = np.indices([len(values) for values in sheet["values"]]).reshape(len(sheet["axes"]), -1).T
+        for places, frame in zip(grid, sheet["frames"], strict=True):
+            moved = {name: all_[at] for name, all_, at in zip(sheet["axes"], sheet["values"], places, strict=True)}
+            found.append((first | moved, unpacked(held["frames"][frame], held["pieces"], unit)))
+    return found
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0])
+def test_every_frame_is_what_the_view_draws_for_its_values(tmp_path, unit):
+    explorer = explore(Toy(), together=("height", "lit"))
+    assert Toy().figure().flow({"Toy": 2.0}) != Toy().figure().flow()  # where it is shown small, words make room
+    made = record(explorer, tmp_path, budget=Budget(slider=5, grid=3))
+    found = states(made, unit)
+    for values, frame in found:
+        if values["size"] <= 8:
+            picture = Toy(**values).figure()
+            assert frame["frame"]["html"] == picture.flow({"Toy": unit})
+            assert frame["frame"]["described"] == picture.description
+            assert frame["frame"]["error"] == ""
+        assert frame["values"] == values or values["size"] > 8
+    assert len({tuple(values.values()) for values, _ in found}) == made.positions
+
+
+def test_a_state_that_cannot_be_drawn_is_told_in_the_words_of_the_pane(tmp_path):
+    made = record(explore(Toy(), "size"), tmp_path)
+    (told,) = [frame["frame"]["error"] for values, frame in states(made) if values["size"] == 10]
+    assert told == "size must be at most 8"
+
+
+def test_axes_alone_keep_the_others_at_first_and_those_together_are_combined(tmp_path):
+    made = record(explore(Toy(), together=("height", "colour")), tmp_path, budget=Budget(slider=6, grid=4))
+    found = [values for values, _ in states(made)]
+    assert {(v["height"], v["colour"]) for v in found} >= {(h, c) for h in (0, 1) for c in ("red", "blue", "green")}
+    assert {v["lit"] for v in found} == {True, False}
+    assert all(v["size"] == 1.0 for v in found if v["height"] or v["colour"] != "red" or not v["lit"])
+    assert made.counts == {"size": 6, "height": 6, "colour": 3, "lit": 2}
+
+
+def test_a_sliders_positions_hold_both_ends_the_first_value_and_only_steps():
+    axis = Axis.slider("k", -1.0, 1.0, 0.01, 0.333)
+    assert len(axis.values) == 41
+    assert (axis.values[0], axis.values[-1]) == (-1.0, 1.0)
+    assert {one for one in axis.values if abs(one * 100 - round(one * 100)) > 1e-9} == {0.333}
+    for count in (3, 5, 8, 15, 31):
+        thinned = axis.thinned(count)
+        assert len(thinned) == count
+        assert {-1.0, 0.333, 1.0} < set(thinned) <= set(axis.values) or count == 3
+    assert Axis.slider("n", 1, 4, 1, 2).values == (1, 2, 3, 4)
+
+
+def test_photographs_are_files_of_their_own_each_once(tmp_path):
+    first = record(explore(Toy(), "size"), tmp_path)
+    again = record(explore(Toy(colour="blue"), "size"), tmp_path)
+    photographs = [name for name in first.files if name.endswith(".webp")]
+    drawn = {values["size"] for values, _ in states(first) if values["size"] <= 8}
+    assert len(photographs) == len(drawn)
+    assert set(photographs) == {name for name in again.files if name.endswith(".webp")}
+    assert (tmp_path / photographs[0]).read_bytes()[:4] == b"RIFF"
+    assert b"data:image" not in (tmp_path / first.pack).read_bytes()
+
+
+def test_recording_again_gives_the_same_files(tmp_path):
+    made = [record(explore(Toy(), "height"), tmp_path / name) for name in "ab"]
+    assert made[0].files == made[1].files
+
+
+@dataclass(frozen=True)
+class Noisy(Toy):
+    """A view that cannot be compressed."""
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        rng = np.random.default_rng(int(1000 * self.height) + 17)
+        return Picture.whole(f"<path d='{rng.bytes(20_000).hex()}'/>", 10, 10, "Noisy", f"height {self.height:g}")
+
+
+def test_positions_are_thinned_until_the_size_holds(tmp_path):
+    made = record(explore(Noisy(), "height"), tmp_path, budget=Budget(size=400_000))
+    assert made.size <= 400_000
+    assert 8 <= made.counts["height"] < 41
+    heights = [values["height"] for values, _ in states(made)]
+    assert (heights[0], heights[-1]) == (0, 1)
+
+
+def test_what_cannot_be_held_is_said_in_a_sentence(tmp_path):
+    with pytest.raises(
+        BudgetError, match=r"^Toy: its fewest positions, \d+, do not fit into 0.03 MB: they take 0.1 MB.$"
+    ):
+        record(explore(Noisy(), "height"), tmp_path / "large", budget=Budget(size=30_000))
+    with pytest.raises(BudgetError, match=r"^Toy: its fewest positions, \d+, do not fit into 0 s of a processor.$"):
+        record(explore(Toy()), tmp_path / "slow", budget=Budget(seconds=0))
+    assert not [*(tmp_path / "large").glob("*.js")]
+
+
+def test_together_names_controls_that_are_shown():
+    with pytest.raises(ValueError, match="together must name controls that are shown, size, got 'height'"):
+        explore(Toy(), "size", together=("size", "height"))
+
+
+def test_any_widget_is_recorded_by_what_its_kernel_answers(tmp_path):
+    made = record(Widget(Smallest(), (Axis.slider("x", 0.0, 100.0, 0.1, 0.0, most=5),), "A dot"), tmp_path)
+    circles = [re.search(r'cx="([\d.]+)"', frame["svg"])[1] for _, frame in states(made)]
+    assert circles == ["0.0", "150.0", "300.0", "450.0", "600.0"]
+    assert content(made)["traits"] == {}
+    assert (made.folder / made.files[1]).read_text().count("render") >= 1
+
+
+class Doubled(anywidget.AnyWidget):
+    """A widget whose page sets a trait, and whose kernel answers with another."""
+
+    _esm = "export default { render({ model, el }) {} }"
+    x = traitlets.Int(1).tag(sync=True)
+    twice = traitlets.Int(2).tag(sync=True)
+
+    @traitlets.observe("x")
+    def _follow(self, change: dict[str, int]) -> None:
+        self.twice = 2 * change["new"]
+
+
+def test_a_widget_that_is_moved_by_its_traits_is_recorded_too(tmp_path):
+    made = record(Widget(Doubled(), (Axis.slider("x", 0, 4, 1, 1),), "Doubled"), tmp_path)
+    assert [frame for _, frame in states(made)] == [{"x": x, "twice": 2 * x} for x in range(5)]
+
+
+def test_a_pull_is_learnt_as_the_view_answers_it():
+    does = Explored(explore(Toy(), "size")).traits["hands"]["size"]
+    direction, after = does["pulls"]["size"]
+    assert direction == "x"
+    assert after[24:27] == pytest.approx([1.0, 1 + 20 / 30, 1 + 40 / 30])
+    assert does["keys"] == {"ArrowRight": {"size": 1}, "ArrowLeft": {"size": -1}}
+    drawn = Explored(explore(ReadoutView(), "time")).traits["hands"]
+    assert [does["pulls"]["time"][0] for does in drawn.values()] == ["x"]
+
+
+def test_a_text_is_packed_without_loss_and_what_stays_is_kept_once():
+    pack, texts = Pack(), [f"<g>{'<line x=1/>' * 20}<text>{i}</text>plain {i}</g>" * 3 for i in range(3)]
+    packed = [pack.packed(one) for one in texts]
+    assert [unpacked(one, pack.pieces, 1.0) for one in packed] == texts
+    assert pack.pieces.count("<line x=1/>") == 1
+    assert len(Images().stored({"a": [1, "x"]})["a"]) == 2
+
+
+def test_the_still_on_the_page_has_its_words_and_sizes_and_is_outside_it(tmp_path):
+    made = record(explore(Toy(), "size"), tmp_path)
+    html = made.html("files/")
+    assert 'alt="Toy. size 1, height 0, red, True"' in html
+    assert 'loading="lazy" width="300" height="200"' in html
+    (name,) = re.findall(r'src="files/(\w+\.svg)"', html)
+    assert "data:image/webp;base64," in (tmp_path / name).read_text()
+    assert f'data-recording="files/{made.pack}" data-positions="{made.positions}"' in html
+    assert len(html) < 1500

@@ -1,0 +1,142 @@
+"""The site is the lessons: each page has every word, picture, question and reply of its notebook."""
+
+import json
+import re
+import sys
+from html import unescape
+from itertools import pairwise
+from pathlib import Path
+
+import nbformat
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "website"))
+
+import clips  # noqa: E402
+import pictures  # noqa: E402
+from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
+from links import on_site  # noqa: E402
+from scripts import question_script  # noqa: E402
+
+from camviz.course.exercises import exercises  # noqa: E402
+from camviz.course.glossary import glossary  # noqa: E402
+from camviz.course.material import lesson_paths  # noqa: E402
+from camviz.views.frustum import FrustumView  # noqa: E402
+from camviz.widgets import explore  # noqa: E402
+
+LESSONS = lesson_paths()
+PAGES = frozenset(path.relative_to(ROOT).as_posix() for path in [*LESSONS, *(ROOT / "docs").glob("*.md")])
+
+
+@pytest.fixture(scope="module", params=LESSONS, ids=lambda path: path.name[:2])
+def pair(request, tmp_path_factory):
+    """A lesson's notebook, and what the site makes its page from."""
+    page = LessonPage(request.param, ROOT, tmp_path_factory.mktemp("site"), PAGES, {})
+    return nbformat.read(request.param, 4), page.notebook(), page
+
+
+def words(text: str) -> list[str]:
+    """What a reader reads of Markdown or HTML: no tags, no addresses."""
+    without_links = re.sub(r"!?\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\([^()\s]+\)", r"\1", text)
+    return unescape(re.sub(r"<a class=\"term\"[^>]*>|</a>|<[^<>]+>", "", without_links)).split()
+
+
+def html_of(cell) -> str:
+    return "".join(output.get("data", {}).get("text/html", "") for output in cell.get("outputs", []))
+
+
+def test_a_page_has_the_cells_of_its_notebook_word_for_word(pair) -> None:
+    lesson, page, _ = pair
+    assert len(lesson.cells) == len(page.cells)
+    for cell, shown in zip(lesson.cells, page.cells, strict=True):
+        if cell.cell_type == "code":
+            assert shown.source == cell.source
+        else:
+            assert words(shown.source) == words(cell.source)
+
+
+def test_a_page_has_every_picture_of_its_notebook_with_its_words_as_a_file(pair) -> None:
+    lesson, page, made = pair
+    for cell, shown in zip(lesson.cells, page.cells, strict=True):
+        if cell.cell_type == "markdown" or asked_by(cell.source):
+            continue
+        html = html_of(shown)
+        assert "data:image" not in html
+        assert re.findall(r'alt="([^"]*)"', html_of(cell)) == re.findall(r'alt="([^"]*)"', html)
+        for name in re.findall(rf'src="\.\./{"_pictures"}/([^"]+)"', html):
+            assert (made.site / "_pictures" / name).stat().st_size > 100
+
+
+def test_a_page_has_every_question_with_all_choices_and_replies(pair) -> None:
+    """In the list for readers without scripts, and in what makes it live; before the lesson the list has no replies."""
+    lesson, page, _ = pair
+    asked = [(asked_by(cell.source), html_of(shown)) for cell, shown in zip(lesson.cells, page.cells, strict=True)]
+    asked = [(found, html) for found, html in asked if found]
+    assert len(asked) == sum(cell.source.startswith(("ask(", "quiz(")) for cell in lesson.cells)
+    for (questions, _, when), html in asked:
+        folded, data = html.split('<script type="application/json">')
+        told = json.loads(data.split("</script>")[0])
+        assert [one["name"] for one in told["questions"]] == [one.name for one in questions]
+        for question, one in zip(questions, told["questions"], strict=True):
+            assert [each["correct"] for each in one["choices"]] == [each.correct for each in question.choices]
+            for choice, each in zip(question.choices, one["choices"], strict=True):
+                reply, text = words(each["reply"]), words(each["text"])
+                assert reply == words_of_prose(choice.reply)
+                assert each["text"] in folded
+                assert text == words_of_prose(choice.text)
+                assert (each["reply"] in folded) == (when != "before")
+
+
+def words_of_prose(text: str) -> list[str]:
+    from camviz.course import prose
+
+    return words(prose.to_html(text))
+
+
+def test_an_exercise_has_its_hints_each_inside_the_one_before(pair) -> None:
+    _, page, made = pair
+    for name, exercise in exercises(made.path.name[:2]).items():
+        html = exercise_html(name, made.path.name)
+        assert html.count("<details>") == 4  # the way into JupyterLab, and three hints
+        assert html.endswith("</details></details></details></div>")
+        assert len(exercise.hints) == 3
+        assert any(html in html_of(cell) for cell in page.cells)
+
+
+def test_a_term_leads_to_the_glossary_and_a_file_that_is_no_page_to_github() -> None:
+    page = "lessons/05_distortion.ipynb"
+    link = on_site("a [ray](00_start_here.ipynb#ray), `[x](y.md)`", page, PAGES, ROOT)
+    assert link == 'a <a class="term" href="../docs/glossary.html#ray">ray</a>, `[x](y.md)`'
+    assert on_site("[next](06_calibration.ipynb)", page, PAGES, ROOT) == "[next](06_calibration.ipynb)"
+    assert "camviz/blob/main/LICENSE)" in on_site("[L](../LICENSE)", "docs/clinic.md", PAGES, ROOT)
+
+
+def test_every_term_that_a_lesson_links_is_in_the_glossary(pair) -> None:
+    _, page, made = pair
+    if made.path.name.startswith("00"):
+        return
+    linked = {
+        name for cell in page.cells for name in re.findall(r'class="term" href="[^"#]+#([^"]+)"', str(cell.source))
+    }
+    assert linked <= {one.anchor for one in glossary().terms}
+
+
+def test_pictures_with_one_content_are_one_file(tmp_path: Path) -> None:
+    image = '<img alt="a" src="data:image/png;base64,iVBORw0KGgo=">'
+    html = pictures.outside(image + image, tmp_path, "../p")
+    assert len(list(tmp_path.iterdir())) == 1
+    assert html.count('loading="lazy"') == 2
+
+
+def test_the_pages_script_is_the_notebooks_own() -> None:
+    source = (ROOT / "camviz/widgets/question.js").read_text(encoding="utf-8")
+    assert source.removesuffix("export default { render };\n") in question_script()
+
+
+def test_a_clip_begins_at_the_present_state_and_goes_to_both_ends(monkeypatch):
+    monkeypatch.setattr(clips, "_drawn", lambda view, values: values["hfov_deg"])
+    explorer = explore(FrustumView(hfov_deg=60), hfov_deg=(20, 120))
+    way = clips.moved(explorer)
+    assert (way[0], max(way), min(way)) == (60, 120, 20)
+    assert {abs(after - before) for before, after in pairwise([*way, way[0]])} == {5}

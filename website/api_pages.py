@@ -1,0 +1,71 @@
+"""The pages of the API reference: one for each part of the package that says what it offers."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from inspect import getdoc
+from pathlib import Path
+from types import GenericAlias, ModuleType
+
+import camviz
+
+PACKAGE = Path(camviz.__file__).parent
+
+
+def parts() -> list[str]:
+    """Every module of the package that says what it offers, by `__all__`."""
+    saying = [path for path in PACKAGE.rglob("*.py") if re.search(r"^__all__\b", path.read_text("utf-8"), re.MULTILINE)]
+    ways = (path.relative_to(PACKAGE.parent).with_suffix("").parts for path in saying)
+    return sorted(".".join(way).removesuffix(".__init__") for way in ways)
+
+
+PARTS = tuple(parts())
+
+
+def api_pages() -> dict[str, str]:
+    """The reference's contents and the page of each part, by their names."""
+    pages = {f"api/{name}.md": _part(name) for name in PARTS}
+    rows = "\n".join(f"| [{name}]({name}.md) | {_first_line(name)} |" for name in PARTS)
+    toctree = "\n".join(PARTS)
+    pages["api/index.md"] = (
+        "# API reference\n\nWhat each part of the package offers. Arrays have shapes such as (..., 2): any number of "
+        "leading axes. Symbols mean the same [everywhere](../lessons/conventions.md).\n\n"
+        f"| Part | What it is for |\n|---|---|\n{rows}\n\n```{{toctree}}\n:hidden:\n\n{toctree}\n```\n"
+    )
+    return pages
+
+
+def _first_line(name: str) -> str:
+    return (getdoc(import_module(name)) or "").split("\n\n")[0].replace("\n", " ").replace("|", "\\|")
+
+
+def offered(name: str) -> list[str]:
+    """The names that a part offers: not its parts, and not names for types, which Sphinx cannot show."""
+    module = import_module(name)
+    names = getattr(module, "__all__", None) or [
+        key for key, value in vars(module).items() if key[0] != "_" and getattr(value, "__module__", "") == name
+    ]
+    hidden = (ModuleType, GenericAlias)
+    return [one for one in names if one[0] != "_" and not isinstance(getattr(module, one), hidden)]
+
+
+def home(name: str, one: str) -> str:
+    """The part on whose page a name that `name` offers is explained: the one that defines it, if that offers it."""
+    module = getattr(getattr(import_module(name), one), "__module__", None) or name
+    defining = [part for part in PARTS if f"{module}.".startswith(f"{part}.") and one in offered(part)]
+    return max(defining, key=len, default=name)
+
+
+def _part(name: str) -> str:
+    """The page of a part: what it says of itself, and each name that it offers with the first line of its own page."""
+    homes = {one: home(name, one) for one in offered(name)}
+    own = [one for one, place in homes.items() if place == name]
+    elsewhere = [f"~{place}.{one}" for one, place in homes.items() if place != name]
+    rst = [f".. currentmodule:: {name}", f".. automodule:: {name}\n   :no-members:\n   :no-index:"]
+    rst += [_summary(own, "   :toctree: generated\n")] * bool(own) + [_summary(elsewhere)] * bool(elsewhere)
+    return f"# {name}\n\n```{{eval-rst}}\n" + "\n\n".join(rst) + "\n```\n"
+
+
+def _summary(names: list[str], toctree: str = "") -> str:
+    return f".. autosummary::\n{toctree}   :nosignatures:\n\n" + "\n".join(f"   {one}" for one in names)

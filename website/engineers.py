@@ -1,0 +1,32 @@
+"""The pages for engineers: the contents of docs/engineers, and the gallery's reports, written by its own script."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+FOLDER = "docs/engineers"
+REPORTS = "engineers/reports"
+"""Where the gallery's links say that its reports are."""
+
+
+def front(root: Path) -> str:
+    """The page that *Inspect a calibration* opens."""
+    return f"{FOLDER}/README" if (root / FOLDER / "README.md").exists() else "docs/clinic"
+
+
+def contents(root: Path) -> str:
+    """What makes the front page the head of the other pages, as Markdown."""
+    pages = [f"/{FOLDER}/{path.stem}" for path in sorted((root / FOLDER).glob("*.md"))]
+    others = [page for page in (*pages, "/docs/clinic", "/docs/formats") if page != f"/{front(root)}"]
+    listed = "\n".join(others)
+    return f"\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
+
+
+def write_reports(root: Path, site: Path) -> None:
+    """Write the gallery's reports into the site, unless they are there and newer than their script."""
+    script, folder = root / FOLDER / "gallery.py", site / REPORTS
+    made = max((path.stat().st_mtime for path in folder.glob("*.html")), default=0)
+    if script.exists() and script.stat().st_mtime > made:
+        subprocess.run([sys.executable, script, folder], check=True, cwd=root)

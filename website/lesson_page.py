@@ -1,0 +1,183 @@
+"""A lesson as a page: its notebook with live questions, recorded panes, hints to unfold and pictures as files.
+
+Text, code, pictures and answers are those of the notebook; nothing is written anew here.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+import pictures
+from links import REPOSITORY, on_site
+
+from camviz.course import prose
+from camviz.course.exercises import exercise
+from camviz.course.notebooks import Cell, Notebook, exercise_of, read
+from camviz.course.questions import Question, question, quiz_questions
+from camviz.widgets.question import LEAD
+
+PICTURES = "_pictures"
+_ASK = re.compile(r'^ask\("([\w.]+)"\)$')
+_QUIZ = re.compile(r'^quiz\("(\w+)"(?:, "(\w)")?\)$')
+_HINTS = ("Where to look", "What to use", "The line, with a gap")
+
+
+@dataclass(frozen=True)
+class LessonPage:
+    """The page of the notebook `path`. `panes` are the recorded panes of its cells, as HTML by the cell's number.
+
+    `site` is the folder of the built site, into which pictures go; `pages` are the sources of all pages.
+    """
+
+    path: Path
+    root: Path
+    site: Path
+    pages: Set[str]
+    panes: Mapping[int, str]
+
+    @property
+    def way(self) -> str:
+        """From the top of the repository."""
+        return self.path.relative_to(self.root).as_posix()
+
+    def notebook(self) -> Notebook:
+        """The notebook that MyST-NB makes the page from."""
+        notebook = read(self.path)
+        for number, cell in enumerate(notebook.cells):
+            if cell.cell_type == "markdown":
+                cell.source = self._text(cell)
+            elif cell.cell_type == "code":
+                self._output(cell, number)
+                if _is_folded(cell, number in self.panes):
+                    cell.metadata["tags"] = [*cell.metadata.get("tags", []), "hide-input"]
+        self._exercises(notebook)
+        notebook.metadata["lesson"] = self.path.name[:2]
+        return notebook
+
+    def _text(self, cell: Cell) -> str:
+        text = on_site(cell.source, self.way, self.pages, self.root)
+        if "solution" in cell.metadata.get("tags", []):
+            text = text.replace("<details>", '<details class="camviz-solution">', 1)
+        return text
+
+    def _output(self, cell: Cell, number: int) -> None:
+        asked = asked_by(cell.source)
+        for output in cell.get("outputs", []):
+            data = output.get("data", {})
+            if "text/html" not in data:
+                continue
+            html = pictures.outside(data["text/html"], self.site / PICTURES, f"../{PICTURES}")
+            if asked:
+                html = questions_html(*asked)
+            elif number in self.panes:
+                html = self.panes[number]
+            data["text/html"] = html
+            data.pop("text/plain", None)
+
+    def _exercises(self, notebook: Notebook) -> None:
+        for cell in notebook.cells:
+            if "stub" in cell.metadata.get("tags", []):
+                html = exercise_html(exercise_of(cell), self.path.name)
+                cell.outputs = [*cell.outputs, _html_output(html)]
+
+
+def _is_folded(cell: Cell, moves: bool) -> bool:
+    """Whether a reader of the page opens the code of a cell: of what only shows a question or a visualizer."""
+    return moves or "setup" in cell.metadata.get("tags", []) or asked_by(cell.source) is not None
+
+
+def asked_by(source: str) -> tuple[tuple[Question, ...], str, str] | None:
+    """The questions that a cell asks, their title, and when: "before", "during" or "after"; None for other cells."""
+    if found := _ASK.match(source.strip()):
+        return (question(found[1]),), "Predict", "during"
+    if found := _QUIZ.match(source.strip()):
+        form = found[2] or "B"
+        before = form == "A"
+        return (
+            quiz_questions(found[1], form),
+            "What do you think now?" if before else "Exit quiz",
+            ("before" if before else "after"),
+        )
+    return None
+
+
+def questions_html(asked: tuple[Question, ...], title: str, when: str) -> str:
+    """Questions as a page has them: a list with folded replies, which questions.js makes live from the data beside it.
+
+    What is asked before a lesson has no replies in the list, as in the notebook.
+    """
+    told = {
+        "title": title,
+        "lead": LEAD if when == "before" else "",
+        "when": when,
+        "lesson": asked[0].name.partition(".")[0],
+        "questions": [
+            {
+                "name": one.name,
+                "form": one.form,
+                "topic": one.topic,
+                "text": prose.to_html(one.text),
+                "choices": [
+                    {"text": prose.inline(each.text), "reply": prose.to_html(each.reply), "correct": each.correct}
+                    for each in one.choices
+                ],
+            }
+            for one in asked
+        ],
+    }
+    data = json.dumps(told, ensure_ascii=False).replace("<", "\\u003c")
+    lead = f"<p>{escape(told['lead'])}</p>" if told["lead"] else ""
+    return (
+        f'<div class="camviz-asked"><section class="camviz-folded"><p><strong>{escape(title)}</strong></p>{lead}'
+        f"{''.join(_folded(one, when == 'before') for one in asked)}</section>"
+        f'<script type="application/json">{data}</script></div>'
+    )
+
+
+def _folded(one: Question, silent: bool) -> str:
+    if silent:
+        choices = f"<ul>{''.join(f'<li>{prose.inline(each.text)}</li>' for each in one.choices)}</ul>"
+    else:
+        choices = "".join(
+            f"<details><summary>{prose.inline(each.text)}</summary><blockquote>"
+            f"<p><em>{'✓ Correct.' if each.correct else '✗ Not this one.'}</em></p>{prose.to_html(each.reply)}"
+            "</blockquote></details>"
+            for each in one.choices
+        )
+    return f"<div>{prose.to_html(one.text)}{choices}</div>"
+
+
+def exercise_html(name: str, file: str) -> str:
+    """Where an exercise can be done, and its hints, one after the other."""
+    hints = exercise(name).hints
+    folded = ""
+    for title, hint in reversed(list(zip(_HINTS, hints, strict=True))):  # each opens only inside the one before
+        folded = f"<details><summary>Hint: {title.lower()}</summary>{prose.to_html(hint)}{folded}</details>"
+    return (
+        f'<div class="camviz-exercise"><p>You write this function in a notebook, which checks it:</p>{doors(file)}'
+        f"{folded}</div>"
+    )
+
+
+def doors(file: str) -> str:
+    """The ways to a lesson's notebook."""
+    binder = f"https://mybinder.org/v2/gh/camviz/camviz/HEAD?urlpath=lab/tree/lessons/{file}"
+    mine = f"<code>camviz lab --lesson {file[:2]}</code>"
+    return (
+        f'<ul class="camviz-doors"><li><a href="{binder}">Binder</a></li>'
+        f'<li><a href="{file}" download>download</a></li>'
+        f"<li><details><summary>in your JupyterLab</summary><p>{mine} opens JupyterLab at this lesson. In a clone of "
+        f'<a href="{REPOSITORY}">the repository</a> it is <code>python start.py lab --lesson {file[:2]}</code>.</p>'
+        "</details></li></ul>"
+    )
+
+
+def _html_output(html: str) -> Cell:
+    import nbformat
+
+    return nbformat.v4.new_output("display_data", data={"text/html": html})

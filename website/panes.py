@@ -1,0 +1,172 @@
+"""The lessons' visualizers, recorded: each lesson is run once, and every explorer that a cell shows goes into files.
+
+A lesson is recorded again when its code, its material or a file of camviz that it has loaded is another one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+import multiprocessing
+import os
+import re
+import sys
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import clips
+
+RECORDINGS = "_recordings"
+SIZE = 1_200_000
+"""Bytes of a pane, as transferred: of more than a hundred, so that the whole site holds its own budget."""
+
+SLOWEST = 4
+"""How many times as long as others the slowest views may take."""
+
+HOME = "home"
+"""The name under which the living picture of the first page is kept, beside the lessons' numbers."""
+
+_HOME_CELL = """
+from camviz.views.frustum import FrustumView
+from camviz.widgets import explore
+explore(FrustumView(), "hfov_deg", "yaw_deg", "pitch_deg")
+"""
+
+
+class RecordingError(Exception):
+    """Lessons could not be recorded."""
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """Records notebooks into `folder`, and remembers in `cache` what came out. `seconds` is what one pane may take."""
+
+    root: Path
+    folder: Path
+    cache: Path
+    seconds: float
+
+    def record(self, notebooks: Iterable[Path]) -> None:
+        """Record the home page's picture and the panes of the notebooks, where that is not done; on all processors."""
+        wanted = {path.name[:2]: code_cells(path) for path in notebooks} | {HOME: {0: _HOME_CELL}}
+        stale = {name: cells for name, cells in wanted.items() if not self._is_fresh(name, cells)}
+        if not stale:
+            return
+        spawn = multiprocessing.get_context("spawn")  # a fresh interpreter each: a lesson leaves nothing to the next
+        workers = min(len(stale), os.cpu_count() or 1)
+        with ProcessPoolExecutor(workers, mp_context=spawn, max_tasks_per_child=1) as pool:
+            jobs = {pool.submit(record_cells, self, name, cells): name for name, cells in stale.items()}
+            for job in as_completed(jobs):
+                said = job.exception() or job.result()
+                print(f"{'not recorded' if job.exception() else 'recorded'} {jobs[job]}: {said}", flush=True)
+        if failed := sorted(name for job, name in jobs.items() if job.exception()):
+            raise RecordingError(f"not recorded: {', '.join(failed)}; above it says why")
+
+    def panes(self, name: str) -> dict[int, dict[str, Any]]:
+        """What is known of the panes of a lesson by the number of their cells: `html` and more; {} before recording."""
+        return {int(number): pane for number, pane in self._kept(name).get("panes", {}).items()}
+
+    def forget_others(self, names: Iterable[str]) -> None:
+        """Remove the files that no pane of the lessons `names` needs any more."""
+        needed = {file for name in names for pane in self.panes(name).values() for file in pane["files"]}
+        for path in self.folder.glob("*"):
+            if path.name not in needed:
+                path.unlink()
+
+    def keep(self, name: str, cells: dict[int, str], panes: dict[int, dict[str, Any]]) -> None:
+        """Remember what was recorded, and the files from which it was made."""
+        files = sorted(str(path.relative_to(self.root)) for path in _loaded(self.root, name))
+        told = {"made from": files, "fingerprint": self._fingerprint(cells, files), "panes": panes}
+        self.cache.mkdir(parents=True, exist_ok=True)
+        (self.cache / f"{name}.json").write_text(json.dumps(told), encoding="utf-8")
+
+    def _kept(self, name: str) -> dict[str, Any]:
+        path = self.cache / f"{name}.json"
+        return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
+
+    def _is_fresh(self, name: str, cells: dict[int, str]) -> bool:
+        kept = self._kept(name)
+        preview = self.folder.parent / clips.CLIPS / f"{name}.png"
+        there = preview.exists() and all(
+            (self.folder / file).exists() for pane in kept.get("panes", {}).values() for file in pane["files"]
+        )
+        return bool(kept) and there and kept["fingerprint"] == self._fingerprint(cells, kept["made from"])
+
+    def _fingerprint(self, cells: dict[int, str], files: list[str]) -> str:
+        made = hashlib.sha256(json.dumps([cells, self.seconds], sort_keys=True).encode())
+        for file in files:
+            path = self.root / file
+            made.update(file.encode() + (path.read_bytes() if path.exists() else b""))
+        return made.hexdigest()
+
+
+def code_cells(path: Path) -> dict[int, str]:
+    """The code of a notebook by the numbers of its cells."""
+    from camviz.course.notebooks import read
+
+    return {number: cell.source for number, cell in enumerate(read(path).cells) if cell.cell_type == "code"}
+
+
+def record_cells(recorder: Recorder, name: str, cells: dict[int, str]) -> str:
+    """Run the cells in this process and record each explorer that one shows; a line about what came out."""
+    panes: dict[int, dict[str, Any]] = {}
+    shown = _shown(recorder.root, cells)
+    clips.write([explorer for _, explorer in shown], name, recorder.folder.parent / clips.CLIPS)
+    for number, explorer in shown:
+        made = _recorded(explorer, recorder)
+        html = made.html(f"../{RECORDINGS}/" if name != HOME else f"{RECORDINGS}/")
+        panes[number] = {
+            "html": html,
+            "files": [*made.files, *re.findall(rf"{RECORDINGS}/(\w+\.svg)", html)],
+            "positions": made.positions,
+            "size": made.size,
+            "seconds": round(made.seconds, 1),
+        }
+    recorder.keep(name, cells, panes)
+    size, seconds = (sum(pane[what] for pane in panes.values()) for what in ("size", "seconds"))
+    return f"{len(panes)} panes, {size / 1e6:.1f} MB, {seconds:.0f} s"
+
+
+def _recorded(explorer: Any, recorder: Recorder) -> Any:
+    """The explorer recorded; the slowest views, whose fewest positions take longer than `seconds`, may take more."""
+    from camviz.record import Budget, BudgetError, record
+
+    try:
+        return record(explorer, recorder.folder, budget=Budget(SIZE, recorder.seconds))
+    except BudgetError:
+        return record(explorer, recorder.folder, budget=Budget(SIZE, SLOWEST * recorder.seconds))
+
+
+def _shown(root: Path, cells: dict[int, str]) -> list[tuple[int, Any]]:
+    """Each explorer that a cell shows, with the cell's number, as IPython shows it."""
+    os.environ |= {"CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "solid", "MPLBACKEND": "Agg"}
+    os.chdir(root / "lessons")
+    from IPython.core.interactiveshell import InteractiveShell
+
+    from camviz.widgets import Explorer
+
+    shell, shown = InteractiveShell.instance(), []
+    number = 0
+    shell.display_formatter.ipython_display_formatter.for_type(Explorer, lambda one: shown.append((number, one)))
+    for number, source in cells.items():
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            done = shell.run_cell(source, silent=False)
+        if not done.success:
+            raise RuntimeError(f"cell {number} failed: {printed.getvalue()[-2000:]}")
+        if "matplotlib.pyplot" in sys.modules:
+            sys.modules["matplotlib.pyplot"].close("all")  # as a notebook does: the next cell begins its own figure
+    return shown
+
+
+def _loaded(root: Path, name: str) -> set[Path]:
+    """The files on which what this process has drawn depends: modules, the package's data, the lesson's material."""
+    modules = {Path(module.__file__) for module in list(sys.modules.values()) if getattr(module, "__file__", None)}
+    data = {path for path in (root / "camviz").rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
+    material = {path for path in (root / "lessons/material" / name).glob("*") if path.is_file()}
+    return {path for path in modules if path.is_relative_to(root / "camviz")} | data | material
