@@ -12,7 +12,8 @@ import camviz
 from camviz import server
 from camviz.commands.common import LACKING, OK, Refusal, add_command
 from camviz.commands.terminal import tell
-from camviz.course.material import checkout_lessons, lessons_folder
+from camviz.course.catalogue import BEGINNING
+from camviz.course.material import checkout_lessons, lesson_paths, lessons_folder
 from camviz.course.working_copy import edition, lay_out
 
 LAB = """\
@@ -24,8 +25,9 @@ version of a lesson you did change is put beside it.
 
 def add(commands: Any) -> None:
     command = add_command(commands, "lab", lab, "open the lessons in JupyterLab", LAB)
-    command.usage = "camviz lab [-h] [--no-browser] [DIR] [-- JUPYTER-OPTIONS]"
+    command.usage = "camviz lab [-h] [--no-browser] [--lesson NN] [DIR] [-- JUPYTER-OPTIONS]"
     command.add_argument("directory", metavar="DIR", nargs="?", type=Path, help="where (default: ./camviz-lessons)")
+    command.add_argument("--lesson", metavar="NN", default=BEGINNING, help="open this lesson first, such as 05")
     command.add_argument("--no-browser", action="store_true", help="only serve them and print the address")
 
 
@@ -46,16 +48,19 @@ def lab(options: argparse.Namespace, beyond: list[str]) -> int:
     if hasattr(os, "geteuid") and os.geteuid() == 0 and "--allow-root" not in extra:
         tell("You are root, as one is in a container, so JupyterLab runs as root: what you run in it may do anything.")
         extra.append("--allow-root")
-    return _start_jupyter(folder.resolve(), extra)
+    first = sorted(folder.glob(f"{options.lesson}_*.ipynb"))
+    if not first and options.lesson != BEGINNING:
+        there = ", ".join(path.name[:2] for path in lesson_paths(folder))
+        raise Refusal(f"there is no lesson {options.lesson} in {folder}; there are {there}.")
+    return _start_jupyter(folder.resolve(), extra, first[:1])
 
 
-def _start_jupyter(folder: Path, extra: list[str]) -> int:
+def _start_jupyter(folder: Path, extra: list[str], first: list[Path]) -> int:
     """JupyterLab in this process, so that Ctrl-C and the terminal are its own."""
     from jupyterlab.labapp import LabApp
 
     if lessons := checkout_lessons():  # which need not be installed for its lessons to import it
         os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(lessons.parent), os.environ.get("PYTHONPATH")]))
     words = [f"--ServerApp.root_dir={folder}", f"--ServerApp.jpserver_extensions={server.__name__}=True", *extra]
-    first = sorted(folder.glob("00*.ipynb"))[:1]
-    LabApp.launch_instance([*words, *map(str, first)])
+    LabApp.launch_instance([*words, *(str(path.resolve()) for path in first)])
     return OK

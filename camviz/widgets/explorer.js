@@ -69,7 +69,7 @@ function render({ model, el }) {
   const watcher = new ResizeObserver(() => tellUnits(picture, told, ask));
   watcher.observe(picture);
   const refold = folding(picture);
-  const tell = announcer(model, picture, said);
+  const tell = announcer(model, said);
   const stopHands = hands(picture, ask);
   const stopWatching = watchKernel(model, (words) => {
     ask.stop();
@@ -84,7 +84,6 @@ function render({ model, el }) {
   model.on("change:frame", tell);
   showValues();
   showFrame();
-  tell();
   return () => {
     watcher.disconnect();
     stopHands();
@@ -135,17 +134,16 @@ function watchKernel(model, gone) {
 }
 
 // Tells a screen reader, once a state that was asked for here has rested, in which words its description differs.
-function announcer(model, picture, said) {
-  let before = null, timer = null;
+function announcer(model, said) {
+  let before = model.get("frame").described ?? "", timer = null;
   return () => {
     clearTimeout(timer);
     timer = setTimeout(() => {
       const { described, draft, answers } = model.get("frame");
-      const words = described ?? picture.querySelector("desc")?.textContent ?? "";
-      if (draft || words === before) return;
-      const known = new Set(before?.split("; "));
-      if (before !== null && answers) said.textContent = words.split("; ").filter((part) => !known.has(part)).join("; ");
-      before = words;
+      if (draft || !described) return;
+      const known = new Set(before.split("; "));
+      if (described !== before && answers) said.textContent = described.split("; ").filter((part) => !known.has(part)).join("; ");
+      before = described;
     }, TELL_MS);
   };
 }
@@ -214,11 +212,12 @@ function asker(model, root, late) {
 }
 
 // Photographs are loaded before the picture is replaced: no flash, no half-drawn state. They travel as data: addresses,
-// for a blob's address is resolved by another process, which takes longer than all the rest of this function.
+// for a blob's address is resolved by another process, which takes longer than all the rest of this function. On a page
+// without a kernel they are files, and come as addresses (record/replay.js).
 async function swap(picture, frame) {
   let html = frame.html;
   const loading = Object.entries(frame.photographs ?? {}).map(([name, data]) => {
-    const address = dataAddress(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
+    const address = typeof data === "string" ? data : dataAddress(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
     html = html.replaceAll(`"attached:${name}"`, `"${address}"`);
     return loaded(address);
   });

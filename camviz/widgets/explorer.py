@@ -49,13 +49,35 @@ class Explorer(StillWidget):
     shown, and `state` all fields of the view; each of them can be set. `value` is `view` by the name that
     `interactive_output` expects. A control whose name the widget needs itself has a "_" behind it: `view_`.
 
-    A number outside a control's range is held at its end, as the slider holds it; `set` goes beyond. ValueError says
-    what cannot be drawn, and the last good state stays.
+    A number outside a control's range is held at its end, as the slider holds it; `set` goes beyond. What cannot be
+    drawn is refused, and the last good state stays.
 
     The browser asks for one picture at a time and always for its newest wish, so a slow picture never builds a queue.
     What it asks for is checked: numbers are held within their ranges, whatever moves them. An error in drawing is shown
     in words above the last good picture. A button makes words twice as large for the back row; CAMVIZ_SCALE (1 to 3)
     does so from the start.
+
+    Parameters
+    ----------
+    view : View
+        The state to begin with.
+    controls : dict of str to Control
+        Those that are shown, by the fields that they change. `explore` makes them.
+    together : tuple of str, optional
+        Controls whose combinations `camviz.record` records.
+
+    Raises
+    ------
+    ValueError
+        For what cannot be drawn, when it is set.
+
+    Examples
+    --------
+    >>> from camviz.views.distortion import DistortionView
+    >>> explorer = explore(DistortionView(), "k1")
+    >>> explorer.k1 = -100  # the slider ends at -1
+    >>> explorer.view.k1, explorer.values
+    (-1.0, {'k1': -1.0})
     """
 
     _esm = (_HERE / "explorer.js").read_text(encoding="utf-8")
@@ -69,7 +91,8 @@ class Explorer(StillWidget):
     view = ViewTrait()
     value = ViewTrait()
 
-    def __init__(self, view: View, controls: dict[str, Control]) -> None:
+    def __init__(self, view: View, controls: dict[str, Control], together: tuple[str, ...] = ()) -> None:
+        self._together = together
         self._first, self._title, self._scale = view, view.title, _scale()
         self._units: dict[str, float] = {}  # picture units that make a CSS pixel, of each tile in the page
         self._controls = controls
@@ -87,9 +110,35 @@ class Explorer(StillWidget):
         stills_for_boxes()
 
     def set(self, **changes: Any) -> Explorer:
-        """Change the view's fields and redraw; errors are raised here, where the code is."""
+        """Change the view's fields and redraw, beyond the controls' ranges too.
+
+        Parameters
+        ----------
+        **changes
+            Fields of the view, and their values.
+
+        Returns
+        -------
+        Explorer
+            Itself.
+
+        Raises
+        ------
+        ValueError
+            For what cannot be drawn: it is raised here, where the code is.
+        """
         self._show(self.view.but(**changes), draft=False)
         return self
+
+    @property
+    def first(self) -> View:
+        """The state in which it was made, to which *Reset* returns."""
+        return self._first
+
+    @property
+    def together(self) -> tuple[str, ...]:
+        """The controls that belong together: a recording has every combination of their positions."""
+        return self._together
 
     @property
     def state(self) -> dict[str, Any]:
@@ -166,12 +215,23 @@ class Explorer(StillWidget):
 
     def _tell(self, error: Exception, answers: int) -> None:
         """Show an error above the last good picture."""
-        told = {"answers": answers, "draft": False, "error": self._in_words(error)}
+        told = {"answers": answers, "draft": False, "error": self.in_words(error)}
         self.set_trait("frame", {**self.frame, **told})
         self.log.warning("%s", "".join(traceback.format_exception(error)))
 
-    def _in_words(self, error: Exception) -> str:
-        """What an error says, the fields of the view by the words that stand beside their controls."""
+    def in_words(self, error: Exception) -> str:
+        """What an error says, the fields of the view by the words that stand beside their controls.
+
+        Parameters
+        ----------
+        error : Exception
+            What a view raised.
+
+        Returns
+        -------
+        str
+            One sentence for a reader.
+        """
         if not isinstance(error, ValueError):
             return f"{type(error).__name__}: {error}"
         words = str(error)
@@ -210,19 +270,47 @@ class Explorer(StillWidget):
         return {**bundle, "text/html": bundle["text/html"].replace("</figure>", f"{_CAPTION}</figure>")}
 
 
-def explore(view: View, *names: str, **ranges: Any) -> Explorer:
-    """The view with controls for the fields in `names`, then `ranges`; for all of its fields when none is given.
+def explore(view: View, *names: str, together: tuple[str, ...] = (), **ranges: Any) -> Explorer:
+    """The view with controls for some of its fields, or for all.
 
-    `ranges` narrows or widens: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words for a choice.
     The notebook is saved with the picture of the state in which one left it; a cell run again begins with `view`.
-    Raises ValueError naming the fields there are when one is unknown.
+
+    Parameters
+    ----------
+    view : View
+        What is shown.
+    *names
+        Fields that get a control, before those of `ranges`; all of its fields when none of both is given.
+    together : tuple of str, optional
+        Controls that a page without a kernel moves at the same time (`camviz.record`); here all do.
+    **ranges
+        Fields with other limits: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words for a
+        choice.
+
+    Returns
+    -------
+    Explorer
+        Live in a notebook.
+
+    Raises
+    ------
+    ValueError
+        Naming the fields there are when one is unknown, and for a range that is none.
+
+    Examples
+    --------
+    >>> from camviz.views.distortion import DistortionView
+    >>> explore(DistortionView(k1=-0.3), "k3", k1=(-0.5, 0.5)).values
+    {'k3': 0.0, 'k1': -0.3}
     """
     declared = view.offered()
     for name in (*names, *ranges):
         if name not in declared:
             raise ValueError(f"{type(view).__name__} has no control {name!r}; it has {', '.join(declared)}")
     wanted = (*names, *ranges) or tuple(declared)
-    return Explorer(view, {name: _ranged(declared[name], ranges.get(name)) for name in wanted})
+    if unknown := [name for name in together if name not in wanted]:
+        raise ValueError(f"together must name controls that are shown, {', '.join(wanted)}, got {unknown[0]!r}")
+    return Explorer(view, {name: _ranged(declared[name], ranges.get(name)) for name in wanted}, tuple(together))
 
 
 def _ranged(control: Control, limits: Any) -> Control:
@@ -230,6 +318,8 @@ def _ranged(control: Control, limits: Any) -> Control:
         return control
     if control.choices:
         return Control(control.label, choices=tuple(limits), help=control.help)
+    if not isinstance(limits, (tuple, list)) or len(limits) not in (2, 3):
+        raise ValueError(f"a range must be (low, high) or (low, high, step), got {limits!r} for {control.label}")
     low, high, *step = limits
     return Control(control.label, control.unit, low, high, step[0] if step else control.step, (), control.help)
 

@@ -44,7 +44,32 @@ def inspect(
     pictures: Mapping[str, tuple[int, int]] | None = None,
     board: Board | None = None,
 ) -> ShownInspection:
-    """What is wrong with a calibration, and what to do: `camviz.clinic.inspect` for a notebook."""
+    """What is wrong with a calibration, and what to do: `camviz.clinic.inspect` for a notebook.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        What to look at.
+    compare : Calibration, optional
+        Another calibration of the same cameras.
+    pictures : mapping of str to tuple of int, optional
+        Sizes (width, height) in pixels of pictures, by their names, that the calibration is meant for.
+    board : Board, optional
+        The board as it was measured, where that is known.
+
+    Returns
+    -------
+    ShownInspection
+        An Inspection that a notebook shows with every view of the clinic.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from camviz.cameras import Camera, Intrinsics
+    >>> camera = Camera(Intrinsics.from_fov(640, 480, 60))
+    >>> inspect(Calibration({"camera": camera}, Path(), "a data sheet")).healthy
+    True
+    """
     return ShownInspection.of(Evidence(calibration, compare, pictures or {}, board))
 
 

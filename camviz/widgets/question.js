@@ -1,5 +1,6 @@
 // A question to commit to. The kernel sends `cards`; the page sends { question, choice } and shows the reply that comes.
 // A card that has been answered and is neither right nor wrong (`correct` is null) is closed: it takes one choice only.
+// While a class is voting on it (`voting`) it has no reply either, and the choice can be changed.
 
 function element(tag, className, html) {
   const node = document.createElement(tag);
@@ -38,7 +39,7 @@ function cardForm(name, number, send) {
   form.append(fieldset, reply);
   let card = null, spoken = "";
 
-  const closed = () => card.tries > 0 && card.correct === null;
+  const closed = () => card.tries > 0 && card.correct === null && !card.voting;
   const selected = () => {
     const radio = rows.querySelector("input:checked");
     return radio ? Number(radio.value) : null;
@@ -126,11 +127,13 @@ function render({ model, el }) {
   const lead = element("div", "camviz-lead");
   lead.textContent = model.get("lead");
   const last = lastWords((message) => model.send(message), () => forms[0].focus());
+  const room = element("div", "camviz-room"); // of a class that votes: how that went
+  room.setAttribute("role", "status");
   const summary = element("div", "camviz-summary");
   summary.setAttribute("role", "status");
   const problem = element("div", "camviz-problem");
   problem.setAttribute("role", "alert");
-  root.append(title, lead, ...forms.map((one) => one.form), summary, last.node, problem);
+  root.append(title, lead, ...forms.map((one) => one.form), room, summary, last.node, problem);
   const hidesStill = element("style");   // while this lives, the saved page is not needed
   hidesStill.textContent = model.get("still_hidden");
   el.append(hidesStill, root);
@@ -139,9 +142,10 @@ function render({ model, el }) {
     model.get("cards").forEach((card, number) => forms[number].show(card));
     if (summary.textContent !== model.get("summary")) summary.textContent = model.get("summary");
     last.show(model.get("looking_back"), model.get("can_export"), model.get("can_start_again"), model.get("exported"));
+    if (room.textContent !== model.get("room")) room.textContent = model.get("room");
     problem.textContent = model.get("problem");
   };
-  const names = ["cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem"];
+  const names = ["cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem", "room"];
   names.forEach((name) => model.on(`change:${name}`, update));
   update();
   return () => names.forEach((name) => model.off(`change:${name}`, update));

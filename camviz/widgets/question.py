@@ -21,6 +21,7 @@ import traitlets
 from camviz.course import prose
 from camviz.course.answers import KEPT_IN, AnswerBook, read_answers
 from camviz.course.questions import Question, question, quiz_questions
+from camviz.widgets.ballot import Ballot
 from camviz.widgets.still import StillWidget
 
 Tries = tuple[int, ...]
@@ -91,11 +92,13 @@ class QuestionWidget(StillWidget):
     can_export = traitlets.Bool().tag(sync=True)
     exported = traitlets.Unicode().tag(sync=True)
     problem = traitlets.Unicode().tag(sync=True)
+    room = traitlets.Unicode().tag(sync=True)
 
     def __init__(self, sheet: Sheet, book: AnswerBook | None = None) -> None:
         self.sheet = sheet
         self.book = book
         self.tries: tuple[Tries, ...] = ((),) * len(sheet.questions)
+        self._ballot = Ballot(sheet.questions[0].name, self._heard) if sheet.when == "during" else None
         super().__init__(title=sheet.title, lead=sheet.lead)
         self._kept(self._recall)
         self._earlier = [bool(made) for made in self.tries]
@@ -112,6 +115,8 @@ class QuestionWidget(StillWidget):
         self._kept(lambda book: book.keep(self.sheet.questions[number], self.sheet.when, choice))
         self.tries = (*before[:number], (*before[number], choice), *before[number + 1 :])
         self._earlier[number] = False
+        if self._ballot:
+            self._ballot.cast(choice)
         self._show()
         self.keep_now()
 
@@ -134,12 +139,26 @@ class QuestionWidget(StillWidget):
 
     def still(self) -> dict[str, str]:
         """The questions with what was chosen, and without any other reply, which would give the answers away."""
-        return {"text/plain": repr(self.sheet), "text/html": self.sheet.so_far(self.tries)}
+        html = self.sheet.unanswered() if self._voting else self.sheet.so_far(self.tries)
+        return {"text/plain": repr(self.sheet), "text/html": html}
+
+    @property
+    def _voting(self) -> bool:
+        """Whether the reply waits until the class's teacher shows it."""
+        return self._ballot is not None and self._ballot.news.waiting
+
+    def _heard(self) -> None:
+        """There is news from the class's room."""
+        if self._ballot and self._ballot.news.again:
+            self.tries = ((),) * len(self.tries)
+        self._show()
+        self.keep_now()
 
     def _show(self) -> None:
         cards = zip(self.sheet.questions, self.tries, self._earlier, strict=True)
-        self.cards = [_card(one, made, earlier, self.sheet.silent) for one, made, earlier in cards]
-        self.can_start_again = any(self.tries) and not self.sheet.silent
+        self.cards = [_card(one, made, earlier, self.sheet.silent, self._voting) for one, made, earlier in cards]
+        self.can_start_again = any(self.tries) and not self.sheet.silent and not self._voting
+        self.room = self._ballot.news.said if self._ballot else ""
         self.summary = "" if self.sheet.silent else score(self.sheet.questions, self.tries)
         self._kept(self._account)
 
@@ -191,15 +210,57 @@ class QuestionWidget(StillWidget):
 
 
 def ask(name: str) -> QuestionWidget | Sheet:
-    """The question called "LESSON.ID", to be answered before going on. Raises ValueError when there is none."""
+    """A question to be answered before going on.
+
+    Parameters
+    ----------
+    name : str
+        "LESSON.ID".
+
+    Returns
+    -------
+    QuestionWidget or Sheet
+        Live in a notebook; a page of folded replies elsewhere.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such question.
+
+    Examples
+    --------
+    >>> print(str(ask("05.far_rays")).splitlines()[0])
+    Predict
+    """
     return _shown(Sheet((question(name),), "Predict"))
 
 
 def quiz(lesson: str, form: str = "B", when: str = "") -> QuestionWidget | Sheet:
     """A form of a lesson's quiz: A before it, without replies, B after it, with replies and a score.
 
-    `when`, "before" or "after", asks a form at the other end: half of a class can so answer B first and A last.
-    Raises ValueError when the lesson has no such form, and for another `when`.
+    Parameters
+    ----------
+    lesson : str
+        Its two digits.
+    form : {"B", "A"}, optional
+        Which form.
+    when : {"", "before", "after"}, optional
+        Asks a form at the other end: half of a class can so answer B first and A last.
+
+    Returns
+    -------
+    QuestionWidget or Sheet
+        Live in a notebook; a page elsewhere, with folded replies where they may be seen.
+
+    Raises
+    ------
+    ValueError
+        Where the lesson has no such form, and for another `when`.
+
+    Examples
+    --------
+    >>> quiz("05", "A").silent, quiz("05").silent  # before the lesson nothing is told
+    (True, False)
     """
     if when not in ("", "before", "after"):
         raise ValueError(f'when must be "before" or "after", got {when!r}')
@@ -243,12 +304,16 @@ def _live() -> bool:
     return getattr(get_ipython(), "kernel", None) is not None
 
 
-def _card(one: Question, made: Tries, earlier: bool, silent: bool) -> dict[str, Any]:
-    """What the page may know of a question: its texts, and after a try, unless silent, the reply to the choice made."""
+def _card(one: Question, made: Tries, earlier: bool, silent: bool, voting: bool = False) -> dict[str, Any]:
+    """What the page may know of a question: its texts, and after a try, unless silent, the reply to the choice made.
+
+    While the class is `voting` on it there is no reply, and the choice can be changed.
+    """
     choices = [prose.inline(choice.text) for choice in one.choices]
     shown = {"text": prose.to_html(one.text), "choices": choices, "tries": len(made), "earlier": earlier}
-    if not made:
-        return {**shown, "chosen": None, "correct": None, "reply": ""}
+    shown["voting"] = voting
+    if not made or voting:
+        return {**shown, "chosen": made[-1] if made else None, "correct": None, "reply": ""}
     if silent:
         return {**shown, "chosen": made[0], "correct": None, "reply": prose.to_html(KEPT)}
     choice = one.choices[made[-1]]
