@@ -1,0 +1,111 @@
+"""The how-to pages' files, by virtual cameras: `python docs/engineers/examples.py FOLDER` writes them to FOLDER."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.special import ndtr
+
+from camviz.calibration import calibrate, calibrate_pair, detect
+from camviz.calibration.types import Board
+from camviz.cameras import Camera, Intrinsics
+from camviz.clinic.snapshots import snapshot
+from camviz.clinic.virtual import spread_boards
+from camviz.files.writing import write as write_calibration
+from camviz.lenses import BrownConrady
+from camviz.panoramas.reprojection import equirectangular_camera
+from camviz.poses import RigidTransform, Rotation
+from camviz.scenes import snapshot as photograph
+from camviz.scenes import textured_scene, to_encoded
+from camviz.sensors import Sensor
+
+BOARD = Board(9, 6, 0.025)
+LEFT = Camera(Intrinsics(640, 480, 530, 531, 322, 238), BrownConrady(-0.2, 0.05))
+RIGHT = Camera(Intrinsics(640, 480, 528, 528, 317, 241), BrownConrady(-0.21, 0.05)).at(
+    RigidTransform.from_components([0.1, 0.001, 0], Rotation.from_rotvec([0.002, -0.01, 0.003]))
+)
+KNOCKED = replace(LEFT, intrinsics=replace(LEFT.intrinsics, fx=538, fy=539))
+VIEWS = 14
+NOISE = 10.0  # grey levels
+
+GIVEN = """\
+%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 534.80326845, 0, 335.68643204, 0, 534.80326845, 240.66183054, 0, 0, 1 ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ 0.29589439552724328, -1.0354662043042675, 0, 0, 0 ]
+"""  # the left camera of samples/data/intrinsics.yml in OpenCV 4.6 (Apache-2.0)
+WIDE = """\
+cam0:
+  camera_model: ds
+  intrinsics: [-0.2, 0.59, 300.0, 300.0, 319.5, 239.5]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [640, 480]
+"""
+
+
+def write(folder: Path) -> None:
+    """left/, right/, later/ and knocked/ show a board, two files are solved from them, others stand beside."""
+    rng = np.random.default_rng(18)
+    together, later = (spread_boards(rng, seen_by, BOARD, VIEWS, (15, 40)) for seen_by in ((LEFT, RIGHT), (KNOCKED,)))
+    shoot(folder / "left", LEFT, together, rng)
+    shoot(folder / "right", RIGHT, RIGHT.cam_from_world * together, rng)
+    shoot(folder / "later", LEFT, later, rng)
+    shoot(folder / "knocked", KNOCKED, later, rng)
+    left, right = (detect(sorted((folder / side).iterdir()), BOARD) for side in ("left", "right"))
+    write_calibration(calibrate(left, BOARD), folder / "camera.yaml", "opencv")
+    write_calibration(calibrate_pair(left, right, BOARD), folder / "stereo.yaml", "opencv")
+    (folder / "given.yml").write_text(GIVEN)
+    (folder / "wide.yaml").write_text(WIDE)
+    cv2.imwrite(str(folder / "edge.png"), edge())
+    around = photograph(textured_scene(), equirectangular_camera(256, 128))
+    cv2.imwrite(str(folder / "around.png"), around[..., ::-1])
+    expose(folder / "frames", rng)
+
+
+def shoot(folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.random.Generator) -> None:
+    """Pictures of the board at these poses, 01.png and so on."""
+    folder.mkdir(parents=True)
+    alone = camera.at(RigidTransform.identity())
+    for number, pose in enumerate(cam_from_board, 1):
+        cv2.imwrite(str(folder / f"{number:02}.png"), snapshot(alone, BOARD, pose, rng, NOISE))
+
+
+def edge() -> np.ndarray:
+    """An edge that leans by 5°, blurred by a Gaussian of 0.8 pixels, sRGB of 8 bits (200, 120)."""
+    v, u = np.indices((200, 120))
+    distance = (u - 60) * np.cos(np.radians(5)) - (v - 100) * np.sin(np.radians(5))
+    return np.rint(255 * to_encoded(0.1 + 0.8 * ndtr(distance / 0.8))).astype(np.uint8)
+
+
+def expose(folder: Path, rng: np.random.Generator) -> None:
+    """Two bright and two dark frames at each of nine exposures, 60 photons a millisecond."""
+    folder.mkdir()
+    sensor = Sensor(
+        quantum_efficiency=0.5, full_well_e=9000, read_noise_e=8.0, gain_dn_per_e=0.4, offset_dn=80,
+        dark_current_e_per_s=300, dsnu_e=6, prnu=0.02,
+    )  # fmt: skip
+    for ms in (20, 60, 100, 140, 180, 220, 260, 300, 340):
+        for number in range(2):
+            for kind, photons in (("bright", 60.0 * ms), ("dark", 0.0)):
+                light = np.full((240, 320), photons, np.float32)
+                frame = sensor.expose(light, ms / 1000, 20.0, rng).dn
+                cv2.imwrite(str(folder / f"{kind}_{ms}_{number}.png"), frame)
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))
