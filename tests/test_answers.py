@@ -11,7 +11,10 @@ from camviz.course.questions import predict_questions, question, quiz_questions
 from camviz.widgets import quiz
 from camviz.widgets.question import QuestionWidget, Sheet
 
-STATE = ("title", "lead", "cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem")
+STATE = (
+    *("title", "lead", "cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem"),
+    "room",
+)
 
 
 @pytest.fixture

@@ -1,16 +1,14 @@
 """The course as a list of lessons: what each says of itself, and the pages that are made from that."""
 
-import doctest
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import nbformat
-import numpy as np
 import pytest
 
 from camviz.commands import lessons as command
-from camviz.course import catalogue, material, pages, tables, trials, yours
+from camviz.course import catalogue, material, pages
 from camviz.course.catalogue import Lesson
 from camviz.course.tables import shaped, table_of
 
@@ -116,11 +114,3 @@ def test_a_table_that_has_another_shape_is_named_with_its_place():
             shaped(table, kinds, "here", {"minutes"})
     with pytest.raises(ValueError, match="here is not TOML: "):
         table_of("title =", "here")
-
-
-@pytest.mark.parametrize("module", [catalogue, tables, trials, yours], ids=lambda module: module.__name__)
-def test_the_examples_in_the_docstrings_come_out_as_they_say(module):
-    with np.printoptions(legacy=False):  # whatever another library has set
-        tried = doctest.testmod(module)
-    assert tried.failed == 0
-    assert tried.attempted > 0

@@ -98,6 +98,7 @@ def test_a_file_name_cannot_forge_lines(capsys, room):
         (["shwo"], "did you mean show?"),
         (["calibrate", "a", "--board", "9x6", "--square-mm", "25", "--model", "fishey"], "did you mean fisheye?"),
         (["convert", str(DATA / "opencv_stereo.xml"), "out", "--to", "kalbr"], "did you mean kalibr?"),
+        (["board", "--board", "9x6", "--square-mm", "25", "--border-bits", "7"], "invalid choice: 7"),
         (["show"], "FILE"),
         (["show", "a.yml", "--size", "640"], "such as 640x480, got '640'"),
         (["show", "a.yml", "--size", "640x-480"], "such as 640x480"),

@@ -213,3 +213,14 @@ def test_the_teachers_edition_has_every_lesson_and_keeps_a_teachers_notes(room, 
 
 def test_the_teachers_edition_is_not_written_over_the_lessons(room, capsys):
     assert "a folder of its own" in refused(capsys, room, "teacher", str(ROOT / "lessons"))
+
+
+def test_a_lesson_is_opened_by_its_number(jupyter, room):
+    assert main(["lab", "--lesson", "05"]) == 0
+    assert jupyter[0][-1] == str((ROOT / "lessons/05_distortion.ipynb").resolve())
+
+
+def test_a_lesson_that_is_not_there_is_refused_with_those_that_are(jupyter, room, capsys):
+    assert main(["lab", "--lesson", "99"]) == 2
+    assert "there is no lesson 99" in capsys.readouterr().err
+    assert jupyter == []

@@ -13,7 +13,7 @@ import nbformat
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-LOCKS = ("requirements.lock", "requirements-test.lock")
+LOCKS = ("requirements.lock", "requirements-site.lock", "requirements-test.lock")
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)|(?:src|href)=\"([^\"#]+)\"")
 
 
@@ -71,11 +71,14 @@ def test_the_lock_covers_every_dependency_that_the_package_declares() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     declared = chain(project["dependencies"], *project["optional-dependencies"].values())
     names = {re.match(r"[\w.-]+", one)[0].lower().replace("_", "-") for one in declared} - {"camviz"}  # type: ignore[index]
-    reader, tester = (set(re.findall(r"^([\w.-]+)==", (ROOT / name).read_text(), flags=re.MULTILINE)) for name in LOCKS)
-    assert names <= reader | tester
+    locks = (set(re.findall(r"^([\w.-]+)==", (ROOT / name).read_text(), flags=re.MULTILINE)) for name in LOCKS)
+    reader, site, tester = locks
+    assert names <= reader | site | tester
     assert {"jupyterlab", "vtk", "hatchling", "editables"} <= reader
     assert {"pytest", "playwright", "mypy"} <= tester
-    assert not reader & tester
+    assert {"sphinx", "myst-nb", "pydata-sphinx-theme"} <= site
+    assert not (reader | site) & tester
+    assert not reader & site
 
 
 def test_light_leaves_out_what_draws_solid_3d_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,11 +89,13 @@ def test_light_leaves_out_what_draws_solid_3d_and_nothing_else(tmp_path: Path, m
     names = [set(re.findall(r"^([\w.-]+)==", lock.read_text(), flags=re.MULTILINE)) for lock in (start.READER, light)]
     assert names[0] - names[1] == {"vtk", "pyvista"}
     assert not names[1] - names[0]
-    assert start.locked("test") == [start.READER, start.TESTER]
+    assert start.locked("site") == [start.READER, start.SITE]
+    assert start.locked("test") == [start.READER, start.SITE, start.TESTER]
 
 
 def test_ci_names_every_action_by_its_commit() -> None:
-    used = re.findall(r"uses: (\S+)", (ROOT / ".github/workflows/ci.yml").read_text())
+    workflows = [path.read_text() for path in (ROOT / ".github/workflows").glob("*.yml")]
+    used = re.findall(r"uses: (\S+)", "".join(workflows))
     assert used
     assert [each for each in used if not re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", each)] == []
 

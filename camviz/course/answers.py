@@ -114,14 +114,19 @@ class AnswerBook:
             raise ValueError(f"no answer to lesson {lesson} is kept in {self.path}")
         path = self.folder / f"answers_{lesson}_{answers[0].participant}.csv"
         with path.open("w", encoding="utf-8", newline="") as file:
-            _write(file, _EXPORTED, filter(None, map(mark, answers)), header=True)
+            write_marked(file, answers)
         return path
+
+
+def write_marked(file: TextIO, answers: Iterable[Answer]) -> None:
+    """Writes answers with what is right and what each wrong one means; left out is what no lesson asks any more."""
+    _write(file, _EXPORTED, filter(None, map(mark, answers)), header=True)
 
 
 def mark(answer: Answer) -> Answer | None:
     """The answer with what is behind it; None when the lesson has no such question or choice any more."""
     for one in questions(answer.lesson).values():
-        if (one.form, one.concept) == (answer.form, answer.concept) and answer.index < len(one.choices):
+        if (one.form, one.topic) == (answer.form, answer.concept) and answer.index < len(one.choices):
             choice = one.choices[answer.index]
             return replace(answer, correct=choice.correct, misconception=choice.misconception)
     return None

@@ -36,7 +36,11 @@ from camviz.course.trials import (
 __all__ = ["SHAPES", "Arguments", "Array", "Exercise", "Misconception", "Verdict", "judge"]
 
 SHAPES: tuple[tuple[int, ...], ...] = ((), (1,), (6,), (3, 4))
-"""The leading axes an exercise's cases should run through: one point, a list of one, a list, a grid."""
+"""The leading axes an exercise's cases should run through: one point, a list of one, a list, a grid.
+
+>>> [np.zeros((*shape, 3)).size for shape in SHAPES]  # numbers in so many points of space
+[3, 3, 18, 36]
+"""
 
 NEAR = 1e-4
 """Of 1 + |answer|: closer than this is a matter of rounding, not of understanding."""
@@ -52,7 +56,26 @@ _COLOURS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the checker says. Shown by a notebook as a box in words, by a terminal as text; true when correct."""
+    """What the checker says. Shown by a notebook as a box in words, by a terminal as text; true when correct.
+
+    Attributes
+    ----------
+    exercise : str
+        Its name.
+    status : {"correct", "wrong", "unsolved", "hint"}
+        What the function is.
+    message : str
+        What to say.
+    hint : str
+        What to say next; empty where it is correct.
+    printed : str
+        What the function printed.
+
+    Examples
+    --------
+    >>> Verdict("00.double", "correct", "Twice.")
+    ✓ Correct. Twice.
+    """
 
     exercise: str
     status: Literal["correct", "wrong", "unsolved", "hint"]
@@ -62,6 +85,7 @@ class Verdict:
 
     @property
     def correct(self) -> bool:
+        """Whether nothing is left to do."""
         return self.status == "correct"
 
     def __bool__(self) -> bool:
@@ -81,10 +105,35 @@ class Verdict:
 
 
 def judge(exercise: Exercise, function: Any, rng: np.random.Generator | None = None, attempt: int = 1) -> Verdict:
-    """What is to be said about a reader's function at the given attempt (1 is the first).
+    """What is to be said about a reader's function.
 
-    Cases are drawn from `rng`, by default one seeded by the operating system. Never raises for what the function does,
-    and stops it when all its calls together take longer than camviz.course.patience allows.
+    Never raises for what the function does, and stops it when all its calls together take longer than
+    camviz.course.patience allows.
+
+    Parameters
+    ----------
+    exercise : Exercise
+        What was asked.
+    function : Any
+        What the reader wrote; a function or not.
+    rng : Generator, optional
+        Where the cases are drawn from; unless given, one seeded by the operating system.
+    attempt : int, optional
+        1 is the first.
+
+    Returns
+    -------
+    Verdict
+        With a stronger hint at each attempt.
+
+    Examples
+    --------
+    >>> hints = "What is x by x?", "Multiply.", "x * ___"
+    >>> square = Exercise("00.square", lambda x: x * x, lambda rng: [(rng.normal(),)], hints, "Yes.")
+    >>> judge(square, lambda x: x**2, np.random.default_rng(1))
+    ✓ Correct. Yes.
+    >>> judge(square, lambda x: 2 * x, np.random.default_rng(1)).hint
+    'What is x by x?'
     """
     rng = np.random.default_rng() if rng is None else rng
     try:

@@ -6,7 +6,7 @@ import ast
 import re
 from typing import Any
 
-from camviz.course import catalogue, glossary, notebooks, questions, reading
+from camviz.course import catalogue, colab, glossary, notebooks, questions, reading
 from camviz.course.exercises import exercises
 
 Notebook = Any
@@ -92,8 +92,11 @@ def _listed(notebook: Notebook, file_name: str) -> list[str]:
 
 
 def _setup(notebook: Notebook) -> list[str]:
-    """One setup cell, the first code, and the same in every lesson."""
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    """One setup cell, the first code but for Colab's, and the same in every lesson."""
+    for cell in notebooks.tagged(notebook, "colab"):
+        if cell.source != colab.INSTALL:
+            return [f"the cell tagged colab must be the same as everywhere:\n{colab.INSTALL}"]
+    code = [cell for cell in notebook.cells if cell.cell_type == "code" and cell.source != colab.INSTALL]
     setup = notebooks.tagged(notebook, "setup")
     if len(setup) != 1 or not code or code[0] is not setup[0]:
         return [f"the first code cell, and no other, must be tagged setup; {len(setup)} are"]

@@ -26,8 +26,10 @@ from numpy.typing import NDArray
 from camviz.course.patience import LIMIT_S, Patience, TimeIsUp
 
 Array = NDArray[np.float64]
+"""Numbers."""
 Function = Callable[..., Any]
 Arguments = tuple[Any, ...]
+"""The arguments of one call."""
 
 HINTS = 3
 """Every exercise has three: where to look, what to use, and the solution's line with a gap, written ___."""
@@ -41,7 +43,20 @@ SHARED: tuple[ModuleType, ...] = (builtins, math, np, np.linalg, np.random)
 
 @dataclass(frozen=True)
 class Misconception:
-    """A known mistake: the function that makes it, and what to say to someone whose answers match it everywhere."""
+    """A known mistake.
+
+    Attributes
+    ----------
+    function : callable
+        Makes it.
+    explanation : str
+        What to say to someone whose answers match the function's everywhere.
+
+    Examples
+    --------
+    >>> Misconception(lambda x: x**2, "This is the square.").explanation
+    'This is the square.'
+    """
 
     function: Function
     explanation: str
@@ -51,14 +66,38 @@ class Misconception:
 class Exercise:
     """What is asked, how to recognise the answer, and what to say otherwise.
 
-    `cases(rng)` yields fresh argument tuples, different each time and of several shapes; `reference(*arguments)` is the
-    answer, an array or a tuple of arrays. `tolerance` is relative to 1 + |answer|. `shown` are the arguments printed in
-    the lesson. `canonical` brings answers that mean the same (a matrix up to scale) to one form before they are
-    compared. `laws` are further statements, law(function, rng) -> complaint in words, or "" where it holds. `hints` are
-    three, one per try. `as_given` is the faulty function with which the search for a bug begins.
+    Known mistakes and other right ways are written below the exercise, under its decorators.
 
-    Known mistakes and other right ways are written below the exercise, under its decorators:
+    Parameters
+    ----------
+    name : str
+        "LESSON.FUNCTION".
+    reference : callable
+        Gives the answer, an array or a tuple of arrays.
+    cases : callable
+        From a Generator to fresh argument tuples, different each time and of several shapes.
+    hints : tuple of str
+        Three, one per try.
+    praise : str
+        What to say to a right answer.
+    tolerance : float, optional
+        Relative to 1 + the size of the answer.
+    shown : tuple of tuple, optional
+        The arguments printed in the lesson.
+    canonical : callable, optional
+        Brings answers that mean the same (a matrix up to scale) to one form before they are compared.
+    laws : tuple of callable, optional
+        Further statements, law(function, rng) -> complaint in words, or "" where it holds.
+    as_given : callable, optional
+        The faulty function with which the search for a bug begins.
 
+    Raises
+    ------
+    ValueError
+        For other than three hints, and a tolerance that is not positive.
+
+    Examples
+    --------
     >>> double = Exercise("00.double", lambda x: 2 * x, lambda rng: [(rng.normal(),)], ("a", "b", "c"), "Twice.")
     >>> @double.wrong("This is the square: it agrees at 2 and nowhere else.")
     ... def squared(x):
@@ -88,7 +127,18 @@ class Exercise:
             raise ValueError(f"tolerance of exercise {self.name} must be positive, got {self.tolerance}")
 
     def wrong(self, explanation: str) -> Callable[[Function], Function]:
-        """Decorates a wrong function that readers write; the explanation speaks to the thought behind it."""
+        """Decorates a wrong function that readers write.
+
+        Parameters
+        ----------
+        explanation : str
+            Speaks to the thought behind it.
+
+        Returns
+        -------
+        callable
+            The decorator.
+        """
 
         def remember(function: Function) -> Function:
             self.misconceptions.append(Misconception(function, explanation))
@@ -97,7 +147,18 @@ class Exercise:
         return remember
 
     def right(self, function: Function) -> Function:
-        """Decorates another right way: OpenCV's function, the lesson's own formula, another order of the terms."""
+        """Decorates another right way: OpenCV's function, the lesson's own formula, another order of the terms.
+
+        Parameters
+        ----------
+        function : callable
+            The other way.
+
+        Returns
+        -------
+        callable
+            The same.
+        """
         self.right_ways.append(function)
         return function
 
@@ -118,30 +179,87 @@ class Exercise:
         return isinstance(answer, bool) or getattr(answer, "dtype", None) == np.bool_
 
     def answer(self, arguments: Arguments, reference: Function | None = None) -> tuple[Array, ...]:
-        """The right answer, or that of another reference, in canonical form."""
+        """The right answer in canonical form.
+
+        Parameters
+        ----------
+        arguments : tuple
+            Of one call.
+        reference : callable, optional
+            Another reference.
+
+        Returns
+        -------
+        tuple of array (...)
+            One for each array of the answer.
+        """
         with quiet():
             return self.normalised((reference or self.reference)(*deepcopy(arguments)))
 
     def normalised(self, result: Any) -> tuple[Array, ...]:
-        """A result as float64 arrays in canonical form. Raises whatever numpy does for what is not numbers."""
+        """A result as float64 arrays in canonical form. Raises whatever numpy does for what is not numbers.
+
+        Parameters
+        ----------
+        result : Any
+            What a function returned.
+
+        Returns
+        -------
+        tuple of array (...)
+            One for each array of the result.
+        """
         parts = as_arrays(result)
         if self.canonical is None:
             return parts
         return tuple(np.asarray(self.canonical(part), dtype=np.float64) for part in parts)
 
     def same(self, actual: tuple[Array, ...], expected: tuple[Array, ...]) -> bool:
-        """True when the answers have the same shapes and agree to the tolerance; NaN equals NaN."""
+        """Whether two answers have the same shapes and agree to the tolerance; NaN equals NaN.
+
+        Parameters
+        ----------
+        actual, expected : tuple of array (...)
+            Answers in canonical form, in the exercise's unit.
+
+        Returns
+        -------
+        bool
+            True where they are the same.
+        """
         if [part.shape for part in actual] != [part.shape for part in expected]:
             return False
         return all(self.close(a, e).all() for a, e in zip(actual, expected, strict=True))
 
     def close(self, actual: Array, expected: Array) -> NDArray[np.bool_]:
-        """Element by element, whether an answer agrees to the tolerance."""
+        """Element by element, whether an answer agrees to the tolerance.
+
+        Parameters
+        ----------
+        actual, expected : array (...)
+            Answers in the exercise's unit.
+
+        Returns
+        -------
+        array (...) of bool
+            True where they agree; NaN equals NaN.
+        """
         with quiet():
             return np.isclose(actual, expected, rtol=self.tolerance, atol=self.tolerance, equal_nan=True)
 
     def call(self, arguments: Arguments) -> str:
-        """The call as a reader would write it; a larger array stands as its shape."""
+        """The call as a reader would write it; a larger array stands as its shape.
+
+        Parameters
+        ----------
+        arguments : tuple
+            Of the call.
+
+        Returns
+        -------
+        str
+            Python within double backquotes.
+        """
         pairs = zip(self.parameters, arguments, strict=False)
         return f"``{self.name.split('.')[-1]}({', '.join(f'{name}={_short(value)}' for name, value in pairs)})``"
 

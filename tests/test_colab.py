@@ -1,0 +1,45 @@
+"""A lesson prepared for Colab is still a lesson, and its extra cell does nothing anywhere else."""
+
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+from camviz.course.colab import INSTALL, badge, prepared
+from camviz.course.lesson_rules import complaints
+from camviz.course.notebooks import read
+
+LESSONS = sorted((Path(__file__).parent.parent / "lessons").glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_every_lesson_can_be_prepared_once_and_is_still_a_good_lesson(path):
+    lesson = read(path)
+    made = prepared(lesson, path.name)
+    assert badge(path.name) in made.cells[0].source
+    (cell,) = (cell for cell in made.cells if "colab" in cell.metadata.get("tags", []))
+    assert "setup" in made.cells[made.cells.index(cell) + 1].metadata["tags"]
+    assert complaints(made, path.name) == complaints(lesson, path.name)
+    assert prepared(made, path.name) == made
+
+
+def test_another_cell_under_colabs_tag_is_complained_of():
+    made = prepared(read(LESSONS[5]), LESSONS[5].name)
+    next(cell for cell in made.cells if cell.source == INSTALL).source = "import camviz"
+    assert any("tagged colab must be the same" in each for each in complaints(made, LESSONS[5].name))
+
+
+def test_the_cell_installs_on_colab_and_does_nothing_elsewhere(monkeypatch, capsys):
+    asked, calls = [], []
+    monkeypatch.setattr("subprocess.run", lambda words, check: asked.append((words[1:], check)))
+    exec(INSTALL, {})
+    assert (asked, capsys.readouterr().out) == ([], "")
+    google, colab = ModuleType("google"), ModuleType("google.colab")
+    colab.output = SimpleNamespace(enable_custom_widget_manager=lambda: calls.append("widgets"))
+    monkeypatch.setitem(sys.modules, "google", google)
+    monkeypatch.setitem(sys.modules, "google.colab", colab)
+    exec(INSTALL, {})
+    wheel = "camviz[lab] @ git+https://github.com/camviz/camviz"
+    assert asked == [(["-m", "pip", "install", "--quiet", wheel], True)]
+    assert calls == ["widgets"]
