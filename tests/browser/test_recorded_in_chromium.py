@@ -43,6 +43,13 @@ UNIT = """root => { const svg = root.querySelector("[data-drag=eye]").closest(".
   return svg.clientWidth / svg.viewBox.baseVal.width }"""
 SAID = """words => { const said = document.querySelector(".camviz-said").textContent;
   return said && said.split("; ").every((part) => words.includes(part)) }"""
+MOVED_AT_ONCE = """() => new Promise((done) => new MutationObserver((_, watcher) => {
+  const root = document.querySelector(".camviz-recorded[data-live] .camviz-explorer");
+  if (!root) return;
+  watcher.disconnect();
+  hands.move(root, "k1", 0);
+  done();
+}).observe(document, { childList: true, subtree: true, attributes: true }))"""
 DRAWN = """html => { const holder = document.createElement("template");
   holder.innerHTML = html;
   for (const one of holder.content.querySelectorAll("image")) one.setAttribute("href", "");
@@ -56,14 +63,14 @@ class Site:
     browser: Browser
     folder: Path
 
-    def open(self, name: str, **options: Any) -> Page:
-        """The page, its pane live and at rest."""
+    def open(self, name: str, wait_until: Any = "load", **options: Any) -> Page:
+        """The page, once it is loaded or as far as `wait_until` says."""
         page = self.browser.new_page(**{"viewport": {"width": 1200, "height": 1000}, **options})
         page.complaints = []
         page.on("console", lambda message: page.complaints.append(message.text))
         page.on("pageerror", lambda error: page.complaints.append(str(error)))
         page.add_init_script(path=Path(__file__).with_name("hands.js"))
-        page.goto((self.folder / f"{name}.html").as_uri())
+        page.goto((self.folder / f"{name}.html").as_uri(), wait_until=wait_until)
         return page
 
 
@@ -125,6 +132,13 @@ def test_every_control_goes_to_both_ends_and_back_as_the_view_draws_it(site: Sit
         root.evaluate("root => hands.reset(root)")
         assert same(page, rested(root), explorer.first)
     assert page.complaints == []
+    page.close()
+
+
+def test_a_screen_reader_is_told_what_is_changed_as_soon_as_the_pane_stands(site: Site) -> None:
+    page = site.open("distortion", wait_until="commit")
+    page.evaluate(MOVED_AT_ONCE)
+    page.wait_for_function("() => document.querySelector('.camviz-said').textContent.includes('k1 = -1')")
     page.close()
 
 
