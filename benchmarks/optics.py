@@ -16,6 +16,8 @@ from camviz.scenes import aperture, parallax, textured_scene, to_display
 from camviz.scenes.aperture import ThinLensCamera
 from camviz.views.depth_of_field import DRAFT, FINE, DepthOfFieldView
 
+POINTS = 64  # of the lens
+
 
 def camera(f_number: float = 1.4) -> ThinLensCamera:
     return ThinLensCamera(f_number=f_number, focus_m=2.3, world_from_cam=RigidTransform.from_translation([0.5, 0.5, 1]))
@@ -40,17 +42,18 @@ def main() -> None:
     stops = iter(np.linspace(1.4, 1.5, 1000))
     focus = iter(np.linspace(2.0, 4.0, 1000))
     fine = iter(np.linspace(1.4, 1.5, 1000))
-    exact = to_display(aperture.photograph(scene, camera(), DRAFT))
-    fast = to_display(parallax.photograph(scene, camera(), DRAFT))
+    exact = to_display(aperture.photograph(scene, camera(), POINTS))
+    fast = to_display(parallax.photograph(scene, camera(), POINTS))
     view = DepthOfFieldView(f_number=1.4)
+    moving, resting = view.samples_for(*DRAFT), view.samples_for(*FINE)
     works: list[tuple[str, int, int, Callable[[], object]]] = [
-        ("layers, the f-number changes", DRAFT, 9, lambda: parallax.photograph(scene, camera(next(stops)), DRAFT)),
-        ("layers, traced afresh", DRAFT, 9, _afresh),
-        ("every ray traced, as pinhole cameras", DRAFT, 3, lambda: aperture.photograph(scene, camera(), DRAFT)),
-        ("every ray traced, straightforward NumPy", DRAFT, 3, lambda: straightforward(camera(), DRAFT)),
-        ("the view while f-number is dragged", DRAFT, 9, lambda: view.but(f_number=next(stops)).figure(draft=True)),
-        ("the view while focus is dragged", DRAFT, 9, lambda: view.but(focus_m=next(focus)).figure(draft=True)),
-        ("the view at rest", FINE, 9, lambda: view.but(f_number=next(fine)).figure()),
+        ("layers, the f-number changes", POINTS, 9, lambda: parallax.photograph(scene, camera(next(stops)), POINTS)),
+        ("layers, traced afresh", POINTS, 9, _afresh),
+        ("every ray traced, as pinhole cameras", POINTS, 3, lambda: aperture.photograph(scene, camera(), POINTS)),
+        ("every ray traced, straightforward NumPy", POINTS, 3, lambda: straightforward(camera(), POINTS)),
+        ("the view while f-number is dragged", moving, 9, lambda: view.but(f_number=next(stops)).figure(draft=True)),
+        ("the view while focus is dragged", moving, 9, lambda: view.but(focus_m=next(focus)).figure(draft=True)),
+        ("the view at rest", resting, 9, lambda: view.but(f_number=next(fine)).figure()),
     ]
     rows = [[name, f"{points}", f"{median_ms(work, repeats):.0f}"] for name, points, repeats, work in works]
     print(table(["photograph through a lens", "points of the lens", "ms"], rows))
@@ -59,7 +62,7 @@ def main() -> None:
 
 def _afresh() -> None:
     parallax._kept.cache_clear()
-    parallax.photograph(textured_scene(), camera(), DRAFT)
+    parallax.photograph(textured_scene(), camera(), POINTS)
 
 
 if __name__ == "__main__":

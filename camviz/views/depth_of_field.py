@@ -27,7 +27,9 @@ from camviz.views import lens_diagram
 from camviz.views.base import View, choice, positive, slider, step_of, switch
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
-DRAFT, FINE = 64, 256  # points of the lens
+DRAFT, FINE = (0.25, 12, 32), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most
+SHOWN = 64  # points in the picture of the aperture
+_NEAREST_M = 1.0  # of what is in the picture, in most states
 GLOBE_Z = 3.3  # of the globe in the world, towards which the camera looks along +z
 STAND = (0.58, 0.45)  # x and y of the camera
 GLOBE_M = 0.54  # the globe's diameter
@@ -200,10 +202,21 @@ class DepthOfFieldView(View):
             f"covered: {self.covered}. {figures}."
         )
 
-    def image(self, samples: int = FINE, *, rough: bool = False) -> np.ndarray:
-        """The photograph, upright, as sRGB bytes (240, 320, 3); a `rough` one takes less time."""
+    def image(self, samples: int | None = None, *, rough: bool = False) -> np.ndarray:
+        """The photograph, upright, as sRGB bytes (240, 320, 3); a `rough` one takes less time.
+
+        It is traced through `samples` points of the lens, at first as many as the blur needs.
+        """
+        samples = samples or self.samples_for(*(DRAFT if rough else FINE))
         light = parallax.photograph(_garden(), self.lens, samples, rough=rough)
-        return to_display(light * np.float32(self.brightness / self.open_share))
+        share = self.lens.points(samples)[1].mean()
+        return to_display(light * np.float32(self.brightness / share))
+
+    def samples_for(self, per_px: float, least: int, most: int) -> int:
+        """How many points of the lens fill the largest disc, of what is far away or as near as anything shown."""
+        sharp = 1 / self.focus_m
+        radius = self.lens.parallax_px * max(sharp, 1 / _NEAREST_M - sharp)
+        return int(np.clip(per_px * np.pi * radius**2, least, most))
 
     # What it looks like ----------------------------------------------------------------------------------------------
 
@@ -213,7 +226,7 @@ class DepthOfFieldView(View):
             parts |= {"rays": self._ray_panel(), "at the sensor": self._loupe_panel() + self._aperture_panel()}
         if "blur" in self.panels:
             parts["blur"] = self._blur_panel()
-        photographs = {"lens": _photographed(self, DRAFT, True) if draft else _photographed(self, FINE, False)}
+        photographs = {"lens": _photographed(self, draft)}
         layout = _LAYOUTS[self.panels]
         return self.tiled(layout, {name: parts[name] for name in layout}, photographs)
 
@@ -248,7 +261,7 @@ class DepthOfFieldView(View):
         x, y, width = (x + 10, y + 214, 260) if width < 400 else (x + 410, y + 34, 200)
         across = 1.1 * width / 140
         panel = Panel("aperture", x, y, width, 140, -across, across, -1.1, 1.1)
-        points, passes = self.lens.points(DRAFT)
+        points, passes = self.lens.points(SHOWN)
         content = lens_diagram.opening(panel, self.lens.aperture, points, passes)
         return panel.show(content, title="Points of the lens")
 
@@ -358,9 +371,9 @@ class DepthOfFieldView(View):
 
 
 @lru_cache(maxsize=4)
-def _photographed(view: DepthOfFieldView, samples: int, rough: bool) -> bytes:
+def _photographed(view: DepthOfFieldView, rough: bool) -> bytes:
     """The view's photograph as JPEG, which no reader's function changes."""
-    return jpeg(view.image(samples, rough=rough))
+    return jpeg(view.image(rough=rough))
 
 
 @lru_cache(maxsize=1)
