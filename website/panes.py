@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import clips
 
@@ -38,6 +38,16 @@ explore(FrustumView(), "hfov_deg", "yaw_deg", "pitch_deg")
 """
 
 
+class CodeCell(NamedTuple):
+    """The code of a cell, and the controls of its visualizer that a reader moves in relation to each other.
+
+    A lesson names those in the cell's metadata, as {"camviz": {"together": ["k1", "k2"]}}.
+    """
+
+    source: str
+    together: tuple[str, ...] = ()
+
+
 class RecordingError(Exception):
     """Lessons could not be recorded."""
 
@@ -53,7 +63,7 @@ class Recorder:
 
     def record(self, notebooks: Iterable[Path]) -> None:
         """Record the home page's picture and the panes of the notebooks, where that is not done; on all processors."""
-        wanted = {path.name[:2]: code_cells(path) for path in notebooks} | {HOME: {0: _HOME_CELL}}
+        wanted = {path.name[:2]: code_cells(path) for path in notebooks} | {HOME: {0: CodeCell(_HOME_CELL)}}
         stale = {name: cells for name, cells in wanted.items() if not self._is_fresh(name, cells)}
         if not stale:
             return
@@ -78,7 +88,7 @@ class Recorder:
             if path.name not in needed:
                 path.unlink()
 
-    def keep(self, name: str, cells: dict[int, str], panes: dict[int, dict[str, Any]]) -> None:
+    def keep(self, name: str, cells: dict[int, CodeCell], panes: dict[int, dict[str, Any]]) -> None:
         """Remember what was recorded, and the files from which it was made."""
         files = sorted(str(path.relative_to(self.root)) for path in _loaded(self.root, name))
         told = {"made from": files, "fingerprint": self._fingerprint(cells, files), "panes": panes}
@@ -89,7 +99,7 @@ class Recorder:
         path = self.cache / f"{name}.json"
         return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
 
-    def _is_fresh(self, name: str, cells: dict[int, str]) -> bool:
+    def _is_fresh(self, name: str, cells: dict[int, CodeCell]) -> bool:
         kept = self._kept(name)
         preview = self.folder.parent / clips.CLIPS / f"{name}.png"
         there = preview.exists() and all(
@@ -97,7 +107,7 @@ class Recorder:
         )
         return bool(kept) and there and kept["fingerprint"] == self._fingerprint(cells, kept["made from"])
 
-    def _fingerprint(self, cells: dict[int, str], files: list[str]) -> str:
+    def _fingerprint(self, cells: dict[int, CodeCell], files: list[str]) -> str:
         made = hashlib.sha256(json.dumps([cells, self.seconds], sort_keys=True).encode())
         for file in files:
             path = self.root / file
@@ -105,20 +115,24 @@ class Recorder:
         return made.hexdigest()
 
 
-def code_cells(path: Path) -> dict[int, str]:
+def code_cells(path: Path) -> dict[int, CodeCell]:
     """The code of a notebook by the numbers of its cells."""
     from camviz.course.notebooks import read
 
-    return {number: cell.source for number, cell in enumerate(read(path).cells) if cell.cell_type == "code"}
+    return {
+        number: CodeCell(cell.source, tuple(cell.metadata.get("camviz", {}).get("together", ())))
+        for number, cell in enumerate(read(path).cells)
+        if cell.cell_type == "code"
+    }
 
 
-def record_cells(recorder: Recorder, name: str, cells: dict[int, str]) -> str:
+def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> str:
     """Run the cells in this process and record each explorer that one shows; a line about what came out."""
     panes: dict[int, dict[str, Any]] = {}
     shown = _shown(recorder.root, cells)
     clips.write([explorer for _, explorer in shown], name, recorder.folder.parent / clips.CLIPS)
     for number, explorer in shown:
-        made = _recorded(explorer, recorder)
+        made = _recorded(explorer, cells[number].together, recorder)
         html = made.html(f"../{RECORDINGS}/" if name != HOME else f"{RECORDINGS}/")
         panes[number] = {
             "html": html,
@@ -132,17 +146,19 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, str]) -> str:
     return f"{len(panes)} panes, {size / 1e6:.1f} MB, {seconds:.0f} s"
 
 
-def _recorded(explorer: Any, recorder: Recorder) -> Any:
+def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder) -> Any:
     """The explorer recorded; the slowest views, whose fewest positions take longer than `seconds`, may take more."""
     from camviz.record import Budget, BudgetError, record
+    from camviz.record.panes import Explored
 
+    pane = Explored(explorer, together)
     try:
-        return record(explorer, recorder.folder, budget=Budget(SIZE, recorder.seconds))
+        return record(pane, recorder.folder, budget=Budget(SIZE, recorder.seconds))
     except BudgetError:
-        return record(explorer, recorder.folder, budget=Budget(SIZE, SLOWEST * recorder.seconds))
+        return record(pane, recorder.folder, budget=Budget(SIZE, SLOWEST * recorder.seconds))
 
 
-def _shown(root: Path, cells: dict[int, str]) -> list[tuple[int, Any]]:
+def _shown(root: Path, cells: dict[int, CodeCell]) -> list[tuple[int, Any]]:
     """Each explorer that a cell shows, with the cell's number, as IPython shows it."""
     os.environ |= {"CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "solid", "MPLBACKEND": "Agg"}
     os.chdir(root / "lessons")
@@ -153,7 +169,7 @@ def _shown(root: Path, cells: dict[int, str]) -> list[tuple[int, Any]]:
     shell, shown = InteractiveShell.instance(), []
     number = 0
     shell.display_formatter.ipython_display_formatter.for_type(Explorer, lambda one: shown.append((number, one)))
-    for number, source in cells.items():
+    for number, (source, _) in cells.items():
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             done = shell.run_cell(source, silent=False)

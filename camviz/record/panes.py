@@ -154,11 +154,18 @@ class Widget:
 
 
 class Explored:
-    """An explorer's pane: its controls, the onlooker's place where it can be dragged, and its picture's handles."""
+    """An explorer's pane: its controls, the onlooker's place where it can be dragged, and its picture's handles.
 
-    def __init__(self, explorer: Explorer) -> None:
+    `together` are the controls whose combinations are recorded, instead of those that the explorer names itself.
+    Raises ValueError where one is not shown.
+    """
+
+    def __init__(self, explorer: Explorer, together: tuple[str, ...] = ()) -> None:
+        shown = [control["name"] for control in explorer.controls]
+        if unknown := set(together) - set(shown):
+            raise ValueError(f"together must name controls that are shown, {', '.join(shown)}, got {unknown.pop()!r}")
         self._explorer, self._first = explorer, explorer.first
-        self.title, self.together = explorer.first.title, explorer.together
+        self.title, self.together = explorer.first.title, together or explorer.together
 
     @property
     def sources(self) -> dict[str, str]:

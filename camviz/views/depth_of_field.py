@@ -85,12 +85,12 @@ class DepthOfFieldView(View):
             raise ValueError(f"focus_m and distance_m must lie beyond the focal length, got {self.focus_m} m")
 
     def but(self, **changes: Any) -> Self:
-        """The same view with some fields changed, and what `hold` makes of a change of focal length or sensor."""
+        """The same view with some fields changed, and what `hold` makes of another focal length or sensor."""
         changed = super().but(**changes)
-        if self.hold == "diameter" and "f_number" not in changes:
+        if changed.hold == "diameter" and "f_number" not in changes:
             number = float(np.clip(changed.focal_mm / self.lens.aperture_mm, *self._range("f_number")))
             return replace(changed, f_number=number)
-        return self._stepped(changed) if self.hold == "framing" and "distance_m" not in changes else changed
+        return self._stepped(changed) if changed.hold == "framing" and "distance_m" not in changes else changed
 
     def _stepped(self, changed: Self) -> Self:
         """m / sensor stays: m = f / (Z - f), so Z = f (1 + 1/m). The focus moves with the camera."""

@@ -116,7 +116,7 @@ class IntrinsicsView(OrbitView):
         if aspect is not None:
             changes["fy"] = aspect * changes.get("fx", self.fx)
         changed = super().but(**changes)
-        return self._locked(changed) if self.dolly_zoom and changed.dolly_zoom and aspect is None else changed
+        return self._locked(changed) if changed.dolly_zoom and aspect is None else changed
 
     def _locked(self, changed: Self) -> Self:
         """fx / distance stays: whichever of the two was changed, the other follows, within the garden."""
