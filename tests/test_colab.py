@@ -1,6 +1,7 @@
 """A lesson prepared for Colab is still a lesson, and its extra cell does nothing anywhere else."""
 
 import sys
+from copy import deepcopy
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -14,14 +15,24 @@ LESSONS = sorted((Path(__file__).parent.parent / "lessons").glob("*.ipynb"))
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_every_lesson_can_be_prepared_once_and_is_still_a_good_lesson(path):
+def test_every_lesson_is_prepared_and_its_cell_is_folded_above_the_setup(path):
     lesson = read(path)
-    made = prepared(lesson, path.name)
-    assert badge(path.name) in made.cells[0].source
-    (cell,) = (cell for cell in made.cells if "colab" in cell.metadata.get("tags", []))
-    assert "setup" in made.cells[made.cells.index(cell) + 1].metadata["tags"]
-    assert complaints(made, path.name) == complaints(lesson, path.name)
-    assert prepared(made, path.name) == made
+    assert badge(path.name) in lesson.cells[0].source
+    (cell,) = (cell for cell in lesson.cells if "colab" in cell.metadata.get("tags", []))
+    assert cell.metadata["jupyter"]["source_hidden"]
+    assert "setup" in lesson.cells[lesson.cells.index(cell) + 1].metadata["tags"]
+    assert prepared(lesson, path.name) == lesson
+
+
+def test_a_lesson_is_prepared_once():
+    lesson = read(LESSONS[5])
+    bare = deepcopy(lesson)
+    bare.cells = [cell for cell in bare.cells if cell.source != INSTALL]
+    bare.cells[0].source = bare.cells[0].source.replace(f"\n{badge(LESSONS[5].name)}", "")
+    made = prepared(bare, LESSONS[5].name)
+    assert made == lesson | {"cells": made.cells}
+    assert [cell.source for cell in made.cells] == [cell.source for cell in lesson.cells]
+    assert complaints(made, LESSONS[5].name) == []
 
 
 def test_another_cell_under_colabs_tag_is_complained_of():

@@ -29,9 +29,10 @@ def test_import_of_camviz_loads_not_even_numpy() -> None:
 
 
 def first_cells() -> set[str]:
-    """The first code of every lesson, each different one once."""
+    """The setup cell of every lesson, each different one once."""
     notebooks = (nbformat.read(path, 4) for path in (ROOT / "lessons").glob("*.ipynb"))
-    return {next(cell.source for cell in notebook.cells if cell.cell_type == "code") for notebook in notebooks}
+    cells = chain.from_iterable(notebook.cells for notebook in notebooks)
+    return {cell.source for cell in cells if "setup" in cell.metadata.get("tags", [])}
 
 
 @pytest.mark.parametrize("code", sorted(first_cells()))

@@ -15,7 +15,7 @@ from pathlib import Path
 import pictures
 from links import REPOSITORY, on_site
 
-from camviz.course import prose
+from camviz.course import colab, prose
 from camviz.course.exercises import exercise
 from camviz.course.notebooks import Cell, Notebook, exercise_of, read
 from camviz.course.questions import Question, question, quiz_questions
@@ -88,7 +88,7 @@ class LessonPage:
 
 def _is_folded(cell: Cell, moves: bool) -> bool:
     """Whether a reader of the page opens the code of a cell: of what only shows a question or a visualizer."""
-    return moves or "setup" in cell.metadata.get("tags", []) or asked_by(cell.source) is not None
+    return moves or bool({"setup", "colab"} & set(cell.metadata.get("tags", []))) or asked_by(cell.source) is not None
 
 
 def asked_by(source: str) -> tuple[tuple[Question, ...], str, str] | None:
@@ -170,6 +170,7 @@ def doors(file: str) -> str:
     mine = f"<code>camviz lab --lesson {file[:2]}</code>"
     return (
         f'<ul class="camviz-doors"><li><a href="{binder}">Binder</a></li>'
+        f'<li><a href="{colab.opens(file)}">Colab</a></li>'
         f'<li><a href="{file}" download>download</a></li>'
         f"<li><details><summary>in your JupyterLab</summary><p>{mine} opens JupyterLab at this lesson. In a clone of "
         f'<a href="{REPOSITORY}">the repository</a> it is <code>python start.py lab --lesson {file[:2]}</code>.</p>'

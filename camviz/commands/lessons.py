@@ -1,7 +1,7 @@
 """Tools for the lessons: what a lesson must have, its saved outputs, and the pages that list the lessons.
 
 python -m camviz.commands.lessons check            what departs from the pattern of a lesson
-python -m camviz.commands.lessons refresh [05 …]   run and save with static outputs
+python -m camviz.commands.lessons refresh [05 …]   run and save with static outputs, Colab's cell among them
 python -m camviz.commands.lessons fresh            which saved outputs are older than their lesson
 python -m camviz.commands.lessons pages            write README's tables, lesson 00's map and both glossaries anew
 """
@@ -13,9 +13,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from camviz.course import colab
 from camviz.course.lesson_rules import complaints
 from camviz.course.material import lessons_folder
-from camviz.course.notebooks import read
+from camviz.course.notebooks import read, write
 from camviz.course.pages import write_pages
 from camviz.course.saved_outputs import is_fresh, refresh
 from camviz.teaching import plans
@@ -54,6 +55,7 @@ def _paths(names: Sequence[str]) -> list[Path]:
 def _run_refresh(given: argparse.Namespace) -> int:
     for path in _paths(given.names):
         print(f"running {path.name}", flush=True)
+        write(colab.prepared(read(path), path.name), path)
         refresh(path)
     return 0
 

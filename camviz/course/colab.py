@@ -18,7 +18,8 @@ if "google.colab" in sys.modules:  # camviz is not installed there; anywhere els
     output.enable_custom_widget_manager()"""
 """The first code of a lesson that is prepared for Colab, in a cell tagged `colab`."""
 
-_BADGE = "[![Open in Colab](https://colab.research.google.com/assets/colab-badge.svg)]"
+_BADGE = "[![Open in Colab](images/colab.svg)]"
+_FOLDED = {"jupyter": {"source_hidden": True}, "cellView": "form"}  # in Jupyter's front ends, and in Colab
 _OPENS = "https://colab.research.google.com/github/camviz/camviz/blob/main/lessons"
 
 
@@ -28,7 +29,16 @@ def badge(file_name: str) -> str:
     >>> badge("05_distortion.ipynb").rpartition("/")[2]
     '05_distortion.ipynb)'
     """
-    return f"{_BADGE}({_OPENS}/{file_name})"
+    return f"{_BADGE}({opens(file_name)})"
+
+
+def opens(file_name: str) -> str:
+    """The address that opens a lesson on Colab.
+
+    >>> opens("05_distortion.ipynb").rpartition("/")[2]
+    '05_distortion.ipynb'
+    """
+    return f"{_OPENS}/{file_name}"
 
 
 def prepared(notebook: Notebook, file_name: str) -> Notebook:
@@ -48,6 +58,6 @@ def prepared(notebook: Notebook, file_name: str) -> Notebook:
         places = [number for number, cell in enumerate(made.cells) if "setup" in cell.metadata.get("tags", [])]
         if not places:
             raise ValueError(f"{file_name}: expected a cell tagged setup, there is none")
-        cell = nbformat.v4.new_code_cell(INSTALL, id="colab", metadata={"tags": ["colab"]})
+        cell = nbformat.v4.new_code_cell(INSTALL, id="colab", metadata=deepcopy(_FOLDED) | {"tags": ["colab"]})
         made.cells.insert(places[0], cell)
     return made
