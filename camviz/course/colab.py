@@ -7,10 +7,11 @@ from copy import deepcopy
 from camviz.course.notebooks import Notebook, tagged
 
 INSTALL = """\
+# On Google Colab this cell installs camviz; anywhere else it does nothing.
 import subprocess
 import sys
 
-if "google.colab" in sys.modules:  # camviz is not installed there; anywhere else this cell does nothing
+if "google.colab" in sys.modules:
     camviz = "camviz[lab] @ git+https://github.com/camviz/camviz"
     subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", camviz], check=True)
     from google.colab import output
