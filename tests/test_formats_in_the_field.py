@@ -428,6 +428,16 @@ def test_bal_looks_along_minus_z_with_y_up(tmp_path):
     np.testing.assert_allclose(cameras["camera0"].project(world), expected, rtol=0, atol=1e-9)
 
 
+def test_a_bal_problem_may_have_empty_lines_between_its_parts(tmp_path):
+    """GTSAM's problems have them after the counts, the observations and each camera."""
+    path = sample("bal", tmp_path)
+    before = camviz.load(path, size=(640, 480)).cameras
+    counts, *observed, numbers = path.read_text().split("\n", 3)
+    path.write_text(f"{counts}\n\n" + "\n".join(observed) + "\n\n" + numbers.replace("0.002\n", "0.002\n\n"))
+    after = camviz.load(path, size=(640, 480)).cameras
+    assert all(same_camera(after[name], before[name], 0) for name in ("camera0", "camera1"))
+
+
 def test_an_ost_is_opencvs_order_and_four_numbers_are_a_fisheye(tmp_path):
     path = sample("ost", tmp_path)
     camera = camviz.load(path).cameras["narrow_stereo"]
