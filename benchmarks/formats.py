@@ -16,8 +16,9 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+from equations import Reference
 from kernel import table
-from references import REFERENCES, Reference
+from references import REFERENCES
 
 from camviz.cameras import Camera, transform
 from camviz.files import format_of, load

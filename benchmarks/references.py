@@ -11,7 +11,6 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,38 +18,11 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 import yaml
-from numpy.typing import ArrayLike, NDArray
+from equations import Array, Reference, camera, double_sphere, extended_unified, fisheye, matrix, opencv
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
-HERE = np.eye(3)
 SIZES = {"bal": (1200, 800)}  # of files that hold none, where the equation needs one
 OPENGL = np.diag([1.0, -1.0, -1.0])
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A camera as its file defines it: pixels of points in its frame, and where it stands, x_cam = R x_world + t."""
-
-    project: Callable[[Array], Array]
-    R: Array
-    t: Array
-
-
-def opencv(points: Array, K: ArrayLike, D: ArrayLike) -> Array:
-    """OpenCV's own projection."""
-    pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.array(K, float), np.array(D, float).ravel())
-    return pixels[:, 0].astype(float)
-
-
-def camera(K: ArrayLike, D: ArrayLike, R: ArrayLike = HERE, t: ArrayLike = (0, 0, 0)) -> Reference:
-    """A camera of OpenCV's model."""
-    return Reference(lambda points: opencv(points, K, D), np.array(R, float), np.array(t, float).ravel())
-
-
-def matrix(fx: float, fy: float, cx: float, cy: float) -> list[list[float]]:
-    """The camera matrix."""
-    return [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
 
 
 def qualisys(path: Path) -> Iterator[Reference]:
@@ -168,20 +140,6 @@ def orbslam3(held: dict[str, Any]) -> Iterator[Reference]:
         yield project(matrix(*K), D, pose[:3, :3], pose[:3, 3])
 
 
-def fisheye(K: ArrayLike, D: ArrayLike, R: ArrayLike = HERE, t: ArrayLike = (0, 0, 0)) -> Reference:
-    """Kannala and Brandt's: r = θ + k1 θ³ + k2 θ⁵ + k3 θ⁷ + k4 θ⁹."""
-    (fx, _, cx), (_, fy, cy), _ = np.array(K, float)
-    k = [1, *np.ravel(D)]
-
-    def project(points: Array) -> Array:
-        across = np.hypot(points[:, 0], points[:, 1])
-        theta = np.arctan2(across, points[:, 2])
-        scale = sum(each * theta ** (2 * power + 1) for power, each in enumerate(k)) / across
-        return np.stack([fx * scale * points[:, 0] + cx, fy * scale * points[:, 1] + cy], axis=-1)
-
-    return Reference(project, np.array(R, float), np.array(t, float).ravel())
-
-
 def document(path: Path) -> Any:
     """A YAML file, also one that begins as OpenCV's do and names its types."""
     text = re.sub(r"^%YAML:1.0.*$", "", path.read_text(), flags=re.MULTILINE).replace("!!opencv-matrix", "")
@@ -226,30 +184,6 @@ def basalt(path: Path) -> Iterator[Reference]:
         model = {"ds": double_sphere, "eucm": extended_unified}[each["camera_type"]]
         cameras.append(Reference(model(**each["intrinsics"]), np.eye(3), np.zeros(3)))
     yield from behind_an_imu(poses, cameras)
-
-
-def double_sphere(fx: float, fy: float, cx: float, cy: float, xi: float, alpha: float) -> Callable[[Array], Array]:
-    """Usenko, Demmel and Cremers 2018, equations 40 to 42."""
-
-    def project(points: Array) -> Array:
-        x, y, z = points.T
-        d1 = np.sqrt(x * x + y * y + z * z)
-        d2 = np.sqrt(x * x + y * y + (xi * d1 + z) ** 2)
-        below = alpha * d2 + (1 - alpha) * (xi * d1 + z)
-        return np.stack([fx * x / below + cx, fy * y / below + cy], axis=-1)
-
-    return project
-
-
-def extended_unified(fx: float, fy: float, cx: float, cy: float, alpha: float, beta: float) -> Callable[[Array], Array]:
-    """Khomutenko, Garcia and Martinet 2016."""
-
-    def project(points: Array) -> Array:
-        x, y, z = points.T
-        below = alpha * np.sqrt(beta * (x * x + y * y) + z * z) + (1 - alpha) * z
-        return np.stack([fx * x / below + cx, fy * y / below + cy], axis=-1)
-
-    return project
 
 
 def camodocal(path: Path) -> Iterator[Reference]:
@@ -369,6 +303,47 @@ def svo(path: Path) -> Iterator[Reference]:
     yield from behind_an_imu([np.reshape(part["T_B_C"]["data"], (4, 4)) for part in parts], cameras)
 
 
+def euroc(path: Path) -> Iterator[Reference]:
+    """radial-tangential; alone, so that its own frame is the world's."""
+    held = document(path)
+    yield camera(matrix(*held["intrinsics"]), held["distortion_coefficients"])
+
+
+def kitti(path: Path) -> Iterator[Reference]:
+    """P = K [1 | t] of cameras without distortion."""
+    for line in path.read_text().splitlines():
+        if re.match(r"P\d:", line):
+            P = np.array(line.split()[1:], float).reshape(3, 4)
+            yield camera(P[:, :3], np.zeros(5), t=np.linalg.solve(P[:, :3], P[:, 3]))
+
+
+def metashape(path: Path) -> Iterator[Reference]:
+    """The frame camera of Metashape's manual, appendix D, first pixel's centre at 0.5; transform: camera → chunk."""
+    chunk = ElementTree.parse(path).getroot().find("chunk")
+    assert chunk is not None
+    sensors = {each.get("id"): each.find("calibration") for each in chunk.iter("sensor")}
+    for each in chunk.iter("camera"):
+        held, pose = sensors[each.get("sensor_id")], each.findtext("transform")
+        if held is None or pose is None:
+            continue
+        w, h = (float(held.find("resolution").attrib[side]) for side in ("width", "height"))  # type: ignore[union-attr]
+        names = "f cx cy b1 b2 k1 k2 k3 p1 p2"
+        f, cx, cy, b1, b2, k1, k2, k3, p1, p2 = (float(held.findtext(name, "0")) for name in names.split())
+
+        def project(points: Array, *n: float) -> Array:
+            w, h, f, cx, cy, b1, b2, k1, k2, k3, p1, p2 = n
+            x, y = (points[:, :2] / points[:, 2:]).T
+            r2 = x * x + y * y
+            radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+            u = x * radial + p1 * (r2 + 2 * x * x) + 2 * p2 * x * y
+            v = y * radial + p2 * (r2 + 2 * y * y) + 2 * p1 * x * y
+            return np.stack([w / 2 + cx + u * f + u * b1 + v * b2, h / 2 + cy + v * f], axis=-1) - 0.5
+
+        numbers = (w, h, f, cx, cy, b1, b2, k1, k2, k3, p1, p2)
+        there = np.linalg.inv(np.array(pose.split(), float).reshape(4, 4))
+        yield Reference(lambda points, n=numbers: project(points, *n), there[:3, :3], there[:3, 3])  # type: ignore[misc]
+
+
 REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
     each.__name__: each
     for each in (
@@ -377,7 +352,10 @@ REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
         basalt,
         camodocal,
         easymocap,
+        euroc,
         kalibr,
+        kitti,
+        metashape,
         mrcal,
         nerfstudio,
         oak,
