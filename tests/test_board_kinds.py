@@ -83,6 +83,14 @@ def test_kalibrs_tag_0_is_at_the_lower_left_with_the_bits_that_kalibr_prints():
     assert code == 0xD5D628584
 
 
+def test_a_charuco_board_printed_white_on_black_is_found_as_well():
+    """caliscope prints it so, to save ink; four real films of such a board showed it."""
+    picture = 255 - photographed(CAMERA, BOARDS["charuco"], POSE)
+    distances = off(BOARDS["charuco"], POSE, picture)
+    assert np.isfinite(distances).mean() > 0.8
+    assert np.nanmax(distances) < 0.15
+
+
 def test_a_part_of_an_aprilgrid_is_enough():
     board = BOARDS["aprilgrid"]
     picture = photographed(CAMERA, board, POSE)

@@ -61,9 +61,10 @@ def test_on_the_samples_the_denominator_stays_above_a_fifth_over_the_whole_image
     assert not [one for one in inspect(photographed["rational"]).findings if one.id == "near-pole"]
 
 
-def test_on_the_samples_what_was_held_out_is_predicted_as_well_as_by_the_standard_model(photographed):
+def test_on_the_samples_what_was_held_out_is_predicted_no_worse_than_by_the_standard_model(photographed):
+    """The denominator of left*.jpg earns its place. That of right*.jpg does not: its solution is the standard one."""
     standard, rational = (held_out(Adjustment.of(photographed[m]), folds=4).rms for m in ("standard", "rational"))
-    assert rational < 1.001 * standard
+    assert rational < standard * (1 + 1e-9)  # two solutions of one problem differ by 1e-10
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -13,6 +13,7 @@ from test_files import sample, write
 import camviz
 from camviz.calibration import Detections, calibrate, calibrate_pair, detect
 from camviz.calibration.adjustment import Adjustment
+from camviz.cameras import Camera, Intrinsics
 from camviz.clinic import Inspection, inspect, inspect_file, kinds
 from camviz.clinic.checks.boards import coverage, held_out_ratio
 from camviz.clinic.evidence import Evidence
@@ -20,8 +21,9 @@ from camviz.clinic.fields import smooth_field, warp_columns
 from camviz.clinic.observed import explained, parameter_columns
 from camviz.clinic.virtual import single
 from camviz.commands.command import main
+from camviz.distortion import valid_region
 from camviz.files import Board, CalibrationError
-from camviz.lenses import BrownConrady
+from camviz.lenses import BrownConrady, Equidistant, KannalaBrandt, Orthographic, Perspective
 
 DATA = Path(__file__).parent / "data"
 BOARD = Board(9, 6, 0.025)
@@ -186,7 +188,42 @@ SQUARE = np.array([[0.0, 0], [639, 0], [639, 479], [0, 479]])
 
 @pytest.mark.parametrize(("corners", "share"), [(SQUARE, 1), (SQUARE * [0.5, 1], 0.5)])
 def test_coverage_is_the_area_inside_the_outline(corners, share):
-    assert coverage(corners[None], 640, 480) == pytest.approx(share, abs=0.03)
+    assert coverage(corners[None], Camera(Intrinsics(640, 480, 500, 500, 320, 240), Perspective())) == pytest.approx(
+        share, abs=0.03
+    )
+
+
+def ring(degrees, focal=297.0):
+    """Corners (1, 60, 2) all around the middle of 1280 × 960 pixels, so far off the axis of an equidistant fisheye."""
+    around = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    return (focal * np.radians(degrees) * np.stack([np.cos(around), np.sin(around)], axis=-1) + [639.5, 479.5])[None]
+
+
+@pytest.mark.parametrize("lens", [Equidistant(), KannalaBrandt()])
+def test_coverage_leaves_out_what_lies_beyond_a_fisheyes_circle(lens):
+    """A board seen up to 75° off the axis fills 39 % of the picture, and 54 % of what 110° come to."""
+    fisheye = Camera(Intrinsics(1280, 960, 297, 297, 639.5, 479.5), lens)
+    x, y = np.meshgrid(np.arange(1280) - 639.5, np.arange(960) - 479.5)
+    off_axis = np.degrees(np.hypot(x, y) / 297)
+    assert (off_axis < 75).mean() < 0.4 < (off_axis < 75).sum() / (off_axis < 110).sum()
+    share = (off_axis < 75).sum() / (off_axis < 110).sum()
+    assert coverage(ring(75), fisheye) == pytest.approx(share, abs=0.04)
+
+
+def test_coverage_counts_corners_that_were_seen_beyond_the_circle_all_the_same():
+    """The circle of an orthographic lens of 300 px is a disc of that radius, and the board was seen up to 400 px."""
+    camera = Camera(Intrinsics(1280, 960, 300, 300, 639.5, 479.5), Orthographic())
+    assert coverage(ring(np.degrees(240 / 297)), camera) == pytest.approx(0.64, abs=0.07)
+    assert coverage(ring(np.degrees(400 / 297)), camera) == 1
+
+
+@pytest.mark.parametrize("lens", [BrownConrady(-1 / 3), BrownConrady(k4=1.0), KannalaBrandt(-0.5)])
+def test_a_fold_or_a_pole_hides_no_missing_views(lens):
+    """Beyond either no ray arrives, in most of this picture; coverage is that of the whole of it all the same."""
+    camera = Camera(Intrinsics(1280, 960, 297, 297, 639.5, 479.5), lens)
+    assert valid_region(camera, 8).mean() < 0.6
+    plain = Camera(camera.intrinsics, Perspective())
+    assert coverage(ring(30), camera) == coverage(ring(30), plain)
 
 
 # What an inspection is -----------------------------------------------------------------------------------------------

@@ -428,6 +428,16 @@ def test_bal_looks_along_minus_z_with_y_up(tmp_path):
     np.testing.assert_allclose(cameras["camera0"].project(world), expected, rtol=0, atol=1e-9)
 
 
+def test_a_bal_problem_may_have_empty_lines_between_its_parts(tmp_path):
+    """GTSAM's problems have them after the counts, the observations and each camera."""
+    path = sample("bal", tmp_path)
+    before = camviz.load(path, size=(640, 480)).cameras
+    counts, *observed, numbers = path.read_text().split("\n", 3)
+    path.write_text(f"{counts}\n\n" + "\n".join(observed) + "\n\n" + numbers.replace("0.002\n", "0.002\n\n"))
+    after = camviz.load(path, size=(640, 480)).cameras
+    assert all(same_camera(after[name], before[name], 0) for name in ("camera0", "camera1"))
+
+
 def test_an_ost_is_opencvs_order_and_four_numbers_are_a_fisheye(tmp_path):
     path = sample("ost", tmp_path)
     camera = camviz.load(path).cameras["narrow_stereo"]
@@ -525,7 +535,23 @@ def test_bf_of_a_camera_with_depth_is_no_second_picture(tmp_path):
     assert camviz.load(written(tmp_path / "b.yaml", f"{text}DepthMapFactor: 5000.0\n")).notes == ()
 
 
+def librealsenses_modified(points, fx, fy, cx, cy, *coeffs):
+    """rs2_project_point_to_pixel of librealsense 2.56, line by line, of one point after another."""
+    found = []
+    for X, Y, Z in points.tolist():
+        x, y = X / Z, Y / Z
+        r2 = x * x + y * y
+        f = 1 + coeffs[0] * r2 + coeffs[1] * r2 * r2 + coeffs[4] * r2 * r2 * r2
+        x *= f
+        y *= f
+        dx = x + 2 * coeffs[2] * x * y + coeffs[3] * (r2 + 2 * x * x)
+        dy = y + 2 * coeffs[3] * x * y + coeffs[2] * (r2 + 2 * y * y)
+        found.append([dx * fx + cx, dy * fy + cy])
+    return np.array(found)
+
+
 REALSENSE = {
+    "modified_brown_conrady": (librealsenses_modified, [0.125, -0.25, 0.001, -0.002, 0.0625]),
     "brown_conrady": (radtan, [0.125, -0.25, 0.001, -0.002, 0.0625]),
     "kannala_brandt4": (kannala_brandt, [0.125, -0.25, 0.001, -0.002, 0.0]),
     "ftheta": (fov, [0.93, 0, 0, 0, 0]),
@@ -547,13 +573,19 @@ def test_a_realsense_stream_has_librealsenses_model(tmp_path, model):
 @pytest.mark.parametrize(
     "word", ["Inverse Brown Conrady", "distortion.inverse_brown_conrady", "RS2_DISTORTION_INVERSE_BROWN_CONRADY"]
 )
-def test_realsenses_inverse_is_read_only_without_terms(tmp_path, word):
+def test_realsenses_inverse_is_the_modified_model_and_older_versions_are_a_note(tmp_path, word):
     path = sample("realsense", tmp_path)
     text = path.read_text().replace("distortion.brown_conrady", word)
-    with pytest.raises(CalibrationError, match="expected 0 numbers for inverse_brown_conrady, with zeros after"):
-        camviz.load(written(path, text))
-    zeros = text.replace("[0.125, -0.25, 0.001, -0.002, 0.0625]", "[0.0, 0.0, 0.0, 0.0, 0.0]")
-    check(camviz.load(written(path, zeros)).cameras["color"], radtan(POINTS, 608.75, 609.5, 318.5, 241.25))
+    calibration = camviz.load(written(path, text))
+    numbers = (608.75, 609.5, 318.5, 241.25, 0.125, -0.25, 0.001, -0.002, 0.0625)
+    check(calibration.cameras["color"], librealsenses_modified(POINTS, *numbers))
+    assert "Older versions of librealsense straightened pixels with them." in calibration.notes[0]
+    assert np.abs(librealsenses_modified(POINTS, *numbers) - radtan(POINTS, *numbers)).max() > 0.01
+    zeros = camviz.load(
+        written(path, text.replace("[0.125, -0.25, 0.001, -0.002, 0.0625]", "[0.0, 0.0, 0.0, 0.0, 0.0]"))
+    )
+    check(zeros.cameras["color"], radtan(POINTS, 608.75, 609.5, 318.5, 241.25))
+    assert zeros.notes == ()
 
 
 def test_an_oaks_extrinsics_go_from_a_camera_to_the_socket_it_names(tmp_path):

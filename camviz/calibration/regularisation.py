@@ -6,9 +6,10 @@ rational model is always solved under a `DenominatorPrior`, as mrcal does it. Op
 cv2.calibrateCamera away.
 
 There are two such priors. The broad one forbids near-poles and little else: a lens whose denominator rises to a
-thousand is what it was without it. Under the strict one there is as good as no denominator. The broad one is taken
-where it lessens the sum of squares, in σ², by more than 2 for each coefficient: then it can be expected to predict the
-corners that it has not seen better, too (Akaike 1974, "A new look at the statistical model identification").
+thousand is what it was without it. Under the strict one the solution is that of the standard model, to the digits that
+a solver has, so that it predicts as well. The broad one is taken where it lessens the sum of squares, in σ², by more
+than 2 for each coefficient: then it can be expected to predict the corners that it has not seen better, too (Akaike
+1974, "A new look at the statistical model identification").
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.denominator_prior import LIKELY, DenominatorPrior
 from camviz.distortion import image_reach
 
-BROAD, STRICT = 10.0, 1e-3  # deviations of log D: any D, and D within a thousandth of 1
+BROAD, STRICT = 10.0, 1e-6  # deviations of log D: any D, and D within a millionth of 1
 TIGHTENED = tuple(np.geomspace(LIKELY, STRICT, 4).tolist())  # on the way to the strict one
 ROUGHLY = 1e-8  # of the sum of squares, where it goes on from there
 EARNED = 2.0  # of the sum of squares, in σ², for each coefficient

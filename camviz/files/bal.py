@@ -15,9 +15,7 @@ from camviz.poses import OPENGL, RigidTransform, Rotation
 
 TITLE = "BAL problem"
 MODEL = Model("BAL", BrownConrady, "f cx cy k1 k2")
-_START = re.compile(
-    r"[ \t]*[0-9]{1,9}[ \t]+[0-9]{1,9}[ \t]+[0-9]{1,9}[ \t]*\r?\n[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+[-+.0-9]"
-)
+_START = re.compile(r"[ \t]*[0-9]{1,9}[ \t]+[0-9]{1,9}[ \t]+[0-9]{1,9}[ \t]*\r?\n\s*[0-9]+[ \t]+[0-9]+[ \t]+[-+.0-9]")
 COUNTS = "cameras points observations"
 
 

@@ -16,6 +16,7 @@ from camviz.lenses.brown_conrady import BrownConrady  # noqa: F401
 from camviz.lenses.declarations import CalibrationModel, Spelling
 from camviz.lenses.fisheye import Equidistant, Equisolid, FieldOfView, Orthographic, Stereographic  # noqa: F401
 from camviz.lenses.kannala_brandt import KannalaBrandt  # noqa: F401
+from camviz.lenses.modified_brown_conrady import ModifiedBrownConrady  # noqa: F401
 from camviz.lenses.panoramas import Cylindrical, Equirectangular  # noqa: F401
 from camviz.lenses.perspective import Perspective
 from camviz.lenses.spheres import DoubleSphere, ExtendedUnified, UnifiedSphere  # noqa: F401

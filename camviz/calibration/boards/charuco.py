@@ -26,13 +26,18 @@ FEWEST = 6  # corners that give the board's pose with something left to check it
 
 
 def find(gray: Gray, shape: Shape, finder: str) -> Array | None:
-    """The corners that are seen, NaN for the others; None where there are few."""
-    corners, ids = detector(shape).detectBoard(gray)[:2]
-    if ids is None or len(ids) < FEWEST:
-        return None
-    seen = np.full((shape.columns * shape.rows, 2), np.nan)
-    seen[np.ravel(ids)] = np.reshape(corners, (-1, 2))
-    return seen
+    """The corners that are seen, NaN for the others; None where there are few.
+
+    A board may be printed white on black, as caliscope prints it to save ink: then it is in the negative.
+    """
+    one = detector(shape)
+    for picture in (gray, 255 - gray):
+        corners, ids = one.detectBoard(picture)[:2]
+        if ids is not None and len(ids) >= FEWEST:
+            seen = np.full((shape.columns * shape.rows, 2), np.nan)
+            seen[np.ravel(ids)] = np.reshape(corners, (-1, 2))
+            return seen
+    return None
 
 
 def detector(shape: Shape) -> Any:

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import cos, radians
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from camviz.calibration.adjustment import Adjustment
 from camviz.calibration.cross_validation import held_out
+from camviz.cameras import Camera
 from camviz.clinic.evidence import Evidence, NotChecked
 from camviz.clinic.observed import Observed
 from camviz.clinic.registry import Finding, LabFault, Rng, finding
 from camviz.clinic.virtual import single, spread_boards
+from camviz.distortion import fold_angle
 from camviz.lenses.base import Array
 
 COVERED = 0.4  # of the image: the outermost corners are a square inside the board
 CELLS = 64  # along the longer side of the image, to measure areas
+WIDEST = radians(110)  # off the axis: the widest common fisheyes see 220°
 SAME_WAY_DEG = 20.0  # between the normals of two boards
 UNCERTAIN = 0.01  # of the focal length
 HELD_OUT = 2.0  # times what noise leads to
@@ -31,7 +36,7 @@ FEWEST_VIEWS = 3
     symptom="The board was seen in too little of the image.",
     causes=("views that all show the board in the same part of the image, or far away",),
     remedy="Add views with the board close to each border and corner of the image.",
-    threshold="They cover less than two fifths of the image.",
+    threshold="They cover less than two fifths of the image, or of what a fisheye of 220° fills of it.",
     explains=("fold", "near-pole", "inverse-not-converged"),
 )
 def low_coverage(evidence: Evidence) -> Iterator[Finding]:
@@ -39,23 +44,41 @@ def low_coverage(evidence: Evidence) -> Iterator[Finding]:
     if not evidence.calibration.detections:
         raise NotChecked("the file holds no detected corners of a known board")
     for name, pixels in evidence.calibration.detections.items():
-        grid = evidence.calibration.cameras[name].intrinsics
-        share = coverage(pixels, grid.width, grid.height)
+        share = coverage(pixels, evidence.calibration.cameras[name])
         if share < COVERED:
             sentence = f"{name}: the board was seen in {share:.0%} of the image, over {len(pixels)} views."
             yield low_coverage.found(sentence, share, "of the image", name)
 
 
-def coverage(pixels: Array, width: int, height: int) -> float:
-    """The share of an image that lies inside the convex outline of some view's corners (views, corners, 2)."""
-    scale = CELLS / max(width, height)
-    cells = np.zeros((max(1, round(height * scale)), max(1, round(width * scale))), np.uint8)
+def coverage(pixels: Array, camera: Camera) -> float:
+    """The share of an image that lies inside the convex outline of some view's corners (views, corners, 2).
+
+    Beyond a fisheye's circle only the cells count in which corners were seen all the same.
+    """
+    grid = camera.intrinsics
+    scale = CELLS / max(grid.width, grid.height)
+    cells = np.zeros((max(1, round(grid.height * scale)), max(1, round(grid.width * scale))), np.uint8)
     for view in pixels:
         seen = view[np.isfinite(view).all(axis=-1)]
         if len(seen) > 2:
             outline = cv2.convexHull(np.round((seen + 0.5) * scale * 16 - 8).astype(np.int32))
             cv2.fillConvexPoly(cells, outline, 1, shift=4)
-    return float(cells.mean())
+    return float(cells.mean() / np.mean(within_reach(camera, *cells.shape) | (cells > 0)))
+
+
+def within_reach(camera: Camera, rows: int, columns: int) -> NDArray[np.bool_]:
+    """In which of rows × columns cells of its image a camera can see something: false beyond a fisheye's circle.
+
+    A fold or a pole nearer than that takes no cell away: missing views lead to it, and must not hide behind it.
+    """
+    grid, lens = camera.intrinsics, camera.lens
+    if lens.goes_round:
+        return np.ones((rows, columns), bool)
+    u = (np.arange(columns) + 0.5) * grid.width / columns - 0.5
+    v = (np.arange(rows) + 0.5) * grid.height / rows - 0.5
+    z = lens.unproject(grid.from_pixels(np.stack(np.meshgrid(u, v), axis=-1)))[..., 2]
+    turns_back = bool(lens.denominator_terms) or fold_angle(lens) < WIDEST
+    return np.where(np.isfinite(z), z >= cos(WIDEST), turns_back)
 
 
 @low_coverage.fault(
