@@ -30,6 +30,7 @@ from camviz.room.address import is_named_safely
 from camviz.room.gain import gain, gains
 from camviz.room.limits import Allowance, Limits
 from camviz.room.server import House, answers_csv, application, listen
+from camviz.room.site import Site
 from camviz.room.store import Room, RoomError
 from camviz.widgets.question import QuestionWidget, Sheet
 
@@ -373,13 +374,13 @@ class Client:
         return await self("api/do", told, self.room.teacher_key)
 
 
-def served(room, run, limits=None, proxied=False, **options):
+def served(room, run, limits=None, proxied=False, site=None, **options):
     """Run a coroutine function with a client of the room's server."""
 
     async def both():
         held, port = bind_unused_port(address="127.0.0.1")
         held.close()
-        house = House(room, f"http://127.0.0.1:{port}/", limits or Limits(), proxied)
+        house = House(room, f"http://127.0.0.1:{port}/", limits or Limits(), proxied, site)
         server = listen(application(house, **options), house, "127.0.0.1", port)
         AsyncHTTPClient.configure(None, max_clients=500)
         try:
@@ -614,7 +615,7 @@ def test_every_answer_has_a_policy_that_runs_no_script_of_a_student(room, tmp_pa
         ):
             assert (await client(path)).code in (403, 404), path
 
-    served(room, play, site=tmp_path)
+    served(room, play, site=Site(tmp_path))
 
 
 def test_the_pages_have_no_script_and_no_style_of_their_own_and_ask_no_other_host():

@@ -33,6 +33,7 @@ async function save(which) {
 
 function doorShown(told) {
   const projector = element("a", { href: `projector#${room.projector}`, target: "_blank", rel: "noopener" }, "Open the projector's page");
+  const site = room.site && element("a", { href: room.site, target: "_blank", rel: "noopener" }, "Open the lessons");
   const home = button(told.at_home ? "Close the questions at home" : "Open all questions at home",
     () => act(told.at_home ? "close at home" : "open at home"), { id: "home", disabled: told.ended });
   const end = button("End the room", () => {
@@ -42,7 +43,7 @@ function doorShown(told) {
     ...(room.qr ? [element("img", { class: "qr", src: room.qr, alt: "QR code of the address with the word" })] : []),
     element("p", {}, element("span", { class: "address" }, room.address), element("strong", { class: "word" }, room.word),
       element("span", { class: "joined" }, `${told.joined} have joined`)),
-    element("div", { class: "tools" }, projector, home,
+    element("div", { class: "tools" }, projector, site, home,
       button("Votes as CSV", () => save("counts"), { id: "counts" }),
       button("Answers as CSV, for the gain", () => save("answers"), { id: "answers" }), end));
 }
