@@ -37,6 +37,7 @@ MOST_FILE = 20_000_000
 MOST_KEPT = 64_000_000
 """Bytes of files that are kept in memory, packed: a lesson with all its recordings takes some five million."""
 
+SELF = "'self'"
 _QUESTIONS = '<div class="camviz-asked">'
 _SCRIPT = re.compile(r"<script(?![^>]*\ssrc=)[^>]*>(.*?)</script>", re.DOTALL | re.IGNORECASE)
 
@@ -105,10 +106,13 @@ def built_site() -> Path | None:
 
 
 def policy(page: str = "") -> str:
-    """What a page may load and run: its own origin's files, and of scripts within it those it was built with."""
+    """What a page may load and run: its own origin's files, and of scripts within it those it was built with.
+
+    What is recorded is shown by the notebook's own module, which `replay.js` loads from a blob.
+    """
     scripts = [_hashed(script.replace("\r\n", "\n")) for script in dict.fromkeys(_SCRIPT.findall(page))]
     return (
-        f"default-src 'none'; script-src {' '.join([chr(39) + 'self' + chr(39), *scripts])}; "
+        f"default-src 'none'; script-src {' '.join((SELF, *scripts))} blob:; "
         "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; "
         "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     )
@@ -129,7 +133,9 @@ def _prepared(path: Path, up: str) -> Served:
         page = body.decode(errors="surrogateescape")
         allowed = policy(page)
         body = with_room(page, up).encode(errors="surrogateescape")
-    packed = None if TYPES[path.suffix].startswith(("image/webp", "image/png", "image/jpeg", "font/")) else _packed(body)
+    packed = (
+        None if TYPES[path.suffix].startswith(("image/webp", "image/png", "image/jpeg", "font/")) else _packed(body)
+    )
     return Served(body, packed, TYPES[path.suffix], allowed, f'"{hashlib.sha256(body).hexdigest()[:32]}"')
 
 

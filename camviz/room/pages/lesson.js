@@ -48,8 +48,8 @@ function state(told, chosen) {
   const own = chosen === undefined ? "You did not vote." : `You chose ${letter(chosen)}.`;
   if (!told.open) return told.rounds.length ? `The vote is closed. ${own} ${told.discuss}` : "The vote has not begun.";
   if (chosen !== undefined) return `Your ${which(told.open)} vote is ${letter(chosen)}. It is counted. You may change it until the vote is closed.`;
-  const before = told.chosen[1] === undefined ? "" : `You chose ${letter(told.chosen[1])}. `;
-  return `This is the ${which(told.open)} ${kind}. ${before}${told.discuss}`;
+  if (told.open === 2) return `This is the second ${kind}. ${told.chosen[1] === undefined ? "" : `You chose ${letter(told.chosen[1])}. `}${told.discuss}`;
+  return `This is the first ${kind}. Your choice goes to the room, and the reply comes ${home ? "after your second answer" : "when your teacher shows it"}.`;
 }
 
 async function send({ name }, choice) {
@@ -100,8 +100,13 @@ function point(told) {
   if (told.at_home) say("The questions are open at home. Answer each twice; then you read why.");
   else if (here) say("The class votes on a question of this page: ", link("go to the question", `#${place(here.name)}`), ".");
   else if (open.length) say("The class votes on a question that is not on this page: ", link("go there", told.read ? room + told.read : room), ".");
-  else if (told.question) say("No vote is open. ", link("See the question", names.includes(told.question.name) ? `#${place(told.question.name)}` : room), ".");
+  else if (told.question) say(link(words(told.question), names.includes(told.question.name) ? `#${place(told.question.name)}` : room), ".");
   else say("You are in. The next question comes when the teacher asks it.");
+}
+
+function words({ revealed, rounds }) {
+  if (revealed) return "The answer is shown";
+  return rounds.length ? "The vote is closed; talk about this question" : "The next vote is on this question";
 }
 
 function place(name) {
@@ -112,6 +117,7 @@ function place(name) {
 
 function enter() {
   const mine = ++following;
+  document.documentElement.classList.add("camviz-joined");
   body.replaceChildren(element("button", { type: "button", on: { click: leave } }, "Leave the room"));
   follow(membership.token, {
     show: (told) => { if (mine === following) show(told); },
@@ -126,6 +132,7 @@ function enter() {
 function over(sentence) {
   following += 1;
   remember(membership = latest = null);
+  document.documentElement.classList.remove("camviz-joined");
   refresh();
   door(sentence);
 }
