@@ -45,7 +45,7 @@ class Allowance:
 class Limits:
     """What a room allows. A classroom is one address: 300 telephones that open the page at once ask 2,000 times.
 
-    A page of the site asks for some sixty files; they have an allowance of their own, and leave that of the votes alone.
+    A page of the site asks for some sixty files; these have an allowance of their own, so that no vote waits for them.
     """
 
     address: Allowance = field(default_factory=lambda: Allowance(burst=4000, rate=200))

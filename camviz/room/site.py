@@ -38,6 +38,7 @@ MOST_KEPT = 64_000_000
 """Bytes of files that are kept in memory, packed: a lesson with all its recordings takes some five million."""
 
 SELF = "'self'"
+_PACKED = (".jpg", ".png", ".webp", ".woff2")
 _QUESTIONS = '<div class="camviz-asked">'
 _SCRIPT = re.compile(r"<script(?![^>]*\ssrc=)[^>]*>(.*?)</script>", re.DOTALL | re.IGNORECASE)
 
@@ -72,7 +73,7 @@ class Site:
         return f"site/lessons/{self._lessons[number]}" if number in self._lessons else "site/index.html"
 
     def find(self, way: str) -> Path | None:
-        """The file at an address below the site's, or None; links that lead elsewhere and hidden files are not there."""
+        """The file at an address below the site's, or None; also for a link that leads elsewhere, and a hidden file."""
         parts = (f"{way}index.html" if way.endswith("/") or not way else way).split("/")
         if not all(map(_is_plain, parts)) or Path(parts[-1]).suffix not in TYPES:
             return None

@@ -26,7 +26,7 @@ LAPTOP, TELEPHONE, PROJECTOR = ((1366, 768), (375, 667), (1920, 1080))
 SMALLEST = """() => Math.min(...[...document.querySelectorAll("body *")]
   .filter((one) => one.offsetParent && [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim()))
   .map((one) => parseFloat(getComputedStyle(one).fontSize)))"""
-# What lies below the strip at a page's foot, axe cannot tell; preload asks for style sheets a second time, by wrong names.
+# What lies below the strip at a page's foot, axe cannot tell; preload asks for style sheets anew, by wrong names.
 SITE_AXE = """async () => {
   const { violations } = await axe.run(document, { resultTypes: ["violations"], preload: false });
   return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 160)}`));
@@ -278,7 +278,7 @@ def test_a_vote_from_a_lessons_page_that_comes_after_closing_is_refused_by_the_s
     page.route("**/api/vote", lambda route: (reading.do("close"), route.continue_()))  # closed while it is on its way
     commits(page, RIGHT)
     expect(page.locator(".camviz-class .news")).to_contain_text("The vote is closed")
-    expect(asked(page).locator(".camviz-reply")).to_contain_text("You did not vote.")
+    expect(asked(page).locator(".camviz-reply")).to_have_text(re.compile("was not counted|did not vote"))
     expect(asked(page).locator("input:checked")).to_have_count(0)
     assert reading.do("choose")["question"]["counts"]["1"] == [0] * 4
     reading.wrong = [one for one in reading.wrong if "409" not in one]
