@@ -55,6 +55,7 @@ function over(problem = "") {
   if (problem) return door(problem);
   content.replaceChildren(element("p", {}, "Your number is deleted from this browser. Thank you for thinking along."));
   say("The room has ended.");
+  privacy("");
 }
 
 async function leave() {

@@ -56,6 +56,8 @@ export const share = (votes, all) => (all ? Math.round((100 * votes) / all) : 0)
 
 export const sum = (numbers) => numbers.reduce((total, one) => total + one, 0);
 
+export const haveJoined = (number) => `${number} ${number === 1 ? "has" : "have"} joined`;
+
 // A bar for each vote on one choice, under one another: the first hatched, the second full, each with its number.
 export function bars(counts, choice, chosen = {}) {
   return element("div", { class: "bars" }, ...Object.entries(counts).map(([round, votes]) => {
