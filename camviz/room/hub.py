@@ -85,11 +85,11 @@ def service(environment: Mapping[str, str]) -> tuple[str, str, int]:
 async def serve(lessons: list[str], environment: Mapping[str, str], folder: Path) -> None:
     """Serve the room of a folder, for ever; one that has ended gives way to a new one."""
     prefix, host, port = service(environment)
+    site = Site(Path(environment["CAMVIZ_CLASS_SITE"])) if environment.get("CAMVIZ_CLASS_SITE") else None
     asked = [one for lesson in lessons for one in questions(lesson).values()]
     room = Room.of(folder, asked, days=float(environment.get("CAMVIZ_CLASS_DAYS", "14")))
     address = environment.get("CAMVIZ_CLASS_ADDRESS", f"http://{host}:{port}{prefix}")
-    folder_of_site = environment.get("CAMVIZ_CLASS_SITE")
-    house = House(room, address, behind_proxy=True, site=Site(Path(folder_of_site)) if folder_of_site else None)
+    house = House(room, address, behind_proxy=True, site=site)
     app = application(house, prefix, more=routes(house))
     app.settings["cookie_secret"] = os.urandom(32)  # of the hub's own sign-in; students have no cookie
     listen(app, house, host, port)
