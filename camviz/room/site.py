@@ -75,7 +75,7 @@ class Site:
     def find(self, way: str) -> Path | None:
         """The file at an address below the site's, or None; also for a link that leads elsewhere, and a hidden file."""
         parts = (f"{way}index.html" if way.endswith("/") or not way else way).split("/")
-        if not all(map(_is_plain, parts)) or Path(parts[-1]).suffix not in TYPES:
+        if not all(map(_is_plain, parts)):
             return None
         try:
             path = self.folder.joinpath(*parts).resolve(strict=True)
