@@ -288,6 +288,8 @@ def test_neighbours_are_asked_to_talk_between_the_votes_and_at_no_other_time(roo
         said.append(bool(shown.to_student(room, 1)["question"]["discuss"]))
         assert said[-1] == bool(shown.to_projector(room)["question"]["discuss"])
     assert said == [False, True, False, False, False]
+    assert "a neighbour who chose another answer" in shown.DISCUSS
+    assert "tell each other your names" in shown.DISCUSS
 
 
 @pytest.mark.parametrize(

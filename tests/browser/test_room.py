@@ -100,6 +100,9 @@ def test_a_class_of_300_votes_talks_votes_again_and_sees_why(classroom):
     classroom.check("1-before")
 
     expect(phone.locator("#kept")).to_contain_text("No name, no address, no time and no cookie")
+    expect(phone.locator("#kept")).to_contain_text("until the teacher deletes that file")
+    expect(teacher.locator("#kept")).to_contain_text(f"Kept in room_{classroom.word}.sqlite")
+    expect(teacher.locator("#kept")).to_contain_text("The room ends by itself on")
     phone.get_by_role("button", name="Join").click()
     dark.get_by_label("The word of the room").fill("wrong-0000")
     dark.get_by_role("button", name="Join").click()
@@ -239,6 +242,9 @@ def commits(page, choice):
 
 def test_a_lessons_page_votes_twice_is_counted_once_and_keeps_its_reply_back(reading):
     page = reading.page(LESSON, TELEPHONE)
+    page.get_by_text("Vote with your class").click()
+    expect(page.locator(".camviz-class .kept")).to_contain_text("No name, no address, no time and no cookie is kept")
+    page.get_by_text("Vote with your class").click()
     joins(page, reading.word)
     expect(page.locator(".camviz-class .news")).to_contain_text("You are in.")
     reading.do("open", 1)
