@@ -318,6 +318,20 @@ def test_from_the_telephones_page_a_student_reads_on_in_the_lesson_and_is_still_
     reading.wrong = [one for one in reading.wrong if "410" not in one]
 
 
+def test_at_home_a_lessons_page_asks_twice_and_then_says_why(reading):
+    page = reading.page(LESSON, LAPTOP)
+    joins(page, reading.word)
+    reading.do("open at home")
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("the reply comes after your second answer")
+    commits(page, WRONG)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("You chose (c). Before you answer again")
+    assert "far_rays" not in page.evaluate(COUNTS)
+    commits(page, RIGHT)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("✓ Correct.")
+    expect(asked(page).locator(".camviz-room")).to_be_empty()  # the class's split comes when the teacher closes it
+    assert reading.do("close at home")["states"][NAME] == "voted twice"
+
+
 def test_the_published_page_offers_no_room(browser):
     """The same files, from anybody else's server."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(SITE)))

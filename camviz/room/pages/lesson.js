@@ -75,9 +75,10 @@ function said(questions) {
 // A student's choices of a vote that is over, once, for the page to keep as answers.
 function settled({ name }, kept) {
   if (waiting(name)) return [];
-  const told = toldOf(name), own = pending[name] ?? (told && !kept.length ? choices(told) : []);
+  const told = toldOf(name), seen = pending[name];
   delete pending[name];
-  return own;
+  if (!seen && kept.length) return [];
+  return told ? choices(told) : seen ?? [];
 }
 
 function show(told) {
