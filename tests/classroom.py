@@ -1,5 +1,6 @@
-"""`camviz class` in a process of its own, and what its pages ask it."""
+"""A room to talk to: `camviz class` in a process of its own, or the server in this one."""
 
+import asyncio
 import json
 import os
 import socket
@@ -11,6 +12,11 @@ from urllib.error import HTTPError
 from urllib.request import ProxyHandler, Request, build_opener
 
 from commandline import ROOT
+from tornado.httpclient import AsyncHTTPClient, HTTPRequest
+from tornado.testing import bind_unused_port
+
+from camviz.room.limits import Limits
+from camviz.room.server import House, application, listen
 
 
 @contextmanager
@@ -45,3 +51,51 @@ def ask(port, path, told=None, key=""):
             return json.loads(answer.read())
     except HTTPError as error:
         return {"status": error.code, **json.loads(error.read())}
+
+
+class Client:
+    """A browser or a program that talks to a house over loopback."""
+
+    def __init__(self, port, room):
+        self.port, self.room = port, room
+
+    async def __call__(self, path, told=None, key="", method=None, raw=None, **headers):
+        names = {name.replace("_", "-"): value for name, value in headers.items()}
+        names = ({"Content-Type": "application/json"} if told is not None or raw is not None else {}) | names
+        names |= {"Authorization": f"Bearer {key}"} if key else {}
+        body = raw if raw is not None else None if told is None else json.dumps(told)
+        method = method or ("GET" if body is None else "POST")
+        request = HTTPRequest(
+            f"http://127.0.0.1:{self.port}/{path}",
+            method,
+            names,
+            body,
+            allow_nonstandard_methods=True,
+            request_timeout=20,
+        )
+        return await AsyncHTTPClient().fetch(request, raise_error=False)
+
+    async def join(self, **headers):
+        return json.loads((await self("api/join", {"word": self.room.word}, **headers)).body)["token"]
+
+    async def do(self, deed, name="05.grid", number=0):
+        told = {"do": deed, "question": name, "number": number}
+        return await self("api/do", told, self.room.teacher_key)
+
+
+def served(room, run, limits=None, proxied=False, site=None, **options):
+    """Run a coroutine function with a client of the room's server."""
+
+    async def both():
+        held, port = bind_unused_port(address="127.0.0.1")
+        held.close()
+        house = House(room, f"http://127.0.0.1:{port}/", limits or Limits(), proxied, site)
+        server = listen(application(house, **options), house, "127.0.0.1", port)
+        AsyncHTTPClient.configure(None, max_clients=500)
+        try:
+            return await run(Client(port, room))
+        finally:
+            server.stop()
+            await server.close_all_connections()
+
+    return asyncio.run(both())

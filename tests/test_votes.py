@@ -15,10 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from classroom import ask, camviz_class
+from classroom import ask, camviz_class, served
 from commandline import ROOT, refused
-from tornado.httpclient import AsyncHTTPClient, HTTPRequest
-from tornado.testing import bind_unused_port
 
 from camviz.commands.command import main
 from camviz.course import prose
@@ -29,7 +27,8 @@ from camviz.room import hub, membership, shown
 from camviz.room.address import is_named_safely
 from camviz.room.gain import gain, gains
 from camviz.room.limits import Allowance, Limits
-from camviz.room.server import House, answers_csv, application, listen
+from camviz.room.server import answers_csv
+from camviz.room.site import Site
 from camviz.room.store import Room, RoomError
 from camviz.widgets.question import QuestionWidget, Sheet
 
@@ -289,6 +288,8 @@ def test_neighbours_are_asked_to_talk_between_the_votes_and_at_no_other_time(roo
         said.append(bool(shown.to_student(room, 1)["question"]["discuss"]))
         assert said[-1] == bool(shown.to_projector(room)["question"]["discuss"])
     assert said == [False, True, False, False, False]
+    assert "a neighbour who chose another answer" in shown.DISCUSS
+    assert "tell each other your names" in shown.DISCUSS
 
 
 @pytest.mark.parametrize(
@@ -341,54 +342,6 @@ def test_the_examples_of_the_docstrings_are_so(module, examples):
 
 
 # The server ----------------------------------------------------------------------------------------------------------
-
-
-class Client:
-    """A browser or a program that talks to a house over loopback."""
-
-    def __init__(self, port, room):
-        self.port, self.room = port, room
-
-    async def __call__(self, path, told=None, key="", method=None, raw=None, **headers):
-        names = {name.replace("_", "-"): value for name, value in headers.items()}
-        names = ({"Content-Type": "application/json"} if told is not None or raw is not None else {}) | names
-        names |= {"Authorization": f"Bearer {key}"} if key else {}
-        body = raw if raw is not None else None if told is None else json.dumps(told)
-        method = method or ("GET" if body is None else "POST")
-        request = HTTPRequest(
-            f"http://127.0.0.1:{self.port}/{path}",
-            method,
-            names,
-            body,
-            allow_nonstandard_methods=True,
-            request_timeout=20,
-        )
-        return await AsyncHTTPClient().fetch(request, raise_error=False)
-
-    async def join(self, **headers):
-        return json.loads((await self("api/join", {"word": self.room.word}, **headers)).body)["token"]
-
-    async def do(self, deed, name=FIRST, number=0):
-        told = {"do": deed, "question": name, "number": number}
-        return await self("api/do", told, self.room.teacher_key)
-
-
-def served(room, run, limits=None, proxied=False, **options):
-    """Run a coroutine function with a client of the room's server."""
-
-    async def both():
-        held, port = bind_unused_port(address="127.0.0.1")
-        held.close()
-        house = House(room, f"http://127.0.0.1:{port}/", limits or Limits(), proxied)
-        server = listen(application(house, **options), house, "127.0.0.1", port)
-        AsyncHTTPClient.configure(None, max_clients=500)
-        try:
-            return await run(Client(port, room))
-        finally:
-            server.stop()
-            await server.close_all_connections()
-
-    return asyncio.run(both())
 
 
 def test_a_vote_goes_from_the_page_to_the_bars(room):
@@ -614,7 +567,7 @@ def test_every_answer_has_a_policy_that_runs_no_script_of_a_student(room, tmp_pa
         ):
             assert (await client(path)).code in (403, 404), path
 
-    served(room, play, site=tmp_path)
+    served(room, play, site=Site(tmp_path))
 
 
 def test_the_pages_have_no_script_and_no_style_of_their_own_and_ask_no_other_host():

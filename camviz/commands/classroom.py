@@ -16,6 +16,7 @@ from camviz.room.address import ANYWHERE, LOOPBACK, PORT, own_addresses, qr_term
 
 if TYPE_CHECKING:
     from camviz.course.questions import Question
+    from camviz.room.site import Site
     from camviz.room.store import Room
 
 CLASS = """\
@@ -51,7 +52,7 @@ def add(commands: Any) -> None:
     command.add_argument("--new", action="store_true", help="a new room, though there is one that could go on")
     command.add_argument("--room", metavar="FILE", type=Path, help="the room in this file")
     command.add_argument(
-        "--site", metavar="DIR", type=Path, help="pages to serve at /site/ (default: build/site, if it is there)"
+        "--site", metavar="DIR", type=Path, help="a built site, served at /site/ (default: build/site of a clone)"
     )
 
 
@@ -61,13 +62,13 @@ def run_class(options: argparse.Namespace) -> int:
         raise Refusal("tornado is not installed; `pip install 'camviz[lab]'` brings it.", LACKING)
     from camviz.room.store import RoomError
 
-    questions = chosen_questions(options.lesson)
+    questions, site = chosen_questions(options.lesson), served_site(options.site)
     try:
         room = opened(options, questions)
     except RoomError as error:
         raise Refusal(f"{error}.") from error
     try:
-        asyncio.run(_served(room, options))
+        asyncio.run(_served(room, site, options))
     finally:
         room.close()
     return OK
@@ -100,29 +101,38 @@ def opened(options: argparse.Namespace, questions: Sequence[Question]) -> Room:
     return room
 
 
-async def _served(room: Room, options: argparse.Namespace) -> None:
+async def _served(room: Room, site: Site | None, options: argparse.Namespace) -> None:
     from camviz.room.server import House, application, listen
 
     _many_files()
     address = f"http://{shown_host(options.host)}:{options.port:.0f}/"
-    house = House(room, address)
-    site = options.site or _built_site()
+    house = House(room, address, site=site)
     try:
-        server = listen(application(house, site=site), house, options.host, int(options.port))
+        server = listen(application(house), house, options.host, int(options.port))
     except OSError as error:
         others = ", ".join([LOOPBACK, *own_addresses()])
         raise Refusal(
             f"{options.host} port {options.port:.0f} cannot be served on ({error.strerror}). "
             f"This machine's addresses are {others}; --port chooses another port."
         ) from error
-    _announce(house, options.host, site)
+    _announce(house, options.host)
     try:
         await asyncio.Event().wait()
     finally:
         server.stop()
 
 
-def _announce(house: Any, host: str, site: Path | None) -> None:
+def served_site(folder: Path | None) -> Site | None:
+    """The built site of the folder that is named, else of this checkout; None where there is none."""
+    from camviz.room.site import Site, built_site
+
+    try:
+        return Site(folder) if folder else Site(built) if (built := built_site()) else None
+    except ValueError as error:
+        raise Refusal(f"--site: {error}. `python start.py site` builds it.") from error
+
+
+def _announce(house: Any, host: str) -> None:
     room, address = house.room, house.address
     link = f"{address}#{room.word}"
     drawn = qr_terminal(link)
@@ -130,7 +140,7 @@ def _announce(house: Any, host: str, site: Path | None) -> None:
     tell(f"Students open    {address}\nand join with    {room.word}")
     tell(f"Your own page    {address}teacher#{room.teacher_key}")
     tell(f"For the screen   {address}projector#{room.projector_key}")
-    if site:
+    if house.site:
         tell(f"The lessons      {address}site/")
     tell(f"Kept in          {room.path}; delete the file to delete the votes. Ctrl-C stops the server.")
     if host == LOOPBACK:
@@ -148,15 +158,6 @@ def _shows(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
-
-
-def _built_site() -> Path | None:
-    """The site that `python start.py site` has built, in a checkout."""
-    from camviz.course.material import checkout_lessons
-
-    lessons = checkout_lessons()
-    built = lessons.parent / "build" / "site" if lessons else None
-    return built if built and (built / "index.html").is_file() else None
 
 
 def _many_files() -> None:

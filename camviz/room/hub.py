@@ -7,7 +7,10 @@ In `jupyterhub_config.py`:
         "url": "http://127.0.0.1:8787",
         "command": ["python", "-m", "camviz.room.hub", "05"],
         "cwd": "/srv/camviz-class",  # where the room's file is kept
-        "environment": {"CAMVIZ_CLASS_ADDRESS": "https://hub.example.org/services/camviz-class/"},
+        "environment": {
+            "CAMVIZ_CLASS_ADDRESS": "https://hub.example.org/services/camviz-class/",
+            "CAMVIZ_CLASS_SITE": "/srv/camviz-site",  # what `python start.py site` built; the line may be left out
+        },
         "oauth_no_confirm": True,
     }]
     c.JupyterHub.load_roles = [{
@@ -35,6 +38,7 @@ from urllib.parse import urlsplit
 
 from camviz.course.questions import questions
 from camviz.room.server import Guarded, House, application, listen
+from camviz.room.site import Site
 from camviz.room.store import Room, RoomError
 
 NEEDED = ("JUPYTERHUB_SERVICE_PREFIX", "JUPYTERHUB_SERVICE_URL", "JUPYTERHUB_API_URL", "JUPYTERHUB_API_TOKEN")
@@ -81,10 +85,11 @@ def service(environment: Mapping[str, str]) -> tuple[str, str, int]:
 async def serve(lessons: list[str], environment: Mapping[str, str], folder: Path) -> None:
     """Serve the room of a folder, for ever; one that has ended gives way to a new one."""
     prefix, host, port = service(environment)
+    site = Site(Path(environment["CAMVIZ_CLASS_SITE"])) if environment.get("CAMVIZ_CLASS_SITE") else None
     asked = [one for lesson in lessons for one in questions(lesson).values()]
     room = Room.of(folder, asked, days=float(environment.get("CAMVIZ_CLASS_DAYS", "14")))
     address = environment.get("CAMVIZ_CLASS_ADDRESS", f"http://{host}:{port}{prefix}")
-    house = House(room, address, behind_proxy=True)
+    house = House(room, address, behind_proxy=True, site=site)
     app = application(house, prefix, more=routes(house))
     app.settings["cookie_secret"] = os.urandom(32)  # of the hub's own sign-in; students have no cookie
     listen(app, house, host, port)

@@ -43,9 +43,13 @@ class Allowance:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a room allows. A classroom is one address: 300 telephones that open the page at once ask 2,000 times."""
+    """What a room allows. A classroom is one address: 300 telephones that open the page at once ask 2,000 times.
+
+    A page of the site asks for some sixty files; these have an allowance of their own, so that no vote waits for them.
+    """
 
     address: Allowance = field(default_factory=lambda: Allowance(burst=4000, rate=200))
+    site: Allowance = field(default_factory=lambda: Allowance(burst=40_000, rate=500))
     token: Allowance = field(default_factory=lambda: Allowance(burst=30, rate=3))
     wrong_word: Allowance = field(default_factory=lambda: Allowance(burst=30, rate=0.5))
     any_wrong_word: Allowance = field(default_factory=lambda: Allowance(burst=200, rate=5))

@@ -9,6 +9,7 @@ Nothing that a student sends is ever shown: a vote is the number of a choice tha
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import io
 import json
@@ -18,38 +19,45 @@ import sqlite3
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from importlib.resources import files
-from pathlib import Path
 from socket import AF_INET, AF_INET6
 from typing import Any
 from urllib.parse import urlsplit
 
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import PeriodicCallback
+from tornado.iostream import StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandler
 
 from camviz.course.answers import Answer, write_marked
 from camviz.room import shown
 from camviz.room.address import is_named_safely, qr_svg
 from camviz.room.bell import Bell
-from camviz.room.limits import MOST_BODY, MOST_HEADERS, Limits
+from camviz.room.limits import MOST_BODY, MOST_HEADERS, Allowance, Limits
+from camviz.room.site import Site
 from camviz.room.store import Room, RoomError
 
 PAGES = {"": "phone.html", "teacher": "teacher.html", "projector": "projector.html"}
 _OWN = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
 POLICY = f"{_OWN}base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-SITE_POLICY = (
-    "default-src 'self' 'unsafe-inline' data: blob:; object-src 'none'; base-uri 'none'; frame-ancestors 'none'"
-)
+PIECE = 65_536
+"""Bytes of a site's file that are on their way to one reader at a time."""
+
+SLOWEST_S = 300.0
+"""Of one file on its way to one reader."""
 
 
 @dataclass
 class House:
-    """A room that is being served. `address` is what students type, `behind_proxy` that another server passes us on."""
+    """A room that is being served, and a built `site` beside it.
+
+    `address` is what students type, `behind_proxy` that another server passes us on.
+    """
 
     room: Room
     address: str
     limits: Limits = field(default_factory=Limits)
     behind_proxy: bool = False
+    site: Site | None = None
     asked: Bell = field(default_factory=Bell)
     counted: Bell = field(default_factory=Bell)
 
@@ -57,6 +65,12 @@ class House:
         """The teacher has done something: tell everyone."""
         self.asked.ring()
         self.counted.ring()
+
+    def to_student(self, number: int) -> shown.Shown:
+        """What one student's pages show, with the address of the page to `read` where there is a site."""
+        told = shown.to_student(self.room, number)
+        name = told["question"]["name"] if told.get("question") else ""
+        return {**told, "read": self.site.lesson(name.partition(".")[0]) if self.site else ""}
 
     def end_in_time(self) -> None:
         """End a room whose time is over."""
@@ -83,11 +97,16 @@ class Guarded(RequestHandler):
 
     def prepare(self) -> None:
         """Refuse what comes too often, from another origin, or to a name that is not ours."""
-        if not self.house.limits.address.takes(self.request.remote_ip):
+        if not self.allowance.takes(self.request.remote_ip):
             raise RoomError(429, "Too many requests come from this address. Wait for some seconds.")
         if not self.house.behind_proxy and not is_named_safely(self.request.host):
             raise RoomError(421, "This server answers to its address only.")
         self._refuse_other_origins()
+
+    @property
+    def allowance(self) -> Allowance:
+        """How often one address may ask for this."""
+        return self.house.limits.address
 
     def _refuse_other_origins(self) -> None:
         origin = self.request.headers.get("Origin")
@@ -195,7 +214,7 @@ class States(Asked):
             tell = lambda: shown.to_projector(room)  # noqa: E731
         else:
             number, bell = self.student(), self.house.asked
-            tell = lambda: shown.to_student(room, number)  # noqa: E731
+            tell = lambda: self.house.to_student(number)  # noqa: E731
         await bell.wait(self.get_query_argument("seen", ""))
         self.finish({"state": bell.state, **tell()})
 
@@ -212,6 +231,7 @@ class Rooms(Asked):
         told: dict[str, Any] = {"word": room.word, "address": self.house.address, "qr": qr_svg(link)}
         if teacher:
             told |= {"projector": room.projector_key, "lessons": shown.contents(room), "file": room.path.name}
+            told["site"] = "site/index.html" if self.house.site else ""
         self.finish(told)
 
 
@@ -222,7 +242,7 @@ class Votes(Asked):
         number, told = self.student(), self.told()
         self.house.room.vote(number, told.get("question"), told.get("round"), told.get("choice"))
         self.house.counted.ring()
-        self.finish({"counted": True, **shown.to_student(self.house.room, number)})
+        self.finish({"counted": True, **self.house.to_student(number)})
 
 
 class Deeds(Asked):
@@ -277,10 +297,41 @@ class Files(Guarded, StaticFileHandler):
         self.set_header("Cache-Control", "no-cache")
 
 
-class Site(Files):
-    """The published pages of the lessons, from the room's own origin. They are ours, and carry styles of their own."""
+class Sites(Guarded):
+    """The pages of the lessons, from the room's own origin."""
 
-    policy = SITE_POLICY
+    @property
+    def allowance(self) -> Allowance:
+        return self.house.limits.site
+
+    async def get(self, way: str) -> None:
+        site = self.house.site
+        if site is None or (path := site.find(way)) is None:
+            raise HTTPError(404)
+        file = await site.read(path)
+        packed = file.packed if "gzip" in self.request.headers.get("Accept-Encoding", "") else None
+        self.set_header("Content-Type", file.type)
+        self.set_header("Content-Security-Policy", file.policy)
+        self.set_header("Cache-Control", "no-cache" if path.suffix == ".html" else "private, max-age=600")
+        self.set_header("Etag", file.etag)
+        self.set_header("Vary", "Accept-Encoding")
+        if self.check_etag_header():
+            self.set_status(304)
+            return
+        if packed:
+            self.set_header("Content-Encoding", "gzip")
+        await self._send(packed or file.body)
+
+    async def _send(self, body: bytes) -> None:
+        """Piece by piece, as fast as they are taken: a slow reader holds one piece in memory, and not the whole."""
+        self.set_header("Content-Length", len(body))
+        try:
+            async with asyncio.timeout(SLOWEST_S):
+                for start in range(0, len(body), PIECE):
+                    self.write(body[start : start + PIECE])
+                    await self.flush()
+        except (StreamClosedError, TimeoutError):  # the reader has gone, or has stopped reading
+            self.request.connection.stream.close()  # type: ignore[union-attr]
 
 
 class Nothing(Guarded):
@@ -291,8 +342,8 @@ class Nothing(Guarded):
         raise HTTPError(404)
 
 
-def application(house: House, prefix: str = "/", site: Path | None = None, more: Iterable[Any] = ()) -> Application:
-    """All addresses of a room below `prefix`; `site` is a folder of pages that are served beside it."""
+def application(house: House, prefix: str = "/", more: Iterable[Any] = ()) -> Application:
+    """All addresses of a room below `prefix`."""
     served, pages = {"house": house}, files("camviz.room") / "pages"
     routes: list[Any] = [
         (r"api/join", Joins, served),
@@ -302,11 +353,10 @@ def application(house: House, prefix: str = "/", site: Path | None = None, more:
         (r"api/do", Deeds, served),
         (r"api/(answers|counts)\.csv", Tables, served),
         (r"static/(.*)", Files, {**served, "path": str(pages)}),
+        (r"site/(.*)", Sites, served),
         (r"(|teacher|projector)", Pages, served),
         *more,
     ]
-    if site:
-        routes.append((r"site/(.*)", Site, {**served, "path": str(site), "default_filename": "index.html"}))
     placed = [(f"{prefix}{route}", *rest) for route, *rest in routes]
     return Application(
         placed, default_handler_class=Nothing, default_handler_args=served, log_function=lambda handler: None

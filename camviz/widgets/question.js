@@ -1,6 +1,7 @@
 // A question to commit to. The kernel sends `cards`; the page sends { question, choice } and shows the reply that comes.
 // A card that has been answered and is neither right nor wrong (`correct` is null) is closed: it takes one choice only.
-// While a class is voting on it (`voting`) it has no reply either, and the choice can be changed.
+// While a class is voting on it (`voting`) it has no reply to the choice either, and the choice can be changed; before and
+// after a vote it can be `held`, and takes none.
 
 function element(tag, className, html) {
   const node = document.createElement(tag);
@@ -39,7 +40,7 @@ function cardForm(name, number, send) {
   form.append(fieldset, reply);
   let card = null, spoken = "";
 
-  const closed = () => card.tries > 0 && card.correct === null && !card.voting;
+  const closed = () => card.held || card.tries > 0 && card.correct === null && !card.voting;
   const selected = () => {
     const radio = rows.querySelector("input:checked");
     return radio ? Number(radio.value) : null;
@@ -68,8 +69,10 @@ function cardForm(name, number, send) {
         rows.append(...card.choices.map((_, index) => choiceRow(name, card, index)));
       } else if (card.chosen !== null) {
         rows.querySelectorAll("input")[card.chosen].checked = true;
+      } else if (card.held) {
+        rows.querySelectorAll("input").forEach((radio) => { radio.checked = false; }); // was not counted
       }
-      const [verdict, colour] = closed() ? ["", " camviz-kept"]
+      const [verdict, colour] = closed() || card.voting ? ["", " camviz-kept"]
         : card.correct ? ["<strong>✓ Correct.</strong>", " camviz-right"] : ["<strong>✗ Not this one.</strong>", " camviz-wrong"];
       const earlier = card.earlier ? `<span class="camviz-earlier">You answered this earlier.</span> ` : "";
       const said = card.reply ? `${earlier}${verdict}${card.reply}` : "";

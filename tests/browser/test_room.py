@@ -3,12 +3,15 @@
 import json
 import os
 import re
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from classroom import ask, camviz_class
-from laboratory import AXE
+from laboratory import AXE, ROOT
 from playwright.sync_api import expect
 
 from camviz.course.questions import question
@@ -23,6 +26,11 @@ LAPTOP, TELEPHONE, PROJECTOR = ((1366, 768), (375, 667), (1920, 1080))
 SMALLEST = """() => Math.min(...[...document.querySelectorAll("body *")]
   .filter((one) => one.offsetParent && [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim()))
   .map((one) => parseFloat(getComputedStyle(one).fontSize)))"""
+# What lies below the strip at a page's foot, axe cannot tell; preload asks for style sheets anew, by wrong names.
+SITE_AXE = """async () => {
+  const { violations } = await axe.run(document, { resultTypes: ["violations"], preload: false });
+  return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 160)}`));
+}"""
 BEYOND = "() => document.documentElement.scrollWidth > innerWidth"
 
 
@@ -54,8 +62,9 @@ class Class:
         self.pages.append(page)
         return page
 
-    def is_elsewhere(self, url):
-        return not url.startswith((f"http://127.0.0.1:{self.port}/", "data:", "blob:"))
+    def do(self, deed, number=0):
+        """What the teacher does, and is told."""
+        return ask(self.port, "api/do", {"do": deed, "question": NAME, "number": number}, self.key)
 
     def vote(self, tokens, number, choices):
         for token, choice in zip(tokens, choices, strict=True):
@@ -65,7 +74,7 @@ class Class:
         """axe-core finds nothing wrong in any page, and none is too wide. A picture of each for who looks."""
         for number, page in enumerate(self.pages):
             page.evaluate(AXE_SCRIPT)
-            assert page.evaluate(AXE, "body") == [], (step, page.url)
+            assert page.evaluate(SITE_AXE if "/site/" in page.url else AXE, "body") == [], (step, page.url)
             assert not page.evaluate(BEYOND), (step, page.url)
             if folder := os.environ.get("CAMVIZ_SCREENSHOTS"):
                 Path(folder).mkdir(parents=True, exist_ok=True)
@@ -91,6 +100,9 @@ def test_a_class_of_300_votes_talks_votes_again_and_sees_why(classroom):
     classroom.check("1-before")
 
     expect(phone.locator("#kept")).to_contain_text("No name, no address, no time and no cookie")
+    expect(phone.locator("#kept")).to_contain_text("until the teacher deletes that file")
+    expect(teacher.locator("#kept")).to_contain_text(f"Kept in room_{classroom.word}.sqlite")
+    expect(teacher.locator("#kept")).to_contain_text("The room ends by itself on")
     phone.get_by_role("button", name="Join").click()
     dark.get_by_label("The word of the room").fill("wrong-0000")
     dark.get_by_role("button", name="Join").click()
@@ -185,3 +197,165 @@ def test_every_question_of_all_lessons_fits_on_the_projector(browser, tmp_path):
             room.check(f"long-{name}")
         projector.close()
         assert room.wrong == []
+
+
+# The site, served by the room ----------------------------------------------------------------------------------------
+
+SITE = Path(os.environ.get("CAMVIZ_SITE", ROOT / "build/site"))
+LESSON = "site/lessons/05_distortion.html"
+COUNTS = "() => JSON.stringify(localStorage)"
+
+
+@pytest.fixture
+def reading(browser, tmp_path):
+    """A room that serves the site."""
+    if not (SITE / "index.html").exists():
+        pytest.fail(f"{SITE} has no index.html: build the site first, by python start.py site")
+    with camviz_class(tmp_path, "05", "--site", str(SITE)) as (_, port, said):
+        room = Class(browser, port, said)
+        yield room
+        for page in room.pages:
+            page.close()
+        assert [one for one in room.wrong if "[PST]" not in one] == []
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        """Nothing."""
+
+
+def asked(page):
+    """The question on a lesson's page."""
+    return page.locator(".camviz-asked", has_text="Keep k1 = −0.3 and look at rays")
+
+
+def joins(page, word):
+    page.get_by_text("Vote with your class").click()
+    page.get_by_label("The word of the room").fill(word)
+    page.get_by_role("button", name="Join").click()
+
+
+def commits(page, choice):
+    asked(page).locator("input").nth(choice).check()
+    asked(page).get_by_role("button", name="Commit").click()
+
+
+def test_a_lessons_page_votes_twice_is_counted_once_and_keeps_its_reply_back(reading):
+    page = reading.page(LESSON, TELEPHONE)
+    page.get_by_text("Vote with your class").click()
+    expect(page.locator(".camviz-class .kept")).to_contain_text("No name, no address, no time and no cookie is kept")
+    page.get_by_text("Vote with your class").click()
+    joins(page, reading.word)
+    expect(page.locator(".camviz-class .news")).to_contain_text("You are in.")
+    reading.do("open", 1)
+    page.get_by_role("link", name="go to the question").click()
+    for choice in (0, WRONG):
+        commits(page, choice)
+        expect(asked(page).locator(".camviz-reply")).to_contain_text(f"Your first vote is ({'abcd'[choice]})")
+    reading.check("6-site-voted")
+    told = reading.do("close")
+    assert told["question"]["counts"]["1"] == [0, 0, 1, 0]
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("Turn to a neighbour who chose another answer")
+    expect(asked(page).locator("input:enabled")).to_have_count(0)
+    reading.do("open", 2)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("This is the second vote. You chose (c).")
+    expect(asked(page).locator("input:checked")).to_have_count(0)
+    commits(page, RIGHT)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("Your second vote")
+    page.reload()  # what is being voted on is in the room, and not in this browser
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("Your second vote")
+    told = reading.do("close")
+    assert (told["joined"], told["question"]["counts"]["2"]) == (1, [0, 1, 0, 0])
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("The vote is closed.")
+    assert "correct" not in asked(page).inner_text().lower()
+    assert "%" not in asked(page).inner_text()
+    assert "far_rays" not in page.evaluate(COUNTS)
+    reading.do("reveal")
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("✓ Correct.")
+    expect(asked(page).locator(".camviz-room")).to_contain_text("0 % in the first vote, 100 % in the second vote")
+    assert json.loads(json.loads(page.evaluate(COUNTS))["camviz.answers.05"]) == {"during  far_rays": [WRONG, RIGHT]}
+
+
+def test_a_vote_from_a_lessons_page_that_comes_after_closing_is_refused_by_the_server(reading):
+    page = reading.page(LESSON, LAPTOP)
+    joins(page, reading.word)
+    reading.do("open", 1)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("This is the first vote")
+    page.route("**/api/vote", lambda route: (reading.do("close"), route.continue_()))  # closed while it is on its way
+    commits(page, RIGHT)
+    expect(page.locator(".camviz-class .news")).to_contain_text("The vote is closed")
+    expect(asked(page).locator(".camviz-reply")).to_have_text(re.compile("was not counted|did not vote"))
+    expect(asked(page).locator("input:checked")).to_have_count(0)
+    assert reading.do("choose")["question"]["counts"]["1"] == [0] * 4
+    reading.wrong = [one for one in reading.wrong if "409" not in one]
+
+
+def test_a_wrong_word_lets_no_lessons_page_in_and_the_lesson_goes_on(reading):
+    page = reading.page(LESSON, TELEPHONE, color_scheme="dark")
+    joins(page, "wrong-0000")
+    expect(page.locator(".camviz-class .news")).to_contain_text("not the word of the room")
+    reading.check("7-site-wrong-word")
+    reading.do("open", 1)
+    commits(page, WRONG)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("Not this one.")
+    told = reading.do("close")
+    assert (told["joined"], told["question"]["counts"]["1"]) == (0, [0] * 4)
+    reading.wrong = [one for one in reading.wrong if "403" not in one]
+
+
+def test_from_the_telephones_page_a_student_reads_on_in_the_lesson_and_is_still_in(reading):
+    page = reading.page(f"#{reading.word}", TELEPHONE)
+    page.get_by_role("button", name="Join").click()
+    reading.do("open", 1)
+    page.get_by_role("link", name="Read the lesson, and vote there").click()
+    commits(page, RIGHT)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("Your first vote is (b)")
+    assert reading.do("close")["question"]["counts"]["1"] == [0, 1, 0, 0]
+    reading.do("end")
+    expect(page.locator(".camviz-class .news")).to_contain_text("The room has ended.")
+    assert page.evaluate("sessionStorage.getItem('camviz-room')") is None
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("✓ Correct.")
+    reading.wrong = [one for one in reading.wrong if "410" not in one]
+
+
+def test_at_home_a_lessons_page_asks_twice_and_then_says_why(reading):
+    page = reading.page(LESSON, LAPTOP)
+    joins(page, reading.word)
+    reading.do("open at home")
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("the reply comes after your second answer")
+    commits(page, WRONG)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("You chose (c). Before you answer again")
+    assert "far_rays" not in page.evaluate(COUNTS)
+    commits(page, RIGHT)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("✓ Correct.")
+    expect(asked(page).locator(".camviz-room")).to_be_empty()  # the class's split comes when the teacher closes it
+    assert reading.do("close at home")["states"][NAME] == "voted twice"
+
+
+def test_the_published_page_offers_no_room(browser):
+    """The same files, from anybody else's server."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(SITE)))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    page = browser.new_page()
+    seen = []
+    page.on("request", lambda one: seen.append(one.url))
+    page.goto(f"http://127.0.0.1:{server.server_port}/lessons/05_distortion.html")
+    commits(page, RIGHT)
+    expect(asked(page).locator(".camviz-reply")).to_contain_text("✓ Correct.")
+    assert page.locator(".camviz-class").count() == 0
+    assert "Vote with your class" not in page.content()
+    assert not [url for url in seen if "/api/" in url or "static/lesson" in url.replace("_static", "")]
+    page.close()
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.mark.parametrize("way", ["index.html", "learn.html", "search.html", "lessons/05_distortion.html"])
+def test_the_rooms_policy_lets_a_page_of_the_site_work(reading, way):
+    page = reading.page(f"site/{way}", LAPTOP)
+    page.mouse.move(5, 5)
+    if way.startswith(("index", "lessons")):
+        page.locator(".camviz-recorded").first.scroll_into_view_if_needed()
+        page.locator('.camviz-recorded[data-live="true"]').first.wait_for()
+    page.wait_for_timeout(300)
+    assert [one for one in reading.wrong if "Content Security Policy" in one] == []

@@ -48,6 +48,10 @@ const answers = {
   },
 };
 
+// What a class's room says of a question while the class votes on it. Its script takes the place of these where a room
+// serves the page (camviz/room/pages/lesson.js); elsewhere nothing does.
+window.camvizClassroom = { card: () => null, send: () => {}, said: () => "", settled: () => [] };
+
 const KEPT = "<p>Kept. The answers come with the quiz at the end.</p>";
 
 // A question as question.js shows it: what camviz.widgets.question tells the page in a notebook.
@@ -60,11 +64,12 @@ function card(question, made, earlier, silent) {
 
 // Questions live in `place`; `others` are all questions of this page, for looking back on those asked before the lesson.
 function makeLive(place, asked, others) {
-  const silent = asked.when === "before";
+  const silent = asked.when === "before", classroom = window.camvizClassroom;
   let tries = asked.questions.map((one) => answers.chosen(asked, one));
   let earlier = tries.map((made) => made.length > 0);
   const state = () => ({
-    cards: asked.questions.map((one, i) => card(one, tries[i], earlier[i], silent)),
+    cards: asked.questions.map((one, i) => ({ ...card(one, tries[i], earlier[i], silent), ...classroom.card(one) })),
+    room: classroom.said(asked.questions),
     can_start_again: tries.some((made) => made.length),
     summary: silent ? summaryBefore() : score(),
     looking_back: !silent && asked.when === "after" && tries.every((made) => made.length) ? lookingBack(others) : "",
@@ -82,10 +87,19 @@ function makeLive(place, asked, others) {
     answers.keep(asked, asked.questions[number], made);
   };
   const model = new Model({ title: asked.title, lead: asked.lead, still_hidden: "", ...state() }, (message) => {
+    if (classroom.card(asked.questions[message.question] ?? {})) return classroom.send(asked.questions[message.question], message.choice);
     if (message.again) asked.questions.forEach((_, number) => change(number, []));
     else change(message.question, [...tries[message.question], message.choice]);
     model.put(state());
     document.dispatchEvent(new Event("camviz-answers"));
+    return undefined;
+  });
+  document.addEventListener("camviz-room", () => {
+    asked.questions.forEach((one, number) => {
+      const made = classroom.settled(one, tries[number]);
+      if (made.length) change(number, made);
+    });
+    model.put(state());
   });
   camvizQuestion({ model, el: place });
 }

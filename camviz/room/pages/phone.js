@@ -1,30 +1,17 @@
 // A student's page: join, vote, talk, vote again, read why. It keeps one random number, in this tab, until the room ends.
 
+import { NOT_REACHED, OVER, STORED, joined, left, recalled, remember } from "./membership.js";
 import { Refused, ask, bars, element, follow } from "./room.js";
 
-const KEPT = "camviz-room";
 const content = document.getElementById("content"), news = document.getElementById("news");
 const picked = {}; // by question and round, what is marked and not sent yet
 let membership = recalled(), shown = "", latest = null, following = 0;
-
-function recalled() {
-  const kept = JSON.parse(sessionStorage.getItem(KEPT) ?? "null");
-  return kept && kept.ends * 1000 > Date.now() ? kept : null;
-}
-
-function remember(told) {
-  membership = told;
-  if (told) sessionStorage.setItem(KEPT, JSON.stringify(told));
-  else sessionStorage.removeItem(KEPT);
-}
 
 const say = (sentence) => { if (news.textContent !== sentence) news.textContent = sentence; };
 
 function privacy(until) {
   const end = until ? ` The room ends by itself on ${until}, at the latest.` : "";
-  document.getElementById("kept").textContent = "Only your choice is sent. It is kept under a random number in a "
-    + "file on the teacher's computer, until the teacher deletes that file. No name, no address, no time and no cookie is "
-    + `kept. What joins this browser to the number is deleted here and there when the room ends.${end}`;
+  document.getElementById("kept").textContent = `${STORED}${end}`;
 }
 
 function door(problem = "") {
@@ -41,11 +28,11 @@ function door(problem = "") {
 
 async function join(word) {
   try {
-    remember(await ask("api/join", null, { word }));
+    membership = await joined(word);
     history.replaceState(null, "", location.pathname);
     enter();
   } catch (error) {
-    say(error instanceof Refused ? error.message : "The room is not reached. Are you in the right network?");
+    say(error instanceof Refused ? error.message : NOT_REACHED);
   }
 }
 
@@ -56,25 +43,25 @@ function enter() {
     lost: say,
     gone: ({ status, message }) => {
       if (mine !== following) return true;
-      if (status === 410 || status === 401) over(status === 410 ? "" : message);
-      return status === 410 || status === 401;
+      if (OVER.includes(status)) over(status === 410 ? "" : message);
+      return OVER.includes(status);
     },
   });
 }
 
 function over(problem = "") {
   following += 1;
-  remember(null);
+  remember(membership = null);
   if (problem) return door(problem);
   content.replaceChildren(element("p", {}, "Your number is deleted from this browser. Thank you for thinking along."));
   say("The room has ended.");
+  privacy("");
 }
 
 async function leave() {
-  const { token } = membership;
   following += 1;
-  remember(null);
-  await ask("api/join", token, undefined, "DELETE").catch(() => {}); // here the number is gone, whoever hears of it
+  await left(membership);
+  membership = null;
   door("You have left the room. What you voted still counts.");
 }
 
@@ -89,7 +76,7 @@ async function vote(question, round, choice) {
 
 function show(told) {
   latest = told;
-  const now = JSON.stringify([told.question, told.questions, told.at_home, told.ended]);
+  const now = JSON.stringify([told.question, told.questions, told.at_home, told.ended, told.read]);
   if (told.ended) return over();
   if (now === shown) return undefined;
   shown = now;
@@ -99,7 +86,9 @@ function show(told) {
   const cards = told.at_home ? told.questions.map((one) => card(one, true)) : told.question ? [card(told.question, false)] : [];
   const lead = told.at_home ? "These questions are open at home. Answer each twice; then you read why."
     : cards.length ? "" : "You are in. The next question comes when the teacher asks it.";
-  content.replaceChildren(element("p", { class: "lead" }, lead), ...cards,
+  const read = told.read && element("p", { class: "read" },
+    element("a", { href: told.read }, told.question ? "Read the lesson, and vote there" : "Read the lessons"));
+  content.replaceChildren(element("p", { class: "lead" }, lead), ...cards, read,
     element("button", { class: "quiet", type: "button", on: { click: leave } }, "Leave the room"));
   if (held) document.getElementById(held)?.focus();
   return undefined;

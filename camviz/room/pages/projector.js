@@ -1,6 +1,6 @@
 // What the whole room sees: the question, how many have voted, and once revealed the split with the reply that is right.
 
-import { ask, bars, element, follow } from "./room.js";
+import { ask, bars, element, follow, haveJoined } from "./room.js";
 
 const key = location.hash.slice(1);
 const content = document.getElementById("content"), news = document.getElementById("news"), door = document.getElementById("door");
@@ -42,7 +42,7 @@ function show(told) {
   content.replaceChildren(...(question && !told.ended ? asked(told) : [idle ? element("p", { class: "asked" }, idle) : "", told.ended ? "" : entrance(true)]));
   door.replaceChildren(question && !question.revealed && !told.ended ? entrance(false) : "");
   document.body.classList.toggle("asking", Boolean(question) && !told.ended);
-  const words = question && !told.ended ? counted(told, question) : `${told.joined} have joined`;
+  const words = question && !told.ended ? counted(told, question) : haveJoined(told.joined);
   if (news.textContent !== words) news.textContent = words;
   fit();
 }

@@ -1,4 +1,4 @@
-// What the three pages share: elements, questions to the server, and waiting for news.
+// What all pages of a room share: elements, questions to the server, and waiting for news.
 
 export function element(tag, options = {}, ...children) {
   const { html, class: className, on = {}, ...attributes } = options;
@@ -25,7 +25,7 @@ export class Refused extends Error {
 // The server's answer; a Refused with its sentence where it says no, and a TypeError where nobody answers.
 export async function ask(path, key, body, method = body ? "POST" : "GET") {
   const headers = { ...(key && { Authorization: `Bearer ${key}` }), ...(body && { "Content-Type": "application/json" }) };
-  const answer = await fetch(path, { method, headers, body: body && JSON.stringify(body), cache: "no-store" });
+  const answer = await fetch(new URL(`../${path}`, import.meta.url), { method, headers, body: body && JSON.stringify(body), cache: "no-store" });
   const told = await answer.json().catch(() => ({ problem: `The room's server says ${answer.status}.` }));
   if (!answer.ok) throw new Refused(answer.status, told.problem);
   return told;
@@ -55,6 +55,8 @@ export async function follow(key, { show, lost, gone, jitter = 300 }) {
 export const share = (votes, all) => (all ? Math.round((100 * votes) / all) : 0);
 
 export const sum = (numbers) => numbers.reduce((total, one) => total + one, 0);
+
+export const haveJoined = (number) => `${number} ${number === 1 ? "has" : "have"} joined`;
 
 // A bar for each vote on one choice, under one another: the first hatched, the second full, each with its number.
 export function bars(counts, choice, chosen = {}) {

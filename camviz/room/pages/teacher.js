@@ -1,6 +1,6 @@
 // The teacher's own screen: which question, when a vote opens and closes, what is behind each bar, and what to say.
 
-import { Refused, ask, bars, element, follow } from "./room.js";
+import { Refused, ask, bars, element, follow, haveJoined } from "./room.js";
 
 const key = location.hash.slice(1);
 const [content, news, door, list, kept] = ["content", "news", "door", "questions", "kept"].map((id) => document.getElementById(id));
@@ -33,6 +33,7 @@ async function save(which) {
 
 function doorShown(told) {
   const projector = element("a", { href: `projector#${room.projector}`, target: "_blank", rel: "noopener" }, "Open the projector's page");
+  const site = room.site && element("a", { href: room.site, target: "_blank", rel: "noopener" }, "Open the lessons");
   const home = button(told.at_home ? "Close the questions at home" : "Open all questions at home",
     () => act(told.at_home ? "close at home" : "open at home"), { id: "home", disabled: told.ended });
   const end = button("End the room", () => {
@@ -41,14 +42,14 @@ function doorShown(told) {
   door.replaceChildren(
     ...(room.qr ? [element("img", { class: "qr", src: room.qr, alt: "QR code of the address with the word" })] : []),
     element("p", {}, element("span", { class: "address" }, room.address), element("strong", { class: "word" }, room.word),
-      element("span", { class: "joined" }, `${told.joined} have joined`)),
-    element("div", { class: "tools" }, projector, home,
+      element("span", { class: "joined" }, haveJoined(told.joined))),
+    element("div", { class: "tools" }, projector, site, home,
       button("Votes as CSV", () => save("counts"), { id: "counts" }),
       button("Answers as CSV, for the gain", () => save("answers"), { id: "answers" }), end));
 }
 
 function listQuestions() {
-  list.replaceChildren(...room.lessons.map(({ lesson, title, questions }) => element("details", { open: room.lessons.length === 1 },
+  list.replaceChildren(...room.lessons.map(({ lesson, title, questions }) => element("details", { open: room.lessons.length === 1 && innerWidth > 800 },
     element("summary", {}, `${lesson} ${title}`),
     element("ul", {}, ...questions.map((one) => {
       const state = element("span", { class: "state" });
