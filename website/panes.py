@@ -118,6 +118,8 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, str]) -> str:
     shown = _shown(recorder.root, cells)
     clips.write([explorer for _, explorer in shown], name, recorder.folder.parent / clips.CLIPS)
     for number, explorer in shown:
+        if not explorer.controls:
+            continue  # its still says all
         made = _recorded(explorer, recorder)
         html = made.html(f"../{RECORDINGS}/" if name != HOME else f"{RECORDINGS}/")
         panes[number] = {
