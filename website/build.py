@@ -122,7 +122,19 @@ def sphinx() -> int:
     """Sphinx's pages of what was laid out; its exit status."""
     from sphinx.cmd.build import build_main
 
-    words = ["-b", "html", "-c", str(HERE), "-d", str(ROOT / "build/site-doctrees"), "-j", "2", "-q", "-W", "--keep-going"]
+    words = [
+        "-b",
+        "html",
+        "-c",
+        str(HERE),
+        "-d",
+        str(ROOT / "build/site-doctrees"),
+        "-j",
+        "2",
+        "-q",
+        "-W",
+        "--keep-going",
+    ]
     return int(build_main([*words, str(SOURCE), str(BUILT)]))
 
 

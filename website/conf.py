@@ -53,7 +53,11 @@ html_css_files = ["camviz.css"]
 html_js_files = [("camviz.js", {"defer": "defer"})]
 html_favicon = "static/favicon.svg"
 html_baseurl = ADDRESS
-html_context = {"default_mode": "auto", "address": ADDRESS, "previews": clips.previews(ROOT / "build/site" / clips.CLIPS)}
+html_context = {
+    "default_mode": "light",  # without scripts; with them the reader's own setting holds, from the template's script on
+    "address": ADDRESS,
+    "previews": clips.previews(ROOT / "build/site" / clips.CLIPS),
+}
 html_copy_source = False
 html_show_sourcelink = False
 html_sidebars = {"index": [], "learn": [], "search": []}

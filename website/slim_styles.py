@@ -31,11 +31,12 @@ def slim(site: Path) -> None:
     static = site / "_static"
     theme = files("pydata_sphinx_theme") / "theme/pydata_sphinx_theme/static" / _THEME
     (notebooks,) = static.glob("mystnb.*.css")
-    sheets = [static / "basic.css", theme, static / "pygments.css", notebooks, static / "camviz.css"]
+    sheets = [static / "basic.css", theme, static / "pygments.css", notebooks]
+    own = (static / "camviz.css").read_text(encoding="utf-8")  # whole: recordings, which are not read here, use it too
     pages = {path: path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
     scripts = [path.read_text(encoding="utf-8") for path in static.rglob("*.js")]
     words = set().union(*(_WORD.findall(text) for text in [*pages.values(), *scripts]))
-    sheet = "\n".join(used(one.read_text(encoding="utf-8"), words) for one in sheets)
+    sheet = "\n".join([*(used(one.read_text(encoding="utf-8"), words) for one in sheets), own])
     (static / SHEET).write_text(sheet, encoding="utf-8")
     _name_by_content(pages, hashlib.sha256(sheet.encode()).hexdigest()[:8])
     unasked = [*static.rglob("*.map"), *static.glob("vendor/fontawesome/**/*.*"), *static.glob("scripts/fontawesome*")]
