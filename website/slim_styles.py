@@ -24,6 +24,8 @@ _NEGATED = re.compile(r":not\([^()]*\)")
 _WORD = re.compile(r"[A-Za-z_][\w-]*")
 _NESTED = ("media", "supports", "layer", "container")
 _ICON_FONT = "Font Awesome"
+_NAMELESS = '<summary><span class="toctree-toggle"'  # the theme's: a screen reader would say "button" and no more
+_NAMED = '<summary aria-label="Pages below"><span class="toctree-toggle"'
 
 
 def slim(site: Path) -> None:
@@ -38,16 +40,16 @@ def slim(site: Path) -> None:
     words = set().union(*(_WORD.findall(text) for text in [*pages.values(), *scripts]))
     sheet = "\n".join([*(used(one.read_text(encoding="utf-8"), words) for one in sheets), own])
     (static / SHEET).write_text(sheet, encoding="utf-8")
-    _name_by_content(pages, hashlib.sha256(sheet.encode()).hexdigest()[:8])
+    _name(pages, hashlib.sha256(sheet.encode()).hexdigest()[:8])
     unasked = [*static.rglob("*.map"), *static.glob("vendor/fontawesome/**/*.*"), *static.glob("scripts/fontawesome*")]
     for path in [*unasked, static / _THEME, static / "webpack-macros.html"]:
         path.unlink(missing_ok=True)
 
 
-def _name_by_content(pages: dict[Path, str], digest: str) -> None:
-    """Have the pages ask for this sheet, and not for one of the same name that a browser has kept."""
+def _name(pages: dict[Path, str], digest: str) -> None:
+    """Have the pages ask for this sheet, not for an older one that a browser has kept, and name what unfolds."""
     for path, text in pages.items():
-        anew = _ASKED.sub(f"_static/{SHEET}?v={digest}", text)
+        anew = _ASKED.sub(f"_static/{SHEET}?v={digest}", text).replace(_NAMELESS, _NAMED)
         if anew != text:
             path.write_text(anew, encoding="utf-8")
 

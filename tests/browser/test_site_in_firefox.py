@@ -41,11 +41,13 @@ MOVED = """(async () => {
            error: hands.error(root), said: slider.getAttribute("aria-valuetext") };
 })()"""
 MIDDLE = """(async () => {
-  const one = [...document.querySelectorAll(".camviz-question")].find((card) => !card.textContent.includes("What do you think now"))
-    .querySelector("SELECTOR");
+  const replying = (card) => !card.textContent.includes("What do you think now");
+  const one = [...document.querySelectorAll(".camviz-question")].find(replying).querySelector("SELECTOR");
   const near = ({ top, bottom }) => bottom > -900 && top < innerHeight + 900;
-  const still = () => [...document.querySelectorAll(".camviz-recorded:not([data-live])")].some((pane) => near(pane.getBoundingClientRect()));
-  for (let i = 0, calm = 0; i < 200 && calm < 4; i++, calm = still() ? 0 : calm + 1) {   // panes that come to life may push
+  const asleep = [...document.querySelectorAll(".camviz-recorded")];
+  const still = () => asleep.some((pane) => !pane.dataset.live && near(pane.getBoundingClientRect()));
+  // Panes near it that come to life may push it.
+  for (let i = 0, calm = 0; i < 200 && calm < 4; i++, calm = still() ? 0 : calm + 1) {
     one.scrollIntoView({ block: "center" });
     await hands.pause(50);
   }
