@@ -24,8 +24,11 @@ _NEGATED = re.compile(r":not\([^()]*\)")
 _WORD = re.compile(r"[A-Za-z_][\w-]*")
 _NESTED = ("media", "supports", "layer", "container")
 _ICON_FONT = "Font Awesome"
-_NAMELESS = '<summary><span class="toctree-toggle"'  # the theme's: a screen reader would say "button" and no more
-_NAMED = '<summary aria-label="Pages below"><span class="toctree-toggle"'
+_MENDED = {  # in the pages: a fold of the theme without a name, and a role of docutils that ARIA has withdrawn
+    '<summary><span class="toctree-toggle"': '<summary aria-label="Pages below"><span class="toctree-toggle"',
+    ' role="doc-biblioentry"': "",
+    '<div role="list" class="citation-list">': '<div class="citation-list">',
+}
 
 
 def slim(site: Path) -> None:
@@ -40,16 +43,18 @@ def slim(site: Path) -> None:
     words = set().union(*(_WORD.findall(text) for text in [*pages.values(), *scripts]))
     sheet = "\n".join([*(used(one.read_text(encoding="utf-8"), words) for one in sheets), own])
     (static / SHEET).write_text(sheet, encoding="utf-8")
-    _name(pages, hashlib.sha256(sheet.encode()).hexdigest()[:8])
+    _mend(pages, hashlib.sha256(sheet.encode()).hexdigest()[:8])
     unasked = [*static.rglob("*.map"), *static.glob("vendor/fontawesome/**/*.*"), *static.glob("scripts/fontawesome*")]
     for path in [*unasked, static / _THEME, static / "webpack-macros.html"]:
         path.unlink(missing_ok=True)
 
 
-def _name(pages: dict[Path, str], digest: str) -> None:
-    """Have the pages ask for this sheet, not for an older one that a browser has kept, and name what unfolds."""
+def _mend(pages: dict[Path, str], digest: str) -> None:
+    """Have the pages ask for this sheet, not for an older one that a browser has kept, and mend them."""
     for path, text in pages.items():
-        anew = _ASKED.sub(f"_static/{SHEET}?v={digest}", text).replace(_NAMELESS, _NAMED)
+        anew = _ASKED.sub(f"_static/{SHEET}?v={digest}", text)
+        for wrong, right in _MENDED.items():
+            anew = anew.replace(wrong, right)
         if anew != text:
             path.write_text(anew, encoding="utf-8")
 
