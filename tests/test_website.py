@@ -9,12 +9,15 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "website"))
 
 import clips  # noqa: E402
+import docstrings  # noqa: E402
 import pictures  # noqa: E402
+import slim_styles  # noqa: E402
 from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
 from scripts import question_script  # noqa: E402
@@ -132,6 +135,25 @@ def test_pictures_with_one_content_are_one_file(tmp_path: Path) -> None:
 def test_the_pages_script_is_the_notebooks_own() -> None:
     source = (ROOT / "camviz/widgets/question.js").read_text(encoding="utf-8")
     assert source.removesuffix("export default { render };\n") in question_script()
+
+
+def test_the_icon_font_is_left_out_and_another_font_is_not():
+    sheet = r"@font-face{font-family:Font Awesome\ 7 Free;src:url(a)}@font-face{font-family:Own;src:url(b)}"
+    assert slim_styles.used(sheet, set()) == "@font-face{font-family:Own;src:url(b)}"
+
+
+def test_a_constant_is_explained_by_its_own_words_and_not_by_its_types():
+    import camviz.mosaics
+
+    said = docstrings.of_constant("camviz.mosaics.PATTERNS", camviz.mosaics.PATTERNS)
+    assert said
+    assert said[0] not in (dict.__doc__ or "")
+    assert docstrings.of_constant("camviz.mosaics.NOTHING", object()) == []
+
+
+def test_a_preview_tells_its_size(tmp_path: Path):
+    Image.new("RGB", (12, 7)).save(tmp_path / "05.png")
+    assert clips.previews(tmp_path) == {"05": (12, 7)}
 
 
 def test_a_clip_begins_at_the_present_state_and_goes_to_both_ends(monkeypatch):

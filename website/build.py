@@ -98,7 +98,9 @@ def lay_out(recorder: panes.Recorder) -> None:
         text = path.read_text(encoding="utf-8").replace("<!--living picture-->", home)
         text = text.replace("{engineers}", engineers.front(ROOT))
         made[SOURCE / path.relative_to(HERE / "pages")] = text
-    made[SOURCE / "_static/camviz.css"] = style_sheet() + (HERE / "static/camviz.css").read_text(encoding="utf-8")
+    made[SOURCE / "_static/camviz.css"] = style_sheet() + "".join(
+        (HERE / "static" / name).read_text(encoding="utf-8") for name in ("camviz.css", "icons.css")
+    )
     made[SOURCE / "_static/camviz.js"] = question_script() + (HERE / "static/camviz.js").read_text(encoding="utf-8")
     for path, text in made.items():
         _write(path, text)
@@ -120,7 +122,19 @@ def sphinx() -> int:
     """Sphinx's pages of what was laid out; its exit status."""
     from sphinx.cmd.build import build_main
 
-    words = ["-b", "html", "-c", str(HERE), "-d", str(ROOT / "build/site-doctrees"), "-j", "2", "-q"]
+    words = [
+        "-b",
+        "html",
+        "-c",
+        str(HERE),
+        "-d",
+        str(ROOT / "build/site-doctrees"),
+        "-j",
+        "2",
+        "-q",
+        "-W",
+        "--keep-going",
+    ]
     return int(build_main([*words, str(SOURCE), str(BUILT)]))
 
 

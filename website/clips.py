@@ -47,6 +47,15 @@ def moved(explorer: Any) -> list[Picture]:
     return [picture for place in way if (picture := drawn[place])]
 
 
+def previews(folder: Path) -> dict[str, tuple[int, int]]:
+    """The width and the height of each preview in the folder, by its lesson."""
+    found = {}
+    for path in sorted(folder.glob("*.png")):
+        with Image.open(path) as image:
+            found[path.stem] = image.size
+    return found
+
+
 def _drawn(view: Any, values: dict[str, Any]) -> Picture | None:
     try:
         picture: Picture = view.but(**values).figure()

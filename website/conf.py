@@ -5,7 +5,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extensions beside this file
 
+import clips
+
 import camviz
+
+ROOT = Path(__file__).resolve().parents[1]
+ADDRESS = "https://camviz.github.io/camviz/"
 
 project = "camviz"
 author = copyright = "The camviz authors"
@@ -43,11 +48,16 @@ default_role = "literal"
 
 html_theme = "pydata_sphinx_theme"
 html_title = "camviz"
-html_static_path = [str(Path(__file__).parents[1] / "build/site-source/_static")]  # laid out by build.py
+html_static_path = [str(ROOT / "build/site-source/_static")]  # laid out by build.py
 html_css_files = ["camviz.css"]
 html_js_files = [("camviz.js", {"defer": "defer"})]
 html_favicon = "static/favicon.svg"
-html_context = {"default_mode": "auto", "address": "https://camviz.github.io/camviz/"}
+html_baseurl = ADDRESS
+html_context = {
+    "default_mode": "light",  # without scripts; with them the reader's own setting holds, from the template's script on
+    "address": ADDRESS,
+    "previews": clips.previews(ROOT / "build/site" / clips.CLIPS),
+}
 html_copy_source = False
 html_show_sourcelink = False
 html_sidebars = {"index": [], "learn": [], "search": []}

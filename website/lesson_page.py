@@ -74,7 +74,7 @@ class LessonPage:
             html = pictures.outside(data["text/html"], self.site / PICTURES, f"../{PICTURES}")
             if asked:
                 html = questions_html(*asked)
-            elif number in self.panes:
+            elif number in self.panes and "<figure" in html:  # the findings of an inspection stay above its pane
                 html = self.panes[number]
             data["text/html"] = html
             data.pop("text/plain", None)

@@ -132,6 +132,8 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> s
     shown = _shown(recorder.root, cells)
     clips.write([explorer for _, explorer in shown], name, recorder.folder.parent / clips.CLIPS)
     for number, explorer in shown:
+        if not explorer.controls:
+            continue  # its still says all
         made = _recorded(explorer, cells[number].together, recorder)
         html = made.html(f"../{RECORDINGS}/" if name != HOME else f"{RECORDINGS}/")
         panes[number] = {

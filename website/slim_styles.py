@@ -1,7 +1,12 @@
-"""The theme's style sheet without the rules that no page can use: a third of it is left, and read sooner."""
+"""All style sheets of the site as one, without the rules that no page can use: a third of it is left, and read sooner.
+
+A page asks for one file where it would ask for six, one after another. The theme's icon font is left out, 115 kB for a
+dozen icons: static/icons.css draws them.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterable, Set
 from importlib.resources import files
@@ -9,21 +14,49 @@ from pathlib import Path
 
 import tinycss2
 
-SHEET = "styles/pydata-sphinx-theme.css"
+SHEET = "site.css"
+"""The one sheet, beside the sheets it is made of; the template of a page asks for it by this name."""
+
+_THEME = "styles/pydata-sphinx-theme.css"
+_ASKED = re.compile(r"_static/site\.css(\?v=\w*)?")
 _CLASS = re.compile(r"\.(-?[A-Za-z_][\w-]*)")
 _NEGATED = re.compile(r":not\([^()]*\)")
 _WORD = re.compile(r"[A-Za-z_][\w-]*")
 _NESTED = ("media", "supports", "layer", "container")
+_ICON_FONT = "Font Awesome"
+_MENDED = {  # in the pages: a fold of the theme without a name, and a role of docutils that ARIA has withdrawn
+    '<summary><span class="toctree-toggle"': '<summary aria-label="Pages below"><span class="toctree-toggle"',
+    ' role="doc-biblioentry"': "",
+    '<div role="list" class="citation-list">': '<div class="citation-list">',
+}
 
 
 def slim(site: Path) -> None:
-    """Write the sheet anew from the theme's own, with what pages and scripts name; drop what only serves the theme."""
-    sheet = files("pydata_sphinx_theme") / "theme/pydata_sphinx_theme/static" / SHEET
-    texts = [*site.rglob("*.html"), *(site / "_static").rglob("*.js")]
-    words = set().union(*(_WORD.findall(path.read_text(encoding="utf-8")) for path in texts))
-    (site / "_static" / SHEET).write_text(used(sheet.read_text(encoding="utf-8"), words), encoding="utf-8")
-    for path in [*(site / "_static").rglob("*.map"), site / "_static/webpack-macros.html"]:
+    """Write the sheet from all others, with what pages and scripts name; drop what only serves the theme."""
+    static = site / "_static"
+    theme = files("pydata_sphinx_theme") / "theme/pydata_sphinx_theme/static" / _THEME
+    (notebooks,) = static.glob("mystnb.*.css")
+    sheets = [static / "basic.css", theme, static / "pygments.css", notebooks]
+    own = (static / "camviz.css").read_text(encoding="utf-8")  # whole: recordings, which are not read here, use it too
+    pages = {path: path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
+    scripts = [path.read_text(encoding="utf-8") for path in static.rglob("*.js")]
+    words = set().union(*(_WORD.findall(text) for text in [*pages.values(), *scripts]))
+    sheet = "\n".join([*(used(one.read_text(encoding="utf-8"), words) for one in sheets), own])
+    (static / SHEET).write_text(sheet, encoding="utf-8")
+    _mend(pages, hashlib.sha256(sheet.encode()).hexdigest()[:8])
+    unasked = [*static.rglob("*.map"), *static.glob("vendor/fontawesome/**/*.*"), *static.glob("scripts/fontawesome*")]
+    for path in [*unasked, static / _THEME, static / "webpack-macros.html"]:
         path.unlink(missing_ok=True)
+
+
+def _mend(pages: dict[Path, str], digest: str) -> None:
+    """Have the pages ask for this sheet, not for an older one that a browser has kept, and mend them."""
+    for path, text in pages.items():
+        anew = _ASKED.sub(f"_static/{SHEET}?v={digest}", text)
+        for wrong, right in _MENDED.items():
+            anew = anew.replace(wrong, right)
+        if anew != text:
+            path.write_text(anew, encoding="utf-8")
 
 
 def used(css: str, words: Set[str]) -> str:
@@ -46,6 +79,8 @@ def _rule(rule, words: Set[str]) -> str:
     if rule.type == "at-rule" and rule.lower_at_keyword in _NESTED and rule.content:
         inner = _rules(tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True), words)
         return f"@{rule.at_keyword} {tinycss2.serialize(rule.prelude).strip()}{{{inner}}}" if inner else ""
+    if rule.type == "at-rule" and rule.lower_at_keyword == "font-face" and _ICON_FONT in _plain(rule.serialize()):
+        return ""
     return str(rule.serialize())
 
 
@@ -67,3 +102,8 @@ def _selectors(prelude: str) -> list[str]:
 
 def _can_be(selector: str, words: Set[str]) -> bool:
     return set(_CLASS.findall(_NEGATED.sub("", selector))) <= words
+
+
+def _plain(css: str) -> str:
+    """A rule's words without the escapes of its spaces."""
+    return css.replace("\\ ", " ")

@@ -209,11 +209,21 @@
     line.before(pane);
     await initialize?.({ model });
     await render({ model, el: pane });
-    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+    await drawn(pane, stills);
     stills.forEach((one) => one.remove());
     pane.removeAttribute("style");
     element.dataset.live = "true";
     element.kept = images(content.frames, base);
+  }
+
+  // A widget may draw later than its render returns: until the pane is nearly as high as its stills, what is below would
+  // jump up and down again. One that is never that high is shown all the same.
+  const AS_HIGH = 0.8, PATIENT_FRAMES = 90;
+  async function drawn(pane, stills) {
+    const painted = () => new Promise((done) => requestAnimationFrame(done));
+    const bottom = stills.length ? stills.at(-1).getBoundingClientRect().bottom - stills[0].getBoundingClientRect().top : 0;
+    for (let i = 0; i < PATIENT_FRAMES && pane.offsetHeight < AS_HIGH * bottom; i++) await painted();
+    await painted().then(painted);
   }
 
   // The photographs of some frames, fetched before they are asked for; they stay at hand as long as they are held.

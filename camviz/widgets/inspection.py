@@ -157,7 +157,7 @@ class LiveInspection:
         if self.explorer is None or self.widget is None:
             return
         if os.environ.get("CAMVIZ_STATIC"):
-            display(self.explorer.still(), raw=True)
+            display(self.explorer)
             return
         display_kept(self._kept, self.explorer)
         display(self.widget._repr_mimebundle_(), raw=True)  # the still is shown already

@@ -3,37 +3,26 @@
 `python start.py site` builds it before; CAMVIZ_SITE names another folder than build/site.
 """
 
-import os
 import re
-import threading
 from collections.abc import Iterator
-from functools import partial
 from html import unescape
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from axe_playwright_python.base import AXE_SCRIPT
-from laboratory import ROOT
+from built_site import LESSONS, SITE, served
 from playwright.sync_api import Browser, Page
 
 from camviz.course.questions import predict_questions, quiz_questions
 
 pytestmark = pytest.mark.browser
 
-SITE = Path(os.environ.get("CAMVIZ_SITE", ROOT / "build/site"))
-LESSONS = sorted(path.stem for path in (ROOT / "lessons").glob("*.ipynb"))
 HANDS = (Path(__file__).with_name("hands.js")).read_text(encoding="utf-8")
 REPORTS = SITE / "engineers/reports"  # each a whole page in one file, as camviz inspect writes it
 READ = ("index", "learn", "search", "docs/clinic", "about", "docs/glossary", "api/index", "lessons/05_distortion")
 SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
 ADDRESS = re.compile(r'<[a-z][^<>]*?\s(?:href|src)="([^"]*)"')
 LOADED = re.compile(r'<(?:script|img|iframe|link)[^<>]*?\s(?:src|href)="([^"]*)"')
-AXE = """async () => {
-  const { violations } = await axe.run(document, { resultTypes: ["violations"], preload: false });
-  return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 160)}`));
-}"""
 TO_BOTH_ENDS = """async () => {
   const wrong = [], panes = [...document.querySelectorAll(".camviz-recorded")];
   let changed = 0;
@@ -82,20 +71,10 @@ TO_BOTH_ENDS = """async () => {
 }"""
 
 
-class Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, *_: object) -> None:
-        """Nothing."""
-
-
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    if not (SITE / "index.html").exists():
-        pytest.fail(f"{SITE} has no index.html: build the site first, by python start.py site")
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(SITE)))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    server.server_close()
+    with served() as address:
+        yield address
 
 
 class Watched:
@@ -138,16 +117,6 @@ def test_every_control_of_every_pane_goes_to_both_ends(watched: Watched, way: st
     done = page.evaluate(TO_BOTH_ENDS)
     assert done["wrong"] == []
     assert done["panes"] >= 1
-
-
-@pytest.mark.parametrize("way", READ)
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_page_is_without_fault_for_axe(watched: Watched, way: str, scheme: str) -> None:
-    watched.page.emulate_media(color_scheme=scheme)
-    page = watched.open(way)
-    page.wait_for_timeout(300)
-    page.evaluate(AXE_SCRIPT)
-    assert page.evaluate(AXE) == []
 
 
 def test_a_phone_scrolls_no_page_sideways(browser: Browser, address: str) -> None:

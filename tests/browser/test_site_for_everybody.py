@@ -1,0 +1,182 @@
+"""The built site for those who see, point or print otherwise: axe on every page, forced colours, phones, paper.
+
+`python start.py site` builds it before; CAMVIZ_SITE names another folder than build/site.
+"""
+
+from collections.abc import Iterator
+
+import pytest
+from axe_playwright_python.base import AXE_SCRIPT
+from built_site import LESSONS, SITE, served
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+pytestmark = pytest.mark.browser
+
+LESSON = "lessons/05_distortion"
+AXE = """async () => {
+  const { violations } = await axe.run(document, { resultTypes: ["violations"], preload: false });
+  return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 160)}`));
+}"""
+JOINED = """async (ways) => {
+  const texts = await Promise.all(ways.map(async (way) => (await fetch(way)).text()));
+  const articles = texts.map((text) => new DOMParser().parseFromString(text, "text/html").querySelector(".bd-article"));
+  document.querySelector(".bd-article").replaceWith(...articles);
+  for (const one of document.querySelectorAll("pre")) one.tabIndex = 0;     // as the theme's script does on each page
+}"""
+PARTS = 4
+BATCH = 50
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with served() as address:
+        yield address
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    yield page
+    page.close()
+
+
+def ways(generated: bool) -> list[str]:
+    """The pages of the site without their ending: those of single names of the API, or all others."""
+    found = [path.relative_to(SITE).with_suffix("").as_posix() for path in SITE.rglob("*.html")]
+    return sorted(way for way in found if way.startswith("api/generated/") == generated)
+
+
+def found_by_axe(page: Page) -> list[str]:
+    page.evaluate(AXE_SCRIPT)
+    return page.evaluate(AXE)
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_axe_finds_no_fault_on_any_page(page: Page, address: str, part: int) -> None:
+    found = {}
+    for way in ways(generated=False)[part::PARTS]:
+        page.goto(f"{address}/{way}.html")
+        found[way] = found_by_axe(page)
+    assert {way: wrong for way, wrong in found.items() if wrong} == {}
+
+
+def test_axe_finds_no_fault_on_the_page_of_any_name(page: Page, address: str) -> None:
+    """Their frame is the same for all, so that many go into one."""
+    names = ways(generated=True)
+    found = []
+    for start in range(0, len(names), BATCH):
+        page.goto(f"{address}/{names[start]}.html")
+        page.evaluate(JOINED, [f"{address}/{way}.html" for way in names[start : start + BATCH]])
+        found += found_by_axe(page)
+    assert found == []
+
+
+def test_axe_finds_no_fault_on_any_lesson_in_the_dark(page: Page, address: str) -> None:
+    page.emulate_media(color_scheme="dark")
+    found = {}
+    for name in LESSONS:
+        page.goto(f"{address}/lessons/{name}.html")
+        found[name] = found_by_axe(page)
+    assert {name: wrong for name, wrong in found.items() if wrong} == {}
+
+
+def test_a_page_has_its_colours_before_and_without_scripts(browser: Browser, address: str) -> None:
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(f"{address}/{LESSON}.html")
+    assert page.locator("html").get_attribute("data-theme") == "light"
+    for scheme in ("dark", "light"):
+        page = browser.new_page(color_scheme=scheme)
+        page.route("**/_static/scripts/*", lambda route: route.abort())
+        page.goto(f"{address}/{LESSON}.html")
+        assert page.locator("html").get_attribute("data-theme") == scheme
+        page.close()
+    context.close()
+
+
+def test_the_icons_are_drawn_and_seen_in_forced_colours(page: Page, address: str) -> None:
+    page.emulate_media(forced_colors="active")
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.goto(f"{address}/{LESSON}.html")
+    wrong = page.evaluate("""() => [...document.querySelectorAll(".fa-solid")].filter((icon) => {
+      const style = getComputedStyle(icon, "::before"), paper = getComputedStyle(document.body).backgroundColor;
+      return !style.maskImage.startsWith("url(") || style.backgroundColor === paper || style.content !== '""';
+    }).map((icon) => icon.className)""")
+    assert wrong == []
+
+
+def test_no_animation_and_no_transition_runs_where_motion_is_unwelcome(page: Page, address: str) -> None:
+    page.emulate_media(reduced_motion="reduce")
+    page.goto(f"{address}/{LESSON}.html")
+    moving = page.evaluate("""() => [...document.querySelectorAll("body *")].filter((one) => {
+      const { transitionDuration, animationName } = getComputedStyle(one);
+      return animationName !== "none" || !/^(0s(, )?)+$/.test(transitionDuration);
+    }).length""")
+    assert moving == 0
+
+
+def test_paper_has_stills_and_nothing_to_press(page: Page, address: str) -> None:
+    page.emulate_media(media="print")
+    page.goto(f"{address}/{LESSON}.html")
+    page.locator(".camviz-recorded").first.scroll_into_view_if_needed()
+    page.locator('.camviz-recorded[data-live="true"]').first.wait_for()
+    pressed = page.locator(".camviz-controls, .camviz-question button, .bd-header, .camviz-solution, .fa-solid")
+    assert pressed.count() > 20
+    assert [one for one in pressed.all() if one.is_visible()] == []
+
+
+def test_a_finger_moves_a_slider_and_scrolls_the_page(browser: Browser, address: str) -> None:
+    page = browser.new_page(**PHONE)
+    page.goto(f"{address}/index.html")
+    page.touchscreen.tap(200, 300)
+    page.locator('.camviz-recorded[data-live="true"]').wait_for()
+    slider = page.locator('.camviz-recorded input[type="range"]').first
+    slider.scroll_into_view_if_needed()
+    before, box = slider.input_value(), slider.bounding_box()
+    page.touchscreen.tap(box["x"] + 0.9 * box["width"], box["y"] + box["height"] / 2)
+    assert float(slider.input_value()) > float(before)
+    assert slider.evaluate("(one) => getComputedStyle(one).touchAction") == "pan-y"
+    page.close()
+
+
+def test_the_keyboard_alone_reaches_a_slider_and_moves_it(page: Page, address: str) -> None:
+    page.goto(f"{address}/index.html")
+    page.keyboard.press("Tab")
+    page.locator('.camviz-recorded[data-live="true"]').wait_for()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.type") == "range":
+            break
+    before = page.evaluate("document.activeElement.value")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("document.activeElement.value") != before
+    assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") != "none"
+
+
+def test_nothing_jumps_on_a_phone_while_the_first_picture_comes_to_life(browser: Browser, address: str) -> None:
+    """A shift that moves what is seen by more than 0.1 counts as poor (Core Web Vitals)."""
+    page = browser.new_page(**PHONE)
+    page.goto(f"{address}/index.html")
+    page.evaluate("""() => { window.shifted = 0;
+      new PerformanceObserver((list) => list.getEntries().forEach((one) => { window.shifted += one.value; }))
+        .observe({ type: "layout-shift", buffered: true }); }""")
+    page.locator('.camviz-recorded[data-live="true"]').wait_for()
+    page.wait_for_timeout(500)
+    assert page.evaluate("window.shifted") < 0.02
+    page.close()
+
+
+def test_a_link_to_any_page_shows_a_picture_of_known_size(page: Page, address: str) -> None:
+    for way in ("index", "learn", LESSON, "docs/glossary"):
+        page.goto(f"{address}/{way}.html")
+        told = page.evaluate("""() => Object.fromEntries([...document.querySelectorAll('meta[property^="og:"]')]
+          .map((one) => [one.getAttribute("property"), one.content]))""")
+        picture = told["og:image"]
+        assert picture.startswith("https://"), way
+        with Image.open(SITE / "_clips" / picture.rsplit("/", 1)[1]) as image:
+            assert image.size == (int(told["og:image:width"]), int(told["og:image:height"])), way
+        assert told["og:url"].startswith("https://"), way
+        assert told["og:description"], way
+        assert told["og:title"], way
