@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from camviz.commands.common import LACKING, OK, Refusal, add_command, bounded
 from camviz.commands.terminal import tell
+from camviz.course.material import built_site
 from camviz.room.address import ANYWHERE, LOOPBACK, PORT, own_addresses, qr_terminal, shown_host
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ async def _served(room: Room, options: argparse.Namespace) -> None:
     _many_files()
     address = f"http://{shown_host(options.host)}:{options.port:.0f}/"
     house = House(room, address)
-    site = options.site or _built_site()
+    site = options.site or built_site()
     try:
         server = listen(application(house, site=site), house, options.host, int(options.port))
     except OSError as error:
@@ -148,15 +149,6 @@ def _shows(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
-
-
-def _built_site() -> Path | None:
-    """The site that `python start.py site` has built, in a checkout."""
-    from camviz.course.material import checkout_lessons
-
-    lessons = checkout_lessons()
-    built = lessons.parent / "build" / "site" if lessons else None
-    return built if built and (built / "index.html").is_file() else None
 
 
 def _many_files() -> None:
