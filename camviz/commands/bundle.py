@@ -54,7 +54,7 @@ def bundle(options: argparse.Namespace) -> int:
     lessons = checkout_lessons()
     if lessons is None:
         raise Refusal(
-            "a bundle is made in a checkout of the repository, which has the lock; this camviz is installed without one.",
+            "a bundle is made in a checkout of the repository, which has the lock; this camviz was installed alone.",
             LACKING,
         )
     if missing := [name for name in ("pip", "hatchling") if find_spec(name) is None]:

@@ -82,15 +82,18 @@ def write_bundle(
 def _download(entries: Sequence[str], machine: str, wheels: Path, say: Say) -> None:
     """Fetch the wheels of a lock for a machine ("linux-x86_64 3.12"), each checked by its hash."""
     name, _, python = machine.partition(" ")
-    first, last = (wanted(entries, PLATFORMS[name], f"{python}.{release}") for release in (0, 99))
-    say(f"fetching {len(first)} wheels for {machine}: a few hundred megabytes")
+    lists = {one: wanted(entries, PLATFORMS[name], one) for one in (f"{python}.0", f"{python}.99")}
+    say(f"fetching {len(lists[f'{python}.0'])} wheels for {machine}: a few hundred megabytes")
     words = ["download", "--no-deps", "--require-hashes", "--only-binary=:all:", "--dest", str(wheels)]
-    words += ["--python-version", python, "--implementation", "cp"]
+    words += ["--implementation", "cp"]
     words += [word for tag in PLATFORMS[name].tags for word in ("--platform", tag)]
     lock = wheels.parent / "wanted.lock"
-    for lines in (first, last)[: 1 + (first != last)]:  # a lock may take older packages for a Python's first releases
-        lock.write_text("\n".join(lines), encoding="utf-8")
-        _pip([*words, "--requirement", str(lock)], f"the wheels for {machine}")
+    fetched: list[list[str]] = []
+    for release, lines in lists.items():  # a lock may name other packages for a Python's first releases
+        if lines not in fetched:
+            lock.write_text("\n".join(lines), encoding="utf-8")
+            _pip([*words, "--python-version", release, "--requirement", str(lock)], f"the wheels for {machine}")
+            fetched.append(lines)
     lock.unlink()
 
 
