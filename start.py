@@ -45,7 +45,7 @@ def main(words):
     special = words[0] if words and words[0] in ("site", "test") else ""
     if special and BUNDLED:
         sys.exit(f"A bundle has the lessons, not what `start.py {special}` needs: take the repository for that.")
-    if BUNDLED:
+    if BUNDLED and SAMPLES.is_dir():
         os.environ.setdefault("CAMVIZ_SAMPLES", str(SAMPLES))
     set_up(special or ("light" if light else "reader"))
     if special == "test":

@@ -31,7 +31,7 @@ For {machines}
        python start.py lab --lesson 05
 
    `python` is called `python3` on Linux and macOS, and `py` on Windows.
-   The first time this takes some minutes and 1.3 GB; from then on it opens JupyterLab at once. Ctrl-C ends it.
+   The first time this takes a few minutes and 2 GB; from then on it opens JupyterLab at once. Ctrl-C ends it.
 
 What you write stays in the folder camviz-lessons. Delete the unpacked folder to undo everything.
 """
