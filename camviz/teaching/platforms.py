@@ -26,11 +26,12 @@ PLATFORMS: Mapping[str, Platform] = MappingProxyType(
         "linux-x86_64": Platform(tuple(f"{one}_x86_64" for one in _GLIBC[::-1]), *_LINUX, "x86_64"),
         "linux-aarch64": Platform(tuple(f"{one}_aarch64" for one in _GLIBC[:1:-1]), *_LINUX, "aarch64"),
         "macos-arm64": Platform(("macosx_14_0_arm64",), *_MACOS, "arm64"),
-        "macos-x86_64": Platform(("macosx_14_0_x86_64",), *_MACOS, "x86_64"),
         "windows-x86_64": Platform(("win_amd64",), *_WINDOWS, "AMD64"),
     }
 )
-"""What a bundle can be made for, by name. On Linux: with glibc 2.31, of the year 2020, or a newer one."""
+"""What a bundle can be made for, by name. On Linux: with glibc 2.31, of the year 2020, or a newer one.
+
+Macs with an Intel processor are missing, for JupyterLab's dependencies have no wheels for them any more."""
 
 
 def wanted(entries: Sequence[str], platform: Platform, release: str) -> list[str]:
