@@ -10,7 +10,7 @@ right      every solution in its place
 wrong      of each exercise a typical wrong answer
 untouched  as handed out
 endless    every function loops for ever
-stuck      a cell of the student's own loops for ever, above right solutions
+stuck      a cell of the student's own loops for ever, above right solutions: all points, when its time is up
 
 Fails where a student gets other points than that state deserves, or where keys or solutions were handed out.
 """
@@ -89,7 +89,7 @@ def graded(course: Path, lesson: str) -> list[str]:
         last = re.findall(r"(?:ERROR|WARNING)\] (.+)", said)
         row = (lesson, student, f"{points:g}", f"{most:g}", f"{seconds:.0f}", last[-1][:90] if last else "")
         print(f"| {' | '.join(row)} |", flush=True)
-        if points != (most if student == "right" else 0):
+        if points != (most if student in ("right", "stuck") else 0):
             found.append(f"lesson {lesson}: {student} has {points:g} of {most:g} points")
     return found
 

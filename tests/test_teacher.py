@@ -71,8 +71,8 @@ def test_a_key_says_which_votes_to_expect_and_that_nobody_counted_them():
 
 def test_the_plan_stands_below_the_header_and_its_links_lead_somewhere():
     cells = made(DISTORTION).cells
-    assert cells[1].metadata["tags"] == ["plan"]
-    plan = cells[1].source
+    assert [one.metadata["tags"] for one in (cells[0], cells[2])] == [["teacher"], ["plan"]]
+    plan = cells[2].source
     assert plan.count("\n| ") == len(plans.plan("05").steps) + 1
     text = "\n".join(one.source for one in cells if one.cell_type == "markdown")
     links = re.findall(r"\]\(#([^)]+)\)", plan)
@@ -133,7 +133,7 @@ def test_an_executed_edition_has_pictures_and_every_solution_is_right_in_it(fold
     checks = notebooks.tagged(notebook, "check")
     assert len(checks) == len(exercises("05"))
     for one in checks:
-        assert "Correct." in one.outputs[-1].data["text/plain"]
+        assert "Correct." in one.outputs[-1].text
     assert not [out for one in notebook.cells for out in one.get("outputs", []) if out.output_type == "error"]
     assert "widget-view" not in (folder / DISTORTION.name).read_text(encoding="utf-8")
 
