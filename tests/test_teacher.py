@@ -14,7 +14,7 @@ from camviz.course import notebooks, questions
 from camviz.course.checks import Exercise
 from camviz.course.exercises import exercises
 from camviz.course.material import module
-from camviz.teaching import edition, marking, markup, parts, plans, sheets
+from camviz.teaching import edition, marking, markup, one_page, parts, plans, sheets
 
 lesson05 = module("05")
 
@@ -140,7 +140,7 @@ def test_an_executed_edition_has_pictures_and_every_solution_is_right_in_it(fold
 
 def test_the_folder_holds_what_the_help_promises(folder, capsys):
     names = {path.name.partition("_")[2] for path in folder.glob("05_*.html")}
-    assert names == {"plan.html", "exercises.html", "marking.html", "slides.html"}
+    assert names == {"plan.html", "one_page.html", "exercises.html", "marking.html", "slides.html"}
     assert [path.name for path in folder.glob("*.ipynb")] == [DISTORTION.name]
     with pytest.raises(SystemExit):
         main(["teacher", "--help"])
@@ -294,3 +294,29 @@ def test_markdown_becomes_html_without_addresses():
     ]
     assert markup.opening("One two. Three four five.", 4) == "One two."
     assert markup.opening("One two three. Four.", 2) == ""
+
+
+# The page for 90 minutes ---------------------------------------------------------------------------------------------
+
+
+@EACH
+def test_the_one_page_says_what_the_lesson_says(path):
+    """Its minutes are the plan's, its votes two of the lesson's, and its first sentence the lesson's question."""
+    plan = plans.plan(path.name[:2])
+    if plan is None:
+        pytest.skip("a lesson without a plan has no such page")
+    page = one_page.one_page(notebooks.read(path), plan, path.name)
+    minutes = [f"{begun}–{ended}" for begun, ended, _ in plan.times(plans.LONG)]
+    assert re.findall(r"<tr><td>(\d+–\d+)</td>", page) == minutes
+    votes = [step for step in plan.steps if step.kind == "question"][:2]
+    assert page.count("class='vote'") == len(votes)
+    assert page.count("✓") == len(votes)
+    assert "They learn" in page
+
+
+def test_the_one_page_names_the_values_that_a_visualizer_opens_with():
+    """Lesson 05's first: DistortionView(k1=-0.28, k2=0.07, panels="picture"), "show", k1=(-0.35, 0.35, 0.005)."""
+    found = list(one_page.settings(notebooks.read(DISTORTION)))
+    assert found[0] == (0, "k1 −0.28, k2 0.07", "show, k1 (−0.35 … 0.35)")
+    page = one_page.one_page(notebooks.read(DISTORTION), plans.plan("05"), DISTORTION.name)
+    assert "Set k1 −0.28, k2 0.07. Move show, k1 (−0.35 … 0.35)." in page
