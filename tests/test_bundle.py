@@ -14,11 +14,11 @@ from zipfile import ZipFile
 import pytest
 from commandline import ROOT, refused
 
+from camviz.commands import packing
 from camviz.commands.command import main
+from camviz.commands.packing import BundleError, this_machine, write_bundle
 from camviz.course import material
 from camviz.samples import SampleUnavailable
-from camviz.teaching import bundle
-from camviz.teaching.bundle import BundleError, this_machine, write_bundle
 from camviz.teaching.platforms import PLATFORMS, wanted
 
 PROJECT = """\
@@ -72,7 +72,7 @@ def checkout(tmp_path, monkeypatch):
     elsewhere = f"absent==1.0 ; sys_platform == 'plan9' \\\n    --hash=sha256:{'0' * 64}"
     (root / "requirements.lock").write_text(lock + elsewhere)
     (tmp_path / "photograph.jpg").write_text("a photograph")
-    monkeypatch.setattr(bundle, "sample", lambda name: tmp_path / "photograph.jpg")
+    monkeypatch.setattr(packing, "sample", lambda name: tmp_path / "photograph.jpg")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(links))
     return root
@@ -124,7 +124,7 @@ def test_without_its_photographs_there_is_a_bundle_and_a_sentence(checkout, tmp_
     def unavailable(name):
         raise SampleUnavailable(f"No {name} here.")
 
-    monkeypatch.setattr(bundle, "sample", unavailable)
+    monkeypatch.setattr(packing, "sample", unavailable)
     assert made(checkout, tmp_path / "b.zip")[-1].startswith("No left01.jpg here. Without it, lessons in the bundle")
     assert (tmp_path / "b.zip").is_file()
 
@@ -209,7 +209,7 @@ def test_an_installed_camviz_says_that_a_bundle_is_made_in_a_checkout(capsys, ro
 
 
 def test_a_machine_that_no_bundle_is_made_for_is_named(capsys, room, monkeypatch):
-    monkeypatch.setattr(bundle, "this_machine", lambda root: ("plan9-mips", "3.12"))
+    monkeypatch.setattr(packing, "this_machine", lambda root: ("plan9-mips", "3.12"))
     assert "no bundle is made for plan9-mips; --platform takes linux-x86_64" in refused(
         capsys, room, "bundle", "out.zip"
     )

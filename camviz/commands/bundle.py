@@ -48,8 +48,8 @@ def add(commands: Any) -> None:
 
 def bundle(options: argparse.Namespace) -> int:
     """Write the zip whole, or nothing."""
+    from camviz.commands.packing import BundleError, this_machine, write_bundle
     from camviz.course.material import built_site, checkout_lessons
-    from camviz.teaching.bundle import BundleError, this_machine, write_bundle
 
     lessons = checkout_lessons()
     if lessons is None:
