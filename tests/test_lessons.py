@@ -1,5 +1,6 @@
 """The lessons: they follow the pattern, solutions pass, stubs do not, and both editions come from one source."""
 
+import ast
 import inspect
 import os
 import re
@@ -13,7 +14,7 @@ import pytest
 
 from camviz.commands import lessons
 from camviz.course import notebooks, saved_outputs
-from camviz.course.exercises import exercises
+from camviz.course.exercises import Tutor, exercises
 from camviz.course.lesson_rules import SETUP, complaints
 from camviz.course.material import module
 from camviz.teaching.edition import mark_solution, teacher_edition, write_teacher_edition
@@ -178,11 +179,13 @@ def test_the_teacher_s_edition_has_solutions_in_place_notes_visible_and_hidden_t
     stub = notebooks.stubs(edition)["05.fold_radius"]
     assert "### BEGIN SOLUTION" in stub
     assert "NotImplementedError" not in stub
-    assert edition.cells[0].source.startswith("# 05 Lens distortion (teacher's edition)\n")
-    notes = [cell.source for cell in notebooks.tagged(edition, "teacher")]
+    notice, *notes = [cell.source for cell in notebooks.tagged(edition, "teacher")]
+    assert notice == edition.cells[0].source
+    assert notice.startswith("**Teacher's edition**")
+    assert edition.cells[1].source == lesson.cells[0].source  # what nbgrader hands out does not call itself a teacher's
     assert notes == ["> **For the teacher:** 10 minutes.\n> Ask for hands before the reveal."]
     assert all("<details open>" in cell.source for cell in notebooks.tagged(edition, "solution"))
-    assert 'assert check("05.distort", distort)' in notebooks.checks(edition)["05.distort"]
+    assert '_verdict = check("05.distort", distort)\nassert _verdict' in notebooks.checks(edition)["05.distort"]
     assert not any(cell.get("outputs") for cell in edition.cells)
 
 
@@ -198,6 +201,16 @@ def test_every_check_of_the_teacher_s_edition_holds_when_run_as_code(lesson):
     for cell in edition.cells:
         if {"setup", "stub", "check"} & set(cell.metadata.get("tags", [])):
             exec(cell.source, namespace)
+
+
+def test_a_graded_check_ends_in_no_value_and_a_failed_one_says_why(lesson):
+    """nbgrader reads a cell's value as points, and shows a student the error of a test that failed."""
+    for source in notebooks.checks(teacher_edition(lesson)).values():
+        assert ast.unparse(ast.parse(source).body[-1]) == "print(_verdict)"
+    fold = notebooks.checks(teacher_edition(lesson))["05.fold_radius"]
+    namespace = {"check": Tutor(), "fold_radius": lambda k1: 2.0}
+    with pytest.raises(AssertionError, match="the same number whatever it is given"):
+        exec(fold, namespace)
 
 
 def test_a_wrong_solution_makes_the_teacher_s_edition_fail(lesson):

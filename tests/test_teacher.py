@@ -14,7 +14,7 @@ from camviz.course import notebooks, questions
 from camviz.course.checks import Exercise
 from camviz.course.exercises import exercises
 from camviz.course.material import module
-from camviz.teaching import edition, marking, markup, parts, plans, sheets
+from camviz.teaching import edition, marking, markup, one_page, parts, plans, sheets
 
 lesson05 = module("05")
 
@@ -71,8 +71,8 @@ def test_a_key_says_which_votes_to_expect_and_that_nobody_counted_them():
 
 def test_the_plan_stands_below_the_header_and_its_links_lead_somewhere():
     cells = made(DISTORTION).cells
-    assert cells[1].metadata["tags"] == ["plan"]
-    plan = cells[1].source
+    assert [one.metadata["tags"] for one in (cells[0], cells[2])] == [["teacher"], ["plan"]]
+    plan = cells[2].source
     assert plan.count("\n| ") == len(plans.plan("05").steps) + 1
     text = "\n".join(one.source for one in cells if one.cell_type == "markdown")
     links = re.findall(r"\]\(#([^)]+)\)", plan)
@@ -133,14 +133,14 @@ def test_an_executed_edition_has_pictures_and_every_solution_is_right_in_it(fold
     checks = notebooks.tagged(notebook, "check")
     assert len(checks) == len(exercises("05"))
     for one in checks:
-        assert "Correct." in one.outputs[-1].data["text/plain"]
+        assert "Correct." in one.outputs[-1].text
     assert not [out for one in notebook.cells for out in one.get("outputs", []) if out.output_type == "error"]
     assert "widget-view" not in (folder / DISTORTION.name).read_text(encoding="utf-8")
 
 
 def test_the_folder_holds_what_the_help_promises(folder, capsys):
     names = {path.name.partition("_")[2] for path in folder.glob("05_*.html")}
-    assert names == {"plan.html", "exercises.html", "marking.html", "slides.html"}
+    assert names == {"plan.html", "one_page.html", "exercises.html", "marking.html", "slides.html"}
     assert [path.name for path in folder.glob("*.ipynb")] == [DISTORTION.name]
     with pytest.raises(SystemExit):
         main(["teacher", "--help"])
@@ -294,3 +294,29 @@ def test_markdown_becomes_html_without_addresses():
     ]
     assert markup.opening("One two. Three four five.", 4) == "One two."
     assert markup.opening("One two three. Four.", 2) == ""
+
+
+# The page for 90 minutes ---------------------------------------------------------------------------------------------
+
+
+@EACH
+def test_the_one_page_says_what_the_lesson_says(path):
+    """Its minutes are the plan's, its votes two of the lesson's, and its first sentence the lesson's question."""
+    plan = plans.plan(path.name[:2])
+    if plan is None:
+        pytest.skip("a lesson without a plan has no such page")
+    page = one_page.one_page(notebooks.read(path), plan, path.name)
+    minutes = [f"{begun}–{ended}" for begun, ended, _ in plan.times(plans.LONG)]
+    assert re.findall(r"<tr><td>(\d+–\d+)</td>", page) == minutes
+    votes = [step for step in plan.steps if step.kind == "question"][:2]
+    assert page.count("class='vote'") == len(votes)
+    assert page.count("✓") == len(votes)
+    assert "They learn" in page
+
+
+def test_the_one_page_names_the_values_that_a_visualizer_opens_with():
+    """Lesson 05's first: DistortionView(k1=-0.28, k2=0.07, panels="picture"), "show", k1=(-0.35, 0.35, 0.005)."""
+    found = list(one_page.settings(notebooks.read(DISTORTION)))
+    assert found[0] == (0, "k1 −0.28, k2 0.07", "show, k1 (−0.35 … 0.35)")
+    page = one_page.one_page(notebooks.read(DISTORTION), plans.plan("05"), DISTORTION.name)
+    assert "Set k1 −0.28, k2 0.07. Move show, k1 (−0.35 … 0.35)." in page

@@ -123,7 +123,12 @@ def questions_html(asked: tuple[Question, ...], title: str, when: str) -> str:
                 "topic": one.topic,
                 "text": prose.to_html(one.text),
                 "choices": [
-                    {"text": prose.inline(each.text), "reply": prose.to_html(each.reply), "correct": each.correct}
+                    {
+                        "text": prose.inline(each.text),
+                        "reply": prose.to_html(each.reply),
+                        "correct": each.correct,
+                        "misconception": each.misconception,
+                    }
                     for each in one.choices
                 ],
             }

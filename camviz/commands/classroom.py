@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from camviz.commands.common import LACKING, OK, Refusal, add_command, bounded
 from camviz.commands.terminal import tell
+from camviz.course.material import built_site
 from camviz.room.address import ANYWHERE, LOOPBACK, PORT, own_addresses, qr_terminal, shown_host
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ async def _served(room: Room, site: Site | None, options: argparse.Namespace) ->
 
 def served_site(folder: Path | None) -> Site | None:
     """The built site of the folder that is named, else of this checkout; None where there is none."""
-    from camviz.room.site import Site, built_site
+    from camviz.room.site import Site
 
     try:
         return Site(folder) if folder else Site(built) if (built := built_site()) else None

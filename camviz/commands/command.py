@@ -13,6 +13,7 @@ from contextlib import contextmanager
 import camviz
 from camviz.commands import (
     board,
+    bundle,
     calibrate,
     check,
     classroom,
@@ -53,6 +54,7 @@ examples:
   camviz mtf photo.png --roi 300,200,80,120  measure sharpness from a slanted edge
   camviz teacher for-me --slides             write the lessons with plans and keys, sheets and slides into ./for-me
   camviz class 05 --host 192.168.4.1         let a class vote on the lesson's questions, with telephones or notebooks
+  camviz bundle /media/stick                 write one zip for a USB stick that installs with no network
 
 A file called - is stdin, or stdout. Colour is for terminals; NO_COLOR and --color never turn it off.
 
@@ -66,7 +68,7 @@ exit status:
 """
 COMMANDS = (
     *(lab, doctor, board, calibrate, inspect, check, show, convert, reproject, noise, mtf, teacher, classroom, join),
-    completion,
+    *(bundle, completion),
 )
 
 

@@ -19,6 +19,7 @@ Writes for each lesson, made from the very notebook that students get:
   NN_name.ipynb      the lesson with its solutions in their places, the plan by the minute at its head and after each
                      question its key, run and with pictures (about 4 s a lesson; --no-run leaves that out)
   NN_plan.html       the plan and the keys, to print, where the lesson has a plan
+  NN_one_page.html   the same in short: minutes, slider values, two votes and what to say, on one A4 page
   NN_exercises.html  the exercise sheet with the exit quiz, to print
   NN_marking.html    the marking scheme: solutions, points, typical wrong answers
   NN_slides.html     with --slides: one idea a slide, in one file that works without a network

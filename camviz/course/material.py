@@ -25,6 +25,13 @@ def checkout_lessons() -> Path | None:
     return lessons if lessons.is_dir() and (root / "pyproject.toml").is_file() else None
 
 
+def built_site() -> Path | None:
+    """The site that `python start.py site` has built, in a checkout; None where there is none."""
+    lessons = checkout_lessons()
+    built = lessons.parent / "build" / "site" if lessons else None
+    return built if built and (built / "index.html").is_file() else None
+
+
 def lessons_folder() -> Path:
     """Where the lessons are: in the checkout, or inside the installed package."""
     return checkout_lessons() or Path(camviz.__file__).with_name("_lessons")

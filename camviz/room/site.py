@@ -15,8 +15,6 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from camviz.course.material import checkout_lessons
-
 TYPES = {
     ".css": "text/css; charset=utf-8",
     ".html": "text/html; charset=utf-8",
@@ -97,13 +95,6 @@ class Site:
             while len(self._kept) > 1 and sum(map(_size, self._kept.values())) > MOST_KEPT:
                 self._kept.popitem(last=False)
             return self._kept[place]
-
-
-def built_site() -> Path | None:
-    """The site that `python start.py site` has built, in a checkout."""
-    lessons = checkout_lessons()
-    built = lessons.parent / "build" / "site" if lessons else None
-    return built if built and (built / "index.html").is_file() else None
 
 
 def policy(page: str = "") -> str:

@@ -18,6 +18,8 @@ from camviz.teaching.plans import Plan, Step, Votes
 
 Say = Callable[[str], None]
 
+NOTICE = "**Teacher's edition**, with keys and solutions: for your own screen."
+
 UNBROKEN_DASH = "\u2060–\u2060"
 """Between two numbers that are to stay on one line."""
 
@@ -32,7 +34,7 @@ def teacher_edition(notebook: Notebook) -> Notebook:
     for name, (stub, check, solution) in exercise_cells(edition).items():
         stub.source = mark_solution(stub.source, solution_code(solution))
         stub.metadata["nbgrader"] = _nbgrader(name, solution=True)
-        check.source = f"### BEGIN HIDDEN TESTS\nassert {check.source.strip()}\n### END HIDDEN TESTS\n{check.source}"
+        check.source = hidden_test(check.source)
         check.metadata["nbgrader"] = {**_nbgrader(f"{name}-check", grade=True), "points": 1}
     for details in edition.cells:
         if details.cell_type == "markdown":
@@ -42,8 +44,7 @@ def teacher_edition(notebook: Notebook) -> Notebook:
     cells = [cell for one, more in zip(edition.cells, beside, strict=True) for cell in (one, *more)]
     if plan:
         _anchored(cells, plan, parts.titles(notebook))
-    edition.cells = [cells[0], *_planned(plan, notebook), *cells[1:]]
-    edition.cells[0].source = re.sub(r"\A# (.*)", r"# \1 (teacher's edition)", edition.cells[0].source)
+    edition.cells = [_cell(NOTICE, "edition", "teacher"), cells[0], *_planned(plan, notebook), *cells[1:]]
     for cell in edition.cells:
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
@@ -120,6 +121,16 @@ def mark_solution(stub: str, solution: str) -> str:
     indent = re.match(r"\s*", next(line for line in lines[same:] if line.strip()))
     margin = indent[0] if indent else ""
     return "\n".join([*lines[:same], f"{margin}### BEGIN SOLUTION", *lines[same:], f"{margin}### END SOLUTION"])
+
+
+def hidden_test(check: str) -> str:
+    """The cell of a check with tests between ### BEGIN HIDDEN TESTS and ### END HIDDEN TESTS.
+
+    Where the check fails, the error says why. Where it holds, its last line is no value: nbgrader takes a value for
+    points, and one that is no number for an oversight.
+    """
+    before = f"### BEGIN HIDDEN TESTS\n_verdict = {check.strip()}\nassert _verdict, _verdict\n### END HIDDEN TESTS"
+    return f"{before}\n{check}\n### BEGIN HIDDEN TESTS\nprint(_verdict)\n### END HIDDEN TESTS"
 
 
 # What is put beside a lesson's cells ---------------------------------------------------------------------------------

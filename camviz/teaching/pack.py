@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from camviz.course.notebooks import Notebook, read
+from camviz.teaching import plans
 from camviz.teaching.deck import deck
 from camviz.teaching.edition import Say, chosen_lessons, write_teacher_edition
+from camviz.teaching.one_page import one_page
 from camviz.teaching.sheets import sheets
 
 
@@ -20,6 +22,8 @@ def write_pack(source: Path, out: Path, only: Sequence[str], *, run: bool, slide
     for path in chosen_lessons(source, only):
         lesson, number = read(path), path.name.partition("_")[0]
         pages = sheets(lesson, number)
+        if plan := plans.plan(number):
+            pages["one_page"] = one_page(lesson, plan, path.name)
         if slides:
             pages["slides"] = deck(_with_solved_pictures(lesson, read(out / path.name)))
         for name, page in pages.items():

@@ -63,7 +63,7 @@ def jupyter(front_end: str, folder: Path, home: Path, **environment: str) -> Ite
     module, app, place = FRONT_ENDS[front_end]
     (home / "app").mkdir(parents=True, exist_ok=True)
     (home / "app/overrides.json").write_text(QUIET)
-    port, token = _free_port(), secrets.token_hex(16)
+    port, token = free_port(), secrets.token_hex(16)
     command = [sys.executable, "-m", module, "--no-browser", "--allow-root", "--expose-app-in-browser"]
     command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0", f"--ServerApp.root_dir={folder}"]
     command += ["--ServerApp.jpserver_extensions=camviz.server=True"]  # as `camviz lab` does
@@ -73,7 +73,7 @@ def jupyter(front_end: str, folder: Path, home: Path, **environment: str) -> Ite
     with log.open("w") as output:
         server = subprocess.Popen(command, env=_private(home) | environment, stdout=output, stderr=output)
     try:
-        _wait_for(f"http://127.0.0.1:{port}/api", server, log)
+        wait_for(f"http://127.0.0.1:{port}/api", server, log)
         yield f"http://127.0.0.1:{port}/{place}/{{path}}?token={token}&reset"
     finally:
         server.terminate()
@@ -189,14 +189,14 @@ def _private(home: Path) -> dict[str, str]:
     return {**os.environ, **kept, "PYTHONPATH": os.pathsep.join(paths)}
 
 
-def _free_port() -> int:
+def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
     return port
 
 
-def _wait_for(url: str, server: subprocess.Popen[bytes], log: Path) -> None:
+def wait_for(url: str, server: subprocess.Popen[bytes], log: Path) -> None:
     end = time.monotonic() + 60
     while time.monotonic() < end and server.poll() is None:
         try:

@@ -13,6 +13,8 @@ import pytest
 from built_site import LESSONS, SITE, served
 from playwright.sync_api import Browser, Page
 
+from camviz.course.answers import mark, read_answers
+from camviz.course.learning import class_scores
 from camviz.course.questions import predict_questions, quiz_questions
 
 pytestmark = pytest.mark.browser
@@ -145,6 +147,33 @@ def test_an_answer_is_replied_to_kept_and_cleared(watched: Watched) -> None:
     assert shown.inner_text() == ""
     page.goto(f"{watched.address}/lessons/05_distortion.html")
     assert "You answered this earlier." not in card.inner_text()
+
+
+def test_answers_are_saved_as_a_notebook_writes_them_and_first_choices_stay_the_first(
+    watched: Watched, tmp_path: Path
+) -> None:
+    """Form A all wrong; form B first all right, then, started again, all wrong: a class of one gains everything."""
+    page = watched.open("lessons/05_distortion")
+    wrong = [1 if one.answer == 0 else 0 for one in quiz_questions("05", "A")]
+    chosen = {"What do you think now?": [wrong], "Exit quiz": [[one.answer for one in quiz_questions("05", "B")]]}
+    chosen["Exit quiz"].append([1 if one == 0 else 0 for one in chosen["Exit quiz"][0]])
+    for title, rounds in chosen.items():
+        quiz = page.locator(".camviz-question", has_text=title).first
+        for number, choices in enumerate(rounds):
+            if number:
+                quiz.get_by_role("button", name="Start again").click()
+            for card, choice in zip(quiz.locator(".camviz-card").all(), choices, strict=True):
+                card.locator("input").nth(choice).check()
+                card.get_by_role("button", name="Commit").click()
+    with page.expect_download() as saved:
+        quiz.get_by_role("button", name="Write my answers to a file, without my name").click()
+    path = tmp_path / saved.value.suggested_filename
+    saved.value.save_as(path)
+    assert re.fullmatch(r"answers_05_[0-9a-f]{8}\.csv", path.name)
+    assert f"Saved as {path.name}: {3 * len(wrong)} choices, a random code, no name." in quiz.inner_text()
+    assert all(mark(one) == one for one in read_answers(path))
+    scores = class_scores([path], "05")
+    assert (scores.before.tolist(), scores.after.tolist(), scores.incomplete) == ([0.0], [1.0], 0)
 
 
 def test_a_quiz_before_and_after_the_lesson_ends_with_looking_back(watched: Watched) -> None:

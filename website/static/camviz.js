@@ -43,6 +43,25 @@ const answers = {
       this.problem = "This browser keeps nothing for this page: your answers are lost when you leave it.";
     }
   },
+  // All that was ever chosen in a lesson, so that a first choice stays the first, under a random code.
+  history(lesson) {
+    const name = `${this.prefix}${lesson}.history`;
+    const fresh = () => Array.from(crypto.getRandomValues(new Uint8Array(4)), (one) => one.toString(16).padStart(2, "0")).join("");
+    try {
+      return JSON.parse(localStorage.getItem(name)) ?? { code: fresh(), made: {} };
+    } catch {
+      return { code: fresh(), made: {} };
+    }
+  },
+  remember(asked, question, choice) {
+    const history = this.history(asked.lesson), key = this.key(question, asked.when);
+    history.made[key] = [...(history.made[key] ?? []), choice];
+    try {
+      localStorage.setItem(`${this.prefix}${asked.lesson}.history`, JSON.stringify(history));
+    } catch {
+      this.problem = "This browser keeps nothing for this page: your answers are lost when you leave it.";
+    }
+  },
   clear() {
     Object.keys(localStorage).filter((key) => key.startsWith(this.prefix)).forEach((key) => localStorage.removeItem(key));
   },
@@ -66,14 +85,14 @@ function card(question, made, earlier, silent) {
 function makeLive(place, asked, others) {
   const silent = asked.when === "before", classroom = window.camvizClassroom;
   let tries = asked.questions.map((one) => answers.chosen(asked, one));
-  let earlier = tries.map((made) => made.length > 0);
+  let earlier = tries.map((made) => made.length > 0), exported = "";
   const state = () => ({
     cards: asked.questions.map((one, i) => ({ ...card(one, tries[i], earlier[i], silent), ...classroom.card(one) })),
     room: classroom.said(asked.questions),
     can_start_again: tries.some((made) => made.length),
     summary: silent ? summaryBefore() : score(),
     looking_back: !silent && asked.when === "after" && tries.every((made) => made.length) ? lookingBack(others) : "",
-    can_export: false, exported: "", problem: answers.problem,
+    can_export: asked.when === "after" && tries.every((made) => made.length), exported, problem: answers.problem,
   });
   const summaryBefore = () => (tries.every((made) => made.length) ? "Kept in this browser, and nowhere else." : "");
   const score = () => {
@@ -88,8 +107,12 @@ function makeLive(place, asked, others) {
   };
   const model = new Model({ title: asked.title, lead: asked.lead, still_hidden: "", ...state() }, (message) => {
     if (classroom.card(asked.questions[message.question] ?? {})) return classroom.send(asked.questions[message.question], message.choice);
-    if (message.again) asked.questions.forEach((_, number) => change(number, []));
-    else change(message.question, [...tries[message.question], message.choice]);
+    if (message.export) exported = exportAnswers(asked.lesson, others);
+    else if (message.again) asked.questions.forEach((_, number) => change(number, []));
+    else {
+      answers.remember(asked, asked.questions[message.question], message.choice);
+      change(message.question, [...tries[message.question], message.choice]);
+    }
     model.put(state());
     document.dispatchEvent(new Event("camviz-answers"));
     return undefined;
@@ -97,11 +120,34 @@ function makeLive(place, asked, others) {
   document.addEventListener("camviz-room", () => {
     asked.questions.forEach((one, number) => {
       const made = classroom.settled(one, tries[number]);
+      made.forEach((choice) => answers.remember(asked, one, choice));
       if (made.length) change(number, made);
     });
     model.put(state());
   });
   camvizQuestion({ model, el: place });
+}
+
+// Saves both forms of a lesson's quiz as camviz.course.answers writes them: answers_05_3f9a2c1b.csv, without a name.
+function exportAnswers(lesson, others) {
+  const { code, made } = answers.history(lesson);
+  const rows = others.flatMap((asked) => asked.questions.filter(({ form }) => form).flatMap((one) => {
+    const chosen = made[answers.key(one, asked.when)] ?? answers.chosen(asked, one);
+    return chosen.filter((choice) => one.choices[choice]).map((choice, number) => {
+      const { correct, misconception } = one.choices[choice];
+      const letter = "abcdefgh"[choice];
+      return [code, lesson, asked.when, one.form, one.topic, number + 1, letter, Number(correct), misconception];
+    });
+  }));
+  const head = "participant,lesson,when,form,concept,attempt,choice,correct,misconception".split(",");
+  const quoted = (value) => (/[",\n]/.test(value) ? `"${String(value).replaceAll('"', '""')}"` : value);
+  const text = [head, ...rows].map((row) => `${row.map(quoted).join(",")}\n`).join("");
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+  link.download = `answers_${lesson}_${code}.csv`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  return `Saved as ${link.download}: ${rows.length} choices, a random code, no name.`;
 }
 
 // What was thought before the lesson, with the replies, as folded HTML; "" where nothing was chosen then.
