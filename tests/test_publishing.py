@@ -41,7 +41,7 @@ def test_the_readme_leads_from_a_package_index_to_the_files_of_its_release(descr
     for before, after in zip(here, there, strict=True):
         assert after == before if "://" in before else after in [base + before for base in bases]
         if not before.startswith("https://"):
-            assert after.startswith(bases[1]) == before.endswith(".svg")
+            assert after.startswith(bases[1]) == before.endswith((".svg", ".webp"))
     assert "<img" not in described
 
 
