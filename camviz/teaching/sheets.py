@@ -132,4 +132,4 @@ def _without_ellipsis(stub: str) -> str:
 def _page(notebook: Notebook, what: str, body: str) -> str:
     title = markup.plain(notebook.cells[0].source.splitlines()[0].lstrip("# "))
     layout = (files(__package__) / "sheets.css").read_text(encoding="utf-8")
-    return document(f"{title}: {what}", f"<main>{body}</main>", layout=layout)
+    return document(f"{title}: {what}", body, layout=layout)
