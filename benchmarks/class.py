@@ -1,13 +1,13 @@
-"""A class on a real JupyterHub on this machine: how long until all see a picture, how soon sliders answer, what it takes.
+"""A class on a real JupyterHub on this machine: when all see a picture, how soon sliders answer, what it takes.
 
     pip install jupyterhub                     # into the environment that runs this
     npm install -g configurable-http-proxy     # needs Node
     python benchmarks/class.py [--students 60] [--moving 10] [--proxy PATH] [--no-faults]
 
-Starts a hub that loads deploy/jupyterhub_config.py, its proxy, and for every student a server and a kernel. Students come
-`--at-once` at a time, as the rows of a room do. Each opens a lesson, all lessons in turn, and runs it from top to bottom.
-Then some move a slider at once, a change every 100 ms for 2 s, and read, and move again. Then a kernel is killed, one
-takes all the memory it can get, the hub is restarted, and the proxy is gone for half a minute.
+Starts a hub that loads deploy/jupyterhub_config.py, its proxy, and for every student a server and a kernel. Students
+come `--at-once` at a time, as the rows of a room do. Each opens a lesson, all lessons in turn, and runs it from top to
+bottom. Then some move a slider at once, a change every 100 ms for 2 s, and read, and move again. Then a kernel is
+killed, one takes all the memory it can get, the hub is restarted, and the proxy is gone for half a minute.
 
 Prints Markdown for docs/performance.md. Fails for any failure, above 14 GB, or where a slider's p95 is above 500 ms. It
 asks nobody but 127.0.0.1 and leaves no process behind. Sixty students take some 12 GB and ten minutes of two cores.
@@ -145,7 +145,8 @@ def memory_line(hub: Hub) -> str:
     """What each kind of process takes."""
     sizes, counts = hub.memory_mb(), hub.counts()
     parts = [f"{kind} {sizes[kind]} MB ({counts[kind]} processes)" for kind in sorted(sizes)]
-    return f"\nMemory (PSS) at the end: {', '.join(parts)}. Free on this machine: {psutil.virtual_memory().available >> 30} GB."
+    free = psutil.virtual_memory().available >> 30
+    return f"\nMemory (PSS) at the end: {', '.join(parts)}. Free on this machine: {free} GB."
 
 
 def both(values: list[float], form: str) -> str:

@@ -18,22 +18,29 @@ c.JupyterHub.cleanup_servers = False
 c.Spawner.http_timeout = 120
 c.Spawner.start_timeout = 180
 
-c.Spawner.args = [
-    # Each picture goes to the browser at once: a slider answers 40 ms sooner.
-    "--ServerApp.jpserver_extensions=camviz.server=True",
-    # A kernel whose browser has been away for an hour ends, and gives its memory to others. Nothing that was saved is lost.
-    "--MappingKernelManager.cull_idle_timeout=3600",
-    "--MappingKernelManager.cull_interval=300",
-    # Kernels that are looked at are left alone.
-    "--MappingKernelManager.cull_connected=False",
-    # A server without a kernel for another hour ends.
-    "--ServerApp.shutdown_no_activity_timeout=3600",
-]
+c.Spawner.args.extend(
+    [
+        # Each picture goes to the browser at once: a slider answers 40 ms sooner.
+        "--ServerApp.jpserver_extensions=camviz.server=True",
+        # A kernel whose browser has been away for an hour ends, and gives its memory to others. What was saved stays.
+        "--MappingKernelManager.cull_idle_timeout=3600",
+        "--MappingKernelManager.cull_interval=300",
+        # Kernels that are looked at are left alone.
+        "--MappingKernelManager.cull_connected=False",
+        # A server without a kernel for another hour ends.
+        "--ServerApp.shutdown_no_activity_timeout=3600",
+    ]
+)
 
-c.Spawner.environment = {
-    # Wireframes: solid pictures take a kernel up to 300 MB more and need a processor each, for servers have no GPU.
-    "CAMVIZ_RENDERER": "wire",
-    # One processor a student: libraries that start a thread on each would stand in each other's way.
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-}
+c.Spawner.environment.update(
+    {
+        # Wireframes: solid pictures take a kernel up to 300 MB more and need a processor each, for servers have no GPU.
+        "CAMVIZ_RENDERER": "wire",
+        # One processor a student: libraries that start a thread on each would stand in each other's way.
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        # What a server needed to hand out a notebook or a picture goes back to the system: 10 MB for each of them.
+        "MALLOC_ARENA_MAX": "2",
+        "MALLOC_TRIM_THRESHOLD_": "131072",
+    }
+)

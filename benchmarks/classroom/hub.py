@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPResponse
 from tornado.escape import json_decode, json_encode
+from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPResponse
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -86,6 +86,8 @@ class Hub:
             with suppress(OSError, HTTPClientError):
                 await self.ask("hub/api/users")
                 return
+            if self.processes["hub"].poll() is not None:
+                break
             await asyncio.sleep(0.2)
         raise RuntimeError(f"the hub did not start: {self.log()[-3000:]}")
 

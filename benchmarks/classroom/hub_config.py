@@ -29,9 +29,11 @@ if os.geteuid() == 0:
     c.Spawner.args.append("--allow-root")
 HANDED_ON = ("CAMVIZ_SAMPLES", "JUPYTER_CONFIG_PATH", "JUPYTER_PATH", "PYTHONPATH")
 c.Spawner.environment.update(
-    {name: os.environ[name] for name in HANDED_ON if name in os.environ},
-    IPYTHONDIR=str(FOLDER / "ipython"),
-    JUPYTER_RUNTIME_DIR=str(FOLDER / "runtime"),
+    {
+        **{name: os.environ[name] for name in HANDED_ON if name in os.environ},
+        "IPYTHONDIR": str(FOLDER / "ipython"),
+        "JUPYTER_RUNTIME_DIR": str(FOLDER / "runtime"),
+    }
 )
 
 c.JupyterHub.services = [{"name": "classroom", "api_token": os.environ["CLASSROOM_TOKEN"]}]

@@ -92,19 +92,23 @@ class Kernel:
             _, parts = deserialize_msg_from_ws_v1(packed)
             header, parent, _, content = map(json_decode, parts[:4])
             self._heard(header["msg_type"], parent.get("msg_id", ""), content)
+        self._give_up("the connection to the kernel is lost")
+
+    def _give_up(self, why: str) -> None:
         for reply in self._replies.values():
             if not reply.done():
-                reply.set_exception(ConnectionError("the connection to the kernel is lost"))
+                reply.set_exception(ConnectionError(why))
 
     def _heard(self, kind: str, asked: str, content: dict[str, Any]) -> None:
         if kind == "comm_open" and content["target_name"] == "jupyter.widget":
             self._opened(content["comm_id"], content["data"]["state"])
         elif kind == "comm_msg" and content["data"].get("method") == "update":
             self._updated(content["comm_id"], content["data"]["state"])
-        elif kind == "execute_reply" and asked in self._replies:
+        elif kind == "execute_reply" and asked in self._replies and not self._replies[asked].done():
             self._replies[asked].set_result(content)
         elif kind == "status" and content["execution_state"] not in ("busy", "idle", "starting"):
             self.states.append((time.perf_counter(), content["execution_state"]))
+            self._give_up(f"the kernel is {content['execution_state']}")
 
     def _opened(self, comm: str, state: dict[str, Any]) -> None:
         self.widgets[comm] = state

@@ -57,13 +57,17 @@ class Student:
         """The lesson as the server hands it out, and a kernel for it. Returns its code."""
         home = self.hub.folder / "homes" / self.name
         (home / self.lesson.name).write_bytes(self.lesson.read_bytes())
-        notebook = await self.hub.ask(f"{self.path}api/contents/{self.lesson.name}")
+        code = await self.code()
         told = {"path": self.lesson.name, "name": "", "type": "notebook", "kernel": {"name": "python3"}}
         session = await self.hub.ask(f"{self.path}api/sessions", told)
         self.kernel = Kernel(self.hub, self.path, session["kernel"]["id"])
         await self.kernel.connect()
-        cells = notebook["content"]["cells"]
-        return [cell["source"] for cell in cells if cell["cell_type"] == "code"]
+        return code
+
+    async def code(self) -> list[str]:
+        """The sources of the lesson's code cells, as the server hands the notebook out."""
+        notebook = await self.hub.ask(f"{self.path}api/contents/{self.lesson.name}")
+        return [cell["source"] for cell in notebook["content"]["cells"] if cell["cell_type"] == "code"]
 
     async def run(self, cells: list[str], began: float) -> None:
         """All of the lesson, from top to bottom; what raised is a failure."""
