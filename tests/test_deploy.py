@@ -74,20 +74,26 @@ def test_a_kernel_at_its_limit_and_its_server_fit_into_a_students_container() ->
 
 
 def test_what_is_guaranteed_is_what_was_measured_and_a_tenth_more() -> None:
-    (row,) = re.findall(r"^\| 60 \|.*$", text("docs/performance.md").partition("## A class on one hub")[2], re.MULTILINE)
+    (row,) = re.findall(
+        r"^\| 60 \|.*$", text("docs/performance.md").partition("## A class on one hub")[2], re.MULTILINE
+    )
     measured = int(re.split(r"\s*\|\s*", row.strip("| "))[7])
     assert measured * 1.1 <= megabytes(values()["singleuser"]["memory"]["guarantee"]) <= measured * 1.5
     assert f"{measured} MB" in text("docs/teaching.md").partition("## From a laptop to 600 students")[2]
 
 
-@pytest.mark.skipif(find_spec("jupyterhub") is None, reason="jupyterhub is not installed here: its traits are not known")
+@pytest.mark.skipif(
+    find_spec("jupyterhub") is None, reason="jupyterhub is not installed here: its traits are not known"
+)
 def test_the_hub_knows_every_trait_that_the_recipe_names() -> None:
     from jupyterhub.app import JupyterHub
     from jupyterhub.spawner import Spawner
 
     config = configured("deploy/jupyterhub_config.py")
     kinds: dict[str, type[Configurable]] = {"JupyterHub": JupyterHub, "Spawner": Spawner}
-    assert {section: sorted(set(config[section]) - set(kinds[section].class_trait_names(config=True))) for section in config} == {
+    assert {
+        section: sorted(set(config[section]) - set(kinds[section].class_trait_names(config=True))) for section in config
+    } == {
         "JupyterHub": [],
         "Spawner": [],
     }
