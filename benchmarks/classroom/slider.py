@@ -8,10 +8,7 @@ from typing import Any
 
 from classroom.kernel import Kernel
 
-SETTLE_S, BUSY_S, LONGEST_S = 0.01, 0.1, 0.3  # explorer.js: SETTLE_MS, BUSY_MS, LONGEST_MS
-
-
-PATIENT = [True]
+SETTLE_S = 0.01  # explorer.js: SETTLE_MS
 
 
 class Slider:
@@ -65,7 +62,6 @@ class Slider:
     def _send(self) -> None:
         self._number += 1
         self._flying, self._flown, self._waiting = self._number, self._waiting, []
-        self._sent = time.perf_counter()
         content = {"id": self._number, "values": self._wish, "drags": [], "keys": [], "units": {}}
         self._wish = None
         self._kernel.tell(self._comm, {**content, "draft": self._draft})
@@ -82,9 +78,7 @@ class Slider:
         if self._wish is not None:
             self._send()
         elif frame["draft"]:
-            took = now - self._sent
-            pause = SETTLE_S if took < BUSY_S or not PATIENT[0] else min(took, LONGEST_S)
-            self._settle = asyncio.get_running_loop().call_later(pause, lambda: self._ask({}, draft=False))
+            self._settle = asyncio.get_running_loop().call_later(SETTLE_S, lambda: self._ask({}, draft=False))
         else:
             self.rests.set()
 
