@@ -14,7 +14,7 @@ c.JupyterHub.spawn_throttle_retry_range = (5, 15)
 # When the hub is restarted, the students' servers and kernels go on. Left alone, it would stop them all.
 c.JupyterHub.cleanup_servers = False
 
-# A proxy that was restarted has forgotten where the students' servers are. The hub tells it within 30 s, not within 300.
+# A proxy that was restarted has forgotten where the students' servers are. The hub tells it in 30 s, not in 300.
 c.JupyterHub.last_activity_interval = 30
 
 # A server that starts among fifty others that work takes longer than the 30 s that are usual.
