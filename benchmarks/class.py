@@ -114,17 +114,21 @@ async def move(students: list[Student], options: argparse.Namespace) -> dict[str
     """Some move their sliders at once, in bursts with reading between them."""
     able = [student for student in students if student.slider]
     moving = Random(5).sample(able, min(options.moving, len(able)))
+    bursts: list[list[float]] = []
     for _ in range(options.bursts):
+        before = [len(student.slider.answers) for student in moving]
         done = await asyncio.gather(*(student.move(BURST_S) for student in moving), return_exceptions=True)
         for student, error in zip(moving, done, strict=True):
             if error:
                 student.failures.append(f"{student.name} moved a slider: {type(error).__name__}: {error}")
         await asyncio.sleep(options.reading)
+        made = zip(moving, before, strict=True)
+        bursts.append([answer * 1000 for student, count in made for answer in student.slider.answers[count:]])
     for student in moving:
         student.failures += [f"{student.lesson.stem}: {error}" for error in student.slider.errors]
-    answers = [answer * 1000 for student in moving for answer in student.slider.answers]
-    p95 = percentile(answers, 0.95)
-    return {"moving": len(moving), "slider": both(answers, "{:.0f}"), "worst_ms": p95}
+    answers = [answer for burst in bursts for answer in burst]
+    print("Slider → answer, ms, burst by burst:", "; ".join(both(burst, "{:.0f}") for burst in bursts), flush=True)
+    return {"moving": len(moving), "slider": both(answers, "{:.0f}"), "worst_ms": percentile(answers, 0.95)}
 
 
 async def suffer(hub: Hub, students: list[Student]) -> bool:
