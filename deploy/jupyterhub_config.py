@@ -42,6 +42,7 @@ c.Spawner.environment.update(
         # One processor a student: libraries that start a thread on each would stand in each other's way.
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
+        "OPENCV_FOR_THREADS_NUM": "1",
         # What a server needed to hand out a notebook or a picture goes back to the system: 10 MB for each of them.
         "MALLOC_ARENA_MAX": "2",
         "MALLOC_TRIM_THRESHOLD_": "131072",
