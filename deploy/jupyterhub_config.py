@@ -9,7 +9,8 @@ c = get_config()  # noqa: F821  # JupyterHub gives this name to the files that i
 c.JupyterHub.concurrent_spawn_limit = 4
 
 # Who comes fifth is asked to come back after 5 to 15 s. Left alone, the hub says 30 to 60.
-c.JupyterHub.spawn_throttle_retry_range = (5, 15)
+# (JupyterHub 6.1 heeds this setting here, and not as a trait.)
+c.JupyterHub.tornado_settings.update({"spawn_throttle_retry_range": (5, 15)})
 
 # When the hub is restarted, the students' servers and kernels go on. Left alone, it would stop them all.
 c.JupyterHub.cleanup_servers = False

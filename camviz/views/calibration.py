@@ -440,9 +440,10 @@ def _number(name: str, value: float) -> str:
 
 
 def _spread(name: str, sigma: float) -> str:
-    if name in _PIXELS:
-        return f"{sigma:.2g}" if sigma < 10 else f"{sigma:.0f}" if sigma < 1e4 else "unknown"
-    return f"{sigma:.4f}" if sigma < 1 else f"{sigma:.3g}" if sigma < 1e3 else "unknown"
+    """Two significant digits, as metrology asks (GUM, 7.2.6): where little is known, rounding decides the third."""
+    if sigma >= (1e4 if name in _PIXELS else 1e3):
+        return "unknown"
+    return f"{sigma:.4f}" if name not in _PIXELS and sigma < 1 else f"{float(f'{sigma:.2g}'):g}"
 
 
 def _digits(value: float) -> str:

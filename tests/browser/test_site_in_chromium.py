@@ -24,7 +24,7 @@ REPORTS = SITE / "engineers/reports"  # each a whole page in one file, as camviz
 READ = ("index", "learn", "search", "docs/clinic", "about", "docs/glossary", "api/index", "lessons/05_distortion")
 SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
 ADDRESS = re.compile(r'<[a-z][^<>]*?\s(?:href|src)="([^"]*)"')
-LOADED = re.compile(r'<(?:script|img|iframe|link)[^<>]*?\s(?:src|href)="([^"]*)"')
+LOADED = re.compile(r'<(?:script|img|iframe|link(?! rel="canonical"))[^<>]*?\s(?:src|href)="([^"]*)"')
 TO_BOTH_ENDS = """async () => {
   const wrong = [], panes = [...document.querySelectorAll(".camviz-recorded")];
   let changed = 0;
