@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import clips
 
 RECORDINGS = "_recordings"
-SIZE = 1_200_000
+SIZE = 950_000
 """Bytes of a pane, as transferred: of more than a hundred, so that the whole site holds its own budget."""
 
 SLOWEST = 4
