@@ -30,8 +30,13 @@ def test_a_glimpse_shows_what_the_tracer_shows(lens):
 
 
 def test_a_camera_that_turns_where_it_stands_is_drafted_from_the_all_round_picture_of_that_place():
-    """The first draft from a place is traced, for the camera may be on its way; the second is the same, but softer."""
+    """The first draft from a place is traced, for the camera may be on its way; the second is the same, but softer.
+
+    At the origin, where a view begins, the first is such a one already: its all-round picture is kept in a file.
+    """
     garden._drafts_from.cache_clear()
+    here = Camera(VIEW)
+    np.testing.assert_array_equal(garden.drafted(here)[0], garden.glimpse(here))
     for place in ([-0.6, -0.5, 0.2], [1.2, -0.3, 0.9]):
         camera = Camera(VIEW, world_from_cam=RigidTransform.from_translation(place))
         first, again = garden.drafted(camera)[0], garden.drafted(camera)[0]

@@ -108,7 +108,7 @@ class Recorder:
         return bool(kept) and there and kept["fingerprint"] == self._fingerprint(cells, kept["made from"])
 
     def _fingerprint(self, cells: dict[int, CodeCell], files: list[str]) -> str:
-        made = hashlib.sha256(json.dumps([cells, self.seconds], sort_keys=True).encode())
+        made = hashlib.sha256(json.dumps([cells, self.seconds, SIZE], sort_keys=True).encode())
         for file in files:
             path = self.root / file
             made.update(file.encode() + (path.read_bytes() if path.exists() else b""))

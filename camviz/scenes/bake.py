@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.scenes import paint
+from camviz.scenes.all_round import KEPT, ORIGIN, traced_all_round
 from camviz.scenes.light import SKYLIGHT, SUN, sunlight, to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.scenes.scene import Scene
@@ -23,7 +24,7 @@ _OPTIONS = [cv2.IMWRITE_JPEG_QUALITY, 93, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.
 
 
 def painted() -> Iterator[tuple[str, paint.Picture]]:
-    """Each picture's name and its sRGB bytes (height, width, 3). The terrace comes last: the other things shade it."""
+    """Each picture's name and its sRGB bytes (height, width, 3): things, the terrace in their shade, then all of it."""
     yield "sky", _smaller(paint.sky(), 3 / 4)
     yield "bricks", _smaller(paint.bricks(), 1 / 2)
     yield "planks", paint.planks()
@@ -32,6 +33,7 @@ def painted() -> Iterator[tuple[str, paint.Picture]]:
     yield "globe", to_display(paint.lit_round(_smaller(paint.globe(), 3 / 4)))
     yield "leaves", to_display(paint.lit_round(paint.leaves()))
     yield "terrace", _terrace()
+    yield KEPT, traced_all_round(ORIGIN)
 
 
 def _terrace() -> paint.Picture:

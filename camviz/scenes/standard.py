@@ -11,6 +11,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from camviz.lenses.base import Array
 from camviz.scenes import paint
@@ -72,8 +73,13 @@ def textured_scene() -> Scene:
 
 def baked(name: str, repeat: bool = False) -> Texture:
     """One of the pictures that `camviz.scenes.bake` has painted."""
+    return Texture(opened(name), repeat)
+
+
+def opened(name: str) -> NDArray[np.uint8]:
+    """Such a picture as sRGB bytes (height, width, 3)."""
     data = np.frombuffer((files("camviz.scenes") / "pictures" / f"{name}.jpg").read_bytes(), dtype=np.uint8)
-    return Texture(np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))[..., ::-1], repeat)
+    return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)[..., ::-1]
 
 
 def terrace_edges() -> tuple[Array, Array, Array]:

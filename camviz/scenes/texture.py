@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.lenses.base import as_points
+from camviz.lenses.base import Array, as_points
 from camviz.scenes.light import to_display, to_linear
 
 Floats = NDArray[np.float32]
@@ -56,7 +57,6 @@ class Texture:
         self.height, self.width = picture.shape[:2]
         self.repeat = repeat
         self._mosaic, self._places = _pyramid(picture, repeat)
-        self.mean = self._mosaic[: self.height, : self.width, :3].mean(axis=(0, 1), dtype=np.float64) / _FULL
 
     @classmethod
     def plain(cls, rgb: ArrayLike) -> Texture:
@@ -78,6 +78,11 @@ class Texture:
             For another shape.
         """
         return cls(to_linear(as_points(rgb, 3, "rgb")).reshape(1, 1, 3))
+
+    @cached_property
+    def mean(self) -> Array:
+        """Linear light (3,), the mean of the finest copy."""
+        return self._mosaic[: self.height, : self.width, :3].mean(axis=(0, 1), dtype=np.float64) / _FULL
 
     @property
     def is_plain(self) -> bool:

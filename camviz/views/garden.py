@@ -13,18 +13,17 @@ from numpy.typing import NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw.picture import jpeg
-from camviz.lenses import Equirectangular, Lens
+from camviz.lenses import Lens
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene, to_display
+from camviz.scenes.all_round import ORIGIN, Place, all_round
 from camviz.scenes.scene import NEUTRAL
 
 NOTHING = (69, 69, 69)  # the grey of what a picture does not show
 DRAFT, FINE = 136, 400  # pixels on the longer side; the tracer takes a fine picture at 4:3 as one block of rays
 
 Pose = tuple[float, ...]
-Place = tuple[float, ...]
-ORIGIN: Place = (0.0, 0.0, 0.0)
 
 
 def taken(camera: Camera, side: int) -> tuple[np.ndarray, bytes]:
@@ -38,8 +37,9 @@ def distances(camera: Camera, side: int) -> NDArray[np.float32]:
 
 
 def drafted(camera: Camera) -> tuple[np.ndarray, bytes]:
-    """What `taken` takes as a draft; once the camera stays where it is, and only turns or zooms, a glimpse."""
-    if next(_drafts_from(_place(camera))) == 0:
+    """What `taken` takes as a draft; at the origin, and once the camera only turns or zooms elsewhere, a glimpse."""
+    place = _place(camera)
+    if place != ORIGIN and next(_drafts_from(place)) == 0:
         return taken(camera, DRAFT)
     image = glimpse(replace(camera, intrinsics=camera.intrinsics.within(DRAFT)))
     return image, jpeg(image)
@@ -53,22 +53,10 @@ def _drafts_from(place: Place) -> Iterator[int]:
 
 def glimpse(camera: Camera) -> np.ndarray:
     """What a camera sees, looked up in one all-round picture from its place: softer, in a third of the time."""
-    around, picture, nothing = _all_round(_place(camera))
+    around, picture = all_round(_place(camera))
+    nothing = to_display(np.full(3, NEUTRAL, np.float32)).tolist()  # the colour of no ray
     uv = np.nan_to_num(around.project(camera.rays()), nan=-9).astype(np.float32)
     return cv2.remap(picture, uv, None, cv2.INTER_LINEAR, borderValue=nothing)
-
-
-@lru_cache(maxsize=2)
-def _all_round(place: Place) -> tuple[Camera, np.ndarray, tuple[int, ...]]:
-    """A camera at the origin that sees every way, the picture it takes at a place, its edges joined, and the colour of
-    no ray; a little coarser from places other than the origin, where most views do not begin."""
-    width = 1024 if place == ORIGIN else 768
-    f = width / (2 * np.pi)
-    around = Camera(Intrinsics(width, width // 2, f, f, (width - 1) / 2, (width // 2 - 1) / 2), Equirectangular())
-    seen = snapshot(textured_scene(), around.at(RigidTransform.from_translation(place)))
-    picture = cv2.copyMakeBorder(seen, 1, 1, 1, 1, cv2.BORDER_WRAP)
-    k = around.intrinsics.cropped(-1, -1, width + 2, width // 2 + 2)
-    return Camera(k, around.lens), picture, tuple(to_display(np.full(3, NEUTRAL, np.float32)).tolist())
 
 
 def looked_up(picture: np.ndarray, uv: Array, side: float) -> np.ndarray:
