@@ -24,8 +24,9 @@ _NEGATED = re.compile(r":not\([^()]*\)")
 _WORD = re.compile(r"[A-Za-z_][\w-]*")
 _NESTED = ("media", "supports", "layer", "container")
 _ICON_FONT = "Font Awesome"
-_MENDED = {  # in the pages: a fold of the theme without a name, and a role of docutils that ARIA has withdrawn
+_MENDED = {  # in the pages: folds with no name or one that nobody sees, and a role of docutils that ARIA has withdrawn
     '<summary><span class="toctree-toggle"': '<summary aria-label="Pages below"><span class="toctree-toggle"',
+    '<summary aria-label="Toggle hidden content">': "<summary>",
     ' role="doc-biblioentry"': "",
     '<div role="list" class="citation-list">': '<div class="citation-list">',
 }

@@ -27,7 +27,7 @@ from camviz.views import lens_diagram
 from camviz.views.base import View, choice, positive, slider, step_of, switch
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
-DRAFT, FINE = (0.25, 12, 32), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most
+DRAFT, FINE = (0.25, 8, 24), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most
 SHOWN = 64  # points in the picture of the aperture
 _NEAREST_M = 1.0  # of what is in the picture, in most states
 GLOBE_Z = 3.3  # of the globe in the world, towards which the camera looks along +z

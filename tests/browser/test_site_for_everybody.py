@@ -3,10 +3,12 @@
 `python start.py site` builds it before; CAMVIZ_SITE names another folder than build/site.
 """
 
+import re
 from collections.abc import Iterator
 
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
+from bs4 import BeautifulSoup
 from built_site import LESSONS, SITE, served
 from PIL import Image
 from playwright.sync_api import Browser, Page
@@ -80,6 +82,18 @@ def test_axe_finds_no_fault_on_any_lesson_in_the_dark(page: Page, address: str) 
         page.goto(f"{address}/lessons/{name}.html")
         found[name] = found_by_axe(page)
     assert {name: wrong for name, wrong in found.items() if wrong} == {}
+
+
+def test_a_button_can_be_called_by_the_words_on_it() -> None:
+    """WCAG 2.5.3: who speaks to the computer says what can be read; its name for scripts must have these words."""
+    for path in SITE.rglob("*.html"):
+        parsed = BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
+        for one in parsed.select("button[aria-label], a[aria-label], summary[aria-label]"):
+            assert words(one.get_text(" ")) in words(str(one["aria-label"])), (path, one)
+
+
+def words(text: str) -> str:
+    return " ".join(re.findall(r"\w+", text.lower()))
 
 
 def test_a_page_has_its_colours_before_and_without_scripts(browser: Browser, address: str) -> None:
