@@ -27,6 +27,7 @@ from scripts import question_script, style_sheet
 from camviz.course.material import lesson_paths
 from camviz.course.notebooks import Notebook, read, text_of
 from camviz.record import write_player
+from camviz.samples import chessboard_pictures
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -51,6 +52,8 @@ def main(words: list[str]) -> int:
     slim_styles.slim(BUILT)
     size = sum(path.stat().st_size for path in BUILT.rglob("*") if path.is_file())
     print(f"{BUILT / 'index.html'}: {size / 1e6:.0f} MB, made in {time.monotonic() - start:.0f} s.")
+    if not (photographs := chessboard_pictures(count=1)).real:
+        print(f"Some panes of lessons 06, 07, 08 and 12 show other pictures than their text. {photographs.sentence}")
     if size > MOST:
         print(f"The site must not be larger than {MOST / 1e6:.0f} MB: record fewer positions (--seconds).")
     return status or int(size > MOST)

@@ -13,6 +13,7 @@ from mistune import create_markdown
 
 from camviz.course import prose
 from camviz.course.questions import predict_questions, quiz_questions
+from camviz.samples import local_sample
 
 pytestmark = pytest.mark.browser
 
@@ -84,6 +85,8 @@ def test_the_page_has_every_line_of_code_and_every_printed_line(pair: Pair) -> N
 
 
 def test_the_page_has_every_picture_in_the_same_words(pair: Pair) -> None:
+    if any("chessboard_pictures" in cell.source for cell in pair.cells("code")) and not local_sample("left01.jpg"):
+        pytest.skip("CAMVIZ_SAMPLES names no folder with the photographs that the notebook was saved with")
     saved = [
         match for output in pair.outputs() for match in PICTURE.findall(output.get("data", {}).get("text/html", ""))
     ]
