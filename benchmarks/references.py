@@ -317,6 +317,14 @@ def kitti(path: Path) -> Iterator[Reference]:
             yield camera(P[:, :3], np.zeros(5), t=np.linalg.solve(P[:, :3], P[:, 3]))
 
 
+def kitti_raw(path: Path) -> Iterator[Reference]:
+    """The cameras before rectification: K, five coefficients D, and x_i = R x_0 + T."""
+    held = dict(line.split(":", 1) for line in path.read_text().splitlines() if re.match(r"[KDRT]_\d\d:", line))
+    for number in sorted(key[2:] for key in held if key.startswith("K_")):
+        K, D, R, T = (np.array(held[f"{what}_{number}"].split(), float) for what in "KDRT")
+        yield camera(K.reshape(3, 3), D, R.reshape(3, 3), T)
+
+
 def metashape(path: Path) -> Iterator[Reference]:
     """The frame camera of Metashape's manual, appendix D, first pixel's centre at 0.5; transform: camera → chunk."""
     chunk = ElementTree.parse(path).getroot().find("chunk")
@@ -345,7 +353,7 @@ def metashape(path: Path) -> Iterator[Reference]:
 
 
 REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
-    each.__name__: each
+    each.__name__.replace("_", "-"): each
     for each in (
         anipose,
         bal,
@@ -355,6 +363,7 @@ REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
         euroc,
         kalibr,
         kitti,
+        kitti_raw,
         metashape,
         mrcal,
         nerfstudio,

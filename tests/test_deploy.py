@@ -109,6 +109,7 @@ def test_a_kernel_beyond_its_limit_gets_a_memory_error_and_lives(monkeypatch: py
     asked_for: list[tuple[int, tuple[int, int]]] = []
     monkeypatch.setattr(resource, "setrlimit", lambda kind, both: asked_for.append((kind, both)))
     monkeypatch.setenv("CAMVIZ_KERNEL_MB", "900")
+    monkeypatch.delenv("VIRTUAL_ENV", raising=False)  # IPython warns where another one than this Python's is active
     (line,) = configured("deploy/ipython_config.py").InteractiveShellApp.exec_lines
     shell = InteractiveShell.instance()
     before = set(shell.user_ns)
