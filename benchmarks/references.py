@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 
 import cv2
 import numpy as np
+import scipy.io
 import yaml
 from equations import Array, Reference, camera, double_sphere, extended_unified, fisheye, matrix, opencv
 from scipy.spatial.transform import Rotation
@@ -325,6 +326,17 @@ def kitti_raw(path: Path) -> Iterator[Reference]:
         yield camera(K.reshape(3, 3), D, R.reshape(3, 3), T)
 
 
+def mat(path: Path) -> Iterator[Reference]:
+    """stereoParameters as a struct, read by SciPy: [u v 1] ~ x IntrinsicMatrix from (1, 1) on, x2 = x1 R + t in mm."""
+    held = scipy.io.loadmat(path, simplify_cells=True)["stereoParams"]
+    poses = [(np.eye(3), np.zeros(3)), (held["RotationOfCamera2"].T, held["TranslationOfCamera2"] / 1000)]
+    for number, (R, t) in enumerate(poses, 1):
+        part = held[f"CameraParameters{number}"]
+        assert part["WorldUnits"] == "mm"
+        K = part["IntrinsicMatrix"].T - np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
+        yield camera(K, [*part["RadialDistortion"], *part["TangentialDistortion"]], R, t)
+
+
 def metashape(path: Path) -> Iterator[Reference]:
     """The frame camera of Metashape's manual, appendix D, first pixel's centre at 0.5; transform: camera → chunk."""
     chunk = ElementTree.parse(path).getroot().find("chunk")
@@ -364,6 +376,7 @@ REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
         kalibr,
         kitti,
         kitti_raw,
+        mat,
         metashape,
         mrcal,
         nerfstudio,

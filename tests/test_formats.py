@@ -247,6 +247,35 @@ def test_matlabs_intrinsics_object_is_read_as_well():
     assert (camera.intrinsics.cx, camera.intrinsics.cy, camera.lens.k3) == (320.5, 240.25, 0.01)
 
 
+def test_matlabs_pair_multiplies_rows_in_the_boards_unit(tmp_path):
+    """x2 = x1 RotationOfCamera2 + TranslationOfCamera2, in WorldUnits (stereoParameters, MATLAB R2014a on)."""
+    one = json.loads((DATA / "matlab_parameters.json").read_text())
+    R = Rotation.from_rotvec([0.02, -0.3, 0.1]).as_matrix()
+    tree = {
+        "CameraParameters1": one,
+        "CameraParameters2": {**one, "RadialDistortion": [0.0, 0.0], "TangentialDistortion": [0.0, 0.0]},
+        "RotationOfCamera2": R.tolist(),
+        "TranslationOfCamera2": [-120.0, 3.0, 8.0],
+    }
+    path, content = tmp_path / "pair.json", json.dumps(tree)
+    path.write_text(content)
+    first, second = camviz.load(path).cameras.values()
+    assert same_camera(first, camera_of("matlab_parameters.json"), 0.0)
+    points = POINTS @ R + np.array([-0.12, 0.003, 0.008])
+    pixels = points @ np.array(one["IntrinsicMatrix"])
+    np.testing.assert_allclose(second.project(POINTS), pixels[:, :2] / pixels[:, 2:] - 1, rtol=0, atol=1e-9)
+    path.write_text(content.replace('"mm"', '"in"'))
+    np.testing.assert_allclose(camviz.load(path).cameras["camera2"].centre, second.centre * 25.4, rtol=1e-12)
+    for was, becomes, said in [
+        ('"mm"', '"feet"', r"WorldUnits: expected .*mm.*, got 'feet'"),
+        ("TranslationOfCamera2", "Translation", "TranslationOfCamera2"),
+        (json.dumps(R.tolist()), json.dumps((2 * R).tolist()), "RotationOfCamera2"),
+    ]:
+        path.write_text(content.replace(was, becomes))
+        with pytest.raises(CalibrationError, match=said):
+            camviz.load(path)
+
+
 def test_metashape_measures_from_the_middle_and_swaps_the_tangential_pair():
     """The frame camera of the Metashape manual, "Camera models", with its 0.5 at the first pixel's centre."""
     camera = camera_of("metashape_calibration.xml")

@@ -1,4 +1,4 @@
-"""MATLAB's cameraParameters or cameraIntrinsics: toStruct(params), saved or written by jsonencode."""
+"""MATLAB's cameraParameters, cameraIntrinsics or stereoParameters: toStruct(params), saved or written by jsonencode."""
 
 from __future__ import annotations
 
@@ -16,24 +16,55 @@ from camviz.files.output import as_json
 from camviz.files.section import Section, Size, agreed_size, explained
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 
 TITLE = "MATLAB cameraParameters"
 FIRST_PIXEL = 1.0
 MODELS = models_of("matlab")
 RADIAL, TANGENTIAL = "RadialDistortion", "TangentialDistortion"
+PAIR = {"camera1": "CameraParameters1", "camera2": "CameraParameters2"}
+METRES = {"mm": 1e-3, "millimeters": 1e-3, "cm": 1e-2, "centimeters": 1e-2, "m": 1.0, "meters": 1.0}
+METRES |= {"in": 0.0254, "inches": 0.0254}
 
 
 def is_parameters(section: Section) -> bool:
-    """True for the fields of cameraParameters or cameraIntrinsics."""
-    return any(key in section for key in (RADIAL, "IntrinsicMatrix", "FocalLength"))
+    """True for the fields of cameraParameters, cameraIntrinsics or stereoParameters."""
+    return any(key in section for key in (RADIAL, "IntrinsicMatrix", "FocalLength")) or _is_pair(section)
+
+
+def _is_pair(section: Section) -> bool:
+    return all(key in section for key in PAIR.values())
 
 
 def read(file: File) -> Calibration:
-    """One camera at the origin, from JSON."""
+    """From JSON."""
     return read_parameters(file.section, file)
 
 
 def read_parameters(section: Section, file: File) -> Calibration:
+    """One camera at the origin, or a pair whose first camera is there."""
+    if not _is_pair(section):
+        return _alone(section, file)
+    each = {name: _alone(section.section(key), file) for name, key in PAIR.items()}
+    first, second = (one.cameras["camera"] for one in each.values())
+    pose = _cam2_from_cam1(section)
+    return Calibration(
+        {"camera1": first, "camera2": second.at(pose.inv())},
+        file.path,
+        "MATLAB stereoParameters",
+        notes=tuple(dict.fromkeys(note for one in each.values() for note in one.notes)),
+        redundant=tuple(check for one in each.values() for check in one.redundant),
+    )
+
+
+def _cam2_from_cam1(section: Section) -> RigidTransform:
+    """MATLAB multiplies rows: x2 = x1 RotationOfCamera2 + TranslationOfCamera2, in the unit of the boards' points."""
+    unit = METRES[section.section(PAIR["camera1"]).choice("WorldUnits", tuple(METRES))]
+    translation = section.vector("TranslationOfCamera2", [3], "x y z")
+    return RigidTransform.from_components(np.multiply(unit, translation), section.rotation("RotationOfCamera2").inv())
+
+
+def _alone(section: Section, file: File) -> Calibration:
     """One camera at the origin. Pixels count from 1, and IntrinsicMatrix is the transpose of K."""
     held = section.size("ImageSize", "height width") if section.values.get("ImageSize") else None
     grid = _intrinsics(section, agreed_size(held, file.size, "ImageSize"))
@@ -107,7 +138,8 @@ FORMAT = Format(
     write=write,
     most_cameras=1,
     models="k1 k2 k3, p1 p2, skew",
-    says="cameraIntrinsics too; first pixel's centre at (1, 1); IntrinsicMatrix is Kᵀ; ImageSize is height, width",
+    says="cameraIntrinsics too, and stereoParameters: x_2 = x_1 R + t, rows, in WorldUnits; first pixel's centre "
+    "at (1, 1); IntrinsicMatrix is Kᵀ; ImageSize is height, width",
     lacks="more coefficients",
     rank=60,
 )

@@ -49,8 +49,8 @@ def read(file: File) -> Calibration:
     if len(found) != 1:
         names = ", ".join(shown(name) for name in list(variables)[:6]) or "nothing"
         raise CalibrationError(
-            f"expected one struct with {matlab.RADIAL}, IntrinsicMatrix or FocalLength, got {len(found)} among "
-            f"{names}; {HOW}"
+            f"expected one struct with {matlab.RADIAL}, IntrinsicMatrix or FocalLength, or with CameraParameters1 and "
+            f"CameraParameters2, got {len(found)} among {names}; {HOW}"
         )
     return matlab.read_parameters(found[0], file)
 
