@@ -1,6 +1,7 @@
 """The calibration visualizer estimates what OpenCV does, tells the truth about it, and lets boards be moved by hand."""
 
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -193,6 +194,16 @@ def test_the_description_states_estimate_truth_and_both_errors():
     assert "8 boards tilted by 2° about 0.45 m away, corners found to 0.2 px; solved for f, c, k1." in text
     assert "(true 545.0)" in text
     assert "RMS 0.267 px; on unseen boards 5.2 px" in text
+
+
+def test_what_the_boards_hardly_fix_is_told_to_two_digits():
+    """Parallel boards fix σ of fx to some 0.2 %. Rounding decides the rest; a third digit would differ each time."""
+    view = CalibrationView(boards=3, tilt=0.0)
+    sigma = view.estimates["fx"][1]
+    assert sigma > 1000
+    told = float(re.search(r"± (\d+)", view.numbers()["fx"])[1])
+    assert told == float(f"{sigma:.1e}")
+    assert abs(told / sigma - 1) < 0.05
 
 
 def test_real_corners_have_no_truth_and_are_not_moved_by_hand():
