@@ -1,11 +1,37 @@
-"""How lessons are run as tests (nbval): what is compared, and what may never be written."""
+"""How lessons are run as tests (nbval): what is compared, what may never be written, and in which font."""
 
+import os
+from pathlib import Path
+
+import matplotlib
 import pytest
 from nbval.plugin import IPyNbCell, IPyNbFile
 
 # A picture depends in its last digits on the versions of OpenCV's JPEG coder and of libm. Its alternative text, which
 # states its numbers, is compared instead (text/plain).
 PICTURES = ("text/html", "image/svg+xml")
+
+
+# Words are as wide as their font. So that no test depends on the fonts of a machine, browsers and Cairo see one family
+# only, the DejaVu that matplotlib brings along.
+FONTS = """<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd">
+<fontconfig>
+  <dir>{folder}</dir>
+  <cachedir>{cache}</cachedir>
+  <alias binding="same"><family>serif</family><prefer><family>DejaVu Serif</family></prefer></alias>
+  <alias binding="same"><family>monospace</family><prefer><family>DejaVu Sans Mono</family></prefer></alias>
+  <match target="pattern">
+    <edit name="family" mode="append_last"><string>DejaVu Sans</string></edit>
+  </match>
+</fontconfig>
+"""
+
+
+def pytest_configure(config):
+    made = Path(__file__).parent / "build/fonts"
+    made.mkdir(parents=True, exist_ok=True)
+    (made / "fonts.conf").write_text(FONTS.format(folder=Path(matplotlib.get_data_path(), "fonts/ttf"), cache=made))
+    os.environ["FONTCONFIG_FILE"] = str(made / "fonts.conf")
 
 
 def pytest_collectstart(collector):

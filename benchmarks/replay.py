@@ -1,6 +1,6 @@
 """Panes on a page without a kernel: what they weigh, how long they take to make, and slider to changed pixels.
 
-    python benchmarks/replay.py [--changes 40] [--seconds 20] [--no-all] [--no-speed]
+    python benchmarks/replay.py [--changes 40] [--positions 400] [--no-all] [--no-speed]
 
 Replays three views in Chromium, timed as benchmarks/browser.py times the notebook, and records one state of every view
 (tests/every_view.py) with all its controls, two at a time. Prints Markdown for docs/performance.md. Leave the machine
@@ -112,7 +112,7 @@ def report_of_speed(folder: Path, changes: int) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--changes", type=int, default=40)
-    parser.add_argument("--seconds", type=float, default=20.0, help="of a processor, for a pane")
+    parser.add_argument("--positions", type=int, default=400, help="of a pane at most")
     parser.add_argument("--speed", action=argparse.BooleanOptionalAction, default=True, help="replay three in Chromium")
     parser.add_argument("--all", action=argparse.BooleanOptionalAction, default=True, help="record every view, too")
     given = parser.parse_args()
@@ -121,7 +121,7 @@ def main() -> None:
             print(report_of_speed(Path(home), given.changes), end="\n\n", flush=True)
     if given.all:
         with tempfile.TemporaryDirectory() as home:
-            print(report_of_all(Path(home), Budget(seconds=given.seconds)))
+            print(report_of_all(Path(home), Budget(positions=given.positions)))
 
 
 if __name__ == "__main__":

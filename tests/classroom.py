@@ -30,7 +30,7 @@ def camviz_class(folder, *words):
     with (folder / "said.txt").open("w+", encoding="utf-8") as said:
         process = subprocess.Popen(command, cwd=folder, env=environment, stdout=said, stderr=said)
         try:
-            end = time.monotonic() + 30
+            end = time.monotonic() + 120
             while "Ctrl-C stops" not in (text := (folder / "said.txt").read_text(encoding="utf-8")):
                 assert process.poll() is None, text
                 assert time.monotonic() < end, text
@@ -46,7 +46,7 @@ def ask(port, path, told=None, key=""):
     body = None if told is None else json.dumps(told).encode()
     try:
         with build_opener(ProxyHandler({})).open(
-            Request(f"http://127.0.0.1:{port}/{path}", body, headers), timeout=10
+            Request(f"http://127.0.0.1:{port}/{path}", body, headers), timeout=120
         ) as answer:
             return json.loads(answer.read())
     except HTTPError as error:
@@ -71,7 +71,7 @@ class Client:
             names,
             body,
             allow_nonstandard_methods=True,
-            request_timeout=20,
+            request_timeout=120,
         )
         return await AsyncHTTPClient().fetch(request, raise_error=False)
 

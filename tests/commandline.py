@@ -15,7 +15,12 @@ def run(*words, **options):
     """The command in a process of its own, as a person runs it."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.run(
-        [sys.executable, "-m", "camviz", *words], capture_output=True, text=True, env=environment, timeout=60, **options
+        [sys.executable, "-m", "camviz", *words],
+        capture_output=True,
+        text=True,
+        env=environment,
+        timeout=300,
+        **options,
     )
 
 

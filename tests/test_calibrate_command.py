@@ -48,7 +48,7 @@ def run(*words, **options):
         capture_output=True,
         text=True,
         env=environment,
-        timeout=100,
+        timeout=300,
         **options,
     )
 
@@ -164,7 +164,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):
         cwd=room,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         start_new_session=True,
-        timeout=60,
+        timeout=300,
     )
     assert (process.returncode, process.stdout, process.stderr) == (130, "", "")
     assert [path.name for path in room.iterdir()] == ["shots"]

@@ -31,7 +31,7 @@ def piped(words, data=b"", **environment):
         input=data,
         capture_output=True,
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        timeout=60,
+        timeout=300,
         check=False,
     )
     return done.returncode, done.stdout, done.stderr

@@ -168,7 +168,9 @@ def test_it_is_stopped_in_other_threads_than_the_main_one_and_nobody_speaks_of_a
     assert capsys.readouterr().out == "still running: it is stopped after 0.2 s\n"
 
 
-def test_what_returns_returns_and_what_is_raised_is_raised(capsys):
+def test_what_returns_returns_and_what_is_raised_is_raised(capsys, monkeypatch):
+    monkeypatch.setattr(patience, "LIMIT_S", A_LONG_TIME)
+    monkeypatch.setattr(patience, "NOTICE_S", A_LONG_TIME)
     with Patience() as few_moments:
         assert few_moments.call(max, 1, 2) == 2
         with pytest.raises(ZeroDivisionError):

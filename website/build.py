@@ -41,7 +41,7 @@ def main(words: list[str]) -> int:
     """Builds the site; the exit status."""
     options = _options(words)
     start = time.monotonic()
-    recorder = panes.Recorder(ROOT, BUILT / panes.RECORDINGS, CACHE, options.seconds)
+    recorder = panes.Recorder(ROOT, BUILT / panes.RECORDINGS, CACHE, options.positions)
     if not options.stills:
         chosen = [path for path in lesson_paths() if not options.lessons or path.name[:2] in options.lessons]
         recorder.record(chosen)
@@ -55,16 +55,14 @@ def main(words: list[str]) -> int:
     if not (photographs := chessboard_pictures(count=1)).real:
         print(f"Some panes of lessons 06, 07, 08 and 12 show other pictures than their text. {photographs.sentence}")
     if size > MOST:
-        print(f"The site must not be larger than {MOST / 1e6:.0f} MB: record fewer positions (--seconds).")
+        print(f"The site must not be larger than {MOST / 1e6:.0f} MB: record fewer (--positions).")
     return status or int(size > MOST)
 
 
 def _options(words: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="start.py site", description=__doc__.splitlines()[0])
     parser.add_argument("lessons", metavar="LESSON", nargs="*", help="its number, such as 05; all by default")
-    parser.add_argument(
-        "--seconds", type=float, default=6.0, help="of a processor for recording one visualizer (default: 6)"
-    )
+    parser.add_argument("--positions", type=int, default=200, help="recorded of one visualizer at most (default: 200)")
     parser.add_argument("--stills", action="store_true", help="record nothing: each visualizer shows its still")
     options = parser.parse_args(words)
     known = [path.name[:2] for path in lesson_paths()]

@@ -13,6 +13,7 @@ import multiprocessing
 import os
 import re
 import sys
+import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -26,9 +27,6 @@ from camviz.samples import local_sample
 RECORDINGS = "_recordings"
 SIZE = 950_000
 """Bytes of a pane, as transferred: of more than a hundred, so that the whole site holds its own budget."""
-
-SLOWEST = 4
-"""How many times as long as others the slowest views may take."""
 
 HOME = "home"
 """The name under which the living picture of the first page is kept, beside the lessons' numbers."""
@@ -56,12 +54,12 @@ class RecordingError(Exception):
 
 @dataclass(frozen=True)
 class Recorder:
-    """Records notebooks into `folder`, and remembers in `cache` what came out. `seconds` is what one pane may take."""
+    """Records notebooks into `folder`, at most `positions` a pane, and remembers in `cache` what came out."""
 
     root: Path
     folder: Path
     cache: Path
-    seconds: float
+    positions: int
 
     def record(self, notebooks: Iterable[Path]) -> None:
         """Record the home page's picture and the panes of the notebooks, where that is not done; on all processors."""
@@ -111,7 +109,7 @@ class Recorder:
 
     def _fingerprint(self, cells: dict[int, CodeCell], files: list[str]) -> str:
         real = any("chessboard_pictures" in cell.source for cell in cells.values()) and bool(local_sample("left01.jpg"))
-        made = hashlib.sha256(json.dumps([cells, self.seconds, SIZE, real], sort_keys=True).encode())
+        made = hashlib.sha256(json.dumps([cells, self.positions, SIZE, real], sort_keys=True).encode())
         for file in files:
             path = self.root / file
             made.update(file.encode() + (path.read_bytes() if path.exists() else b""))
@@ -144,23 +142,17 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> s
             "files": [*made.files, *re.findall(rf"{RECORDINGS}/(\w+\.svg)", html)],
             "positions": made.positions,
             "size": made.size,
-            "seconds": round(made.seconds, 1),
         }
     recorder.keep(name, cells, panes)
-    size, seconds = (sum(pane[what] for pane in panes.values()) for what in ("size", "seconds"))
-    return f"{len(panes)} panes, {size / 1e6:.1f} MB, {seconds:.0f} s"
+    size, positions = (sum(pane[what] for pane in panes.values()) for what in ("size", "positions"))
+    return f"{len(panes)} panes, {positions} positions, {size / 1e6:.1f} MB, {time.process_time():.0f} s of a processor"
 
 
 def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder) -> Any:
-    """The explorer recorded; the slowest views, whose fewest positions take longer than `seconds`, may take more."""
-    from camviz.record import Budget, BudgetError, record
+    from camviz.record import Budget, record
     from camviz.record.panes import Explored
 
-    pane = Explored(explorer, together)
-    try:
-        return record(pane, recorder.folder, budget=Budget(SIZE, recorder.seconds))
-    except BudgetError:
-        return record(pane, recorder.folder, budget=Budget(SIZE, SLOWEST * recorder.seconds))
+    return record(Explored(explorer, together), recorder.folder, budget=Budget(SIZE, recorder.positions))
 
 
 def _shown(root: Path, cells: dict[int, CodeCell]) -> list[tuple[int, Any]]:

@@ -28,11 +28,11 @@ that needs more (handles that are dragged, texts for small screens) implements `
 together. A wish between two positions is answered by the nearest one. A wish for two axes that were not recorded
 together keeps the one that was moved last, and the line below the pane says which one went back.
 
-**What it costs.** `Budget` holds the size of a pane as transferred and the seconds to make it. Positions are thinned
-until both hold; `BudgetError` says in a sentence what cannot be held. Texts are stored in pieces that frames share,
-photographs once each as WebP; all files are named by their content. They are scripts and images, which a page may load
-that was opened as a file: no server is needed. Many panes are recorded in several processes, which must be started
-afresh ("spawn"): a fork would share the OpenGL of solid pictures, and wait forever.
+**What it costs.** `Budget` holds the size of a pane as transferred and the number of its positions. Positions are
+thinned until both hold; `BudgetError` says in a sentence what is too large all the same. Texts are stored in pieces
+that frames share, photographs once each as WebP; all files are named by their content. They are scripts and images,
+which a page may load that was opened as a file: no server is needed. Many panes are recorded in several processes,
+which must be started afresh ("spawn"): a fork would share the OpenGL of solid pictures, and wait forever.
 """
 
 from camviz.record.axes import Axis

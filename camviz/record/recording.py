@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from html import escape
@@ -25,7 +24,7 @@ PLAYER = "replay.js"
 
 
 class BudgetError(ValueError):
-    """A pane that cannot be recorded within its budget, even with the fewest positions.
+    """A pane that is too large for its budget, even with the fewest positions.
 
     Examples
     --------
@@ -42,8 +41,8 @@ class Budget:
     ----------
     size : int, optional
         In bytes as transferred (gzip), all its photographs included.
-    seconds : float, optional
-        Of one processor, to draw and to pack.
+    positions : int, optional
+        States that are drawn. A pane whose fewest positions are more keeps those.
     slider, grid, orbit : int, optional
         Positions at most: of a slider, of a slider among those that belong together, of the onlooker all around.
 
@@ -54,7 +53,7 @@ class Budget:
     """
 
     size: int = 2_500_000
-    seconds: float = 20.0
+    positions: int = 400
     slider: int = 41
     grid: int = 15
     orbit: int = 24
@@ -113,8 +112,6 @@ class Recording:
         Positions of each axis by its name.
     size : int
         Bytes as transferred (gzip) once all photographs are there; the stills of `html` come on top.
-    seconds : float
-        Of a processor, to draw and to pack.
     still : Picture or None
         What stands on the page before any script.
     controls : int, optional
@@ -123,7 +120,7 @@ class Recording:
     Examples
     --------
     >>> from pathlib import Path
-    >>> Recording("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, 0.1, None).html("dots/")[:63]
+    >>> Recording("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, None).html("dots/")[:63]
     '<div class="camviz-recorded" data-recording="dots/d.js" data-po'
     """
 
@@ -134,7 +131,6 @@ class Recording:
     positions: int
     counts: dict[str, int]
     size: int
-    seconds: float
     still: Picture | None = field(repr=False, compare=False)
     controls: int = 0
 
@@ -172,7 +168,7 @@ def record(widget: Explorer | Pane, folder: str | Path, *, budget: Budget | None
 
     Every slider is drawn at up to `budget.slider` positions with all else at its first value, every choice and switch
     in each of its values, the axes that belong together in all combinations, and the onlooker from all around. Where
-    size or time would not hold, positions are thinned: how many a slow pane has depends on the machine.
+    they would be too many or too large, positions are thinned. The same budget gives the same positions on any machine.
 
     Parameters
     ----------
@@ -191,7 +187,7 @@ def record(widget: Explorer | Pane, folder: str | Path, *, budget: Budget | None
     Raises
     ------
     BudgetError
-        Where the fewest positions are still too many.
+        Where the fewest positions are still too large.
 
     Examples
     --------
@@ -239,7 +235,6 @@ class _Recorder:
         self._pane, self._folder, self._budget = pane, folder, budget
         self._images = Images()
         self._drawn: dict[tuple[Any, ...], dict[str, Any]] = {}
-        self._start = time.process_time()
         self._source, source = script(pane.sources)
         self._scripts = {self._source: source}
         self._says = ""
@@ -249,10 +244,10 @@ class _Recorder:
         kept = self._within(SHARES[-1])
         if kept is None:
             raise BudgetError(self._says)
-        states, size, seconds = kept.positions, kept.size, kept.seconds
         for share in SHARES[:-1]:
-            more = len(self._states(self._sheets(share))) / states
-            if more > 1 and size * more <= self._budget.size and seconds * more <= 0.8 * self._budget.seconds:
+            states = len(self._states(self._sheets(share)))
+            more = states / kept.positions
+            if more > 1 and kept.size * more <= self._budget.size and states <= self._budget.positions:
                 finer = self._within(share)
                 if finer:
                     return self._written(finer)
@@ -265,20 +260,17 @@ class _Recorder:
         for key, values in states.items():
             if key not in self._drawn:
                 self._drawn[key] = self._frame(values)
-            if self._spent > self._budget.seconds:
-                self._refuse(len(states), f"{self._budget.seconds:g} s of a processor")
-                return None
         pack, content, images = self._packed(sheets)
         size = transferred(content) + sum(len(self._images.data[name]) for name in images)
         if size > self._budget.size:
-            self._refuse(len(states), f"{self._budget.size / 1e6:g} MB: they take {size / 1e6:.1f} MB")
+            limit = f"{self._budget.size / 1e6:g} MB: they take {size / 1e6:.1f} MB"
+            self._says = f"{self._pane.title}: its fewest positions, {len(states)}, do not fit into {limit}."
             return None
         self._scripts[pack] = content
         counts = {sheet.axes[0].name: len(sheet.values[0]) for sheet in sheets if len(sheet.axes) == 1}
         names = (pack, self._source, *images)
-        title, spent = self._pane.title, self._spent
         still, controls = self._pane.still(), len(self._pane.traits.get("controls", ()))
-        return Recording(title, self._folder, pack, names, len(states), counts, size, spent, still, controls)
+        return Recording(self._pane.title, self._folder, pack, names, len(states), counts, size, still, controls)
 
     def _written(self, kept: Recording) -> Recording:
         """The recording, its files written."""
@@ -286,13 +278,6 @@ class _Recorder:
             (self._folder / name).write_bytes(self._scripts[name])
         self._images.write(kept.files[2:], self._folder)
         return kept
-
-    def _refuse(self, states: int, limit: str) -> None:
-        self._says = f"{self._pane.title}: its fewest positions, {states}, do not fit into {limit}."
-
-    @property
-    def _spent(self) -> float:
-        return time.process_time() - self._start
 
     def _sheets(self, share: float) -> list[Sheet]:
         """Each axis alone, and those that belong together."""

@@ -21,7 +21,7 @@ from websocket import WebSocket, create_connection
 
 NAMES = ("firefox-esr", "firefox")
 LISTENING = re.compile(r"WebDriver BiDi listening on (ws://\S+)")
-STARTED_S, ANSWERED_S = 60, 60
+STARTED_S, ANSWERED_S = 300, 300
 LEFT = 0  # the number of a mouse's button
 PREFERENCES = {  # no calls home, nothing said on a first start
     "app.update.disabledForTesting": True,
@@ -62,7 +62,7 @@ def firefox(profile: Path, width: int = 1280, height: int = 900) -> Iterator[Fir
         socket.close()
     finally:
         process.terminate()
-        process.wait(timeout=30)
+        process.wait(timeout=300)
 
 
 def _address(process: subprocess.Popen[bytes], log: Path) -> str:

@@ -3,7 +3,7 @@ window.hands = {
   pause: (ms) => new Promise((done) => setTimeout(done, ms)),
 
   // Nothing under way and nothing new on two looks in a row.
-  async settled(root, limit = 15000) {
+  async settled(root, limit = 200000) {
     const end = performance.now() + limit;
     for (let before = null; performance.now() < end; await hands.pause(40)) {
       const now = root.dataset.rendered;

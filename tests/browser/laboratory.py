@@ -52,6 +52,11 @@ AXE = """async (ours) => {
   const told = ({ id, nodes }) => nodes.map(({ html, target }) => `${id}: ${html.slice(0, 150)} at ${target}`);
   return [...violations, ...incomplete].flatMap(told);
 }"""
+LATE_MS = 300_000
+"""After so long a page is broken: a wait ends as soon as it may, and no test passes or fails by the machine's speed."""
+# MathJax lays a copy of each formula for screen readers over it, unseen, in whatever font the machine has for formulas.
+# Where that is the wider one, and a line ends there, JupyterLab's cell would scroll by some pixels of nothing.
+UNSEEN_FORMULAS = "mjx-assistive-mml { max-width: 100% !important }"
 SCROLLED = "() => document.querySelector('.jp-WindowedPanel-outer').scrollTop"
 # The kernel is idle before the page has drawn its last widget.
 ALL_SHOWN = "(made) => document.querySelectorAll('.camviz-explorer').length >= made"
@@ -77,7 +82,7 @@ def jupyter(front_end: str, folder: Path, home: Path, **environment: str) -> Ite
         yield f"http://127.0.0.1:{port}/{place}/{{path}}?token={token}&reset"
     finally:
         server.terminate()
-        server.wait(timeout=30)
+        server.wait(timeout=300)
 
 
 jupyterlab = partial(jupyter, "JupyterLab")
@@ -95,6 +100,13 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
+def new_page(browser: Browser, **options: Any) -> Page:
+    """A page of its own, with Playwright's options, that waits as long as a slow machine needs."""
+    page = browser.new_page(**options)
+    page.set_default_timeout(LATE_MS)
+    return page
+
+
 class Notebook:
     """One notebook open in JupyterLab or Notebook 7; `options` are those of Playwright's `new_page`.
 
@@ -103,16 +115,16 @@ class Notebook:
 
     def __init__(self, browser: Browser, address: str, path: str, **options: Any) -> None:
         self.errors: list[str] = []
-        self.page: Page = browser.new_page(**{"viewport": {"width": 1400, "height": 1000}, **options})
+        self.page = new_page(browser, **{"viewport": {"width": 1400, "height": 1000}, **options})
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.add_init_script(path=Path(__file__).with_name("hands.js"))
         self.page.goto(address.format(path=path))
-        self.page.wait_for_selector(".jp-NotebookPanel:visible .jp-Cell", timeout=60_000)
+        self.page.wait_for_selector(".jp-NotebookPanel:visible .jp-Cell", timeout=LATE_MS)
 
     def run_all(self) -> list[dict[str, Any]]:
         """Run every cell, wait until the kernel and all visualizers rest, and return the cells as they are now."""
-        cells: list[dict[str, Any]] = self.page.evaluate(RUN_ALL, 180_000)
-        self.page.wait_for_function(ALL_SHOWN, arg=sum(map(_shows_explorer, cells)), timeout=60_000)
+        cells: list[dict[str, Any]] = self.page.evaluate(RUN_ALL, 10 * LATE_MS)
+        self.page.wait_for_function(ALL_SHOWN, arg=sum(map(_shows_explorer, cells)), timeout=LATE_MS)
         for explorer in self.page.query_selector_all(".camviz-explorer"):
             explorer.evaluate("root => hands.settled(root)")
         return cells
@@ -121,7 +133,10 @@ class Notebook:
         """What cannot be read in the visualizers, in a window of that many CSS pixels."""
         found = []
         for number, explorer in enumerate(self.shown_in(width, 900), 1):
-            seen = explorer.evaluate("root => hands.unreadable(root)")
+            for _ in range(20):  # words make room once the kernel knows how large they are shown
+                if not (seen := explorer.evaluate("root => hands.unreadable(root)")):
+                    break
+                self.page.wait_for_timeout(250)
             found += [f"{width} px, visualizer {number}: {one}" for one in seen]
         return found
 
@@ -167,6 +182,7 @@ class Notebook:
         self.page.wait_for_selector(".jp-OutputArea-output", state="attached")
         if self.page.evaluate("() => !window.axe"):
             self.page.evaluate(AXE_SCRIPT)
+            self.page.add_style_tag(content=UNSEEN_FORMULAS)
         found: list[str] = self.page.evaluate(AXE, ".jp-OutputArea-output, .jp-RenderedMarkdown")
         return found
 
@@ -197,7 +213,7 @@ def free_port() -> int:
 
 
 def wait_for(url: str, server: subprocess.Popen[bytes], log: Path) -> None:
-    end = time.monotonic() + 60
+    end = time.monotonic() + LATE_MS / 1000
     while time.monotonic() < end and server.poll() is None:
         try:
             urlopen(url, timeout=5).close()

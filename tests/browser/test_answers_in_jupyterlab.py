@@ -73,7 +73,7 @@ def run(notebook):
 
 def assert_answered_earlier(notebook):
     reply = asked(notebook).get_by_role("status").first
-    reply.get_by_text("You answered this earlier.").wait_for(timeout=10_000)
+    reply.get_by_text("You answered this earlier.").wait_for()
     assert "Not this one." in reply.inner_text()
     assert asked(notebook).locator("input").nth(WRONG).is_checked()
     fieldset = asked(notebook).locator("fieldset")

@@ -215,7 +215,7 @@ def test_a_kernel_that_is_gone_is_told_without_being_asked(notebook, end, words)
     """Nothing is asked of the kernel, so that no time limit runs out."""
     notebook.page.evaluate(end)
     told = notebook.page.locator(FIRST).locator("[role=alert]")
-    told.get_by_text(re.compile(words)).wait_for(timeout=20_000)
+    told.get_by_text(re.compile(words)).wait_for()
     slider(notebook).evaluate("it => { it.value = 0; it.dispatchEvent(new Event('input')); }")
     assert notebook.first.get_attribute("data-busy") == "false"
     notebook.page.evaluate(NEW_KERNEL)

@@ -53,8 +53,7 @@ def notebook(browser, tmp_path_factory):
     with jupyterlab(home / "lab", home / "private") as address:
         opened = Notebook(browser, address, "endless.ipynb")
         opened.page.evaluate(RUN, 0)
-        opened.page.set_default_timeout(20_000)
-        cell(opened, 0).get_by_text("ready").wait_for(timeout=90_000)
+        cell(opened, 0).get_by_text("ready").wait_for()
         yield opened
         opened.close()
 
@@ -70,16 +69,16 @@ def assert_alive(notebook):
 
 def test_an_endless_exercise_is_announced_and_then_stopped(notebook):
     notebook.page.evaluate(RUN, 1)
-    cell(notebook, 1).get_by_text("still running: press ■ to stop").wait_for(timeout=8_000)
-    cell(notebook, 1).get_by_text("had not returned after 10 s, and was stopped.").wait_for(timeout=20_000)
+    cell(notebook, 1).get_by_text("still running: press ■ to stop").wait_for()
+    cell(notebook, 1).get_by_text("had not returned after 10 s, and was stopped.").wait_for()
     assert_alive(notebook)
 
 
 def test_the_stop_button_brings_a_sentence_and_no_traceback(notebook):
     notebook.page.evaluate(RUN, 1)
-    cell(notebook, 1).get_by_text("still running: press ■ to stop").wait_for(timeout=8_000)
+    cell(notebook, 1).get_by_text("still running: press ■ to stop").wait_for()
     notebook.page.locator("[data-command='notebook:interrupt-kernel'], [title^='Interrupt']").first.click()
-    cell(notebook, 1).get_by_text("You stopped").wait_for(timeout=5_000)
+    cell(notebook, 1).get_by_text("You stopped").wait_for()
     assert "Traceback" not in cell(notebook, 1).inner_text()
     assert_alive(notebook)
 
@@ -90,8 +89,8 @@ def test_a_view_whose_control_leads_into_a_loop_says_so_and_goes_on(notebook):
     explorer = notebook.page.query_selector(".camviz-explorer")
     explorer.evaluate("root => hands.move(root, 'k1', 1)")
     view = cell(notebook, 2)
-    view.locator(".camviz-error").get_by_text("Your function is still running").wait_for(timeout=8_000)
-    view.get_by_text("`endless_beyond` had not returned after 10 s").first.wait_for(timeout=20_000)
+    view.locator(".camviz-error").get_by_text("Your function is still running").wait_for()
+    view.get_by_text("`endless_beyond` had not returned after 10 s").first.wait_for()
     explorer.evaluate("root => hands.settled(root)")
     assert explorer.evaluate("hands.error") == ""
     assert_alive(notebook)

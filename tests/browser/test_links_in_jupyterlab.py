@@ -55,7 +55,7 @@ def shown(explorer, control: str) -> float:
 def come_to(notebook, explorer, control: str, value: float) -> None:
     """Wait until a control of an explorer shows that value, and its picture rests."""
     at = "([root, name, value]) => Math.abs(root.querySelector(`[data-control='${name}'] input`).value - value) < 1e-6"
-    notebook.page.wait_for_function(at, arg=[explorer, control, value], timeout=10_000)
+    notebook.page.wait_for_function(at, arg=[explorer, control, value])
     explorer.evaluate("root => hands.settled(root)")
 
 

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from laboratory import new_page
 from playwright.sync_api import Browser
 
 from camviz.course.material import lesson_paths
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.browser
 @pytest.mark.parametrize("path", PLANNED, ids=lambda path: path.stem)
 def test_the_page_of_a_lesson_prints_on_one_sheet_of_a4(browser: Browser, path):
     """Chromium writes each page of a PDF as an object with its size in points."""
-    page = browser.new_page()
+    page = new_page(browser)
     page.set_content(one_page(read(path), plans.plan(path.name[:2]), path.name))
     printed = page.pdf(prefer_css_page_size=True)
     page.close()
@@ -29,7 +30,7 @@ def test_the_page_of_a_lesson_prints_on_one_sheet_of_a4(browser: Browser, path):
 
 def test_nothing_on_the_page_is_wider_than_a_telephone(browser: Browser):
     path = next(one for one in PLANNED if one.name.startswith("05"))
-    page = browser.new_page(viewport={"width": 360, "height": 740})
+    page = new_page(browser, viewport={"width": 360, "height": 740})
     page.set_content(one_page(read(path), plans.plan("05"), path.name))
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
     page.close()

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
-from laboratory import ROOT
+from laboratory import ROOT, new_page
 from playwright.sync_api import Browser, ElementHandle, Page
 
 sys.path.append(str(ROOT / "benchmarks"))
@@ -65,7 +65,7 @@ class Site:
 
     def open(self, name: str, wait_until: Any = "load", **options: Any) -> Page:
         """The page, once it is loaded or as far as `wait_until` says."""
-        page = self.browser.new_page(**{"viewport": {"width": 1200, "height": 1000}, **options})
+        page = new_page(self.browser, **{"viewport": {"width": 1200, "height": 1000}, **options})
         page.complaints = []
         page.on("console", lambda message: page.complaints.append(message.text))
         page.on("pageerror", lambda error: page.complaints.append(str(error)))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from laboratory import new_page
 from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -32,7 +33,7 @@ def written(tmp_path_factory):
 
 def opened(browser: Browser, path: Path, **options) -> tuple[Page, list[str], list[str]]:
     """The page, and what it complains of, and whatever it asks the network for."""
-    page = browser.new_page(viewport={"width": 1200, "height": 1000}, **options)
+    page = new_page(browser, viewport={"width": 1200, "height": 1000}, **options)
     complaints, asked = [], []
     page.on("console", lambda message: complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -102,12 +103,11 @@ def test_a_findings_link_to_a_picture_chooses_it(browser, written):
 
 
 def test_without_javascript_every_picture_is_there(browser, written):
-    context = browser.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = new_page(browser, java_script_enabled=False)
     page.goto((written / "one.html").as_uri())
     assert page.locator(".pictures figure:visible").count() == 10
     assert page.locator("#findings li").first.is_visible()
-    context.close()
+    page.close()
 
 
 def test_nothing_is_wider_than_a_narrow_window(browser, written):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from classroom import ask, camviz_class
-from laboratory import AXE, ROOT
+from laboratory import AXE, ROOT, new_page
 from playwright.sync_api import expect
 
 from camviz.course.questions import question
@@ -47,7 +47,7 @@ class Class:
         )
 
     def page(self, path, size, **options):
-        page = self.browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)), **options)
+        page = new_page(self.browser, viewport=dict(zip(("width", "height"), size, strict=True)), **options)
         page.on("pageerror", lambda error: self.wrong.append(str(error)))
         page.on("console", lambda message: self.wrong.append(message.text) if ENDED not in message.text else None)
         page.on(
@@ -336,7 +336,7 @@ def test_the_published_page_offers_no_room(browser):
     """The same files, from anybody else's server."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(SITE)))
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    page = browser.new_page()
+    page = new_page(browser)
     seen = []
     page.on("request", lambda one: seen.append(one.url))
     page.goto(f"http://127.0.0.1:{server.server_port}/lessons/05_distortion.html")

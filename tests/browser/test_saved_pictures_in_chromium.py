@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from laboratory import new_page
 from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -26,7 +27,7 @@ AROUND = np.ones((3, 3), np.uint8)  # pixels: how far antialiasing and a letter'
 
 @pytest.fixture(scope="module", params=["light", "dark"])
 def page(request, browser: Browser):
-    page = browser.new_page(viewport={"width": 1000, "height": 1000}, color_scheme=request.param)
+    page = new_page(browser, viewport={"width": 1000, "height": 1000}, color_scheme=request.param)
     page.theme = request.param
     yield page
     page.close()

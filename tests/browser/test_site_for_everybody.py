@@ -10,6 +10,7 @@ import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from bs4 import BeautifulSoup
 from built_site import LESSONS, SITE, served
+from laboratory import new_page
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
@@ -39,7 +40,7 @@ def address() -> Iterator[str]:
 
 @pytest.fixture
 def page(browser: Browser) -> Iterator[Page]:
-    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page = new_page(browser, viewport={"width": 1280, "height": 900})
     yield page
     page.close()
 
@@ -97,17 +98,16 @@ def words(text: str) -> str:
 
 
 def test_a_page_has_its_colours_before_and_without_scripts(browser: Browser, address: str) -> None:
-    context = browser.new_context(java_script_enabled=False)
-    page = context.new_page()
-    page.goto(f"{address}/{LESSON}.html")
-    assert page.locator("html").get_attribute("data-theme") == "light"
+    without = new_page(browser, java_script_enabled=False)
+    without.goto(f"{address}/{LESSON}.html")
+    assert without.locator("html").get_attribute("data-theme") == "light"
     for scheme in ("dark", "light"):
-        page = browser.new_page(color_scheme=scheme)
+        page = new_page(browser, color_scheme=scheme)
         page.route("**/_static/scripts/*", lambda route: route.abort())
         page.goto(f"{address}/{LESSON}.html")
         assert page.locator("html").get_attribute("data-theme") == scheme
         page.close()
-    context.close()
+    without.close()
 
 
 def test_the_icons_are_drawn_and_seen_in_forced_colours(page: Page, address: str) -> None:
@@ -142,7 +142,7 @@ def test_paper_has_stills_and_nothing_to_press(page: Page, address: str) -> None
 
 
 def test_a_finger_moves_a_slider_and_scrolls_the_page(browser: Browser, address: str) -> None:
-    page = browser.new_page(**PHONE)
+    page = new_page(browser, **PHONE)
     page.goto(f"{address}/index.html")
     page.touchscreen.tap(200, 300)
     page.locator('.camviz-recorded[data-live="true"]').wait_for()
@@ -171,7 +171,7 @@ def test_the_keyboard_alone_reaches_a_slider_and_moves_it(page: Page, address: s
 
 def test_nothing_jumps_on_a_phone_while_the_first_picture_comes_to_life(browser: Browser, address: str) -> None:
     """A shift that moves what is seen by more than 0.1 counts as poor (Core Web Vitals)."""
-    page = browser.new_page(**PHONE)
+    page = new_page(browser, **PHONE)
     page.goto(f"{address}/index.html")
     page.evaluate("""() => { window.shifted = 0;
       new PerformanceObserver((list) => list.getEntries().forEach((one) => { window.shifted += one.value; }))

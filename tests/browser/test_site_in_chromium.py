@@ -11,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 from built_site import LESSONS, SITE, served
+from laboratory import new_page
 from playwright.sync_api import Browser, Page
 
 from camviz.course.answers import mark, read_answers
@@ -30,7 +31,7 @@ TO_BOTH_ENDS = """async () => {
   let changed = 0;
   for (const pane of panes) {
     pane.scrollIntoView();
-    for (let i = 0; i < 400 && !pane.dataset.live; i++) await hands.pause(25);
+    for (let i = 0; i < 8000 && !pane.dataset.live; i++) await hands.pause(25);
     const root = pane.querySelector(".camviz-explorer");
     if (!root) { wrong.push(`${pane.ariaLabel} stands still`); continue; }
     await hands.settled(root);
@@ -83,7 +84,7 @@ class Watched:
     """A page, what it complains of, and whom it asks for what."""
 
     def __init__(self, browser: Browser, address: str, **options) -> None:
-        self.page: Page = browser.new_page(**options)
+        self.page: Page = new_page(browser, **options)
         self.address = address
         self.complaints: list[str] = []
         self.asked: list[str] = []
@@ -202,7 +203,7 @@ def test_a_term_shows_its_sentence_to_pointer_and_keyboard(watched: Watched) -> 
 
 
 def test_without_scripts_a_lesson_has_stills_and_folded_replies(browser: Browser, address: str) -> None:
-    page = browser.new_context(java_script_enabled=False).new_page()
+    page = new_page(browser, java_script_enabled=False)
     page.goto(f"{address}/lessons/05_distortion.html")
     stills = page.locator(".camviz-recorded img")
     assert stills.count() >= 6
@@ -223,7 +224,7 @@ def test_a_printed_lesson_has_pictures_and_no_solution(watched: Watched) -> None
 
 
 def test_a_site_opened_as_a_file_moves_too(browser: Browser) -> None:
-    page = browser.new_page()
+    page = new_page(browser)
     complaints: list[str] = []
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.goto((SITE / "index.html").as_uri())

@@ -21,7 +21,7 @@ HANDS = Path(__file__).with_name("hands.js").read_text(encoding="utf-8")
 SLIDER = """(async () => {
   for (const pane of document.querySelectorAll(".camviz-recorded")) {
     pane.scrollIntoView();
-    for (let i = 0; i < 400 && !pane.dataset.live; i++) await hands.pause(25);
+    for (let i = 0; i < 8000 && !pane.dataset.live; i++) await hands.pause(25);
     window.root = pane.querySelector(".camviz-explorer");
     await hands.settled(root);
     window.slider = root.querySelector('[data-control] input[type="range"]');

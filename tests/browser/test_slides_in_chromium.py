@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from laboratory import new_page
 
 from camviz.course import notebooks
 from camviz.teaching.deck import deck
@@ -31,7 +32,7 @@ def written(tmp_path_factory):
 @pytest.fixture
 def opened(browser, written):
     """The deck on a projector; whatever it asks for besides itself fails the test, as does an error of its script."""
-    page = browser.new_page(viewport=WIDE)
+    page = new_page(browser, viewport=WIDE)
     wrong = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda message: wrong.append(message.text))
@@ -80,8 +81,7 @@ def test_keys_clicks_and_the_address_lead_to_slides(opened):
 
 
 def test_a_swipe_turns_the_page(browser, written):
-    context = browser.new_context(viewport=NARROW, has_touch=True)
-    page = context.new_page()
+    page = new_page(browser, viewport=NARROW, has_touch=True)
     page.goto(written.as_uri())
     swipe = """([from, to]) => {
       const touch = (x) => new Touch({ identifier: 1, target: document.body, clientX: x, clientY: 300 });
@@ -94,7 +94,7 @@ def test_a_swipe_turns_the_page(browser, written):
     assert now(page) == ["s1"]
     page.evaluate(swipe, [300, 320])
     assert now(page) == ["s1"]
-    context.close()
+    page.close()
 
 
 def test_a_picture_comes_nearer_and_the_light_can_be_turned(opened):
@@ -113,13 +113,12 @@ def test_a_picture_comes_nearer_and_the_light_can_be_turned(opened):
 
 
 def test_without_a_script_and_on_paper_all_slides_stand_one_below_the_other(browser, written):
-    context = browser.new_context(java_script_enabled=False, viewport=NARROW)
-    page = context.new_page()
+    page = new_page(browser, java_script_enabled=False, viewport=NARROW)
     page.goto(written.as_uri())
     slides = page.locator(".slide")
     assert all(slides.nth(number).is_visible() for number in range(slides.count()))
-    context.close()
-    page = browser.new_page()
+    page.close()
+    page = new_page(browser)
     page.goto(written.as_uri())
     page.keyboard.press("ArrowRight")
     pdf = page.pdf(prefer_css_page_size=True)
@@ -134,7 +133,7 @@ def test_nothing_leaves_its_slide(browser, tmp_path, path):
     """On a projector, on an old one of 4:3, and on paper."""
     written = tmp_path / "slides.html"
     written.write_text(deck(notebooks.read(path)), encoding="utf-8")
-    page = browser.new_page(viewport=WIDE)
+    page = new_page(browser, viewport=WIDE)
     page.goto(f"{written.as_uri()}?print")
     for size in (WIDE, NARROW):
         page.set_viewport_size(size)
