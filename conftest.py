@@ -27,6 +27,10 @@ FONTS = """<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd">
 """
 
 
+def pytest_addoption(parser):
+    parser.addoption("--all", action="store_true", help="everything: more seeds, both themes, Firefox, every pane")
+
+
 def pytest_configure(config):
     made = Path(__file__).parent / "build/fonts"
     made.mkdir(parents=True, exist_ok=True)

@@ -10,6 +10,12 @@ settings.register_profile(
 settings.load_profile("camviz")
 
 
+@pytest.fixture(scope="session")
+def thorough(request):
+    """Whether --all was given: what is drawn at random is drawn more often."""
+    return request.config.getoption("--all")
+
+
 @pytest.fixture
 def room(tmp_path, monkeypatch):
     """An empty current folder, apart from the files the tests read."""

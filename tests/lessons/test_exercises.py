@@ -14,7 +14,6 @@ from camviz.course.checks import judge
 from camviz.course.exercises import exercises
 from camviz.course.trials import HINTS
 
-SEEDS = range(50)
 ADVERSARIES = 8
 HELD = [path.name.split("_")[1] for path in sorted(HERE.glob("test_[0-9][0-9]_*.py"))]
 ALL = [one for number in HELD for one in exercises(number).values()]
@@ -36,32 +35,37 @@ def squeezed(code):
     return re.sub(r"\s+", "", code)
 
 
+@pytest.fixture
+def seeds(thorough):
+    return range(50 if thorough else 5)
+
+
 @EACH
-def test_no_wrong_function_is_accepted_and_each_is_answered_by_its_own_reply(one):
+def test_no_wrong_function_is_accepted_and_each_is_answered_by_its_own_reply(one, seeds):
     assert len(one.misconceptions) >= ADVERSARIES
     assert len({known.explanation for known in one.misconceptions}) == len(one.misconceptions)
-    for seed in SEEDS:
+    for seed in seeds:
         for known in one.misconceptions:
             answer = judge(one, known.function, np.random.default_rng(seed))
             assert answer.status == "wrong", f"{known.function.__name__} at seed {seed}: {answer!r}"
             assert answer.message == known.explanation, f"{known.function.__name__} at seed {seed}: {answer!r}"
-    print(f"{one.name}: {len(one.misconceptions)} wrong functions × {len(SEEDS)} seeds, 0 accepted")
+    print(f"{one.name}: {len(one.misconceptions)} wrong functions × {len(seeds)} seeds, 0 accepted")
 
 
 @EACH
-def test_no_right_way_is_refused(one):
+def test_no_right_way_is_refused(one, seeds):
     assert one.right_ways
     ways = [one.reference, *one.right_ways]
-    for seed in SEEDS:
+    for seed in seeds:
         for way in ways:
             answer = judge(one, way, np.random.default_rng(seed))
             assert answer.correct, f"{way.__name__} at seed {seed}: {answer!r}"
-    print(f"{one.name}: {len(ways)} right ways × {len(SEEDS)} seeds, 0 refused")
+    print(f"{one.name}: {len(ways)} right ways × {len(seeds)} seeds, 0 refused")
 
 
 @pytest.mark.parametrize("one", [one for one in ALL if one.bug], ids=lambda one: one.name)
-def test_the_function_given_to_be_mended_is_not_tried_yet_and_gives_nothing_away(one):
-    for seed in SEEDS:
+def test_the_function_given_to_be_mended_is_not_tried_yet_and_gives_nothing_away(one, seeds):
+    for seed in seeds:
         answer = judge(one, one.as_given, np.random.default_rng(seed))
         assert answer.status == "unsolved"
         assert answer.hint == ""
@@ -105,5 +109,5 @@ def test_the_notebook_gives_what_the_exercise_says_it_gives(one):
 def test_the_counts():
     wrong = sum(len(one.misconceptions) for one in ALL)
     right = sum(1 + len(one.right_ways) for one in ALL)
-    print(f"\n{len(ALL)} exercises, {wrong} wrong functions and {right} right ways, {len(SEEDS)} seeds each")
+    print(f"\n{len(ALL)} exercises, {wrong} wrong functions and {right} right ways")
     assert wrong >= ADVERSARIES * len(ALL)
