@@ -21,8 +21,10 @@ from camviz.lenses import (
     ExtendedUnified,
     FieldOfView,
     KannalaBrandt,
+    ModifiedBrownConrady,
     Orthographic,
     Perspective,
+    Scaramuzza,
     Stereographic,
     UnifiedSphere,
     same_lenses,
@@ -104,6 +106,64 @@ def test_whatever_has_an_image_has_it_alone(lens, widest_deg):
     images = lens.project(rays)
     near = np.linalg.norm(images, axis=-1) < 8
     assert angle_between(lens.unproject(images[near]), rays[near]).max() < 1e-5  # the square root of a rounding error
+
+
+def drawn(cls, rng):
+    """A lens of a class with random parameters, many times as strong as a lens maker's: the first that it takes."""
+    tangential = ("p1", "p2", "s1", "s2", "s3", "s4", "sx1", "sy1")
+    while True:
+        values = {}
+        for name in cls.parameters():
+            sizes = (0, 1e-3, 0.01, 0.03) if name in tangential else (0, 1e-8, 1e-3, 0.03, 0.3, 1)
+            values[name] = rng.normal() * rng.choice(sizes)
+            if name in ("tau_x", "tau_y", "d", "e"):
+                values[name] = rng.uniform(-0.1, 0.1)
+            if name in ("alpha", "beta", "xi", "omega", "c"):
+                values[name] = rng.uniform(0.5, 1.5) if name == "c" else rng.uniform(0, 1.5)
+        try:
+            return cls(**values)
+        except ValueError:
+            continue
+
+
+@pytest.mark.parametrize("cls", [cls for cls in LENSES.values() if cls.parameters()], ids=lambda cls: cls.__name__)
+def test_with_any_parameters_what_has_an_image_has_a_ray_that_returns_to_it(cls, thorough):
+    """Where `project` is finite, up to 8 focal lengths out, `unproject` is finite and its image is the same."""
+    rng, rays = np.random.default_rng(0), all_directions()
+    for _ in range(1000 if thorough else 60):
+        lens = drawn(cls, rng)
+        images = lens.project(rays)
+        images = images[np.linalg.norm(images, axis=-1) < 8]
+        back = lens.unproject(images)
+        assert np.isfinite(back).all(), lens
+        np.testing.assert_allclose(lens.project(back), images, rtol=0, atol=4 * TOLERANCE, err_msg=str(lens))
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        BrownConrady(p1=-0.236, p2=-0.196, k5=-0.0232, k6=-0.0195, s1=-0.015, s2=0.3, s3=-0.0142, tau_y=0.278),
+        BrownConrady(0.42, k4=-0.0038, k5=0.023, s3=0.0104, tau_x=-0.09, tau_y=-0.09),  # images on the tilt's horizon
+        ModifiedBrownConrady(0.0184, 0.0441, p2=0.54, k3=0.418),
+    ],
+)
+def test_beside_a_tangential_fold_every_image_has_a_ray(lens):
+    images = lens.project(all_directions())
+    images = images[np.linalg.norm(images, axis=-1) < 8]
+    assert len(images) > 500
+    np.testing.assert_allclose(lens.project(lens.unproject(images)), images, rtol=0, atol=4 * TOLERANCE)
+
+
+def test_scaramuzzas_polynomial_of_degree_6_has_a_ray_for_every_image():
+    """The ray of (x, y) is (x, y, 1 + a2 r² + … + a6 r⁶): written down, and not solved for."""
+    lens = Scaramuzza(-0.35, 0.02, -0.03, 0.01, -0.02)
+    x = np.linspace(-5, 5, 41)
+    xy = np.stack(np.meshgrid(x, x), axis=-1)
+    r = np.hypot(*np.moveaxis(xy, -1, 0))
+    expected = unit(np.dstack([xy, 1 - 0.35 * r**2 + 0.02 * r**3 - 0.03 * r**4 + 0.01 * r**5 - 0.02 * r**6]))
+    assert lens.fold is None
+    np.testing.assert_allclose(lens.unproject(xy), expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(lens.project(expected), xy, rtol=0, atol=1e-12)
 
 
 @every_lens
@@ -384,6 +444,15 @@ def test_three_spheres_give_the_published_pixels(form):
 def test_the_unified_sphere_at_one_is_the_stereographic_projection_at_half_scale():
     rays = directions(np.linspace(0, 2.9, 30)[:, None], np.linspace(0, 6, 7))
     np.testing.assert_allclose(2 * UnifiedSphere(1).project(rays), Stereographic().project(rays), rtol=1e-12)
+
+
+@pytest.mark.parametrize("lens", [UnifiedSphere(1), ExtendedUnified(0.5, 1), DoubleSphere(0, 0.5)])
+def test_straight_backwards_the_spheres_lose_no_digit_that_the_stereographic_lens_keeps(lens):
+    off_axis = np.geomspace(1e-15, 0.1, 15)
+    rays = np.stack([off_axis, 0 * off_axis, -np.ones(15)], axis=-1)
+    exact = 2 * (np.hypot(off_axis, 1) + 1) / off_axis  # 2 tan(θ/2) = 2 (D - Z) / R
+    focal_length = 2 if isinstance(lens, UnifiedSphere) else 1
+    np.testing.assert_allclose(focal_length * lens.project(rays)[:, 0], exact, rtol=1e-15)
 
 
 def test_a_vanishing_field_of_view_parameter_is_a_pinhole():

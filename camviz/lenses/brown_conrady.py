@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan, cos, inf, pi, sin, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -22,6 +23,7 @@ GRID = "fx fy cx cy"
 RADTAN = "k1 k2 p1 p2"
 RATIONAL = f"{RADTAN} k3 k4 k5 k6"
 PRISM = f"{RATIONAL} s1 s2 s3 s4"
+FARTHEST = 1e4  # focal lengths: beyond, all images crowd on the horizon of a tilted sensor
 CLOSE = 1e-13  # focal lengths, relative beyond 1: how well an inverse must return
 
 
@@ -373,7 +375,12 @@ class BrownConrady(Lens):
             x[lost] = y[lost] = np.nan
             rim = np.interp(np.arctan2(v[lost], u[lost]), *self._rim, period=2 * pi)
             lost = lost[np.hypot(u[lost], v[lost]) <= rim]
-            x[lost], y[lost] = self._newton_inside(u[lost], v[lost])
+            x[lost], y[lost] = self._newton_inside(u[lost], v[lost], *self._guess_inside(u[lost], v[lost]))
+            lost = lost[np.isnan(x[lost])]
+            if len(lost) and not self._symmetric:
+                for start in self._nearest_samples(u[lost], v[lost]):
+                    found = self._newton_inside(u[lost], v[lost], *start)
+                    x[lost], y[lost] = np.where(np.isnan(x[lost]), found, (x[lost], y[lost]))
         return x, y
 
     # Forwards. With m = N/D + 2 (p1 y + p2 x): x' = x m + (p2 + s1) r² + s2 r⁴, y' = y m + (p1 + s3) r² + s4 r⁴.
@@ -465,10 +472,13 @@ class BrownConrady(Lens):
         return not any((self.p1, self.p2, self.s1, self.s2, self.s3, self.s4))
 
     def _orientation(self, x: Array, y: Array) -> Array:
-        """The Jacobian's determinant before the tilt; negative also where the tilted sensor is not in front."""
+        """The Jacobian's determinant before the tilt; negative where a tilted sensor is not in front, and near."""
         u, v, u_x, u_y, v_x, v_y = self._bend_and_derivatives(x, y)
         determinant = u_x * v_y - u_y * v_x
-        return determinant if self._tilt is None else np.where(_homography(self._tilt, u, v)[2] > 0, determinant, -1)
+        if self._tilt is None:
+            return determinant
+        seen = (_homography(self._tilt, u, v)[2] > 0) & (np.hypot(u, v) < FARTHEST)
+        return np.where(seen, determinant, -1)
 
     @cached_property
     def _limits(self) -> tuple[float, float]:
@@ -563,6 +573,12 @@ class BrownConrady(Lens):
         scale = np.interp(u * u + v * v, *self._inverse_table)
         return u * scale, v * scale
 
+    def _guess_inside(self, u: Array, v: Array) -> tuple[Array, Array]:
+        """The same, moved towards the axis to where every point is valid."""
+        x, y = self._guess(u, v)
+        inwards = np.minimum(1, 0.999 * self._limits[0] / np.maximum(np.hypot(x, y), 1e-300))
+        return inwards * x, inwards * y
+
     def _step(self, x: Array, y: Array, u: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         """Newton's step from (x, y) towards the point whose image is (u, v), the error of its image now, and det J."""
         bent_x, bent_y, u_x, u_y, v_x, v_y = self._bend_and_derivatives(x, y)
@@ -581,13 +597,27 @@ class BrownConrady(Lens):
             x, y = x + dx, y + dy
         return x, y, self._step(x, y, u, v)[2]
 
-    def _newton_inside(self, u: Array, v: Array) -> tuple[Array, Array]:
-        """Newton's method that shortens a step which comes no closer or leaves the domain; NaN where that fails."""
-        inner, outer = self._limits
+    @cached_property
+    def _samples(self) -> tuple[Any, Array]:
+        """A tree of the images, before the tilt, of points all over the domain, and these points (2, n)."""
+        from scipy.spatial import KDTree  # half of what importing a lens would cost
+
+        r, azimuth, least = self._spokes
+        x, y = (np.broadcast_to(r * turned, least.shape)[least > 0] for turned in (np.cos(azimuth), np.sin(azimuth)))
+        x, y = np.append(x, 0.0), np.append(y, 0.0)
+        return KDTree(np.stack(self._polynomial(x, y), axis=-1)), np.stack([x, y])
+
+    def _nearest_samples(self, u: Array, v: Array) -> Array:
+        """The ideal points (16, 2, n) of those samples whose images are the nearest to each (u, v)."""
+        tree, points = self._samples
+        nearest = tree.query(np.stack([u, v], axis=-1), k=16)[1]
+        return np.moveaxis(points[:, np.minimum(nearest, points.shape[1] - 1)], -1, 0)
+
+    def _newton_inside(self, u: Array, v: Array, x: Array, y: Array) -> tuple[Array, Array]:
+        """Newton's method from (x, y) that shortens a step which comes no closer or leaves the domain; NaN if lost."""
         close = CLOSE * (1 + np.abs(u) + np.abs(v))
-        x, y = self._guess(u, v)
-        inwards = np.minimum(1, 0.999 * inner / np.maximum(np.hypot(x, y), 1e-300))
-        state = np.stack([inwards * x, inwards * y, u, v])
+        outer = self._limits[1]
+        state = np.stack([x, y, u, v])
         state = np.stack([*state, *self._step(*state)[:3], np.ones_like(u)])
         for _ in range(24):
             moving = (state[6] > close) & (state[7] > 1e-3)

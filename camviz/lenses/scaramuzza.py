@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, check_parameters, check_range
+from camviz.lenses.base import Array, check_parameters, check_range, up_to
 from camviz.lenses.declarations import Example, Fold
 from camviz.lenses.fisheye import Fisheye
 from camviz.lenses.roots import first_positive_root, solve_rising
@@ -83,13 +83,18 @@ class Scaramuzza(Fisheye):
         radius = self.fold_radius
         return Fold(radius, self.max_angle, radius) if radius < inf else None
 
+    @property
+    def rim(self) -> float:
+        """The radius of the last image, before it is stretched, in focal lengths."""
+        return min(self.fold_radius, FARTHEST)
+
     @cached_property
     def max_angle(self) -> float:
-        return float(self.angle(np.array(min(self.fold_radius, FARTHEST))))
+        return float(self.angle(np.array(self.rim)))
 
     def radial(self, theta: ArrayLike) -> Array:
-        theta = np.asarray(theta, dtype=float)
-        return solve_rising(self.angle, self.slope, theta.ravel(), *self._table).reshape(theta.shape)
+        half = np.tan(np.asarray(theta, dtype=float) / 2)
+        return self._radius(half.ravel()).reshape(half.shape)
 
     def angle(self, radius: Array) -> Array:
         return np.arctan2(radius, np.polynomial.polynomial.polyval(radius, self.forward))
@@ -111,18 +116,36 @@ class Scaramuzza(Fisheye):
         rising = np.polynomial.polynomial.polyval(radius, self.forward * (1 - np.arange(7)))
         return rising / (radius * radius + ahead * ahead)
 
+    # t = tan(θ/2) grows without end where θ comes to rest at π, so that no digit is lost there.
+
+    def _half(self, radius: Array) -> Array:
+        ahead = np.polynomial.polynomial.polyval(radius, self.forward)
+        length = np.hypot(radius, ahead)
+        return np.where(ahead > 0, radius / (length + ahead), (length - ahead) / radius)
+
+    def _half_slope(self, radius: Array) -> Array:
+        return self.slope(radius) * (1 + self._half(radius) ** 2) / 2
+
+    def _radius(self, half: Array) -> Array:
+        return solve_rising(self._half, self._half_slope, half, *self._table)
+
     @cached_property
     def _table(self) -> tuple[Array, Array]:
         if self.fold_radius < FARTHEST:
             nodes = self.fold_radius * np.sin(np.linspace(0, np.pi / 2, 513))  # denser towards the fold
         else:
             nodes = np.sinh(np.linspace(0, np.arcsinh(FARTHEST), 513))
-        return nodes, np.maximum.accumulate(self.angle(nodes))
+        return nodes, np.maximum.accumulate(self._half(nodes))
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
-        x, y = super().image(x, y, z)
+        off_axis = np.hypot(x, y)
+        distance = np.hypot(off_axis, z)
+        scale = self._radius(np.where(z > 0, off_axis / (distance + z), (distance - z) / off_axis)) / off_axis
+        scale[(off_axis == 0) & (z > 0)] = 1
+        x, y = x * scale, y * scale
         return x + self.e * y, self.d * x + self.c * y
 
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         area = self.c - self.d * self.e
-        return super().ray((self.c * x - self.e * y) / area, (y - self.d * x) / area)
+        x, y = (self.c * x - self.e * y) / area, (y - self.d * x) / area
+        return x, y, np.polynomial.polynomial.polyval(up_to(self.rim, np.hypot(x, y)), self.forward)

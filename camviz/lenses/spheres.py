@@ -139,8 +139,7 @@ class UnifiedSphere(Lens):
         return self.distortion.denominator if self.distortion else NO_DENOMINATOR
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
-        distance = np.sqrt(x * x + y * y + z * z)
-        depth = np.where(_seen(z, self.xi, distance), z + self.xi * distance, np.nan)
+        depth = _seen_depth(self.xi, x * x + y * y, 1.0, z)
         x, y = x / depth, y / depth
         return self.distortion.bend(x, y) if self.distortion else (x, y)
 
@@ -209,8 +208,7 @@ class ExtendedUnified(Lens):
             yield UnifiedSphere.from_alpha(self.alpha), 1 / (1 - self.alpha)
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
-        distance = np.sqrt(self.beta * (x * x + y * y) + z * z)
-        depth = np.where(_seen(z, _xi(self.alpha), distance), self.alpha * distance + (1 - self.alpha) * z, np.nan)
+        depth = _seen_depth(self.alpha, self.beta * (x * x + y * y), 1 - self.alpha, z)
         return x / depth, y / depth
 
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -270,12 +268,9 @@ class DoubleSphere(Lens):
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         r2 = x * x + y * y
-        first = np.sqrt(r2 + z * z)
-        shifted = self.xi * first + z
-        second = np.sqrt(r2 + shifted * shifted)
-        depth = np.where(
-            self._seen(z, first, shifted, second), self.alpha * second + (1 - self.alpha) * shifted, np.nan
-        )
+        shifted = _sum(self.xi, r2, 1.0, z)
+        depth = _seen_depth(self.alpha, r2, 1 - self.alpha, shifted)
+        depth[~self._in_half_space(z, np.sqrt(r2 + z * z))] = np.nan
         return x / depth, y / depth
 
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -283,26 +278,38 @@ class DoubleSphere(Lens):
         shifted = _depth(self.alpha, r2)
         scale = (shifted * self.xi + np.sqrt(shifted**2 + (1 - self.xi**2) * r2)) / (shifted**2 + r2)
         z = scale * shifted - self.xi
-        seen = self._seen(z, 1.0, scale * shifted, scale * np.sqrt(r2 + shifted**2))
+        seen = self._in_half_space(z, 1.0) & np.isfinite(_seen_depth(self.alpha, r2, 1 - self.alpha, shifted))
         return scale * x, scale * y, np.where(seen, z, np.nan)
 
-    def _seen(self, z: Array, first: Array | float, shifted: Array, second: Array) -> np.ndarray:
-        """The published half-space (eq. 43); for ξ < 0 it holds rays that have no image, so that is asked as well."""
+    def _in_half_space(self, z: Array, distance: Array | float) -> np.ndarray:
+        """The published half-space (eq. 43); for ξ < 0 it holds rays that have no image, too."""
         w1 = min(_xi(self.alpha), 1 / _xi(self.alpha)) if self.alpha else 0.0
         w2 = (w1 + self.xi) / sqrt(2 * w1 * self.xi + self.xi**2 + 1)
-        return (z > -(w2 + ROUNDING) * first) & _seen(shifted, _xi(self.alpha), second)
+        return z > -(w2 + ROUNDING) * distance
 
 
 def _xi(alpha: float) -> float:
     return alpha / (1 - alpha) if alpha < 1 else inf
 
 
-def _seen(z: Array, xi: float, distance: Array) -> np.ndarray:
-    """True where a sphere seen from ξ behind its centre shows a point at all, Z > -ξ D, and for ξ > 1 on its near side.
+def _sum(weight: float, r2: Array, share: float, z: Array) -> Array:
+    """a D + b Z of weight a and share b, with D² = r² + Z².
 
-    That is Z > -D/ξ. There the image has a rim, which belongs to it.
+    Where the two have opposite signs it is (a² r² + (a² - b²) Z²) / (a D - b Z), so that no digit is lost.
     """
-    return (z > -xi * distance) if xi <= 1 else (z >= -(1 / xi + ROUNDING) * distance)
+    distance = np.sqrt(r2 + z * z)
+    apart = (weight**2 * r2 + (weight - share) * (weight + share) * z * z) / (weight * distance - share * z)
+    return np.where(weight * share * z < 0, apart, weight * distance + share * z)
+
+
+def _seen_depth(weight: float, r2: Array, share: float, z: Array) -> Array:
+    """Their sum, by which (X, Y) is divided; NaN where the sphere, seen from ξ = a/b behind its centre, shows no point.
+
+    That is where the sum is not positive, and for ξ > 1 on the far side, Z < -D/ξ; the rim belongs to the image.
+    """
+    depth = _sum(weight, r2, share, z)
+    seen = depth > 0 if weight <= share else weight * z >= -(share + ROUNDING * weight) * np.sqrt(r2 + z * z)
+    return np.where(seen, depth, np.nan)
 
 
 def _root(squared: Array) -> Array:
