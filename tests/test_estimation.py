@@ -89,6 +89,34 @@ def test_too_few_pairs_and_pairs_on_one_plane_are_refused():
         tv.eight_point(np.ones((9, 2)), np.ones((9, 2)))
 
 
+def flat_and_deep(seed):
+    """Noisy pairs of 40 points on a plane aslant, of a camera that only turned, and of 40 points at all depths."""
+    rng, (left, right) = np.random.default_rng(seed), stereo()
+    rays = left.unproject(rng.uniform([160, 120], [480, 360], (40, 2)))
+    normal = left.world_from_cam.rotation.apply([0.3, -0.2, 1])
+    plane = left.centre + rays * (4 / (rays @ normal))[:, None]
+    deep = left.centre + rays * rng.uniform(3, 6, (40, 1))
+    turned = right.at(RigidTransform.from_components(left.centre, right.world_from_cam.rotation))
+    for points, other in ((plane, right), (deep, turned), (deep, right)):
+        pairs = left.project(points), other.project(points)
+        yield [uv + rng.normal(0, 0.5, uv.shape) for uv in pairs]
+
+
+def test_noisy_pairs_of_a_plane_and_of_a_camera_that_only_turned_are_refused_and_those_with_depth_are_not():
+    refused = np.zeros(3, int)
+    for seed in range(60):
+        for kind, pairs in enumerate(flat_and_deep(seed)):
+            try:
+                tv.eight_point(*pairs)
+            except ValueError:
+                refused[kind] += 1
+    assert refused[0] >= 54
+    assert refused[1] >= 54
+    assert refused[2] == 0
+    with pytest.raises(ValueError, match="these 40 points leave F undetermined: a homography explains them as well"):
+        tv.eight_point(*next(flat_and_deep(0)))
+
+
 def test_pairs_without_an_image_are_left_out():
     _, uv_left, uv_right = seen(*stereo())
     with_gap = uv_left.copy()

@@ -38,6 +38,12 @@ def test_hyperfocal_distance_and_limits_have_their_published_values():
     assert optics.far_limit_mm(50, 8, H / 2, 0.03) == pytest.approx(10416.67, abs=5e-3)
 
 
+def test_where_no_blur_is_allowed_only_the_focus_is_sharp():
+    for limit in (optics.near_limit_mm, optics.far_limit_mm):
+        np.testing.assert_array_equal(limit(50, 8, [400.0, 5000.0, np.inf], 0), [400, 5000, np.inf])
+        assert limit(50, 8, 5000.0, 1e-9) == pytest.approx(5000, rel=1e-6)  # the limit of ever smaller circles
+
+
 @pytest.mark.parametrize(("f", "N", "s", "c"), [(50, 8, 5233.3, 0.03), (100, 1.4, 900, 0.02), (24, 22, 400, 0.005)])
 def test_at_the_limits_the_blur_is_the_circle_allowed(f, N, s, c):
     for limit in (optics.near_limit_mm(f, N, s, c), optics.far_limit_mm(f, N, s, c)):
@@ -100,6 +106,7 @@ def test_a_sensor_sees_less_light_the_closer_the_lens_is_focused_and_towards_its
     assert m == pytest.approx(1)
     assert optics.working_f_number(4, m) == pytest.approx(8)  # life size costs two stops
     assert optics.relative_illumination(np.radians(45)) == pytest.approx(0.25)
+    assert optics.relative_illumination(np.radians([90.001, 115, 180])).tolist() == [0, 0, 0]
 
 
 def test_the_cooke_triplet_has_the_focal_length_it_was_designed_for():

@@ -99,10 +99,13 @@ def test_an_ideal_pair_is_already_rectified():
 
 def test_what_cannot_be_rectified_is_refused():
     left, right = stereo()
-    with pytest.raises(ValueError, match="to the right"):
+    with pytest.raises(ValueError, match=r"to the right of the left one, it stands .* m to the left: exchange"):
         tv.rectify(right, left)
-    with pytest.raises(ValueError, match="0 m from it"):
+    with pytest.raises(ValueError, match="it stands in the same place: they see no depth"):
         tv.rectify(left, left)
+    for step, told in (((0, 0, 0.5), "0.5 m in front"), ((0, 0, -2), "2 m behind"), ((0, 0.1, 0), "0.1 m below")):
+        with pytest.raises(ValueError, match=f"it stands {told}: "):
+            tv.rectify(*stereo(baseline=step, turn=(0, 0, 0)))
     with pytest.raises(ValueError, match="along their baseline"):
         tv.rectify(*stereo(baseline=(np.sin(-0.19), 0, np.cos(-0.19)), turn=(0, -0.4, 0)))
 

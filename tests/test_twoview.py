@@ -155,6 +155,21 @@ def test_clipping_keeps_rows_columns_and_the_border_itself():
     assert np.isnan(tv.clip_lines(np.full(3, np.nan), LEFT_PIXELS)).all()
 
 
+def test_an_epipole_has_no_line_and_the_two_epipoles_are_a_pair():
+    """The epipoles are where each camera sees the other's centre: F sends them to 0, up to its rounding."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        left, right = stereo(baseline=(*rng.uniform(-0.3, 0.3, 2), 0.9), turn=rng.uniform(-0.1, 0.1, 3))
+        F = tv.fundamental(left, right)
+        in_left, in_right = left.project(right.centre), np.linalg.svd(F)[0][:, -1]
+        in_right = in_right[:2] / in_right[2]
+        assert np.isnan(tv.epipolar_lines(F, in_left)).all()
+        assert np.isfinite(tv.epipolar_lines(F, in_left + [1e-6, 0])).all()
+        assert tv.sampson_distance(F, in_left, in_right) == 0
+        assert tv.sampson_distance(F, in_left + [30, 0], in_right) < 1e-9  # its line goes through the other epipole
+        assert tv.sampson_distance(F, in_left + [30, 0], in_right + [7, 90]) > 1e-3
+
+
 def test_sampson_distance_squared_is_opencvs():
     left, right = stereo()
     _, uv_left, uv_right = seen(left, right)

@@ -173,7 +173,8 @@ def hyperfocal_mm(focal_mm: ArrayLike, f_number: ArrayLike, circle_mm: ArrayLike
     np.float64(10050.0)
     """
     f = np.asarray(focal_mm, dtype=float)
-    return f**2 / (np.asarray(f_number) * np.asarray(circle_mm)) + f
+    with np.errstate(divide="ignore"):  # infinite where no blur is allowed
+        return f**2 / (np.asarray(f_number) * np.asarray(circle_mm)) + f
 
 
 def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
@@ -213,7 +214,8 @@ def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike,
     """
     f, s = _focused(focal_mm, focus_mm)
     H = hyperfocal_mm(f, f_number, circle_mm)
-    return (H - f) / (1 + (H - 2 * f) / s)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isinf(H), s, (H - f) / (1 + (H - 2 * f) / s))[()]
 
 
 def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
@@ -253,8 +255,9 @@ def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, 
     """
     f, s = _focused(focal_mm, focus_mm)
     H = hyperfocal_mm(f, f_number, circle_mm)
-    with np.errstate(divide="ignore"):
-        return np.where(s >= H, np.inf, (H - f) / (H / s - 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        limit = np.where(s >= H, np.inf, (H - f) / (H / s - 1))
+    return np.where(np.isinf(H), s, limit)[()]
 
 
 def working_f_number(f_number: ArrayLike, magnification: ArrayLike) -> Array:
@@ -326,7 +329,7 @@ def relative_illumination(angle_rad: ArrayLike) -> Array:
     Returns
     -------
     array (...)
-        A share, 0 … 1.
+        A share, 0 … 1; none from 90° on, where light would come from beside or behind the lens.
 
     References
     ----------
@@ -337,7 +340,7 @@ def relative_illumination(angle_rad: ArrayLike) -> Array:
     >>> relative_illumination(np.radians([0, 30, 45])).round(4)
     array([1.    , 0.5625, 0.25  ])
     """
-    return np.cos(angle_rad) ** 4
+    return np.maximum(np.cos(angle_rad), 0) ** 4
 
 
 def _focused(focal_mm: ArrayLike, focus_mm: ArrayLike) -> tuple[Array, Array]:

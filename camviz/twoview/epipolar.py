@@ -9,6 +9,8 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array, as_points, unit
 from camviz.poses import RigidTransform
 
+ROUNDED = 1e-12  # of the terms of a sum: what is left of them is the rounding of F and of the epipole
+
 
 def to_homogeneous(uv: ArrayLike) -> Array:
     """Pixels as homogeneous points.
@@ -373,10 +375,17 @@ def epipolar_lines(F: ArrayLike, uv_left: ArrayLike) -> Array:
     >>> epipolar_lines(fundamental(left, right), [100, 50]).round(9)
     array([  0.,   1., -50.])
     """
-    lines = to_homogeneous(uv_left) @ as_matrix(F, "F").T
+    F, x = as_matrix(F, "F"), to_homogeneous(uv_left)
+    lines = x @ F.T
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        lines = lines / np.linalg.norm(lines[..., :2], axis=-1, keepdims=True)
+        lines = lines / np.where(_vanish(lines, F, x), np.nan, np.linalg.norm(lines[..., :2], axis=-1))[..., None]
     return np.where(np.isfinite(lines).all(axis=-1, keepdims=True), lines, np.nan)
+
+
+def _vanish(lines: Array, F: Array, x: Array) -> np.ndarray:
+    """Where the direction of the lines F x (..., 3) is rounding alone: x is the epipole."""
+    terms = np.abs(x) @ np.abs(F).T
+    return np.asarray(np.abs(lines[..., :2]).max(axis=-1) <= ROUNDED * terms[..., :2].max(axis=-1))
 
 
 def clip_lines(lines: ArrayLike, intrinsics: Intrinsics) -> Array:
@@ -549,7 +558,7 @@ def sampson_distance(F: ArrayLike, uv_left: ArrayLike, uv_right: ArrayLike) -> A
     Returns
     -------
     array (...)
-        In pixels.
+        In pixels; 0 for the two epipoles, which satisfy F with every partner.
 
     Raises
     ------
@@ -573,5 +582,7 @@ def sampson_distance(F: ArrayLike, uv_left: ArrayLike, uv_right: ArrayLike) -> A
     x_left, x_right = to_homogeneous(uv_left), to_homogeneous(uv_right)
     line_right, line_left = x_left @ F.T, x_right @ F
     gradient = np.concatenate([line_right[..., :2], line_left[..., :2]], axis=-1)
+    epipoles = _vanish(line_right, F, x_left) & _vanish(line_left, F.T, x_right)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.abs(np.sum(x_right * line_right, axis=-1)) / np.linalg.norm(gradient, axis=-1)
+        distance = np.abs(np.sum(x_right * line_right, axis=-1)) / np.linalg.norm(gradient, axis=-1)
+    return np.where(epipoles, 0.0, distance)[()]

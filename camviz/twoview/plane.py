@@ -1,4 +1,4 @@
-"""The homography between a plane and its image, or between two images of the plane."""
+"""The homography between a plane and its image, or between two images of the plane; and Hartley's normalisation."""
 
 from __future__ import annotations
 
@@ -7,9 +7,50 @@ from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array, as_points
 from camviz.twoview.epipolar import to_homogeneous
-from camviz.twoview.estimate import normalising_transform
 
 UNDETERMINED = 1e-10  # of the largest singular value: below this is rounding
+
+
+def normalising_transform(uv: ArrayLike) -> Array:
+    """The transform that takes the centroid of pixels to 0 and their mean distance from it to √2.
+
+    Parameters
+    ----------
+    uv : array_like (n, 2)
+        In pixels.
+
+    Returns
+    -------
+    array (3, 3)
+        It acts on homogeneous pixels.
+
+    Raises
+    ------
+    ValueError
+        For points that coincide, and another shape.
+
+    References
+    ----------
+    Hartley & Zisserman (2004), section 4.4.4.
+
+    Examples
+    --------
+    The corners of a square of 200 pixels lie 100 √2 from its middle:
+
+    >>> normalising_transform([[0, 0], [200, 0], [200, 200], [0, 200]]).round(6)
+    array([[ 0.01,  0.  , -1.  ],
+           [ 0.  ,  0.01, -1.  ],
+           [ 0.  ,  0.  ,  1.  ]])
+    """
+    uv = as_points(uv, 2, "uv")
+    if uv.ndim != 2:
+        raise ValueError(f"uv must have shape (n, 2), got {uv.shape}")
+    centroid = uv.mean(axis=0)
+    mean_distance = np.linalg.norm(uv - centroid, axis=1).mean()
+    if not mean_distance > 0:
+        raise ValueError(f"cannot normalise {len(uv)} points that coincide")
+    s = np.sqrt(2) / mean_distance
+    return np.array([[s, 0, -s * centroid[0]], [0, s, -s * centroid[1]], [0, 0, 1]])
 
 
 def homography(xy: ArrayLike, uv: ArrayLike) -> Array:

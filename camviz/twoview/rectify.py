@@ -14,6 +14,8 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import right_from_left
 
+BESIDE = 1e-9  # of the way in the other directions: less is rounding
+
 
 def depth_from_disparity(disparity: ArrayLike, focal_length: float, baseline: float, doffs: float = 0.0) -> Array:
     """Depths Z = f B / (d + doffs) of disparities.
@@ -256,10 +258,8 @@ def rectify(left: Camera, right: Camera, intrinsics: Intrinsics | None = None) -
     to_right = right_from_left(left, right)
     half = Rotation.from_rotvec(to_right.rotation.as_rotvec() / 2)
     x, y, z = -half.inv().apply(to_right.translation)
-    if not x > 0:
-        raise ValueError(
-            f"the right camera must stand to the right of the left one, it is {x + 0.0:.3g} m from it along x"
-        )
+    if not x > BESIDE * (abs(y) + abs(z)):
+        raise ValueError(f"the right camera must stand to the right of the left one, it stands {_where(x, y, z)}")
     # The least turn from the baseline b to x̂ is about b × x̂ = (0, z, −y).
     sine = np.hypot(y, z)
     turn = Rotation.from_rotvec(np.array([0, z, -y]) * (atan2(sine, x) / sine if sine > 0 else 0))
@@ -270,6 +270,19 @@ def rectify(left: Camera, right: Camera, intrinsics: Intrinsics | None = None) -
         for camera in (left, right)
     )
     return RectifiedPair(rectified_left, rectified_right, left, right)
+
+
+def _where(x: float, y: float, z: float) -> str:
+    """Where a camera that is not to the right stands, in metres, and what can be done."""
+    ways = {
+        "to the left: exchange the two": -x,
+        "below: turn both pictures by 90°": y,
+        "above: turn both pictures by 90°": -y,
+        "in front: no rectified pair sees what two cameras see that look along their baseline": z,
+        "behind: no rectified pair sees what two cameras see that look along their baseline": -z,
+    }
+    way = max(ways, key=lambda name: ways[name])
+    return f"{ways[way]:.3g} m {way}" if ways[way] > 0 else "in the same place: they see no depth"
 
 
 def _shared_intrinsics(left: Camera, right: Camera, world_from_rectified: Rotation) -> Intrinsics:
