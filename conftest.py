@@ -36,6 +36,13 @@ def pytest_addoption(parser):
     parser.addoption("--all", action="store_true", help="everything: more seeds, both themes, Firefox, every pane")
 
 
+def pytest_collection_modifyitems(config, items):
+    if not config.getoption("--all"):
+        left_out = [item for item in items if item.get_closest_marker("thorough")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("thorough")]
+
+
 def pytest_configure(config):
     made = Path(__file__).parent / "build/fonts"
     made.mkdir(parents=True, exist_ok=True)
