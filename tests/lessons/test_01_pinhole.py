@@ -1,5 +1,7 @@
 """What lesson 01 says about the pinhole camera, recomputed with NumPy, SciPy and OpenCV."""
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -95,7 +97,7 @@ def test_one_point_by_hand(says):
 
 
 def test_the_board_s_points_land_on_the_corners_of_the_photograph(says, samples):
-    (count,) = says("finds it from the 54 inner corners")
+    (count,) = says("finds out how it is turned and how far it is moved, from the 54 inner corners")
     (drawn,) = says("The blue dots are the board's 54 corners")
     says("Half a pixel is what remains")
     file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
@@ -188,12 +190,33 @@ def test_all_points_of_a_ray_share_a_pixel_and_so_does_what_is_behind(says):
 
 
 def test_each_pixel_of_a_thing_is_as_bright_from_twice_as_far(says):
-    says(
-        "A lamp at twice the distance sends a quarter of the light through the hole, "
-        "but its image also covers a quarter of the area"
-    )
+    says("a quarter of the light comes through the hole, onto a quarter of the area")
     light, area = (1 / 2) ** 2, np.ptp([on_the_wall((x, 0, 4), 0.05)[0] for x in (0, 1)]) ** 2
     assert light / (area / np.ptp([on_the_wall((x, 0, 2), 0.05)[0] for x in (0, 1)]) ** 2) == pytest.approx(1)
+
+
+def test_a_thing_smaller_than_the_blur_gets_dimmer_with_its_distance(says):
+    """An image 5 px wide after blurring, of a square at two distances: its middle is compared."""
+    says("Only a thing whose image is smaller than the blur, such as a star, gets dimmer.")
+
+    def middle(width_px):  # what a Gaussian blur of 5 px leaves of an evenly bright strip, squared for two directions
+        return math.erf(width_px / 2 / 5 / math.sqrt(2)) ** 2
+
+    assert middle(0.5) / middle(1.0) == pytest.approx(1 / 4, rel=0.02)  # a star at twice the distance
+    assert middle(100) / middle(200) == pytest.approx(1)  # a wall
+
+
+def test_where_the_first_pixel_is_and_where_the_picture_ends(says):
+    columns, last, middle, begins, ends = says(
+        "So of 480 columns the last centre is 479, the middle is 239.5, and the picture ends half a pixel beyond, "
+        "at −0.5 and 479.5."
+    )
+    centres = np.arange(columns.value)
+    assert last == centres[-1]
+    assert middle == centres.mean()
+    assert (begins.value, ends.value) == (centres[0] - 0.5, centres[-1] + 0.5)
+    blurred = cv2.resize(np.tile(centres, (2, 1)), (240, 1), interpolation=cv2.INTER_AREA)[0]  # OpenCV's halving
+    assert blurred[0] == 0.5  # the centre of the first two lies between 0 and 1
 
 
 def test_the_airy_disc(says):
@@ -392,8 +415,28 @@ def test_rows_and_columns_of_the_board_are_at_right_angles_in_space(says, sample
     cosine = rows @ columns / np.linalg.norm(rows) / np.linalg.norm(columns)
     assert np.degrees(np.arccos(cosine)) == pytest.approx(right.value, abs=0.2)
     v1, v2 = (matrix[0, 0] * one[:2] / one[2] for one in (rows, columns))
-    says("So one photograph of a right angle measures a focal length to about one per cent.")
+    says("So this photograph of a right angle measures the focal length to about one per cent")
     assert np.sqrt(-v1 @ v2) == pytest.approx(matrix[0, 0], rel=0.012)
+
+
+def test_a_board_held_squarely_tells_no_focal_length(says):
+    """Two vanishing points of boards whose corners are off by 0.1 px, by how far the board leans about both axes."""
+    says("because the board is held far aslant. Held squarely to the camera, it would tell nothing.")
+    rng, square = np.random.default_rng(0), np.array([[x, y, 0.0] for y in (-2.5, 2.5) for x in (-4, 4)])
+
+    def off(lean_deg):
+        turn = cv2.Rodrigues(np.radians([lean_deg, 0.9 * lean_deg, 0]))[0]
+        corners = cv2.projectPoints(square @ turn.T + [0, 0, 14], np.zeros(3), np.zeros(3), K, None)[0][:, 0]
+        found = []
+        for _ in range(300):
+            a, b, c, d = np.c_[corners + rng.normal(0, 0.1, (4, 2)) - K[:2, 2], np.ones(4)]
+            meet = [np.cross(np.cross(*one), np.cross(*other)) for one, other in (((a, b), (c, d)), ((a, c), (b, d)))]
+            v1, v2 = (v[:2] / v[2] for v in meet)
+            found.append(np.sqrt(np.maximum(-v1 @ v2, 0)) / K[0, 0] - 1)
+        return np.median(np.abs(found))
+
+    assert off(30) < 0.01
+    assert off(0) > 0.5
 
 
 def test_vanishing_points_need_no_focal_length(says):

@@ -687,6 +687,8 @@ def test_before_the_lesson_whose_background_is_more_blurred(says):
     wide, narrow = says("The large one's: its aperture is 18 mm wide, the other's 4.5 mm.")
     assert wide == large.value / 2
     assert narrow == small.value / 2
+    says("f/2 puts equally much light on both sensors.")
+    assert wide.value / large.value == narrow.value / small.value  # the cone of light has one angle
     (needed,) = says("The small camera would need f/0.5 for the same background.")
     assert needed == small.value / wide.value
     (times,) = says("as a share of the picture, blur goes with the aperture's width: here 4 times as much")

@@ -165,7 +165,7 @@ def test_near_the_lock_the_two_differ_less_and_less(says):
     at, back, there, off, near = says(
         "At pitch 90°, move yaw, then roll, and watch R. Then take pitch back to 60° and do it again. "
         "At 90° the two sliders change R in the same way, in opposite directions: two sliders, one freedom. At 60° "
-        "they differ. The nearer you come to 90°, the less they do."
+        "they differ. The nearer you come to 90°, the less the two differ."
     )
     assert at.value == there.value == near.value
 

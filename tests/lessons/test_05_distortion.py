@@ -4,6 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from camviz.views.distortion import DistortionView
+
 EXCEPTIONS: dict[str, str] = {}
 
 LEFT = ((534.80, 335.69, 240.66), (0.29589439552724328, -1.0354662043042675))
@@ -248,16 +250,46 @@ def test_the_quiz_about_the_fold(says):
 
 def test_the_quiz_about_a_low_error(says):
     says("This number says nothing about it: there the polynomial extrapolates.")
-    fitted, *again = (says("fits its corners to 0.2 pixels") + says("It is known to about 0.2 pixels there too.")
-                      + says("The 0.2 pixels were measured where there were corners."))  # fmt: skip
+    fitted, *again = (
+        says("fits the corners of a chessboard to 0.2 pixels")
+        + says("It is known to about 0.2 pixels there too.")
+        + says("The 0.2 pixels were measured where there were boards.")
+    )
     assert all(one == fitted.value for one in again)
     r, width, height, f, k3, pixels = says(
-        "At r = 0.78, the corner of a 640 × 480 image with f = 536 px, even k3 = −0.2 moves a point by 19 px."
+        "At r = 0.78, the outermost pixel of a 640 × 480 image with f = 536 px, even k3 = −0.2 moves a point by 19 px."
     )
     corner = np.hypot(342, 479 - 236) / f.value  # the centre of the last pixel
     assert r == corner
     assert (width.value, height.value) == (640, 480)
     assert pixels == f.value * (corner - g(corner, 0, 0, k3.value))
+
+
+def test_the_corners_of_the_straightened_picture_are_lost(says):
+    """With the same K, the corner of the picture that was taken lands beyond the new frame."""
+    says("The lens had drawn its corners in; now they lie outside the frame, and their content is lost.")
+    grid = DistortionView().camera.intrinsics
+    taken = grid.from_pixels([0, 0])
+    ideal = cv2.undistortPointsIter(
+        taken[None, None], np.eye(3), np.array([-0.28, 0.07, 0, 0]), None, None, (3, 200, 1e-12)
+    )[0, 0]
+    assert (grid.to_pixels(ideal) < -0.5).all()
+
+
+@pytest.mark.parametrize("terms", ["rational", "thin prism"])
+def test_the_formulas_of_the_smaller_terms_are_opencv_s(says, terms):
+    x, y = 0.4, -0.3
+    r2 = x * x + y * y
+    k4, k5, k6, s1, s2, s3, s4 = 0.2, -0.1, 0.3, 0.02, -0.03, 0.01, 0.05
+    if terms == "rational":
+        says("The factor becomes $(1 + k_1 r^2 + k_2 r^4 + k_3 r^6)/(1 + k_4 r^2 + k_5 r^4 + k_6 r^6)$.")
+        coefficients, expected = (0, 0, 0, 0, 0, k4, k5, k6), np.array([x, y]) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
+    else:
+        says("thin prism: elements that are tilted a little.")
+        coefficients = (*[0] * 8, s1, s2, s3, s4)
+        expected = np.array([x + s1 * r2 + s2 * r2**2, y + s3 * r2 + s4 * r2**2])
+    opencv = cv2.projectPoints(np.array([[x, y, 1.0]]), np.zeros(3), np.zeros(3), np.eye(3), np.array(coefficients))[0]
+    np.testing.assert_allclose(opencv[0, 0], expected, atol=1e-12)
 
 
 def test_the_tangential_exercise_s_point_and_its_twos(says):

@@ -565,19 +565,21 @@ def test_before_the_lesson_e_knows_no_length(says):
     points = np.random.default_rng(7).uniform([-2, -2, 4], [2, 2, 9], (10, 3))
     large, small = (cv2.projectPoints(s * points, turn, s * t, K, None)[0] for s in (1.0, 0.01))
     np.testing.assert_allclose(large, small, atol=1e-9)
-    says("The program made t as long as 1, or whatever it likes.")
+    says("The program made that vector as long as 1, or whatever it likes.")
     E = cross_matrix(t) @ cv2.Rodrigues(turn)[0]
     assert np.linalg.norm(cv2.recoverPose(E, large, large, K)[2]) == pytest.approx(1)
-    says("Their ratio has a meaning, and it is 1.")
-    s = np.linalg.svd(E)[1]
-    assert s[0] / s[1] == pytest.approx(1)
+    says("Any multiple of them serves as well, so their size has no meaning.")
+    x = cv2.convertPointsToHomogeneous(large)[:, 0] @ np.linalg.inv(K).T
+    X = points / points[:, 2:]
+    for scale in (1, -3, 0.1):
+        assert np.abs(np.einsum("ni,ij,nj->n", x, scale * E, X)).max() < 1e-9
 
 
 def test_before_the_lesson_a_camera_that_pans(says):
-    (angle,) = says("A camera on a pole pans by 20° between two pictures and does not move from its place.")
-    (claimed,) = says("A turn of 20°, and t = 0.")
+    (angle,) = says("A calibrated camera on a pole pans by 20° between two pictures and does not move from its place.")
+    (claimed,) = says("A turn of 20°, and no way.")
     assert claimed == angle.value
-    says("Many different E fit these pairs exactly")
+    says("Many different answers fit these pairs exactly")
     R = Rotation.from_euler("y", angle.value, degrees=True).as_matrix()
     x = np.random.default_rng(8).uniform([-1, -1, 2], [1, 1, 5], (20, 3))
     A = ((x @ R.T)[:, :, None] * x[:, None, :]).reshape(-1, 9)
