@@ -6,6 +6,7 @@ import pytest
 
 from camviz.cameras import Intrinsics
 from camviz.colour import spaces
+from camviz.scenes import to_linear
 from camviz.views.frustum import FrustumView
 
 EXCEPTIONS: dict[str, str] = {}
@@ -79,6 +80,14 @@ def test_angles_and_decibels(says):
     (twenty,) = says("in decibels 20 times its common logarithm")
     assert twenty.value * np.log10(10.0) == 20
     says("a last number of zero stands for a point at infinity")
+
+
+def test_which_grey_a_meter_makes_is_no_law(says):
+    """Two ways of ISO 12232 to a camera's speed: 10/78 of saturation, and number 118 of 255 in sRGB."""
+    low, high = says("Which grey is the maker's choice, as a rule between 12 and 18 % of white.")
+    saturation_based, output = 100 * 10 / 78, 100 * float(to_linear(np.array(118 / 255)))
+    assert low.value < saturation_based < high.value
+    assert high == output
 
 
 def test_gamma_is_near_a_power_of_1_over_2_2(says):

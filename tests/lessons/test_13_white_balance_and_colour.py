@@ -469,6 +469,17 @@ def test_a_camera_that_sees_as_the_eye_leaves_nothing(says):
         assert delta((raw * gains) @ matrix.T, truth).mean() < most
 
 
+def test_a_camera_that_sees_as_the_eye_needs_its_matrix_too(says):
+    """The eye's own curves, white balanced in the light of the bulb, and shown without and with a matrix."""
+    says("A camera whose curves are mixtures of the eye's (Luther's condition) needs a matrix too, and then it is exact.")
+    says("Because its curves are not those that belong to the screen's red, green and blue: colours must be translated.")
+    says("what the camera's three curves count is not the red, green and blue of a screen")
+    raw, gains, matrix, truth = shot(BULB, None, "bulb", "eye")
+    balanced = raw * gains
+    assert delta(balanced, truth).mean() > 10
+    assert delta(balanced @ matrix.T, truth).max() < 1e-6
+
+
 def test_the_null_space(says):
     sums, unknowns, left = says(
         "what it does not notice lies in the null space of 3 equations in 81 unknowns, and 78 dimensions are left"
