@@ -207,7 +207,8 @@ def test_opencv_mirrors_what_is_behind(says):
     assert ray(np.radians(angle.value))[2] < 0
     says("OpenCV's fisheye module divides x and y by z first.")
     ratio, radius, wrong = says(
-        "But z is negative here, and x/z is −5.67: the point is on the left before there is an angle, and atan(5.67) is 80°."
+        "But z is negative here, and x/z is −5.67: the point is on the left before there is an angle, and "
+        "atan(5.67) is 80°."
     )
     x, _, z = ray(np.radians(angle.value))
     assert z < 0
@@ -218,7 +219,9 @@ def test_opencv_mirrors_what_is_behind(says):
     (mirror,) = says("On the left, at 80° from the axis.")
     assert again.value == radius.value
     assert same.value == mirror.value == wrong.value
-    assert by_opencv(ray(np.radians(angle.value)))[0] == pytest.approx(C[0] - F[0] * g(np.radians(mirror.value)), abs=0.1)
+    assert by_opencv(ray(np.radians(angle.value)))[0] == pytest.approx(
+        C[0] - F[0] * g(np.radians(mirror.value)), abs=0.1
+    )
     hundred, eighty, further, u, width = says(
         "At 100° the true place is on the right. OpenCV puts the point on the left, at the mirror image "
         "of 80°. The point at 110° lies behind the camera and outside this picture, at u = 1167 of 1024."

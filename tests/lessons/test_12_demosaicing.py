@@ -621,7 +621,7 @@ def test_quartz_takes_false_colour_and_detail(says, plate):
 
 
 def spots(*plates):
-    """Where unpolarised light lands, and how much of it, behind plates: (how far, the axis' angle) or a quarter wave's."""
+    """Where unpolarised light lands, and how much of it, behind plates: (how far, the axis' angle), or (None, …)."""
     landed = {}
     for field in ([1, 0], [0, 1]):  # unpolarised: both, without interference
         rays = {(0.0, 0.0): np.array(field, dtype=complex)}
@@ -838,19 +838,20 @@ def test_nothing_above_a_question_answers_it(question, words):
 
 
 def test_before_the_lesson_the_jacket(says):
-    (f,) = says("A jacket has vertical stripes, 0.46 cycles per pixel.")
+    pairs, pixels = says("46 pairs of a light and a dark one lie side by side on 100 pixels")
+    f = pairs.value / pixels.value
     (wide,) = says("Bands of orange and blue, about 25 pixels from orange to orange.")
     (too,) = says("Bands of green and magenta, about 25 pixels from green to green.")
     half, minus, away, width = says("Yes: 0.5 − 0.46 = 0.04 cycles per pixel, a band in 25 pixels.")
-    assert minus.value == f.value
-    assert away == half.value - f.value
-    assert width == 1 / beat(f.value)
+    assert minus.value == f
+    assert away == half.value - f
+    assert width == 1 / beat(f)
     assert wide.value == too.value == width.value
     (fine,) = says("Coloured stripes as fine as those of the jacket, about 2 pixels each.")
-    assert fine == 1 / f.value
+    assert fine == 1 / f
     (middle,) = says("the nearer to 0.5, the wider its bands")
     assert middle.value == half.value
-    assert beat(0.48) < beat(f.value) < beat(0.44)
+    assert beat(0.48) < beat(f) < beat(0.44)
 
 
 def test_before_the_lesson_the_first_column_cut_off(says):

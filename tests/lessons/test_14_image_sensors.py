@@ -193,7 +193,7 @@ def test_the_imx174_is_measured_and_has_one_figure(says):
     percent, noise, saturation, rounded = says(
         "It opens as the IMX174: 77 %, 6.8 e⁻ of noise, saturated at 32,691 e⁻, which the slider rounds to 32,700."
     )
-    says("Point Grey, who built a camera with it, measured them in that camera after the standard EMVA 1288.")
+    says("Point Grey, who built a camera with it, measured them in that camera after the standard")
     assert "EMVA 1288" in IMX174.basis
     assert percent == IMX174_MEASURED["η"] == 100 * IMX174.sensor.efficiency()
     assert noise == IMX174_MEASURED["noise"] == IMX174.sensor.read_noise_e
@@ -576,7 +576,7 @@ def test_what_arrives_in_its_own_packet_is_the_impulse_response_s_first_value():
 
 
 def test_the_question_about_two_sheets(says):
-    a = says("**A**: quantum efficiency 77 %, read noise 6.8 e⁻, saturated at 32,700 e⁻.")
+    a = says("**A**: quantum efficiency 77 %, 6.8 e⁻ of noise in the dark, saturated at 32,700 e⁻.")
     assert a[0] == IMX174_MEASURED["η"]
     assert a[1] == IMX174_MEASURED["noise"]
     assert a[2].about(IMX174_MEASURED["saturation"], within=0.001)
@@ -683,7 +683,7 @@ def test_the_quiz_about_decibels(says):
 
 
 def test_before_the_lesson_two_efficiencies(says):
-    high, low = says("Two data sheets promise quantum efficiencies of 70 % and of 60 %.")
+    high, low = says("one sensor makes an electron of 70 % of all photons, and another one of 60 %")
     (asked,) = says("What can make the sensor with 60 % collect more electrons in the same light?")
     here, there = says("That its 60 % hold for your wavelength, and the other's 70 % for another one.")
     assert (here.value, asked.value, there.value) == (low.value, low.value, high.value)

@@ -237,7 +237,9 @@ def test_diffraction_and_defocus_do_not_multiply(says):
 def test_why_an_opening_s_overlap_with_its_copy_is_its_mtf(says):
     """Two slits at distance d before a screen at v, and the pairs of points of a disc that stand so far apart."""
     says("Two points of the opening draw stripes on the sensor, as two slits do: the farther apart they are, the finer")
-    says("Their share is the area that a round opening has in common with a copy of itself, moved aside by that distance")
+    says(
+        "Their share is the area that a round opening has in common with a copy of itself, moved aside by that distance"
+    )
     v, N, f = 50.0, 8.0, 100.0  # mm and cycles per mm
     apart = f * GREEN * v
     at = np.linspace(0, 0.2, 2001)  # on the screen: 20 stripes
@@ -318,7 +320,9 @@ def test_the_corners(says):
         d2 = 1 + (aside - x) ** 2 + y**2
         bright.append(np.sum((np.hypot(x, y) <= 0.01) / d2**2))  # cos · cos / d², both cosines 1/d
     assert bright[1] / bright[0] == pytest.approx(cos4, rel=1e-4)
-    says("A lens that is symmetric about its aperture does the same, as far as its glasses show the aperture in one size")
+    says(
+        "A lens that is symmetric about its aperture does the same, as far as its glasses show the aperture in one size"
+    )
     (angle,) = says("at 45° a quarter of the light is left")
     assert np.cos(np.radians(angle.value)) ** 4 == pytest.approx(0.25)
 
@@ -418,7 +422,9 @@ def test_the_meter_s_constants(says):
     assert share == 100 * metered.value / saturated.value
     assert heading == share.value
     assert np.log2(grey.value / 100 / (share.value / white.value)) == pytest.approx(0.5, abs=0.02)
-    number, largest, of_white = says("the metered surface is number 118 of 255 in the sRGB file, which is 18 % of white")
+    number, largest, of_white = says(
+        "the metered surface is number 118 of 255 in the sRGB file, which is 18 % of white"
+    )
     assert of_white == 100 * to_linear(np.array(number.value / largest.value))
     assert abs(share.value - of_white.value) > 5  # one standard, two greys
     factor, base, K = says("A meter reads the luminance L = 0.125 · 2^EV cd/m² at ISO 100 (its constant K is 12.5).")
