@@ -9,6 +9,7 @@ from camviz.cameras import Intrinsics
 from camviz.colour import spaces
 from camviz.course.glossary import term
 from camviz.scenes import to_linear
+from camviz.views.exposure import ExposureView
 from camviz.views.frustum import FrustumView
 
 EXCEPTIONS: dict[str, str] = {}
@@ -164,6 +165,39 @@ def test_the_two_telecentric_lenses(says):
     here, there = (lands(-f, 150.0, at) for at in (70.0, 80.0))
     assert here == pytest.approx(there)
     assert lands(10.0, 150.0, sensor) != pytest.approx(lands(10.0, 200.0, sensor), rel=0.1)  # an ordinary stop
+
+
+def test_a_symmetric_lens_darkens_as_a_hole_does_and_another_one_by_its_pupils(says):
+    """Two thin lenses about a stop: the ray through the stop's middle, and cos⁴ of the angle at which it lands."""
+    says("The angle alone leaves cos⁴ θ behind a small hole, and behind a symmetric lens whose pupils have no")
+
+    def left(front, back, apart, theta):
+        within = np.tan(theta) / (1 - apart / front)  # the slope at the stop of a ray that came at θ
+        return np.cos(np.arctan(within * (1 - apart / back))) ** 4
+
+    theta = np.radians(40)
+    assert left(60.0, 60.0, 15.0, theta) == pytest.approx(np.cos(theta) ** 4)
+    assert left(-60.0, 30.0, 15.0, theta) > 1.5 * np.cos(theta) ** 4  # a retrofocus lens: its light lands less aslant
+
+
+def test_twice_the_iso_needs_half_the_light(says):
+    says("The number that says how bright a camera renders an exposure: twice the number needs half the light.")
+    says("In most digital cameras it sets how much is amplified after the exposure, and gathers no light.")
+    plain = ExposureView()
+    fast = plain.but(iso=1.0, shutter=plain.shutter - 1)
+    assert fast.recorded(draft=True).mean() == pytest.approx(plain.recorded(draft=True).mean(), rel=0.01)
+    assert fast.electrons_of_white == pytest.approx(plain.electrons_of_white / 2)
+
+
+def test_a_part_of_a_charuco_board_names_its_corners(says):
+    says("So every corner that is seen is known, even where a part of the board is hidden or outside the picture.")
+    codes = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    board = cv2.aruco.CharucoBoard((6, 5), 0.04, 0.03, codes)
+    picture = board.generateImage((600, 500), marginSize=0)[:, 300:]  # its right half
+    uv, ids, *_ = cv2.aruco.CharucoDetector(board).detectBoard(picture)
+    assert len(ids) >= 4
+    truth = 100 * (1 + np.stack([ids.ravel() % 5, ids.ravel() // 5], axis=-1)) - [300, 0]  # 5 inner corners a row
+    np.testing.assert_allclose(uv.reshape(-1, 2), truth, atol=1.5)
 
 
 def test_which_grey_a_meter_makes_is_no_law(says):
