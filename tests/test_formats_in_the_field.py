@@ -418,7 +418,7 @@ def test_vikits_atan_without_its_angle_is_refused(tmp_path):
 
 def test_a_vikit_file_that_names_ocamcalibs_is_refused_with_the_file_to_give(tmp_path):
     text = "cam_model: Ocam\ncam_calib_file: /home/me/calib_results.txt\n"
-    with pytest.raises(CalibrationError, match="Ocam has its numbers in another file, OCamCalib's calib_results.txt"):
+    with pytest.raises(CalibrationError, match=r"Ocam has .* OCamCalib's calib_results\.txt"):
         camviz.load(written(tmp_path / "a.yaml", text))
 
 
