@@ -72,7 +72,7 @@ def mtf(options: argparse.Namespace) -> int:
     _refuse_large(picture, options.photo)
     light, taken_as = linear_light(picture, options)
     try:
-        edge = SlantedEdge.of(light)
+        edge = SlantedEdge.of(light, ends_of_scale(picture))
     except ValueError as error:
         raise Refusal(f"{options.photo}: {error}.") from error
     if options.report:
@@ -121,6 +121,19 @@ def linear_light(picture: np.ndarray, options: argparse.Namespace) -> tuple[np.n
     if light.ndim == 3:  # ITU-R BT.709: the luminance of linear red, green and blue
         light = light[..., 2::-1] @ np.array([0.2126, 0.7152, 0.0722])
     return np.asarray(light), "sRGB, made linear" if encoded else "linear"
+
+
+def ends_of_scale(picture: np.ndarray) -> np.ndarray | None:
+    """Which pixels (height, width) of a picture (grey, BGR or BGRA) have a colour at the first or last of its numbers.
+
+    None where the numbers are not whole, and so have no ends.
+    """
+    import numpy as np
+
+    if picture.dtype.kind not in "ui":
+        return None
+    at_an_end = (picture == 0) | (picture == np.iinfo(picture.dtype).max)
+    return np.asarray(at_an_end if picture.ndim == 2 else at_an_end[..., :3].any(axis=-1))
 
 
 def figures(edge: SlantedEdge) -> dict[str, float]:
