@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scipy.stats import chi2
+
 from camviz.lenses.base import Array
-from camviz.optics.edge_rows import row_shifts
 
 if TYPE_CHECKING:
     from camviz.optics.slanted_edge import SlantedEdge
+
+UNLIKELY = 0.1  # the chance at which pieces of a clean edge count as differing
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,5 +158,8 @@ class EdgeError:
     @cached_property
     def total(self) -> float:
         """The standard error of ln MTF, all parts together."""
-        noise = max(self.independent * self.shared, self.pieces[1])
+        noise = self.independent * self.shared
+        n = len(self.pieces[0])
+        if self.pieces[1] > noise * np.sqrt(chi2.isf(UNLIKELY, n - 1) / (n - 1)):
+            noise = self.pieces[1]
         return float(np.sqrt(noise**2 + (self.bend / 2) ** 2 + (self.alias / 2) ** 2 + self.light**2))

@@ -14,6 +14,8 @@ FEWEST_ROWS = 16
 LEAST_CONTRAST = 10.0  # times the noise: below, the edge cannot be found in each row
 MOST_CLIPPED = 0.05  # of the pixels of a side: with 5 % noise they move its level by 0.1 % of the contrast
 
+MOST_BENT = 0.15  # of ln MTF at MTF50: what rows off the line may take of it
+
 
 def refuse_what_spoils(edge: SlantedEdge) -> None:
     """Say what is wrong with an edge that cannot be measured.
@@ -43,6 +45,11 @@ def refuse_what_spoils(edge: SlantedEdge) -> None:
             f"the edge crosses less than one pixel within {len(inside)} rows: take more of it, or lean it more"
         )
     _refuse_clipped(edge)
+    if np.isfinite(edge.mtf50) and edge.error.bend > MOST_BENT:
+        raise ValueError(
+            f"the rows' edges lie {edge.error.off_the_line:.2f} px off a straight line, which blurs them: take a shorter "
+            "piece, or one without spots"
+        )
 
 
 def _refuse_clipped(edge: SlantedEdge) -> None:

@@ -12,6 +12,7 @@ from camviz.lenses.base import Array
 MOST_PIXELS = 1_000_000  # in a strip; of longer edges every n-th row is taken
 SIGNIFICANT = 3.0  # standard errors: smaller slopes of light are not taken out
 FEWEST_ON_A_SIDE = 40  # pixels
+OUTLIER = 4.0  # standard deviations: dust and the like, left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,36 +71,47 @@ class Sides:
         return (2 * v - v.max() - v.min()) / max(np.ptp(v), 1)
 
     @cached_property
-    def _fit(self) -> tuple[Array, Array, float, bool]:
-        """Dark, bright, p, q and the two slopes (6,), their covariance (6, 6), the noise, and whether they are known."""
+    def _fit(self) -> tuple[Array, Array, float]:
+        """Dark, bright, p, q, two slopes and two curvatures (8,), their covariance (8, 8), and the noise.
+
+        The curvatures are kept where the light's is beyond chance, for the levels are much less certain with them.
+        """
+        first = self._fitted(8)
+        share = np.array([-1, 1]) / (first[0][1] - first[0][0])
+        if self.known and abs(share @ first[0][6:]) > SIGNIFICANT * np.sqrt(share @ first[1][6:, 6:] @ share):
+            return first
+        return self._fitted(6)
+
+    def _fitted(self, terms: int) -> tuple[Array, Array, float]:
         d, light = self.strip.distance, self.strip.light
         beside = np.abs(d) >= self.start
         d, light, y = d[beside], light[beside], self._y[beside]
         bright = d > 0
-        unknown = np.zeros(6), np.zeros((6, 6)), 0.0, False
-        if min(bright.sum(), (~bright).sum()) < FEWEST_ON_A_SIDE:
-            return unknown
+        solved, covariance, noise = np.zeros(8), np.zeros((8, 8)), 0.0
+        if not self.known:
+            return solved, covariance, noise
         levels = np.array([np.median(light[~bright]), np.median(light[bright])])
-        kept, noise, solved, covariance = np.ones(len(d), bool), 0.0, np.zeros(6), np.zeros((6, 6))
+        kept = np.ones(len(d), bool)
+        across = [one * d**power for power in (1, 2) for one in (~bright, bright)][: terms - 4]
         for _ in range(3):
             level = np.where(bright, levels[1], levels[0])
-            columns = np.stack([~bright, bright, level * y, level * y**2, ~bright * d, bright * d], axis=1)
-            weighted = columns[kept]
-            inverse = np.linalg.pinv(weighted.T @ weighted)
-            solved = inverse @ (weighted.T @ light[kept])
-            residual = light - columns @ solved
-            noise = float(np.median(np.abs(residual)) * 1.4826)
-            kept = np.abs(residual) <= max(4 * noise, 1e-9 * np.ptp(light))
+            columns = np.stack([~bright, bright, level * y, level * y**2, *across], axis=1)
+            inverse = np.linalg.pinv(columns[kept].T @ columns[kept])
+            solved[:terms] = inverse @ (columns[kept].T @ light[kept])
+            off = np.abs(light - columns @ solved[:terms])
+            noise = 1.4826 * float(np.hypot(np.median(off[~bright]), np.median(off[bright])) / np.sqrt(2))
+            kept = off <= max(OUTLIER * np.sqrt(2) * noise, 1e-9 * np.ptp(light))
             if kept.sum() < len(kept) / 2:
                 kept[:] = True
-            covariance = inverse * np.mean(residual[kept] ** 2)
-            levels = solved[:2]
-        return solved, covariance, noise, True
+            covariance[:terms, :terms] = inverse * np.mean(off[kept] ** 2)
+            levels = solved[:2].copy()
+        return solved, covariance, noise
 
     @property
     def known(self) -> bool:
         """Whether enough pixels lie on either side."""
-        return self._fit[3]
+        d = self.strip.distance
+        return min(np.sum(d >= self.start), np.sum(d <= -self.start)) >= FEWEST_ON_A_SIDE
 
     @property
     def noise(self) -> float:
@@ -119,11 +131,11 @@ class Sides:
     def _slopes(self) -> tuple[Array, Array]:
         """Slope of the light as a share per pixel, and of the blur's feet in light per pixel; standard errors (2, 2)."""
         dark, bright = self.levels
-        solved, covariance, _, _ = self._fit
+        solved, covariance, _ = self._fit
         share = np.array([-1, 1]) / self.contrast
         feet = np.array([bright, -dark]) / self.contrast
         mixed = np.stack([share, feet])
-        return mixed @ solved[4:], np.sqrt(np.diag(mixed @ covariance[4:, 4:] @ mixed.T))
+        return mixed @ solved[4:6], np.sqrt(np.diag(mixed @ covariance[4:6, 4:6] @ mixed.T))
 
     @cached_property
     def falls(self) -> float:
@@ -152,5 +164,6 @@ class Sides:
     def profile(self) -> Array:
         """The strip's light (n,) with the light's slopes taken out: 0 on the dark side, 1 on the bright one."""
         solved = self._fit[0]
-        share = 1 + solved[2] * self._y + solved[3] * self._y**2 + self.falls * self.strip.distance
+        d, curves = self.strip.distance, (solved[7] - solved[6]) / self.contrast
+        share = 1 + solved[2] * self._y + solved[3] * self._y**2 + self.falls * d + curves * d**2
         return (self.strip.light / share - self.levels[0]) / self.contrast
