@@ -15,6 +15,8 @@ from camviz.lenses.base import Array
 if TYPE_CHECKING:
     from camviz.optics.slanted_edge import SlantedEdge
 
+PROCESSED = 1.3  # times the sides' noise: more scatter than that near the edge is no noise of the sensor's
+SHARE_OF_PROCESSED = 0.2  # of a row's scatter, that all rows have alike: found on JPEGs, benchmarks/mtf_troubles.py
 UNLIKELY = 0.1  # the chance at which pieces of a clean edge count as differing
 
 
@@ -69,6 +71,8 @@ class EdgeError:
         From the residuals' correlation at up to 8 pixels apart, with the weights that the pixels have.
         """
         edge, profile = self.edge, self.edge.profile
+        if not np.isfinite(self.frequency):
+            return float("nan")
         weight = self.influence * self._pixel_noise
         if not np.any(weight):
             return 1.0
@@ -76,7 +80,6 @@ class EdgeError:
         v, u = strip.v[edge.kept], strip.u[edge.kept]
         near = np.abs(profile.distance) <= edge.flat
         row = np.searchsorted(np.unique(v[near]), v[near])
-        column = np.rint(profile.distance[near]).astype(int) + int(edge.flat) + 1
         column = u[near] - u[near].min()
         grid = np.zeros((2, row.max() + 1, column.max() + 1))
         grid[0, row, column] = weight[near]
@@ -101,6 +104,30 @@ class EdgeError:
         without = np.array([self.edge.log_mtf(self.frequency, profile.without(b)) for b in np.unique(profile.block)])
         n = len(without)
         return without, float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
+
+    @cached_property
+    def scatter(self) -> tuple[float, float]:
+        """The standard deviation of pixels about the profile, in contrasts: on the sides, and near the edge in most rows."""
+        profile, sides = self.edge.profile, self.edge.sides
+        near = np.abs(profile.distance) <= max(self.edge.rise, 1.5)
+        v = sides.strip.v[self.edge.kept][near]
+        number = np.bincount(v)
+        squares = np.bincount(v, profile.residual[near] ** 2)[number > 0] / number[number > 0]
+        pixels = float(np.median(number[number > 0]))
+        of_median = (1 - 2 / (9 * pixels)) ** 3  # of a mean of so many squares
+        return sides.noisier / self.edge.contrast, float(np.sqrt(np.median(squares) / of_median))
+
+    @cached_property
+    def processed(self) -> float:
+        """By how much a row's ln MTF scatters beyond the sides' noise, as where JPEG has changed edges and not areas."""
+        near = self.scatter[1]
+        return float(self.independent * np.sqrt(len(self.edge.rows[0])) * self.unexplained / near) if near else 0.0
+
+    @cached_property
+    def unexplained(self) -> float:
+        """The scatter near the edge that the sides' noise does not explain, in contrasts; 0 where it may be chance."""
+        beside, near = self.scatter
+        return float(np.sqrt(near**2 - beside**2)) if near > PROCESSED * beside else 0.0
 
     # What is no noise ------------------------------------------------------------------------------------------------
 
@@ -162,4 +189,5 @@ class EdgeError:
         n = len(self.pieces[0])
         if self.pieces[1] > noise * np.sqrt(chi2.isf(UNLIKELY, n - 1) / (n - 1)):
             noise = self.pieces[1]
-        return float(np.sqrt(noise**2 + (self.bend / 2) ** 2 + (self.alias / 2) ** 2 + self.light**2))
+        others = self.bend / 2, self.alias / 2, self.light, SHARE_OF_PROCESSED * self.processed
+        return float(np.sqrt(noise**2 + np.sum(np.square(others))))

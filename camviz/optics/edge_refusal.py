@@ -11,9 +11,11 @@ if TYPE_CHECKING:
 
 LEAST_ANGLE_DEG, MOST_ANGLE_DEG = 1.0, 30.0  # outside, phases repeat too early or rows blur the edge
 FEWEST_ROWS = 16
+LEAST_RISES = 1.2  # on either side: 3 standard deviations of a Gaussian blur
 LEAST_CONTRAST = 10.0  # times the noise: below, the edge cannot be found in each row
 MOST_CLIPPED = 0.05  # of the pixels of a side: with 5 % noise they move its level by 0.1 % of the contrast
 
+MOST_UNEXPLAINED = 0.04  # of the contrast: scatter at the edge beyond the sides' noise
 MOST_BENT = 0.15  # of ln MTF at MTF50: what rows off the line may take of it
 
 
@@ -35,7 +37,9 @@ def refuse_what_spoils(edge: SlantedEdge) -> None:
             f"the edge leans by {abs(edge.angle_deg):.1f}°: expected {LEAST_ANGLE_DEG:g}° to {MOST_ANGLE_DEG:g}° "
             "against the pixels' columns or rows (about 5° is best)"
         )
-    if not edge.sides.known:
+    if not edge.sides.known or edge.flat < LEAST_RISES * edge.rise:
+        raise ValueError("the edge's blur reaches the image's border: take more of both sides")
+    if edge.flat < LEAST_RISES * edge.rise:
         raise ValueError("the edge's blur reaches the image's border: take more of both sides")
     inside = edge.rows[0]
     if len(inside) < FEWEST_ROWS:
@@ -45,6 +49,11 @@ def refuse_what_spoils(edge: SlantedEdge) -> None:
             f"the edge crosses less than one pixel within {len(inside)} rows: take more of it, or lean it more"
         )
     _refuse_clipped(edge)
+    if edge.error.unexplained > MOST_UNEXPLAINED:
+        raise ValueError(
+            f"pixels at the edge scatter by {100 * edge.error.unexplained:.0f} % of its contrast, beyond the noise "
+            "beside it, as in a JPEG of low quality: save the photograph with less compression"
+        )
     if np.isfinite(edge.mtf50) and edge.error.bend > MOST_BENT:
         raise ValueError(
             f"the rows' edges lie {edge.error.off_the_line:.2f} px off a straight line, which blurs them: take a shorter "

@@ -46,6 +46,14 @@ class Strip:
         v, u, distance = np.broadcast_to(v, u.shape)[kept], u[kept], distance[kept]
         return cls(v, u, distance, image[v, u])
 
+    @cached_property
+    def room(self) -> float:
+        """How far from the line there are pixels on both sides, but for the corners', pixels."""
+        if not len(self.distance):
+            return 0.0
+        left, right = np.percentile(self.distance, [2, 98])
+        return float(max(min(-left, right), 0))
+
 
 @dataclass(frozen=True, eq=False)
 class Sides:
@@ -71,8 +79,8 @@ class Sides:
         return (2 * v - v.max() - v.min()) / max(np.ptp(v), 1)
 
     @cached_property
-    def _fit(self) -> tuple[Array, Array, float]:
-        """Dark, bright, p, q, two slopes and two curvatures (8,), their covariance (8, 8), and the noise.
+    def _fit(self) -> tuple[Array, Array, float, tuple[float, float]]:
+        """Dark, bright, p, q, two slopes and two curvatures (8,), their covariance (8, 8), and the noise of both and each.
 
         The curvatures are kept where the light's is beyond chance, for the levels are much less certain with them.
         """
@@ -82,14 +90,15 @@ class Sides:
             return first
         return self._fitted(6)
 
-    def _fitted(self, terms: int) -> tuple[Array, Array, float]:
+    def _fitted(self, terms: int) -> tuple[Array, Array, float, tuple[float, float]]:
         d, light = self.strip.distance, self.strip.light
         beside = np.abs(d) >= self.start
         d, light, y = d[beside], light[beside], self._y[beside]
         bright = d > 0
         solved, covariance, noise = np.zeros(8), np.zeros((8, 8)), 0.0
+        both = 0.0, 0.0
         if not self.known:
-            return solved, covariance, noise
+            return solved, covariance, noise, both
         levels = np.array([np.median(light[~bright]), np.median(light[bright])])
         kept = np.ones(len(d), bool)
         across = [one * d**power for power in (1, 2) for one in (~bright, bright)][: terms - 4]
@@ -99,13 +108,14 @@ class Sides:
             inverse = np.linalg.pinv(columns[kept].T @ columns[kept])
             solved[:terms] = inverse @ (columns[kept].T @ light[kept])
             off = np.abs(light - columns @ solved[:terms])
-            noise = 1.4826 * float(np.hypot(np.median(off[~bright]), np.median(off[bright])) / np.sqrt(2))
+            both = 1.4826 * float(np.median(off[~bright])), 1.4826 * float(np.median(off[bright]))
+            noise = float(np.hypot(*both) / np.sqrt(2))
             kept = off <= max(OUTLIER * np.sqrt(2) * noise, 1e-9 * np.ptp(light))
             if kept.sum() < len(kept) / 2:
                 kept[:] = True
             covariance[:terms, :terms] = inverse * np.mean(off[kept] ** 2)
             levels = solved[:2].copy()
-        return solved, covariance, noise
+        return solved, covariance, noise, both
 
     @property
     def known(self) -> bool:
@@ -117,6 +127,11 @@ class Sides:
     def noise(self) -> float:
         """The standard deviation of a pixel about the sides' light."""
         return self._fit[2]
+
+    @property
+    def noisier(self) -> float:
+        """The standard deviation of a pixel on the noisier side."""
+        return max(self._fit[3])
 
     @cached_property
     def levels(self) -> tuple[float, float]:
@@ -131,7 +146,7 @@ class Sides:
     def _slopes(self) -> tuple[Array, Array]:
         """Slope of the light as a share per pixel, and of the blur's feet in light per pixel; standard errors (2, 2)."""
         dark, bright = self.levels
-        solved, covariance, _ = self._fit
+        solved, covariance, _, _ = self._fit
         share = np.array([-1, 1]) / self.contrast
         feet = np.array([bright, -dark]) / self.contrast
         mixed = np.stack([share, feet])

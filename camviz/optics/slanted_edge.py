@@ -20,15 +20,15 @@ from camviz.optics.edge_line import normal_angle, rough_edge
 from camviz.optics.edge_profile import Profile
 from camviz.optics.edge_rows import row_shifts, straight
 from camviz.optics.edge_sides import Sides, Strip
-from camviz.optics.edge_refusal import refuse_what_spoils
+from camviz.optics.edge_refusal import LEAST_RISES, refuse_what_spoils
 
 OVERSAMPLING = 8  # strips a pixel
-LEAST_ANGLE_DEG, MOST_ANGLE_DEG = 1.0, 30.0  # outside, phases repeat too early or rows blur the edge
-FEWEST_ROWS = 16
-LEAST_CONTRAST = 10.0  # times the noise: below, the edge cannot be found in each row
 RISES = 2.5  # times the distance from 10 to 90 % of the edge: what counts as the edge, on either side
 NARROWEST = 2.5  # pixels on either side
+FLAT_SHARE = 0.7  # of what there is on either side
+LEAST_SIDE = 3.0  # pixels: what is kept for the light of a side in a small image
 SIDE = 24.0  # pixels beyond the edge, on which the light of either side is measured
+LEAST_NOISE = 1e-4  # of the contrast: below, it is a number's rounding
 PADDED = 4096  # samples of the Fourier transform: frequencies 1/1024 cycle a pixel apart
 
 
@@ -127,8 +127,7 @@ class SlantedEdge:
         """The sides of a line: beyond the edge's blur, or where the image is too small for that, at its border."""
         flat = max(RISES * rise, NARROWEST)
         strip = Strip.of(self.image, line, 2 * flat + SIDE)
-        room = min(-float(np.percentile(strip.distance, 2)), float(np.percentile(strip.distance, 98)), 2 * flat) if len(strip.v) else 0
-        return Sides(strip, max(min(flat, room - 3), 1.2 * rise, 1.0))
+        return Sides(strip, max(min(flat, strip.room - LEAST_SIDE), LEAST_RISES * rise, 1.0))
 
     @property
     def line(self) -> tuple[float, float]:
@@ -152,12 +151,23 @@ class SlantedEdge:
 
     @cached_property
     def clipped_shares(self) -> tuple[float, float]:
-        """The shares of the pixels on the dark and the bright side that are at an end of the camera's scale."""
-        if self.clipped is None:
-            return 0.0, 0.0
+        """The shares of the pixels on the dark and the bright side that are at an end of the camera's scale.
+
+        Of those that count as the edge's. Where it is not known which pixels are clipped, those are taken for it that
+        share the least or the greatest light though the next light is nearer than the noise.
+        """
         strip = self.sides.strip
-        ends, bright = self.clipped[strip.v, strip.u], strip.distance > 0
-        return float(ends[~bright].mean()), float(ends[bright].mean())
+        near, bright = np.abs(strip.distance) <= 2 * self.flat, strip.distance > 0
+        if self.clipped is not None:
+            ends = self.clipped[strip.v, strip.u]
+            return float(ends[near & ~bright].mean()), float(ends[near & bright].mean())
+        shares, noise = [], self.sides.noisier
+        for light in (-strip.light[near & ~bright], strip.light[near & bright]):
+            most = light.max()
+            next_below = light[light < most].max(initial=-np.inf)
+            finer = most - next_below < noise / 2 and noise > LEAST_NOISE * self.contrast
+            shares.append(float(np.mean(light == most)) if finer else 0.0)
+        return shares[0], shares[1]
 
     @property
     def angle_deg(self) -> float:
@@ -227,12 +237,13 @@ class SlantedEdge:
 
     @cached_property
     def flat(self) -> float:
-        """How far from the line all light counts as the edge's, pixels."""
-        return max(RISES * self.rise, NARROWEST)
+        """How far from the line all light counts as the edge's, pixels; less than usual in a small image."""
+        return min(max(RISES * self.rise, NARROWEST), FLAT_SHARE * self.sides.strip.room)
 
     def fade(self, x: Array) -> Array:
         """What counts as the edge: 1 near it, falling to 0 far away (a Tukey window), at places (n,) in pixels."""
-        fade = np.clip((2 * self.flat - np.abs(x)) / self.flat, 0, 1)
+        end = min(2 * self.flat, self.sides.strip.room)
+        fade = np.clip((end - np.abs(x)) / (end - self.flat), 0, 1)
         return np.asarray(0.5 * (1 - np.cos(np.pi * fade)))
 
     # What is left of a grating ---------------------------------------------------------------------------------------
