@@ -111,7 +111,9 @@ def kinds() -> dict[str, Callable[[np.random.Generator], Edge]]:
 
     return {
         "none": usual,
-        "noise of 2 to 5 %": lambda rng: replace(usual(rng), noise=rng.uniform(0.02, 0.05)),
+        "noise of 2 to 5 %": lambda rng: replace(
+            usual(rng), noise=rng.uniform(0.02, 0.05), dark=rng.uniform(0.12, 0.2)
+        ),
         "a small picture, 24 to 50 pixels": lambda rng: replace(
             usual(rng, 4), rows=int(rng.integers(24, 50)), columns=int(rng.integers(24, 50)), place=rng.uniform(-2, 2)
         ),

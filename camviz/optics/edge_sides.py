@@ -12,6 +12,7 @@ from camviz.lenses.base import Array
 MOST_PIXELS = 1_000_000  # in a strip; of longer edges every n-th row is taken
 SIGNIFICANT = 3.0  # standard errors: smaller slopes of light are not taken out
 FEWEST_ON_A_SIDE = 40  # pixels
+DEEP_FOR_SLOPES, DEEP_FOR_CURVES = 0.5, 1.0  # a side's depth over its distance from the edge
 OUTLIER = 4.0  # standard deviations: dust and the like, left out
 
 
@@ -82,12 +83,17 @@ class Sides:
     def _fit(self) -> tuple[Array, Array, float, tuple[float, float]]:
         """Dark, bright, p, q, two slopes and two curvatures (8,), their covariance (8, 8), and the noise of both and each.
 
-        The curvatures are kept where the light's is beyond chance, for the levels are much less certain with them.
+        Curvatures are kept where the light's is beyond chance, for the levels are much less certain with them. Sides
+        that are not deep enough for slopes or curvatures have levels only: so little does not tell them from ripples.
         """
-        first = self._fitted(8)
-        share = np.array([-1, 1]) / (first[0][1] - first[0][0])
-        if self.known and abs(share @ first[0][6:]) > SIGNIFICANT * np.sqrt(share @ first[1][6:, 6:] @ share):
-            return first
+        depth = (self.strip.room - self.start) / self.start
+        if depth < DEEP_FOR_SLOPES:
+            return self._fitted(4)
+        if depth >= DEEP_FOR_CURVES:
+            first = self._fitted(8)
+            share = np.array([-1, 1]) / (first[0][1] - first[0][0])
+            if self.known and abs(share @ first[0][6:]) > SIGNIFICANT * np.sqrt(share @ first[1][6:, 6:] @ share):
+                return first
         return self._fitted(6)
 
     def _fitted(self, terms: int) -> tuple[Array, Array, float, tuple[float, float]]:
@@ -150,7 +156,11 @@ class Sides:
         share = np.array([-1, 1]) / self.contrast
         feet = np.array([bright, -dark]) / self.contrast
         mixed = np.stack([share, feet])
-        return mixed @ solved[4:6], np.sqrt(np.diag(mixed @ covariance[4:6, 4:6] @ mixed.T))
+        error = np.sqrt(np.diag(mixed @ covariance[4:6, 4:6] @ mixed.T))
+        if (self.strip.room - self.start) / self.start < DEEP_FOR_SLOPES:  # whatever slope is there remains
+            other, spread, _, _ = self._fitted(6)
+            error = np.hypot(mixed @ other[4:6], np.sqrt(np.diag(mixed @ spread[4:6, 4:6] @ mixed.T)))
+        return mixed @ solved[4:6], error
 
     @cached_property
     def falls(self) -> float:
