@@ -118,7 +118,10 @@ class SlantedEdge:
             line = straight(rows, moved, errors)
             if line is None:
                 break
-            slope, intercept = slope + line[0] / np.cos(np.arctan(slope)), intercept + line[1] / np.cos(np.arctan(slope))
+            slope, intercept = (
+                slope + line[0] / np.cos(np.arctan(slope)),
+                intercept + line[1] / np.cos(np.arctan(slope)),
+            )
             if max(abs(line[0]) * len(self.image), abs(line[1])) < 1e-4:
                 break
         return (float(slope), float(intercept)), float(rise)
