@@ -127,7 +127,7 @@ class Sides:
     def known(self) -> bool:
         """Whether enough pixels lie on either side."""
         d = self.strip.distance
-        return min(np.sum(d >= self.start), np.sum(d <= -self.start)) >= FEWEST_ON_A_SIDE
+        return bool(min(np.sum(d >= self.start), np.sum(d <= -self.start)) >= FEWEST_ON_A_SIDE)
 
     @property
     def noise(self) -> float:

@@ -18,9 +18,9 @@ from camviz.lenses.base import Array
 from camviz.optics.edge_error import EdgeError
 from camviz.optics.edge_line import normal_angle, rough_edge
 from camviz.optics.edge_profile import Profile
+from camviz.optics.edge_refusal import LEAST_RISES, refuse_what_spoils
 from camviz.optics.edge_rows import row_shifts, straight
 from camviz.optics.edge_sides import Sides, Strip
-from camviz.optics.edge_refusal import LEAST_RISES, refuse_what_spoils
 
 OVERSAMPLING = 8  # strips a pixel
 RISES = 2.5  # times the distance from 10 to 90 % of the edge: what counts as the edge, on either side
