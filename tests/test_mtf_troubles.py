@@ -129,7 +129,7 @@ def test_slopes_whose_rows_repeat_each_other_read_right_on_the_sharpest_edge(slo
     assert edge.error.alias > 2 * SlantedEdge.of(photograph("pixel", 0.0, 17, SHAPE)).error.alias
 
 
-# Light, bends and spots --------------------------------------------------------------------------------------------------
+# Light, bends and spots ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("falls", [-0.4, -0.2, 0.2, 0.4])
@@ -156,7 +156,7 @@ def test_a_bent_edge_widens_the_error_or_is_refused(sagitta):
     """A parabola lies 2/√45 of its sagitta off the line that fits it best, root mean square."""
     light = noisy(bent(sagitta), 0.004)
     if sagitta >= 0.5:
-        with pytest.raises(ValueError, match="off a straight line|scatter by"):
+        with pytest.raises(ValueError, match=r"off a straight line|scatter by"):
             SlantedEdge.of(light)
         return
     edge = SlantedEdge.of(light)
@@ -176,7 +176,7 @@ def test_a_spot_of_five_pixels_on_the_edge_widens_the_error(seed):
     assert edge.mtf50_error > 3 * clean
 
 
-# Noise that neighbours share -------------------------------------------------------------------------------------------
+# Noise that neighbours share ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("blur", "size"), [("gauss", 0.4), ("gauss", 0.8), ("disc", 1.5)])

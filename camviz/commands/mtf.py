@@ -20,8 +20,8 @@ MTF = """\
 Measures how sharp a camera is from a photograph of one straight edge between dark and bright, leaning by about 5
 degrees against the pixels' rows or columns (ISO 12233): the modulation transfer function, and MTF50, the frequency at
 which half of a grating's contrast is left. Its standard error is what the pixels' noise leaves, wider where neighbours
-share it, the edge is bent or has a spot, the light is uneven, or a JPEG has changed it. Where that is too much, or pixels
-are at an end of the scale, it refuses. It knows nothing of sharpening.
+share it, the edge is bent or has a spot, the light is uneven, or a JPEG has changed it. Where that is too much, or
+pixels are at an end of the scale, it refuses. It knows nothing of sharpening.
 
 PHOTO, or the part of it that --roi names, shows the edge and nothing else: PNG, JPEG or TIFF. Numbers of 8 bits are
 taken for sRGB and made linear; those of 16 bits and more are taken as linear. --linear and --srgb say otherwise.

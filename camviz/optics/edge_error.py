@@ -106,7 +106,7 @@ class EdgeError:
 
     @cached_property
     def scatter(self) -> tuple[float, float]:
-        """The standard deviation of pixels about the profile, in contrasts: on the sides, and near the edge in most rows."""
+        """The scatter of pixels about the profile, in contrasts: on the sides, and near the edge in most rows."""
         profile, sides = self.edge.profile, self.edge.sides
         near = np.abs(profile.distance) <= max(self.edge.rise, 1.5)
         v = sides.strip.v[self.edge.kept][near]
@@ -118,7 +118,7 @@ class EdgeError:
 
     @cached_property
     def processed(self) -> float:
-        """By how much a row's ln MTF scatters beyond the sides' noise, as where JPEG has changed edges and not areas."""
+        """By how much a row's ln MTF scatters beyond the sides' noise, as where JPEG has changed edges alone."""
         near = self.scatter[1]
         return float(self.independent * np.sqrt(len(self.edge.rows[0])) * self.unexplained / near) if near else 0.0
 

@@ -99,7 +99,7 @@ class Profile:
     @cached_property
     def means(self) -> Array:
         """The mean light (intervals,) of the intervals between knots."""
-        return np.convolve(self.coefficients, _IN_AN_INTERVAL, "valid")
+        return np.asarray(np.convolve(self.coefficients, _IN_AN_INTERVAL, "valid"))
 
     @cached_property
     def counts(self) -> Array:

@@ -56,8 +56,8 @@ def refuse_what_spoils(edge: SlantedEdge) -> None:
         )
     if np.isfinite(edge.mtf50) and edge.error.bend > MOST_BENT:
         raise ValueError(
-            f"the rows' edges lie {edge.error.off_the_line:.2f} px off a straight line, which blurs them: take a shorter "
-            "piece, or one without spots"
+            f"the rows' edges lie {edge.error.off_the_line:.2f} px off a straight line, which blurs them: take a "
+            "shorter piece, or one without spots"
         )
 
 

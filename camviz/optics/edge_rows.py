@@ -27,7 +27,7 @@ def row_shifts(sides: Sides, rise: float) -> tuple[Array, Array, Array]:
 
     Returns
     -------
-    rows : array (n,) of int
+    rows : array (n,) of whole numbers
         Those whose edge lies within the image.
     shifts, errors : array (n,)
         To the right, in pixels, and their standard errors.
@@ -43,7 +43,8 @@ def row_shifts(sides: Sides, rise: float) -> tuple[Array, Array, Array]:
     left = np.bincount(v, profile.residual**2) / np.maximum(np.bincount(v), 1)
     rows = np.flatnonzero(weight > LEAST_SHARE * np.median(weight[weight > 0]))
     noise = np.sqrt(np.median(left[rows]))
-    return rows, moved[rows] / weight[rows], noise / np.sqrt(weight[rows])
+    shifts, errors = moved[rows] / weight[rows], noise / np.sqrt(weight[rows])
+    return rows.astype(float), np.asarray(shifts), np.asarray(errors)
 
 
 def straight(rows: Array, shifts: Array, errors: Array) -> tuple[float, float] | None:

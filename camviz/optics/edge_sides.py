@@ -81,7 +81,7 @@ class Sides:
 
     @cached_property
     def _fit(self) -> tuple[Array, Array, float, tuple[float, float]]:
-        """Dark, bright, p, q, two slopes and two curvatures (8,), their covariance (8, 8), and the noise of both and each.
+        """Dark, bright, p, q, two slopes two curvatures (8,), their covariance (8, 8), the noise of both and each.
 
         Curvatures are kept where the light's is beyond chance, for the levels are much less certain with them. Sides
         that are not deep enough for slopes or curvatures have levels only: so little does not tell them from ripples.
@@ -150,7 +150,7 @@ class Sides:
 
     @cached_property
     def _slopes(self) -> tuple[Array, Array]:
-        """Slope of the light as a share per pixel, and of the blur's feet in light per pixel; standard errors (2, 2)."""
+        """Slopes: of the light, a share per pixel; of the blur's feet, light per pixel (2,); their errors (2,)."""
         dark, bright = self.levels
         solved, covariance, _, _ = self._fit
         share = np.array([-1, 1]) / self.contrast

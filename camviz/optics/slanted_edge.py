@@ -199,11 +199,11 @@ class SlantedEdge:
     @cached_property
     def kept(self) -> Array:
         """Which pixels (n,) of the strip the profile is made of."""
-        return np.abs(self.sides.strip.distance) <= self._reach
+        return np.asarray(np.abs(self.sides.strip.distance) <= self._reach)
 
     @cached_property
     def rows(self) -> tuple[Array, Array, Array]:
-        """The rows (n,) whose edge lies within the image, how far (n,) each is off the line, and the error (n,) of that."""
+        """The rows (n,) whose edge lies within the image, how far (n,) off the line, and the error (n,) of that."""
         return row_shifts(self.sides, self._located[1])
 
     def _blocks(self, v: Array) -> Array:
