@@ -134,7 +134,7 @@ class EdgeError:
     def off_the_line(self) -> float:
         """How far the rows' edges lie off the line beyond what noise explains, root mean square, pixels."""
         _, shifts, errors = self.edge.rows
-        return float(np.sqrt(max(np.mean(shifts**2) - np.mean(errors**2), 0)))
+        return float(np.sqrt(max(float(np.mean(shifts**2) - np.mean(errors**2)), 0)))
 
     @cached_property
     def bend(self) -> float:

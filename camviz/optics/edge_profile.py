@@ -94,7 +94,7 @@ class Profile:
     @cached_property
     def places(self) -> Array:
         """The middles (intervals,) of the intervals between knots, pixels."""
-        return (np.arange(self.intervals) + 0.5) * self.step - self.reach
+        return np.asarray((np.arange(self.intervals) + 0.5) * self.step - self.reach, dtype=float)
 
     @cached_property
     def means(self) -> Array:
