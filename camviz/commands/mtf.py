@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 MTF = """\
 Measures how sharp a camera is from a photograph of one straight edge between dark and bright, leaning by about 5
 degrees against the pixels' rows or columns (ISO 12233): the modulation transfer function, and MTF50, the frequency at
-which half of a grating's contrast is left. Its standard error is what the pixels' noise leaves: it falls with the root
-of the edge's length. It knows nothing of JPEG, sharpening or an edge that a lens has bent.
+which half of a grating's contrast is left. Its standard error is what the pixels' noise leaves, wider where neighbours
+share it, the edge is bent or has a spot, the light is uneven, or a JPEG has changed it. Where that is too much, or
+pixels are at an end of the scale, it refuses. It knows nothing of sharpening.
 
 PHOTO, or the part of it that --roi names, shows the edge and nothing else: PNG, JPEG or TIFF. Numbers of 8 bits are
 taken for sRGB and made linear; those of 16 bits and more are taken as linear. --linear and --srgb say otherwise.
@@ -72,7 +73,7 @@ def mtf(options: argparse.Namespace) -> int:
     _refuse_large(picture, options.photo)
     light, taken_as = linear_light(picture, options)
     try:
-        edge = SlantedEdge.of(light)
+        edge = SlantedEdge.of(light, ends_of_scale(picture))
     except ValueError as error:
         raise Refusal(f"{options.photo}: {error}.") from error
     if options.report:
@@ -123,6 +124,19 @@ def linear_light(picture: np.ndarray, options: argparse.Namespace) -> tuple[np.n
     return np.asarray(light), "sRGB, made linear" if encoded else "linear"
 
 
+def ends_of_scale(picture: np.ndarray) -> np.ndarray | None:
+    """Which pixels (height, width) of a picture (grey, BGR or BGRA) have a colour at the first or last of its numbers.
+
+    None where the numbers are not whole, and so have no ends.
+    """
+    import numpy as np
+
+    if picture.dtype.kind not in "ui":
+        return None
+    at_an_end = (picture == 0) | (picture == np.iinfo(picture.dtype).max)
+    return np.asarray(at_an_end if picture.ndim == 2 else at_an_end[..., :3].any(axis=-1))
+
+
 def figures(edge: SlantedEdge) -> dict[str, float]:
     """The figures by name: cycles per pixel, pixels, degrees, and the MTF at a quarter and half a cycle per pixel."""
     return {
@@ -134,6 +148,13 @@ def figures(edge: SlantedEdge) -> dict[str, float]:
         "rise_10_90_pixels": edge.rise,
         "angle_deg": abs(edge.angle_deg),
         "contrast_over_noise": edge.contrast / edge.noise if edge.noise > 0 else float("nan"),
+        "clipped_percent": 100 * max(edge.clipped_shares),
+        "light_across_percent_per_pixel": 100 * abs(edge.sides.falls),
+        "light_along_percent": 100 * edge.sides.along,
+        "off_a_line_pixels": edge.error.off_the_line,
+        "widest_gap_pixels": edge.error.gap,
+        "scatter_at_edge_percent": 100 * edge.error.unexplained,
+        "noise_shared_factor": edge.error.shared,
     }
 
 

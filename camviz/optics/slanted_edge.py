@@ -15,13 +15,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array
+from camviz.optics.edge_error import EdgeError
+from camviz.optics.edge_line import normal_angle, rough_edge
+from camviz.optics.edge_profile import Profile
+from camviz.optics.edge_refusal import LEAST_RISES, refuse_what_spoils
+from camviz.optics.edge_rows import row_shifts, straight
+from camviz.optics.edge_sides import Sides, Strip
 
-OVERSAMPLING = 8  # bins a pixel; the standard has 4, with which a sharp edge at 3° comes out 2 % too blurred
-LEAST_ANGLE_DEG, MOST_ANGLE_DEG = 1.0, 30.0  # outside, phases repeat too early or rows blur the edge
-FEWEST_ROWS = 16
-LEAST_CONTRAST = 10.0  # times the noise: below, the edge cannot be found in each row
+OVERSAMPLING = 8  # strips a pixel
 RISES = 2.5  # times the distance from 10 to 90 % of the edge: what counts as the edge, on either side
 NARROWEST = 2.5  # pixels on either side
+FLAT_SHARE = 0.7  # of what there is on either side
+LEAST_SIDE = 3.0  # pixels: what is kept for the light of a side in a small image
+SIDE = 24.0  # pixels beyond the edge, on which the light of either side is measured
+LEAST_NOISE = 1e-4  # of the contrast: below, it is a number's rounding
 PADDED = 4096  # samples of the Fourier transform: frequencies 1/1024 cycle a pixel apart
 
 
@@ -36,6 +43,8 @@ class SlantedEdge:
     ----------
     image : array (height, width)
         *Linear* light.
+    clipped : array (height, width) of bool, optional
+        Which pixels are at an end of the camera's scale, where the number no longer tells the light.
 
     References
     ----------
@@ -52,15 +61,18 @@ class SlantedEdge:
     """
 
     image: Array
+    clipped: Array | None = None
 
     @classmethod
-    def of(cls, image: ArrayLike) -> SlantedEdge:
+    def of(cls, image: ArrayLike, clipped: ArrayLike | None = None) -> SlantedEdge:
         """The edge in an image, nearly vertical or nearly horizontal, dark first or bright first.
 
         Parameters
         ----------
         image : array_like (height, width)
             *Linear* light in any unit.
+        clipped : array_like (height, width) of bool, optional
+            Which pixels are at an end of the camera's scale.
 
         Returns
         -------
@@ -73,79 +85,94 @@ class SlantedEdge:
             In one sentence, where the image holds no edge that can be measured.
         """
         light = np.asarray(image, dtype=float)
+        ends = None if clipped is None else np.asarray(clipped, dtype=bool)
         if light.ndim != 2 or not np.isfinite(light).all():
             raise ValueError(f"image must be (height, width) of finite numbers, got shape {light.shape}")
-        across, down = (float(np.abs(np.diff(light.mean(axis=axis))).sum()) for axis in (0, 1))
-        if down > across:
-            light = light.T
-        columns = light.mean(axis=0)
-        quarter = -(-len(columns) // 4)
-        if columns[-quarter:].mean() < columns[:quarter].mean():
-            light = light[:, ::-1]
-        found = cls(light)
-        found.refuse_what_cannot_be_measured()
+        if ends is not None and ends.shape != light.shape:
+            raise ValueError(f"clipped must have the image's shape {light.shape}, got {ends.shape}")
+        if abs(normal_angle(light)) > np.pi / 4:
+            light, ends = light.T, None if ends is None else ends.T
+        if light[:, -1:].mean() + light[:, -3:].mean() < light[:, :1].mean() + light[:, :3].mean():
+            light, ends = light[:, ::-1], None if ends is None else ends[:, ::-1]
+        found = cls(light, ends)
+        refuse_what_spoils(found)
         return found
-
-    def refuse_what_cannot_be_measured(self) -> None:
-        """Say what is wrong with an edge that is too small, has no contrast, or leans too little or too much.
-
-        Raises
-        ------
-        ValueError
-            In one sentence.
-        """
-        rows, columns = self.image.shape
-        if rows < FEWEST_ROWS or columns < FEWEST_ROWS:
-            raise ValueError(f"image must be at least {FEWEST_ROWS} × {FEWEST_ROWS} pixels, got {columns} × {rows}")
-        if not self.contrast > LEAST_CONTRAST * self.noise:
-            raise ValueError("image holds no edge: one side is hardly brighter than the other")
-        if not LEAST_ANGLE_DEG <= abs(self.angle_deg) <= MOST_ANGLE_DEG:
-            raise ValueError(
-                f"the edge leans by {abs(self.angle_deg):.1f}°: expected {LEAST_ANGLE_DEG:g}° to {MOST_ANGLE_DEG:g}° "
-                "against the pixels' columns or rows (about 5° is best)"
-            )
-        if abs(self.line[0]) * (rows - 1) < 1:
-            raise ValueError(
-                f"the edge crosses less than one pixel within {rows} rows: take more of it, or lean it more"
-            )
 
     # Where the edge is -----------------------------------------------------------------------------------------------
 
     @cached_property
+    def _located(self) -> tuple[tuple[float, float], float]:
+        """The line, and the rise of the blurred step that fits roughly.
+
+        From the rough line, each row is moved to where it fits the profile of all rows best.
+        """
+        slope, intercept, spread = rough_edge(self.image)
+        rise = 2.5631 * spread
+        for _ in range(4):
+            if not np.isfinite(slope):
+                break
+            sides = self._sides_of((slope, intercept), rise)
+            if not sides.known or not sides.contrast > 0:
+                break
+            rows, moved, errors = row_shifts(sides, rise)
+            line = straight(rows, moved, errors)
+            if line is None:
+                break
+            slope, intercept = (
+                slope + line[0] / np.cos(np.arctan(slope)),
+                intercept + line[1] / np.cos(np.arctan(slope)),
+            )
+            if max(abs(line[0]) * len(self.image), abs(line[1])) < 1e-4:
+                break
+        return (float(slope), float(intercept)), float(rise)
+
+    def _sides_of(self, line: tuple[float, float], rise: float) -> Sides:
+        """The sides of a line: beyond the edge's blur, or where the image is too small for that, at its border."""
+        flat = max(RISES * rise, NARROWEST)
+        strip = Strip.of(self.image, line, 2 * flat + SIDE)
+        return Sides(strip, max(min(flat, strip.room - LEAST_SIDE), LEAST_RISES * rise, 1.0))
+
+    @property
+    def line(self) -> tuple[float, float]:
+        """Slope and intercept of the edge, u = slope · v + intercept."""
+        return self._located[0]
+
+    @cached_property
+    def sides(self) -> Sides:
+        """What lies beside the edge."""
+        return self._sides_of(*self._located)
+
+    @property
     def contrast(self) -> float:
         """The bright side less the dark side."""
-        quarter = self.image.shape[1] // 6
-        return float(np.median(self.image[:, -quarter:]) - np.median(self.image[:, :quarter]))
+        return self.sides.contrast
 
-    @cached_property
+    @property
     def noise(self) -> float:
-        """The standard deviation of a pixel, from differences of neighbours down the two sides."""
-        sixth = self.image.shape[1] // 6
-        steps = np.diff(np.concatenate([self.image[:, :sixth], self.image[:, -sixth:]], axis=1), axis=0)
-        return float(np.median(np.abs(steps)) * 1.4826 / np.sqrt(2))
+        """The standard deviation of a pixel on the two sides."""
+        return self.sides.noise
 
     @cached_property
-    def line(self) -> tuple[float, float]:
-        """Slope and intercept of the edge, u = slope · v + intercept, from where each row has its centre of change."""
-        rows, columns = self.image.shape
-        change = np.gradient(self.image, axis=1)
-        v, u = np.arange(rows), np.arange(columns)
-        smooth = change.mean(axis=0)
-        middle, half = np.full(rows, float(np.argmax(smooth))), columns / 2
-        for width in (half, half / 2, half / 4, half / 4):
-            reach = max(width, 3 * NARROWEST)
-            weight = np.clip(np.cos(np.pi / 2 * (u - middle[:, None]) / reach), 0, None) * (
-                abs(u - middle[:, None]) < reach
-            )
-            centre = np.sum(change * weight * u, axis=1) / np.sum(change * weight, axis=1)
-            good = np.isfinite(centre) & (abs(centre - middle) < reach)
-            if good.sum() < 2:
-                return np.nan, np.nan
-            slope, intercept = np.polyfit(v[good], centre[good], 1)
-            middle = slope * v + intercept
-        return float(slope), float(intercept)
+    def clipped_shares(self) -> tuple[float, float]:
+        """The shares of the pixels on the dark and the bright side that are at an end of the camera's scale.
 
-    @cached_property
+        Of those that count as the edge's. Where it is not known which pixels are clipped, those are taken for it that
+        share the least or the greatest light though the next light is nearer than the noise.
+        """
+        strip = self.sides.strip
+        near, bright = np.abs(strip.distance) <= 2 * self.flat, strip.distance > 0
+        if self.clipped is not None:
+            ends = self.clipped[strip.v, strip.u]
+            return float(ends[near & ~bright].mean()), float(ends[near & bright].mean())
+        shares, noise = [], self.sides.noisier
+        for light in (-strip.light[near & ~bright], strip.light[near & bright]):
+            most = light.max()
+            next_below = light[light < most].max(initial=-np.inf)
+            finer = most - next_below < noise / 2 and noise > LEAST_NOISE * self.contrast
+            shares.append(float(np.mean(light == most)) if finer else 0.0)
+        return shares[0], shares[1]
+
+    @property
     def angle_deg(self) -> float:
         """How far the edge leans against the columns, degrees."""
         return float(np.degrees(np.arctan(self.line[0])))
@@ -160,30 +187,47 @@ class SlantedEdge:
         return np.asarray((u - slope * v - intercept) * np.cos(np.arctan(slope)))
 
     @cached_property
-    def binned(self) -> tuple[Array, Array, Array]:
-        """Bins along the normal: places (n,) of their middles in pixels, their pixels' number and mean value (n,)."""
-        reach = np.floor(np.abs(self.distance).max() * OVERSAMPLING) / OVERSAMPLING
-        borders = np.arange(-reach, reach + 0.5 / OVERSAMPLING, 1 / OVERSAMPLING)
-        counts, _ = np.histogram(self.distance, borders)
-        sums, _ = np.histogram(self.distance, borders, weights=self.image)
-        places = (borders[:-1] + borders[1:]) / 2
-        where, _ = np.histogram(self.distance, borders, weights=self.distance)
-        some = counts > 0  # a bin's pixels lie somewhat beside its middle
-        means = np.interp(places, where[some] / counts[some], sums[some] / counts[some])
-        return places, counts.astype(np.float64), means
+    def profile(self) -> Profile:
+        """The edge's profile, from 0 to 1: a smooth curve with knots at every eighth of a pixel."""
+        strip, light, kept = self.sides.strip, self.sides.profile, self.kept
+        return Profile(strip.distance[kept], light[kept], self._reach, 1 / OVERSAMPLING, self._blocks(strip.v[kept]))
+
+    @property
+    def _reach(self) -> float:
+        return float(np.floor(np.abs(self.sides.strip.distance).max() * OVERSAMPLING) / OVERSAMPLING)
 
     @cached_property
+    def kept(self) -> Array:
+        """Which pixels (n,) of the strip the profile is made of."""
+        return np.asarray(np.abs(self.sides.strip.distance) <= self._reach)
+
+    @cached_property
+    def rows(self) -> tuple[Array, Array, Array]:
+        """The rows (n,) whose edge lies within the image, how far (n,) off the line, and the error (n,) of that."""
+        return row_shifts(self.sides, self._located[1])
+
+    def _blocks(self, v: Array) -> Array:
+        """The number of the piece of the edge that a row belongs to: pieces of 8 rows or more, at most 16."""
+        first, last = int(v.min()), int(v.max())
+        pieces = int(np.clip((last - first + 1) // 8, 4, 16))
+        return (v - first) * pieces // (last - first + 1)
+
+    @cached_property
+    def binned(self) -> tuple[Array, Array, Array]:
+        """Strips along the edge: places (n,) of their middles in pixels, their pixels' number and mean light (n,)."""
+        dark, _ = self.sides.levels
+        return self.profile.places, self.profile.counts, dark + self.contrast * self.profile.means
+
+    @property
     def edge_spread(self) -> tuple[Array, Array]:
         """The edge's profile: places (n,) in pixels from it, and values (n,) from 0 to 1."""
-        places, _, means = self.binned
-        dark = np.median(self.image[:, : self.image.shape[1] // 6])
-        return places, (means - dark) / self.contrast
+        return self.profile.places, self.profile.means
 
     @cached_property
     def rise(self) -> float:
         """The distance in pixels over which the edge rises from 10 to 90 %."""
         places, values = self.edge_spread
-        near = np.abs(places) < self.image.shape[1] / 3
+        near = np.abs(places) < max(RISES * self._located[1], NARROWEST)
         x, y = places[near], np.maximum.accumulate(values[near])
         return float(np.interp(0.9, y, x) - np.interp(0.1, y, x))
 
@@ -192,12 +236,17 @@ class SlantedEdge:
         """The derivative of the profile: places (n,) in pixels, and the light (n,) per pixel, faded out far away."""
         places, values = self.edge_spread
         x, change = (places[:-1] + places[1:]) / 2, np.diff(values) * OVERSAMPLING
-        return x, change * self._fade(x)
+        return x, change * self.fade(x)
 
-    def _fade(self, x: Array) -> Array:
+    @cached_property
+    def flat(self) -> float:
+        """How far from the line all light counts as the edge's, pixels; less than usual in a small image."""
+        return min(max(RISES * self.rise, NARROWEST), FLAT_SHARE * self.sides.strip.room)
+
+    def fade(self, x: Array) -> Array:
         """What counts as the edge: 1 near it, falling to 0 far away (a Tukey window), at places (n,) in pixels."""
-        flat = max(RISES * self.rise, NARROWEST)
-        fade = np.clip((2 * flat - np.abs(x)) / flat, 0, 1)
+        end = min(2 * self.flat, self.sides.strip.room)
+        fade = np.clip((end - np.abs(x)) / (end - self.flat), 0, 1)
         return np.asarray(0.5 * (1 - np.cos(np.pi * fade)))
 
     # What is left of a grating ---------------------------------------------------------------------------------------
@@ -260,39 +309,42 @@ class SlantedEdge:
 
     @cached_property
     def residual_noise(self) -> Array:
-        """The standard deviation (n,) of a pixel about the profile, bin by bin, from the pixels within a pixel of it.
+        """The standard deviation (n,) of a pixel about the profile, strip by strip, from pixels within a pixel of it.
 
         Dark and bright pixels differ in noise, and so each part of the profile has its own.
         """
-        places, counts, means = self.binned
-        residual = self.image - np.interp(self.distance, places, means)
-        inside = np.clip(np.searchsorted(places, self.distance.ravel()), 0, len(places) - 1)
-        squares = np.bincount(inside, residual.ravel() ** 2, len(places))
+        profile = self.profile
+        at = np.clip(((profile.distance + profile.reach) / profile.step).astype(int), 0, profile.intervals - 1)
+        squares = np.bincount(at, profile.residual**2, profile.intervals)
         near = np.ones(2 * OVERSAMPLING + 1)
-        freedom = np.convolve(np.maximum(counts - 2 / 3, 0), near, "same")  # a line between two means takes 2/3
-        return np.sqrt(np.convolve(squares, near, "same") / np.maximum(freedom, 1))
+        freedom = np.convolve(np.maximum(profile.counts - 0.9, 0), near, "same")  # the curve takes one a strip
+        return self.contrast * np.sqrt(np.convolve(squares, near, "same") / np.maximum(freedom, 1))
+
+    def log_mtf(self, frequency: float, means: Array) -> float:
+        """ln MTF at a frequency in cycles per pixel, of a profile's means (n,) at the places of `edge_spread`."""
+        x, _ = self.line_spread
+        light = np.diff(means) * OVERSAMPLING * self.fade(x)
+        return float(np.log(np.abs(np.sum(light * np.exp(-2j * np.pi * frequency * x))) / np.abs(np.sum(light))))
+
+    def spread_weights(self, wave: Array) -> Array:
+        """How much Σ wave · line spread changes with each strip's mean (n,), the wave given between strips (n - 1,)."""
+        faded = OVERSAMPLING * self.fade(self.line_spread[0]) * wave
+        return -np.diff(faded, prepend=0, append=0)
+
+    @cached_property
+    def error(self) -> EdgeError:
+        """What may move ln MTF at MTF50."""
+        return EdgeError(self, self.mtf50)
 
     @cached_property
     def mtf50_error(self) -> float:
-        """The standard error of MTF50, cycles per pixel, that the pixels' noise leaves; NaN where there is no MTF50.
+        """The standard error of MTF50, cycles per pixel; NaN where there is no MTF50.
 
-        To first order. The transform S(f) = Σ_j m_j s_j(f) is linear in the bins' means m_j, of variance σ_j²/n_j.
-        So ln MTF changes by Re(s_j(f) / S(f)) - s_j(0) / S(0) with m_j, and MTF50 by that over the slope of ln MTF.
-        Noise is taken to be independent from pixel to pixel, which demosaicing and sharpening make untrue.
+        That of ln MTF over the slope of ln MTF.
         """
         f = self.mtf50
         if not np.isfinite(f):
             return float("nan")
-        x, light = self.line_spread
-        wave = np.exp(-2j * np.pi * f * x)
-        change = self._weights(wave) / np.sum(light * wave) - self._weights(np.ones_like(x)) / np.sum(light)
-        _, counts, _ = self.binned
-        variance = np.sum(change.real**2 * self.residual_noise**2 / np.maximum(counts, 1)) / self.contrast**2
         step = 2 / PADDED * OVERSAMPLING
         slope = (self.mtf(f + step) - self.mtf(f - step)) / (2 * step) / 0.5
-        return float(np.sqrt(variance) / abs(slope))
-
-    def _weights(self, wave: Array) -> Array:
-        """How much the transform changes with each bin's mean (n,), the wave given between bins (n - 1,)."""
-        faded = OVERSAMPLING * self._fade(self.line_spread[0]) * wave
-        return -np.diff(faded, prepend=0, append=0)
+        return float(self.error.total / abs(slope))

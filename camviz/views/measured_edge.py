@@ -27,6 +27,13 @@ _WORDS = {
     "rise_10_90_pixels": ("rise from 10 to 90 %", "{:.2f} px"),
     "angle_deg": ("angle", "{:.1f}°"),
     "contrast_over_noise": ("contrast over noise", "{:.0f}"),
+    "clipped_percent": ("pixels at an end of the scale", "{:.1f} %"),
+    "light_across_percent_per_pixel": ("light changes across", "{:.2f} % per px"),
+    "light_along_percent": ("light changes along", "{:.1f} %"),
+    "off_a_line_pixels": ("rows off a straight line", "{:.3f} px"),
+    "widest_gap_pixels": ("widest gap between samples", "{:.3f} px"),
+    "scatter_at_edge_percent": ("scatter at the edge beyond noise", "{:.1f} %"),
+    "noise_shared_factor": ("shared noise widens the error", "{:.2f} times"),
 }
 
 
