@@ -13,7 +13,19 @@ _SHAPE = {"ones_like", "zeros_like", "zeros", "ones", "eye", "range", "arange", 
 """Functions that look at the size of what they are given."""
 _NO_SIGN = {"abs", "norm", "hypot", "sqrt", "arange", "var", "arccos", "eye", "ones_like", "zeros_like", "len"}
 _SIGN_OF_ALL = {"sum", "mean", "nanmean", "median", "nanmedian", "max", "maximum", "minimum", "asarray", "diag"}
-_SIGN_OF_ALL |= {"stack", "array", "concatenate", "meshgrid", "rint", "broadcast_to", "moveaxis"}
+_SIGN_OF_ALL |= {
+    "arctan",
+    "degrees",
+    "radians",
+    "cbrt",
+    "stack",
+    "array",
+    "concatenate",
+    "meshgrid",
+    "rint",
+    "broadcast_to",
+    "moveaxis",
+}
 
 
 class Signs:
@@ -72,7 +84,7 @@ class Signs:
         owner = around[-1]
         if isinstance(owner, ast.Attribute | ast.keyword | ast.Slice | ast.withitem | ast.For):
             return False
-        if isinstance(owner, ast.Subscript) and node is owner.slice:
+        if isinstance(owner, ast.Subscript):  # it is asked of the part
             return False
         calls = [name_of(one.func) for one in around if isinstance(one, ast.Call)]
         if _SHAPE & set(calls) or (isinstance(owner, ast.Call) and calls[-1] in _SEVERAL):
