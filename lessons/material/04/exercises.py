@@ -345,6 +345,14 @@ IS_ROTATION = Exercise(
 )
 
 
+@IS_ROTATION.wrong(
+    "`np.allclose` adds its `rtol`, 1e-5 unless told otherwise, to your `atol`, so that MᵀM may be off by 1.1e-5 on "
+    "its diagonal: give it `rtol=0`."
+)
+def with_the_relative_tolerance_left_on(M):
+    return np.allclose(M.T @ M, np.eye(3), atol=1e-6) and abs(np.linalg.det(M) - 1) < 1e-6
+
+
 @IS_ROTATION.right
 def with_the_sign_of_the_determinant(M):
     return np.abs(M @ M.T - np.eye(3)).max() < 1e-6 and np.linalg.det(M) > 0
