@@ -52,8 +52,8 @@ def _equidistant_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         [1.0, 0.0, 0.0],
         [-0.7, 0.4, 0.0],
         [0.0, -0.3, 0.2],
-    ]  # 90° and behind
-    yield (np.array(beside) * rng.uniform(0.5, 2), *rng.uniform([100, 200, 320], [400, 300, 500]).tolist())
+    ]  # 90° and behind, left of the picture and above it
+    yield (np.array(beside) * rng.uniform(0.5, 2), *rng.uniform([200, 20, 30], [400, 60, 50]).tolist())
 
 
 EQUIDISTANT = Exercise(
@@ -571,7 +571,7 @@ def _window_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         f_window, f, cx, cy = rng.uniform([3, 90, 150, 210], [9, 200, 200, 260]).tolist()
         yield (width, height, f_window, float(yaw), f, cx, cy)
     for width, height in ((5, 5), (7, 3)):  # its middle pixel looks along the axis
-        yield (width, height, float(rng.uniform(3, 9)), 0.0, *rng.uniform([90, 150, 210], [200, 200, 260]).tolist())
+        yield (width, height, float(rng.uniform(3, 5)), 0.0, *rng.uniform([150, 3, 5], [200, 8, 9]).tolist())
 
 
 WINDOW_MAP = Exercise(
