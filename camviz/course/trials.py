@@ -268,8 +268,8 @@ class Exercise:
 class Trial:
     """What came of one call.
 
-    `actual` is () unless numbers came back, `stub` says that nothing did, `raised` is the type of what was raised, and
-    `interrupted` that the reader, or the end of the time there is, stopped the call.
+    `actual` is () unless numbers came back, `stub` says that nothing did, `raised` is the type of what was raised and
+    its message, and `interrupted` that the reader, or the end of the time there is, stopped the call.
     """
 
     arguments: Arguments
@@ -277,7 +277,7 @@ class Trial:
     actual: tuple[Array, ...] = ()
     complaint: str = ""
     stub: bool = False
-    raised: type[BaseException] | None = None
+    raised: tuple[type[BaseException], str] | None = None
     interrupted: bool = False
     mutated: str = ""
     printed: str = ""
@@ -318,7 +318,7 @@ def _called(
         return _interrupted(exercise, trial, stop), None
     except BaseException as error:
         complaint = explain(error, function) + f" It was called as {exercise.call(trial.arguments)}."
-        return replace(trial, raised=type(error), complaint=complaint), None
+        return replace(trial, raised=(type(error), _message(error)), complaint=complaint), None
     return (_nothing(exercise, trial) if result is None or result is Ellipsis else trial), result
 
 
@@ -339,7 +339,7 @@ def outcome(exercise: Exercise, function: Function, arguments: Arguments) -> Tri
         with quiet():
             result = function(*deepcopy(arguments))
     except Exception as error:
-        return Trial(arguments, raised=type(error))
+        return Trial(arguments, raised=(type(error), _message(error)))
     if result is None:
         return Trial(arguments, stub=True)
     with quiet():
@@ -347,7 +347,7 @@ def outcome(exercise: Exercise, function: Function, arguments: Arguments) -> Tri
 
 
 def same_outcome(exercise: Exercise, one: Trial, other: Trial) -> bool:
-    """True where two functions did the same: numbers that agree, or nothing, or an error of the same type."""
+    """True where two functions did the same: numbers that agree, or nothing, or an error with the same message."""
     if one.actual or other.actual:
         return exercise.same(one.actual, other.actual)
     return one.stub == other.stub and one.raised == other.raised
