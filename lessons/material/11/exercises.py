@@ -422,7 +422,7 @@ def _spot(rng: np.random.Generator, views: int, d: float) -> Array:
 
 
 def _noisy(rng: np.random.Generator, epi: Array) -> Array:
-    return epi + rng.normal(0, 1e-3, epi.shape)
+    return 5 + epi + rng.normal(0, 1e-3, epi.shape)  # light is never negative
 
 
 SLOPE = Exercise(

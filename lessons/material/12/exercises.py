@@ -584,7 +584,7 @@ def _edge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     peaked[:, :, 2] = (1, 0.4, 1, 0.6, 1)
     peaked[2:] = np.swapaxes(peaked[2:], 1, 2)
     yield (peaked + rng.uniform(0, 0.02, peaked.shape),)
-    draw = rng.integers(0, 8, (6, 5, 5)) / 8
+    draw = rng.integers(-8, 8, (6, 5, 5)) / 8
     draw[..., :, 2] = 2 * draw[..., 2, 2, None] - draw[..., 2, :]  # upside down, the column changes as much as the row
     yield (draw,)
 

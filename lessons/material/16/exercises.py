@@ -434,7 +434,7 @@ def _triage_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         off, near = np.zeros((2, 8, rows, columns), dtype=bool)
         near[5:7, 4] = True  # two rows of corners that are far, and not off
         off[mark] = True
-        yield (_at_a_limit(rng, off, near & ~off, rng.choice([1.01, rng.uniform(2, 40)])),)
+        yield (_at_a_limit(rng, off, near & ~off, rng.choice([1.003, rng.uniform(2, 40)])),)
     whole = np.arange(8)[:, None, None] == np.full((rows, columns), rng.integers(8))
     yield (_at_a_limit(rng, whole, whole & False, float(rng.uniform(5, 40))),)  # a view that is wildly off
     for times in (0.53, 0.7, 0.84, 0.92, 1.1, 1.28, 1.55, 1.87):  # of 6 σ: a corner between every two usual limits
@@ -453,8 +453,8 @@ def _at_a_limit(
     lengths = np.clip(np.linalg.norm(residuals, axis=-1), 0, 3.1 * np.std(residuals))
     lengths[off | near] = np.inf
     limit = 6 * np.median(lengths) / RAYLEIGH
-    lengths[near] = limit * rng.uniform(0.985, 0.995, near.sum())
-    lengths[off] = limit * times * rng.uniform(0.995, 1.005, off.sum())
+    lengths[near] = limit * rng.uniform(0.996, 0.999, near.sum())
+    lengths[off] = limit * times * rng.uniform(0.998, 1.002, off.sum())
     around = rng.uniform(0, 2 * np.pi, off.shape)
     direction = np.pi * (aslant + rng.choice([0, 0.5, 1, 1.5]))  # along x or y, either way
     around[off | near] = direction + rng.normal(0, 0.1)
@@ -661,9 +661,25 @@ def _rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         turn = Rotation.from_rotvec(rng.uniform(0.1, 0.3, 3) * rng.choice([-1, 1], 3))
         other = turn.apply(rays) + rng.normal(0, 0.002, (n, 3))
         yield rays, other / np.linalg.norm(other, axis=1, keepdims=True)
+    yield _two_mirrors(rng)
     angle, tilt = np.linspace(-1, 1, 7), 0.01 * np.array([1, -1, 1, -1, 1, -1, 1])
     flat = np.stack([np.sin(angle), tilt, np.cos(angle)], axis=-1)  # almost one plane, where noise may ask for a mirror
     yield flat, Rotation.from_rotvec([0.1, -0.2, rng.uniform(0.2, 0.5)]).apply(flat * [1, -1, 1])
+
+
+def _two_mirrors(rng: np.random.Generator) -> Arguments:
+    """Rays and the same turned, of whose decomposition U and Vᵀ are both mirrors: together they are a rotation."""
+    for _ in range(300):  # one in ten is such a pair
+        rays = np.array([[x, y, 1] for x in (-1, 1) for y in (-1, 1)]) * [
+            rng.uniform(0.1, 0.3),
+            rng.uniform(0.4, 0.6),
+            1,
+        ]
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        turned = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3)).apply(rays)
+        if np.linalg.det(np.linalg.svd(turned.T @ rays)[0]) < 0:
+            break
+    return rays, turned
 
 
 ROTATION = Exercise(
