@@ -264,8 +264,9 @@ def _coefficients(rng: np.random.Generator) -> list[float]:
 
 
 def _polynomial_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        yield (_all_round(rng, shape), *_coefficients(rng))
+    for shape, signs in zip(SHAPES, ((1, 1), (1, -1), (-1, 1), (-1, -1)), strict=True):
+        k1, k2 = (signs * np.abs(_coefficients(rng))).tolist()
+        yield (_all_round(rng, shape), k1, k2)
     yield (np.array([[0.3, -0.2, -1.0], [-0.5, 0.1, 0.4]]), *_coefficients(rng))
 
 
