@@ -158,6 +158,9 @@ def _judged(exercise: Exercise, function: Any, rng: np.random.Generator, attempt
         return _wrong(exercise, f"{trials[-1].complaint} Does a loop in it never end?", attempt)
     if _untouched(exercise, trials):
         return replace(_unsolved(exercise), printed=printed)
+    other_convention = _known(exercise, exercise.conventions, trials)
+    if other_convention:
+        return Verdict(exercise.name, "correct", other_convention, printed=printed)
     complaint = _complaint(exercise, function, trials, rng, patience)
     verdict = _wrong(exercise, complaint, attempt) if complaint else _correct(exercise)
     return replace(verdict, printed=printed)
@@ -219,7 +222,7 @@ def _complaint(
         mutated = next((trial.mutated for trial in trials if trial.mutated), "")
         return mutated or _broken_law(exercise, function, rng, patience)
     wrong = [trial for trial in trials if not trial.fits]
-    known = _misconception(exercise, trials) or _nothing_but_nan(trials) or _constant(trials)
+    known = _known(exercise, exercise.misconceptions, trials) or _nothing_but_nan(trials) or _constant(trials)
     broken = next((trial.complaint for trial in wrong if trial.complaint), "")
     if broken:
         return known or _only_for_some(exercise, trials) + broken
@@ -250,14 +253,14 @@ def _broken_law(exercise: Exercise, function: Function, rng: np.random.Generator
     return ""
 
 
-def _misconception(exercise: Exercise, trials: Sequence[Trial]) -> str:
-    """The explanation of the known mistake that does what the reader's function does in every case.
+def _known(exercise: Exercise, functions: Sequence[Misconception], trials: Sequence[Trial]) -> str:
+    """The explanation of the known function that does what the reader's does in every case.
 
     It has to give a number somewhere: functions that only raise errors, or only answer NaN, have little in common.
     """
     if not any((~np.isnan(part)).any() for trial in trials for part in trial.actual):
         return ""
-    for known in exercise.misconceptions:
+    for known in functions:
         if _does_the_same(exercise, known.function, trials):
             return known.explanation
     return ""

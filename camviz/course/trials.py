@@ -66,7 +66,7 @@ class Misconception:
 class Exercise:
     """What is asked, how to recognise the answer, and what to say otherwise.
 
-    Known mistakes and other right ways are written below the exercise, under its decorators.
+    Known mistakes, other right ways and other conventions are written below the exercise, under its decorators.
 
     Parameters
     ----------
@@ -119,6 +119,7 @@ class Exercise:
     as_given: Function | None = None
     misconceptions: list[Misconception] = field(default_factory=list, init=False)
     right_ways: list[Function] = field(default_factory=list, init=False)
+    conventions: list[Misconception] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
         if len(self.hints) != HINTS:
@@ -161,6 +162,26 @@ class Exercise:
         """
         self.right_ways.append(function)
         return function
+
+    def convention(self, explanation: str) -> Callable[[Function], Function]:
+        """Decorates a function that answers by another convention, and is accepted with a word about it.
+
+        Parameters
+        ----------
+        explanation : str
+            Says whose convention it is, and what the task's is.
+
+        Returns
+        -------
+        callable
+            The decorator.
+        """
+
+        def remember(function: Function) -> Function:
+            self.conventions.append(Misconception(function, explanation))
+            return function
+
+        return remember
 
     @property
     def bug(self) -> bool:

@@ -72,8 +72,8 @@ def _changed_line(original: str, mutant: str) -> tuple[str, str]:
     """The line that is changed, after and before; of several the first."""
     before, after = original.splitlines(), mutant.splitlines()
     at = next((i for i, pair in enumerate(zip(before, after, strict=False)) if pair[0] != pair[1]), len(after))
-    changed = f"without {before[at].strip()}" if len(after) < len(before) else after[at].strip()
-    return changed, before[at].strip()
+    changed = after[at].strip() if at < len(after) else "pass"
+    return (f"without {before[at].strip()}" if changed == "pass" else changed), before[at].strip()
 
 
 class _Replacement:
