@@ -480,6 +480,8 @@ def _nothing(exercise: Exercise, trial: Trial) -> Trial:
 
 
 def _compared(exercise: Exercise, trial: Trial, result: Any, patience: Patience) -> Trial:
+    if isinstance(result, list) and len(trial.expected) > 1:
+        result = tuple(result)  # two answers in a list are two answers
     try:
         with contained(_Printed()):  # the result's own methods are a reader's, too
             shapes, actual = patience.call(lambda: ([p.shape for p in as_arrays(result)], exercise.normalised(result)))
