@@ -14,7 +14,7 @@ from camviz.course import notebooks, questions
 from camviz.course.checks import Exercise
 from camviz.course.exercises import exercises
 from camviz.course.material import module
-from camviz.teaching import edition, marking, markup, one_page, parts, plans, sheets
+from camviz.teaching import deck, edition, marking, markup, numbering, one_page, panels, parts, plans, sheets
 
 lesson05 = module("05")
 
@@ -28,6 +28,10 @@ DISTORTION = next(path for path in LESSONS if path.name.startswith("05"))
 def made(path):
     """A lesson's teacher's edition, not to be changed."""
     return edition.teacher_edition(notebooks.read(path))
+
+
+def numbers(path):
+    return numbering.Numbering.of(plans.plan(path.name[:2]), deck.planned_slides(notebooks.read(path)))
 
 
 def cell(source, **output):
@@ -87,7 +91,7 @@ def test_a_lesson_without_a_plan_has_its_keys_all_the_same(monkeypatch):
     cells = edition.teacher_edition(notebooks.read(DISTORTION)).cells
     assert not [one for one in cells if "plan" in one.metadata.get("tags", [])]
     assert [one for one in cells if "key" in one.metadata.get("tags", [])]
-    assert set(sheets.sheets(notebooks.read(DISTORTION), "05")) == {"exercises", "marking"}
+    assert set(sheets.sheets(notebooks.read(DISTORTION), "05", [])) == {"exercises", "marking"}
 
 
 @EACH
@@ -128,8 +132,8 @@ def folder(tmp_path_factory):
 
 def test_an_executed_edition_has_pictures_and_every_solution_is_right_in_it(folder, capsys):
     notebook = notebooks.read(folder / DISTORTION.name)
-    shown = [one for one in notebook.cells if parts.pictures(one)]
-    assert len(shown) == len([one for one in notebooks.read(DISTORTION).cells if parts.pictures(one)])
+    shown = [one for one in notebook.cells if panels.panels(one)]
+    assert len(shown) == len([one for one in notebooks.read(DISTORTION).cells if panels.panels(one)])
     checks = notebooks.tagged(notebook, "check")
     assert len(checks) == len(exercises("05"))
     for one in checks:
@@ -197,7 +201,7 @@ def test_pictures_of_the_lessons_come_along(folder):
 @EACH
 def test_the_sheets_hold_every_exercise_and_the_quiz_and_load_nothing(path):
     number, lesson = path.name[:2], notebooks.read(path)
-    pages = sheets.sheets(lesson, number)
+    pages = sheets.sheets(lesson, number, deck.planned_slides(lesson))
     for name, page in pages.items():
         assert not re.findall(r'(?:src|href)="(?!data:)[^"]*"|url\((?!data:)|@import', page), name
     stubs = notebooks.stubs(lesson)
@@ -305,7 +309,7 @@ def test_the_one_page_says_what_the_lesson_says(path):
     plan = plans.plan(path.name[:2])
     if plan is None:
         pytest.skip("a lesson without a plan has no such page")
-    page = one_page.one_page(notebooks.read(path), plan, path.name)
+    page = one_page.one_page(notebooks.read(path), numbers(path), path.name)
     minutes = [f"{begun}–{ended}" for begun, ended, _ in plan.times(plans.LONG)]
     assert re.findall(r"<tr><td>(\d+–\d+)</td>", page) == minutes
     votes = [step for step in plan.steps if step.kind == "question"][:2]
@@ -318,5 +322,5 @@ def test_the_one_page_names_the_values_that_a_visualizer_opens_with():
     """Lesson 05's first: DistortionView(k1=-0.28, k2=0.07, panels="picture"), "show", k1=(-0.35, 0.35, 0.005)."""
     found = list(one_page.settings(notebooks.read(DISTORTION)))
     assert found[0] == (0, "k1 −0.28, k2 0.07", "show, k1 (−0.35 … 0.35)")
-    page = one_page.one_page(notebooks.read(DISTORTION), plans.plan("05"), DISTORTION.name)
+    page = one_page.one_page(notebooks.read(DISTORTION), numbers(DISTORTION), DISTORTION.name)
     assert "Set k1 −0.28, k2 0.07. Move show, k1 (−0.35 … 0.35)." in page

@@ -14,6 +14,8 @@ from camviz.course.notebooks import Cell, Notebook, exercise_cells, read, soluti
 from camviz.course.questions import Question
 from camviz.course.saved_outputs import tidied
 from camviz.teaching import parts, plans
+from camviz.teaching.deck import planned_slides
+from camviz.teaching.numbering import Numbering
 from camviz.teaching.plans import Plan, Step, Votes
 
 Say = Callable[[str], None]
@@ -137,14 +139,25 @@ def hidden_test(check: str) -> str:
 
 
 def _planned(plan: Plan | None, notebook: Notebook) -> list[Cell]:
-    return [_cell(plan_markdown(plan, parts.titles(notebook)), f"plan-{plan.lesson}", "plan")] if plan else []
+    if not plan:
+        return []
+    numbering = Numbering.of(plan, planned_slides(notebook))
+    return [_cell(plan_markdown(numbering, parts.titles(notebook)), f"plan-{plan.lesson}", "plan")]
 
 
-def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
-    """The plan as a table of minutes, places, and what teacher and class do; then what to bring, and if it fails."""
-    rows = []
+def renumber(edition: Notebook, numbering: Numbering) -> None:
+    """Puts the numbers of these slides into the edition's plan: a solved lesson may have others than an open one."""
+    for cell in edition.cells:
+        if "plan" in cell.metadata.get("tags", []):
+            cell.source = plan_markdown(numbering, parts.titles(edition))
+
+
+def plan_markdown(numbering: Numbering, titles: dict[str, str]) -> str:
+    """The plan as a table of minutes, slides, places, and what teacher and class do; what to skip; what to bring."""
+    rows, plan = [], numbering.plan
     for long, short, step in plan.timetable(UNBROKEN_DASH):
-        cells = (long, short, _linked(step, titles), _one_line(step.teacher), _one_line(step.students))
+        shown = numbering.slides(step).replace("–", UNBROKEN_DASH)
+        cells = (long, short, shown, _linked(step, titles), _one_line(step.teacher), _one_line(step.students))
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(
         [
@@ -152,11 +165,11 @@ def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
             "",
             "Keep this file on your own screen, for it shows the keys. Project the slides and the students' lesson.",
             "",
-            f"| {plans.LONG} min | {plans.SHORT} min | Where | You | The class |",
-            "|---|---|---|---|---|",
+            f"| {plans.LONG} min | {plans.SHORT} min | Slides | Where | You | The class |",
+            "|---|---|---|---|---|---|",
             *rows,
             "",
-            "A step marked – is left out in that plan.",
+            f"A step marked – is left out in that plan. {numbering.sentence}",
             "",
             *(f"* **{title}.** {_one_line(text)}" for title, text in plan.cases),
         ]

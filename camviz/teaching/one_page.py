@@ -17,8 +17,9 @@ from camviz.course.catalogue import described
 from camviz.course.notebooks import Notebook
 from camviz.course.questions import Question
 from camviz.draw.page import document
-from camviz.teaching import markup, parts, plans
+from camviz.teaching import markup, panels, parts, plans
 from camviz.teaching.edition import place
+from camviz.teaching.numbering import Numbering
 from camviz.teaching.plans import Plan
 
 VOTES, PICTURES = 2, 6
@@ -29,8 +30,9 @@ FULL, LARGEST, SMALLEST = 4700, 8.6, 6.5
 _UNSHOWN = {"panels", "yours"}  # which panels are open is seen, and one's own function is not on the projector
 
 
-def one_page(notebook: Notebook, plan: Plan, file: str) -> str:
-    """The page of a lesson with a plan; `file` is the notebook's name."""
+def one_page(notebook: Notebook, numbering: Numbering, file: str) -> str:
+    """The page of a lesson with a plan and numbered slides; `file` is the notebook's name."""
+    plan = numbering.plan
     told = described(notebook, file)
     learned = _learned(notebook.cells[0].source)
     goal = f"<p><b>They learn</b> {markup.inline(learned)}.</p>" if learned else ""
@@ -38,7 +40,7 @@ def one_page(notebook: Notebook, plan: Plan, file: str) -> str:
     right = f"<h2>Two votes, and what students get wrong</h2>{_votes(plan)}"
     body = (
         f"<p>{markup.inline(told.question)} <b>Nobody leaves without:</b> {escape(told.takeaway)}.</p>{goal}"
-        f"{_minutes(notebook, plan)}<div class='halves'>{left}{right}</div>"
+        f"{_minutes(notebook, numbering)}<div class='halves'>{left}{right}</div>"
     )
     letters = len(re.sub(r"<[^>]*>", "", unescape(body)))
     size = min(LARGEST, max(SMALLEST, LARGEST * (FULL / letters) ** 0.5))
@@ -54,16 +56,16 @@ def _learned(header: str) -> str:
     return titled.get("What you'll learn", "").rstrip(".")
 
 
-def _minutes(notebook: Notebook, plan: Plan) -> str:
+def _minutes(notebook: Notebook, numbering: Numbering) -> str:
     titles, rows = parts.titles(notebook), ""
-    for long, short, step in plan.timetable():
+    for long, short, step in numbering.plan.timetable():
         if long != "–":
-            told = prose.inline(_brief(step.teacher, 24))
-            rows += (
-                f"<tr><td>{long}</td><td>{short}</td><td>{markup.inline(place(step, titles))}</td><td>{told}</td></tr>"
-            )
-    head = f"<th>{plans.LONG} min</th><th>{plans.SHORT}</th><th>where</th><th>you</th>"
-    return f"<table class='minutes'><tr>{head}</tr>{rows}</table>"
+            where, told = markup.inline(place(step, titles)), prose.inline(_brief(step.teacher, 24))
+            cells = (long, short, numbering.slides(step), where, told)
+            rows += f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+    heads = (f"{plans.LONG} min", plans.SHORT, "slides", "where", "you")
+    head = "".join(f"<th>{one}</th>" for one in heads)
+    return f"<table class='minutes'><tr>{head}</tr>{rows}</table><p>{numbering.sentence}</p>"
 
 
 def _shown(notebook: Notebook, plan: Plan) -> str:
@@ -71,7 +73,7 @@ def _shown(notebook: Notebook, plan: Plan) -> str:
     titled = [one for one in settings(notebook) if one[1] or one[2]][:PICTURES]
     rows = ""
     for number, setting, moved in titled:
-        noticed = prose.inline(plan.notice[number]) if number < len(plan.notice) else ""
+        noticed = prose.inline(plan.notice[number].text) if number < len(plan.notice) else ""
         start = f"Set {setting}. " if setting else ""
         rows += f"<li>{noticed} <span>{escape(start)}Move {escape(moved)}.</span></li>"
     return f"<ol>{rows}</ol>"
@@ -81,7 +83,7 @@ def settings(notebook: Notebook) -> Iterator[tuple[int, str, str]]:
     """Of each visualizer its number among the lesson's pictures, the values it opens with, and its controls."""
     number = 0
     for cell in notebook.cells:
-        if parts.pictures(cell):
+        if panels.panels(cell):
             for call in _explored(cell.source):
                 named = {one.arg: one.value for one in call.keywords if one.arg}
                 controls = [str(ast.literal_eval(one)) for one in call.args[1:]]
