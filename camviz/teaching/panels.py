@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import unescape
 from itertools import combinations, pairwise
-from math import inf
 
 from camviz.course.notebooks import Cell
 
@@ -17,7 +16,7 @@ SLIDE = 1280.0
 """Pixels across the slide for which panels are laid out; on any other they keep their proportions."""
 WIDTH, HEIGHT, GAP = 1228.0, 604.0, 10.0
 """Of the room below a heading of one line, and between two panels, in pixels of that slide."""
-HEADING_LINE, LETTERS_A_LINE = 37.0, 54
+HEADING_LINE, LETTERS_A_LINE = 37.0, 62
 """What a further line of the heading takes from the height, and how many letters fill a line."""
 LEAST_TEXT = 14.0
 """Pixels of the smallest letters on a slide of 1280 pixels."""
@@ -108,15 +107,15 @@ class Page:
 def pages(shown: Sequence[Panel], heading: str, together: Sequence[str] = ()) -> list[Page]:
     """Panels on as few pages as keep every word legible, each page as large as it fits below `heading`, which is HTML.
 
-    They keep their order, except that the panels named in `together`, if any, have the first page for themselves. A
-    panel that is too large by itself has a page of its own, where it is as large as it fits.
+    They keep their order, except that the panels named in `together`, if any, have the first page for themselves,
+    whatever their size. A panel that is too large by itself has a page of its own, where it is as large as it fits.
     """
     letters = len(unescape(re.sub(r"<[^>]*>", "", heading)))
     height = HEIGHT - HEADING_LINE * max(0, -(-letters // LETTERS_A_LINE) - 1)
     if together and len(_filled(shown, height)) > 1:
         first = [one for one in shown if one.name in together]
         rest = [one for one in shown if one.name not in together]
-        return [*_filled(first, height), *_filled(rest, height)]
+        return [_page(first, height), *_filled(rest, height)]
     return _filled(shown, height)
 
 
@@ -130,20 +129,20 @@ def _filled(shown: Sequence[Panel], height: float) -> list[Page]:
 
 
 def _page(shown: Sequence[Panel], height: float) -> Page:
-    """The rows in which panels are largest."""
-    best = Page((), -inf)
-    for count in range(1, len(shown) + 1):
-        for rows in _divisions(shown, count):
-            scale = _scale(rows, height)
-            if scale > best.scale:
-                best = Page(tuple(map(tuple, rows)), scale)
-    return best
+    """The rows in which panels are largest; of several, the fewest and the shortest."""
+    divided = [rows for count in range(1, len(shown) + 1) for rows in _divisions(shown, count)]
+    pages = [Page(tuple(map(tuple, rows)), _scale(rows, height)) for rows in divided]
+    return max(pages, key=lambda one: (round(one.scale, 3), -len(one.rows), -max(map(_width, one.rows))))
 
 
 def _scale(rows: Sequence[Sequence[Panel]], height: float) -> float:
-    across = min((WIDTH - GAP * (len(row) - 1)) / sum(one.size[0] for one in row) for row in rows)
+    across = min((WIDTH - GAP * (len(row) - 1)) / _width(row) for row in rows)
     down = (height - GAP * (len(rows) - 1)) / sum(max(one.size[1] for one in row) for row in rows)
     return min(across, down, LARGEST)
+
+
+def _width(row: Sequence[Panel]) -> float:
+    return sum(panel.size[0] for panel in row)
 
 
 def _legible(page: Page) -> bool:

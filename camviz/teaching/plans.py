@@ -37,7 +37,7 @@ from camviz.course import notebooks, questions
 from camviz.course.exercises import exercises
 from camviz.course.material import material
 from camviz.course.tables import shaped, table_of
-from camviz.teaching import markup, panels, parts
+from camviz.teaching import markup, panels
 
 LONG, SHORT = 90, 45
 GUESS = "a guess"

@@ -21,8 +21,8 @@ from camviz.teaching.plans import Notice
 
 MOST_WORDS, HEADING_WORDS, LEAST_WORDS = 40, 18, 5
 RECAP_WORDS, RECAP_ROWS = 55, 3
-GIVEN_LINES = 9
-"""Of a function that is given and wrong: a longer one is shown by its first line."""
+GIVEN_LINES, CODE_LETTERS = 8, 62
+"""Of a function that is given and wrong, each line so many letters: a longer one is shown by its first line."""
 
 LONGEST_LINE, LONG_QUESTION = 60, 75
 WITHHELD = "<p class='withheld'>Your own function draws this picture. Run its cell in the lesson, and it is there.</p>"
@@ -153,11 +153,15 @@ def _of_code(cell: Cell, place: _Place, following: list[Cell]) -> Iterator[Slide
 def _picture(cell: Cell, shown: list[Panel], place: _Place, following: list[Cell]) -> Iterator[Slide]:
     noticed = place.notice.pop(0) if place.notice else None
     heading = prose.inline(noticed.text.rstrip(".")) if noticed else _to_notice(place, following)
+    at = place.of_picture(cell)
+    if cell.id in place.withheld:
+        yield Slide("picture", place.part, heading, WITHHELD, at)
+        return
     pages = panels.pages(shown, heading, noticed.panels if noticed else ())
-    for number, page in enumerate(pages, start=1):
-        which = f" <small>({number} of {len(pages)})</small>" if len(pages) > 1 else ""
-        body = WITHHELD if cell.id in place.withheld else page.html
-        yield Slide("picture", place.part, f"{heading}{which}", body, place.of_picture(cell))
+    yield Slide("picture", place.part, heading, pages[0].html, at)
+    for page in pages[1:]:
+        names = ", ".join(escape(panel.name) for row in page.rows for panel in row if panel.name)
+        yield Slide("picture more", place.part, f"<small>The same view: {names}</small>", page.html, at)
 
 
 def _to_notice(place: _Place, following: list[Cell]) -> str:
@@ -200,7 +204,7 @@ def _as_heading(sentence: str) -> str:
 def _exercise(cell: Cell, place: _Place) -> Slide:
     task = markup.opening(place.said, MOST_WORDS)
     lines = cell.source[cell.source.find("def ") :].splitlines()
-    given = not parts.is_open(cell) and len(lines) <= GIVEN_LINES
+    given = not parts.is_open(cell) and sum(-(-len(line) // CODE_LETTERS) for line in lines) <= GIVEN_LINES
     code = "\n".join(lines if given else lines[:1])
     body = f"{f'<p>{markup.inline(task)}</p>' if task else ''}<pre>{escape(code)}</pre>"
     return Slide("exercise", place.part, markup.inline(place.heading), body)
