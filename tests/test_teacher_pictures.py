@@ -2,7 +2,6 @@
 
 import re
 from base64 import b64decode, b64encode
-from dataclasses import replace
 from functools import cache
 from html import unescape
 from pathlib import Path

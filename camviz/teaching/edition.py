@@ -42,7 +42,7 @@ def teacher_edition(notebook: Notebook) -> Notebook:
         if details.cell_type == "markdown":
             details.source = details.source.replace("<details>", "<details open>")
     plan = plans.plan(parts.number_of(notebook))
-    beside = [(*_notes(one), *_keys(one, plan)) for one in edition.cells]
+    beside = [(*_notes(one, plan), *_keys(one, plan)) for one in edition.cells]
     cells = [cell for one, more in zip(edition.cells, beside, strict=True) for cell in (one, *more)]
     if plan:
         _anchored(cells, plan, parts.titles(notebook))
@@ -232,8 +232,14 @@ def key_markdown(question: Question, votes: Votes | None) -> str:
     return "\n".join([lines[0], "", lines[1], ">", *lines[2:]])
 
 
-def _notes(cell: Cell) -> list[Cell]:
-    note = cell.metadata.get("camviz", {}).get("teacher")
+def _notes(cell: Cell, plan: Plan | None) -> list[Cell]:
+    """The note of a cell. The minutes that one gives are a reader's, who votes with nobody: a class has the plan's."""
+    note = cell.metadata.get("camviz", {}).get("teacher", "")
+    if plan:
+        of_class = f"and a class {plans.LONG} or {plans.SHORT}, as the plan says"
+        note = re.sub(
+            r"\*\*(\d+) minutes(\.?)\*\*", rf"This lesson takes a reader about \1 minutes, {of_class}\2", note
+        )
     text = f"> **For the teacher:** {note.strip()}".replace("\n", "\n> ") if note else ""
     return [_cell(text, f"teacher-{cell.id}", "teacher")] if note else []
 

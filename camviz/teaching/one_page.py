@@ -9,6 +9,7 @@ import ast
 import re
 from collections.abc import Iterator
 from html import escape, unescape
+from importlib import import_module
 from importlib.resources import files
 from typing import Any
 
@@ -26,8 +27,6 @@ VOTES, PICTURES = 2, 6
 """How many questions and how many pictures fit."""
 FULL, LARGEST, SMALLEST = 4700, 8.6, 6.5
 """Letters that fill the page when it is set in LARGEST pt; more letters are set smaller, down to SMALLEST."""
-
-_UNSHOWN = {"panels", "yours"}  # which panels are open is seen, and one's own function is not on the projector
 
 
 def one_page(notebook: Notebook, numbering: Numbering, file: str) -> str:
@@ -80,18 +79,24 @@ def _shown(notebook: Notebook, plan: Plan) -> str:
 
 
 def settings(notebook: Notebook) -> Iterator[tuple[int, str, str]]:
-    """Of each visualizer its number among the lesson's pictures, the values it opens with, and its controls."""
-    number = 0
+    """Of each visualizer its number among the lesson's pictures, the values it opens with, and its controls.
+
+    A control is called what stands on it.
+    """
+    number, code = 0, ""
     for cell in notebook.cells:
+        code += f"{cell.source}\n" if cell.cell_type == "code" else ""
         if panels.panels(cell):
             for call in _explored(cell.source):
-                named = {one.arg: one.value for one in call.keywords if one.arg}
+                view = _view(call.args[0], code)
+                labels = _labels(view, code)
+                named = {one.arg: one.value for one in call.keywords if one.arg in labels}
                 controls = [str(ast.literal_eval(one)) for one in call.args[1:]]
-                yield (
-                    number,
-                    _values(_view(call.args[0], cell.source)),
-                    ", ".join([*controls, *map(_ranged, named.items())]),
-                )
+                moved = [
+                    *(labels.get(one, one.replace("_", " ")) for one in controls),
+                    *(_ranged(labels[a], b) for a, b in named.items()),
+                ]
+                yield number, _values(view, labels), ", ".join(moved)
             number += 1
 
 
@@ -102,24 +107,48 @@ def _explored(source: str) -> list[ast.Call]:
     return [call for call in found if all(isinstance(one, ast.Constant) for one in call.args[1:])]
 
 
-def _view(node: ast.expr, source: str) -> ast.expr:
-    """What is explored: the call that makes it, in the cell, where it has a name."""
+def _view(node: ast.expr, code: str) -> ast.expr:
+    """What is explored: the call that makes it, in this cell or before it, where it has a name."""
     if isinstance(node, ast.Name):
-        for statement in ast.parse(source).body:
+        for statement in reversed(ast.parse(code).body):
             if isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == node.id:
                 return statement.value
     return node
 
 
-def _values(view: ast.expr) -> str:
-    """The numbers and words that a view is made with, such as "k1 −0.28, k2 0.07"."""
-    named = [one for one in view.keywords if one.arg not in _UNSHOWN] if isinstance(view, ast.Call) else []
-    told = [(one.arg, _literal(one.value)) for one in named]
+def _labels(view: ast.expr, code: str) -> dict[str, str]:
+    """What stands on each control of a view, by the name that the view's code has for it; {} for no known view.
+
+    `code` is all that has been run before; where the view has a name, its class is what the name was made with.
+    """
+    nodes = list(ast.walk(ast.parse(code)))
+    modules = {name.name: node.module for node in nodes if isinstance(node, ast.ImportFrom) for name in node.names}
+    made = [node for node in nodes if isinstance(node, ast.Assign)]
+    looked, to_look = set(), _names(view)
+    while to_look:
+        name = to_look.pop(0)
+        looked.add(name)
+        found = getattr(import_module(modules[name] or ""), name) if name in modules else None
+        if hasattr(found, "controls"):
+            return {field: control.label for field, control in found.controls().items()}
+        before = [one.value for one in reversed(made) if name in _names(*one.targets)]
+        to_look += [one for value in before for one in _names(value) if one not in looked]
+    return {}
+
+
+def _names(*nodes: ast.expr) -> list[str]:
+    return [one.id for node in nodes for one in ast.walk(node) if isinstance(one, ast.Name)]
+
+
+def _values(view: ast.expr, labels: dict[str, str]) -> str:
+    """The numbers and words that a view's controls are set to, such as "k1 −0.28, k2 0.07"."""
+    named = [one for one in view.keywords if one.arg in labels] if isinstance(view, ast.Call) else []
+    told = [(labels[one.arg or ""], _literal(one.value)) for one in named]
     return ", ".join(f"{name} {_written(value)}" for name, value in told if isinstance(value, bool | int | float | str))
 
 
-def _ranged(item: tuple[str, ast.expr]) -> str:
-    name, value = item[0], _literal(item[1])
+def _ranged(name: str, limits: ast.expr) -> str:
+    value = _literal(limits)
     ends = value if isinstance(value, tuple) and len(value) > 1 else ()
     return f"{name} ({_written(ends[0])} … {_written(ends[1])})" if ends and not isinstance(ends[0], str) else name
 
