@@ -129,7 +129,7 @@ def _labels(view: ast.expr, code: str) -> dict[str, str]:
         name = to_look.pop(0)
         looked.add(name)
         found = getattr(import_module(modules[name] or ""), name) if name in modules else None
-        if hasattr(found, "controls"):
+        if found is not None and hasattr(found, "controls"):
             return {field: control.label for field, control in found.controls().items()}
         before = [one.value for one in reversed(made) if name in _names(*one.targets)]
         to_look += [one for value in before for one in _names(value) if one not in looked]
