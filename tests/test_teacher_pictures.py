@@ -17,7 +17,7 @@ from camviz.teaching import deck, panels, parts, plans, slides
 LESSONS = sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))
 EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 BESIDE = re.compile(r"\b(?:Left|Right|Middle):|\b(?:left|right) (?:one|picture)\b|\bon the (?:left|right)\b")
-BELOW = re.compile(r"\bBelow:|\b(?:[Ll]ower|[Uu]pper) (?:row|right|left)\b")
+BELOW = re.compile(r"\bBelow:|\b(?:Lower|lower|Upper|upper) (?:row|right|left)\b")
 DRAWN_BY = {  # what a heading may speak of, and the panels that draw it, or words of a plot's description
     r"contours?": "displacements",
     r"[Cc]urves?": "radial curve|curves?|section|towards the corner|right picture|Plot",
