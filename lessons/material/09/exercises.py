@@ -174,7 +174,7 @@ def divided_by_the_whole_length(points, f, cx, cy):
 
 
 @EQUIDISTANT.wrong(
-    "The arcsine knows the angle up to 90° only, so that points behind the camera come out in front. np.arctan2(r, z) "
+    "The arcsine never exceeds a right angle, so that points behind the camera come out in front. np.arctan2(r, z) "
     "knows the sign of z."
 )
 def by_the_arc_sine(points, f, cx, cy):
@@ -484,7 +484,7 @@ def clamped_at_half_a_turn(radius, k1, k2):
     return np.minimum(_newton(radius, k1, k2, 20), np.pi)
 
 
-@ANGLE.wrong("You let angles up to 3.2 pass. The limit is π itself, `np.pi`, 3.14159…: no ray has an angle beyond it.")
+@ANGLE.wrong("You let angles a little above π pass. The limit is π itself, `np.pi`: no ray has an angle beyond it.")
 def three_point_two_for_pi(radius, k1, k2):
     theta = _newton(radius, k1, k2, 20)
     return np.where(theta <= 3.2, theta, np.nan)
@@ -637,8 +637,8 @@ def with_a_very_small_number_beside_zero(width, height, f_window, yaw, f, cx, cy
 
 
 @WINDOW_MAP.wrong(
-    "The pixel in the middle of a 5 × 5 window at yaw 0 looks along the axis itself, and there your direction is 0/0, "
-    "NaN. The fisheye has that ray at (cx, cy): divide by something else where √(x² + y²) is 0."
+    "The pixel in the middle of a window that looks straight ahead may lie on the axis itself, and there yours "
+    "is 0/0, NaN. The fisheye has that ray at (cx, cy): divide by something else where √(x² + y²) is 0."
 )
 def nothing_on_the_axis(width, height, f_window, yaw, f, cx, cy):
     return equidistant(_turned(_rays(width, height, f_window), yaw), f, cx, cy)

@@ -349,8 +349,8 @@ def _double_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         alpha = float(rng.choice([rng.uniform(0.35, 0.45), rng.uniform(0.55, 0.65)]))
         yield _in_front(rng, shape), sign * float(rng.uniform(0.1, 0.3)), alpha
     beside = rng.uniform(0.5, 1.0, (4, 3)) * rng.choice([-1, 1], (4, 3)) * [1, 1, 0]
-    behind = beside - np.array([0.0, 0.0, 0.2]) * np.arange(4)[:, None] / 3  # from beside the camera to behind it
-    yield behind * rng.uniform(0.5, 2), float(rng.uniform(0.1, 0.3)), float(rng.uniform(0.55, 0.65))
+    behind = beside - np.array([0.0, 0.0, 0.4]) * np.arange(4)[:, None] / 3  # from beside the camera to behind it
+    yield behind * rng.uniform(0.5, 2), float(rng.uniform(0.1, 0.2)), float(rng.uniform(0.55, 0.65))
 
 
 DOUBLE_SPHERE = Exercise(

@@ -280,6 +280,7 @@ def _malvar_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     bright = rng.uniform(0.8, 1, (5, 5, 5))  # among greens of 0.8 and more, a red that stands out by as much
     bright[:, [0, 4], 2], bright[:, 2, [0, 4]] = rng.uniform(0, 0.2, (2, 5, 2))
     yield (bright,)
+    yield (-bright,)
 
 
 MALVAR_GREEN = Exercise(
@@ -587,6 +588,7 @@ def _edge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     draw = rng.integers(-8, 8, (6, 5, 5)) / 8
     draw[..., :, 2] = 2 * draw[..., 2, 2, None] - draw[..., 2, :]  # upside down, the column changes as much as the row
     yield (draw,)
+    yield (draw - 4,)
 
 
 EDGE_GREEN = Exercise(

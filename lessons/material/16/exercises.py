@@ -522,35 +522,37 @@ def with_the_rounded_factor_of_the_lesson(residuals):
     return np.int64(2) if lines >= 0.5 else np.int64(off.max())
 
 
-@TRIAGE.wrong("You compare with 6 *median lengths*. The median length is 1.177 σ: divide it by √(2 ln 2) first.")
+@TRIAGE.wrong(
+    "You compare with multiples of the *median length*, which is longer than σ: divide it by its factor first."
+)
 def rayleigh_s_factor_forgotten(residuals):
     return _triage(residuals, times=6 * RAYLEIGH)
 
 
-@TRIAGE.wrong("You multiply the median by √(2 ln 2). The median length is *longer* than σ by that factor: divide.")
+@TRIAGE.wrong("You multiply the median by its factor. The median length is *longer* than σ: divide.")
 def multiplied_by_rayleigh_s_factor(residuals):
     return _triage(residuals, times=6 * RAYLEIGH**2)
 
 
-@TRIAGE.wrong("You divide the median by 2 ln 2. The factor is its *root*, √(2 ln 2) = 1.177.")
+@TRIAGE.wrong("You divide the median by the square of its factor: a *root* is missing.")
 def without_the_root_of_the_factor(residuals):
     return _triage(residuals, times=6 / RAYLEIGH)
 
 
 @TRIAGE.wrong(
-    "1.4826 belongs to the median of the *absolute values* of one coordinate. A median length in the plane is divided "
-    "by √(2 ln 2)."
+    "Your factor belongs to the median of the *absolute values* of one coordinate. A median *length* in the plane has "
+    "another."
 )
 def factor_of_a_single_coordinate(residuals):
     return _triage(residuals, times=6 * 1.4826 * RAYLEIGH)
 
 
-@TRIAGE.wrong("Your limit is 12 σ, twice what is asked. Corners between 6 and 12 σ are off as well.")
+@TRIAGE.wrong("Your limit is twice as far as the one that is asked for. Corners between the two are off as well.")
 def twelve_sigma(residuals):
     return _triage(residuals, times=12.0)
 
 
-@TRIAGE.wrong("Your limit is 5 σ. A corner between 5 and 6 σ is far, but here it is not yet off.")
+@TRIAGE.wrong("Your limit is nearer than the one that is asked for. A corner between the two is far, and not yet off.")
 def five_sigma(residuals):
     return _triage(residuals, times=5.0)
 

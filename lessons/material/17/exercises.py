@@ -96,7 +96,7 @@ def by_the_brightest_value(profile, step):
     return np.diff(profile) / step / np.max(profile)
 
 
-@LINE_SPREAD.wrong("You take the differences backwards, earlier less later: an edge's own area comes out as −1.")
+@LINE_SPREAD.wrong("You take the differences backwards, earlier less later: the area comes out negative.")
 def backwards(profile, step):
     return (profile[:-1] - profile[1:]) / step / (profile[-1] - profile[0])
 
