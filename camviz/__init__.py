@@ -16,14 +16,14 @@ __version__ = "0.1.0"
 """
 
 _HOME = {
-    "Calibration": "camviz.calibration",
+    "Calibration": "camviz_clinic.calibration",
     "Camera": "camviz.cameras",
     "Intrinsics": "camviz.cameras",
     "Rig": "camviz.cameras",
     "explore": "camviz.widgets",
-    "inspect": "camviz.widgets.inspection",
-    "join": "camviz.room.membership",
-    "load": "camviz.files",
+    "inspect": "camviz_clinic.report.notebook",
+    "join": "camviz_school.room.membership",
+    "load": "camviz_clinic.files",
     "look_at": "camviz.cameras",
 }
 
@@ -63,16 +63,16 @@ def __dir__() -> list[str]:
 
 
 def _show_calibrations() -> None:
-    """Have IPython, where it runs, show a bare calibration by `camviz.report.glance`, imported when it is wanted."""
+    """Have IPython, where it runs, show a bare calibration by `camviz_clinic.report.glance`, imported when it is wanted."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if shell is None:
         return
-    formatters, calibration = shell.display_formatter.formatters, ("camviz.calibration.types", "Calibration")
+    formatters, calibration = shell.display_formatter.formatters, ("camviz_clinic.calibration.types", "Calibration")
     formatters["text/html"].for_type_by_name(
-        *calibration, lambda shown: import_module("camviz.report.glance").html(shown)
+        *calibration, lambda shown: import_module("camviz_clinic.report.glance").html(shown)
     )
     formatters["text/plain"].for_type_by_name(
-        *calibration, lambda shown, printer, _: printer.text(import_module("camviz.report.glance").text(shown))
+        *calibration, lambda shown, printer, _: printer.text(import_module("camviz_clinic.report.glance").text(shown))
     )
 
 

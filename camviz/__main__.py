@@ -2,7 +2,7 @@
 
 import sys
 
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
 
 if __name__ == "__main__":
     sys.exit(main())

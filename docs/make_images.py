@@ -4,13 +4,13 @@ from pathlib import Path
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
-from camviz.views.calibration import CalibrationView
+from camviz_clinic.views.calibration import CalibrationView
 from camviz.views.colour import ColourView
 from camviz.views.demosaicing import DemosaicingView
 from camviz.views.depth_of_field import DepthOfFieldView
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
-from camviz.views.fault_lab import FaultLabView
+from camviz_clinic.views.fault_lab import FaultLabView
 from camviz.views.fisheye import FisheyeView
 from camviz.views.frustum import FrustumView
 from camviz.views.image_sensor import ImageSensorView

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.problem import moved
-from camviz.calibration.types import Board
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.problem import moved
+from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.types import Board, Calibration
+from camviz_clinic.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 

@@ -18,8 +18,8 @@ from camviz.sensors import Sensor
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import Level
 from camviz.views.base import View
-from camviz.views.board_poses import BoardPosesView
-from camviz.views.clinic.catalogue import VIEWS, Case
+from camviz_clinic.views.board_poses import BoardPosesView
+from camviz_clinic.views.catalogue import VIEWS, Case
 from camviz.views.measured_edge import MeasuredEdgeView
 from camviz.views.measured_noise import MeasuredNoiseView
 

@@ -107,6 +107,6 @@ def test_what_is_true_needs_nothing_that_draws(name: str) -> None:
 
 
 def test_the_lessons_material_is_read_by_the_course_alone() -> None:
-    """No module of the package imports a lesson's own: they are loaded by `camviz.course.material`."""
+    """No module of the package imports a lesson's own: they are loaded by `camviz_school.course.material`."""
     named = [name for name, path in MODULES.items() if "lessons.material" in path.read_text(encoding="utf-8")]
     assert named == []

@@ -7,10 +7,10 @@ import types
 import pytest
 from commandline import ROOT, refused
 
-from camviz.commands import lab
-from camviz.commands.command import main
-from camviz.course import material
-from camviz.course.working_copy import MANIFEST, lay_out
+from camviz_school.commands import lab
+from camviz_clinic.commands.command import main
+from camviz_school.course import material
+from camviz_school.course.working_copy import MANIFEST, lay_out
 
 
 @pytest.fixture
@@ -138,7 +138,7 @@ def test_a_checkout_opens_its_own_lessons(jupyter, room, capsys):
     (words,) = jupyter
     assert words[:4] == [
         f"--ServerApp.root_dir={(ROOT / 'lessons').resolve()}",
-        "--ServerApp.jpserver_extensions=camviz.server=True",
+        "--ServerApp.jpserver_extensions=camviz_school.server=True",
         "--no-browser",
         "--port=9999",
     ]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import yaml
 
-from camviz.calibration.redundancy import half_last_digit
-from camviz.clinic import inspect, inspect_file
-from camviz.files import load
+from camviz_clinic.calibration.redundancy import half_last_digit
+from camviz_clinic.checks import inspect, inspect_file
+from camviz_clinic.files import load
 from camviz.poses import RigidTransform, Rotation
 
 TURN = Rotation.from_euler("xyz", [2.03, -1.27, 0.71], degrees=True)

@@ -6,7 +6,7 @@ import pytest
 from every_view import words
 
 from camviz import mosaics
-from camviz.course.material import module
+from camviz_school.course.material import module
 from camviz.mosaics import BAYER, PATTERNS, XTRANS
 from camviz.scenes import to_display, to_linear
 from camviz.scenes.photographs import photograph

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import Detections, calibrate, detect
+from camviz_clinic.calibration import Detections, calibrate, detect
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import Board
+from camviz_clinic.files import Board
 from camviz.lenses import KannalaBrandt
 from camviz.scenes import board_corners, snapshot, textured_scene
 from camviz.scenes.standard import SQUARE

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.course.exercises import exercises
+from camviz_school.course.exercises import exercises
 from camviz.scenes import snapshot, textured_scene
 from camviz.views.fisheye import EQUATIONS, LENSES, FisheyeView
 

@@ -8,7 +8,7 @@ import pytest
 from test_tiles import problems, unit_on_a_telephone
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.material import module
+from camviz_school.course.material import module
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors import decibel, gliding, rolling_picture
 from camviz.views.image_sensor import ImageSensorView

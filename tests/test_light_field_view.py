@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from camviz.course.exercises import exercises
+from camviz_school.course.exercises import exercises
 from camviz.lightfields import LightField
 from camviz.scenes import to_display, to_linear
 from camviz.views import garden_field

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from camviz.calibration.types import Calibration
+from camviz_clinic.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
 from camviz.distortion import remap, undistort_maps
-from camviz.files.lookup_tables import LookupTables, RayTable, table_error
-from camviz.files.writing import write
+from camviz_clinic.files.lookup_tables import LookupTables, RayTable, table_error
+from camviz_clinic.files.writing import write
 from camviz.lenses import BrownConrady, DoubleSphere, KannalaBrandt
 from camviz.poses import RigidTransform
 

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from camviz import samples, twoview
+from camviz import twoview
+from camviz_school import samples
 from camviz.cameras import Camera, Intrinsics
-from camviz.samples import motorcycle
+from camviz_school.samples import motorcycle
 from camviz.scenes import snapshot, textured_scene
 
 EACH = pytest.mark.parametrize("method", twoview.METHODS)

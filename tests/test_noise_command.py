@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.commands.command import main
-from camviz.commands.noise import NOISE
+from camviz_clinic.commands.command import main
+from camviz_clinic.commands.noise import NOISE
 from camviz.sensors import Sensor
 
 SENSOR = Sensor(

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from every_view import words
 
-from camviz.course.exercises import exercises
+from camviz_school.course.exercises import exercises
 from camviz.lenses import UnifiedSphere
 from camviz.panoramas.reprojection import reproject
 from camviz.scenes import snapshot, textured_scene

@@ -10,7 +10,7 @@ from hatchling.metadata.core import ProjectMetadata
 from hatchling.plugin.manager import PluginManager
 from packaging.requirements import Requirement
 
-from camviz import samples
+from camviz_school import samples
 from camviz.scenes.photographs import PHOTOGRAPHS, photograph_credit
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -59,7 +59,7 @@ def sources():
 
 
 def imported(name):
-    if name == "camviz.meshes":
+    if name == "camviz_clinic.meshes":
         pytest.importorskip("pyvista")
     return importlib.import_module(name)
 

@@ -11,10 +11,10 @@ import pytest
 from calibrations import bare, pair, sick, single
 
 import camviz
-from camviz.clinic import Inspection, inspect, inspect_file, kinds
-from camviz.report.inspection import MOST_VIEWS, report, write_report
-from camviz.views.clinic.catalogue import ALIASES, VIEWS
-from camviz.widgets.inspection import LiveInspection
+from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
+from camviz_clinic.report.inspection import MOST_VIEWS, report, write_report
+from camviz_clinic.views.catalogue import ALIASES, VIEWS
+from camviz_clinic.report.notebook import LiveInspection
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -202,7 +202,7 @@ def displayed(monkeypatch):
 
 def test_a_saved_notebook_keeps_the_findings_and_a_still(displayed, monkeypatch):
     monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
-    inspection = camviz.inspect(sick())
+    inspection = camviz_clinic.inspect(sick())
     live = LiveInspection(inspection)
     live._ipython_display_()
     words, still, widget = displayed

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
 from camviz.panoramas.projections import PROJECTIONS, across_deg, projection
 
 DATA = Path(__file__).parent / "data"

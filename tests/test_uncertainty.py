@@ -15,10 +15,10 @@ from boards import BOARD, CAMERA, RIGHT, board_poses, noisy, truth
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.difference import aligned, difference, pixel_grid
-from camviz.calibration.jacobian import pixel_jacobian
-from camviz.calibration.uncertainty import (
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.difference import aligned, difference, pixel_grid
+from camviz_clinic.calibration.jacobian import pixel_jacobian
+from camviz_clinic.calibration.uncertainty import (
     mean_deviation,
     projection_covariance,
     projection_jacobian,

@@ -22,9 +22,9 @@ from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
 from scripts import question_script  # noqa: E402
 
-from camviz.course.exercises import exercises  # noqa: E402
-from camviz.course.glossary import glossary  # noqa: E402
-from camviz.course.material import lesson_paths  # noqa: E402
+from camviz_school.course.exercises import exercises  # noqa: E402
+from camviz_school.course.glossary import glossary  # noqa: E402
+from camviz_school.course.material import lesson_paths  # noqa: E402
 from camviz.views.frustum import FrustumView  # noqa: E402
 from camviz.widgets import explore  # noqa: E402
 
@@ -92,7 +92,7 @@ def test_a_page_has_every_question_with_all_choices_and_replies(pair) -> None:
 
 
 def words_of_prose(text: str) -> list[str]:
-    from camviz.course import prose
+    from camviz.draw import prose
 
     return words(prose.to_html(text))
 
@@ -133,7 +133,7 @@ def test_pictures_with_one_content_are_one_file(tmp_path: Path) -> None:
 
 
 def test_the_pages_script_is_the_notebooks_own() -> None:
-    source = (ROOT / "camviz/widgets/question.js").read_text(encoding="utf-8")
+    source = (ROOT / "camviz_school/widgets/question.js").read_text(encoding="utf-8")
     assert source.removesuffix("export default { render };\n") in question_script()
 
 

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import clips
 
-from camviz.samples import local_sample
+from camviz_school.samples import local_sample
 
 RECORDINGS = "_recordings"
 SIZE = 950_000
@@ -118,7 +118,7 @@ class Recorder:
 
 def code_cells(path: Path) -> dict[int, CodeCell]:
     """The code of a notebook by the numbers of its cells."""
-    from camviz.course.notebooks import read
+    from camviz_school.course.notebooks import read
 
     return {
         number: CodeCell(cell.source, tuple(cell.metadata.get("camviz", {}).get("together", ())))
@@ -149,8 +149,8 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> s
 
 
 def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder) -> Any:
-    from camviz.record import Budget, record
-    from camviz.record.panes import Explored
+    from camviz_school.record import Budget, record
+    from camviz_school.record.panes import Explored
 
     return record(Explored(explorer, together), recorder.folder, budget=Budget(SIZE, recorder.positions))
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.calibration.picture_files import read_picture
+from camviz.colour.picture_files import read_picture
 from camviz.lightfields.field import LightField
 
 _HCI = re.compile(r"input_Cam(\d+)\.png")

@@ -380,7 +380,7 @@ class _Reader:
 
 def _grey(path: Path) -> Frame:
     """A frame (height, width) of 8 or 16 bits, or one of 32 bits whose values are whole numbers of 16."""
-    from camviz.calibration.picture_files import PictureError, picture_kind, read_picture
+    from camviz.colour.picture_files import PictureError, picture_kind, read_picture
 
     try:
         if picture_kind(path) == "JPEG":

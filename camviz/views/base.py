@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz.course.yours import tried
+from camviz.views.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import Cell, Tile
 from camviz.draw.orbit_camera import OrbitCamera

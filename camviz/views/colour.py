@@ -17,7 +17,7 @@ from camviz.colour import balance, spectra
 from camviz.colour.developing import Shot, developed, errors, in_daylight, xyz_from_raw
 from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
-from camviz.course.yours import tried
+from camviz.views.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_in, placed_image

@@ -17,7 +17,7 @@ from scipy.fft import fftshift, rfft2
 
 from camviz import mosaics
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
+from camviz.views.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz import optics
-from camviz.course.yours import tried
+from camviz.views.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_in, placed_image

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics, transform
-from camviz.course.yours import tried
+from camviz.views.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import rows
 from camviz.draw.matrix import matrix

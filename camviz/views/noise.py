@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
+from camviz.views.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_panel, placed_image

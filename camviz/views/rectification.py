@@ -15,7 +15,7 @@ import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
+from camviz.views.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image

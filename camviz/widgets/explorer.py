@@ -64,7 +64,7 @@ class Explorer(StillWidget):
     controls : dict of str to Control
         Those that are shown, by the fields that they change. `explore` makes them.
     together : tuple of str, optional
-        Controls whose combinations `camviz.record` records.
+        Controls whose combinations `camviz_school.record` records.
 
     Raises
     ------
@@ -282,7 +282,7 @@ def explore(view: View, *names: str, together: tuple[str, ...] = (), **ranges: A
     *names
         Fields that get a control, before those of `ranges`; all of its fields when none of both is given.
     together : tuple of str, optional
-        Controls that a page without a kernel moves at the same time (`camviz.record`); here all do.
+        Controls that a page without a kernel moves at the same time (`camviz_school.record`); here all do.
     **ranges
         Fields with other limits: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words for a
         choice.

@@ -23,7 +23,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
 
 HERE = Path(__file__).parent
 BLOCK = re.compile(

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 from scipy.special import ndtr
 
-from camviz.calibration import calibrate, calibrate_pair, detect
-from camviz.calibration.types import Board
+from camviz_clinic.calibration import calibrate, calibrate_pair, detect
+from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.snapshots import snapshot
-from camviz.clinic.virtual import spread_boards
-from camviz.files.writing import write as write_calibration
+from camviz_clinic.checks.snapshots import snapshot
+from camviz_clinic.checks.virtual import spread_boards
+from camviz_clinic.files.writing import write as write_calibration
 from camviz.lenses import BrownConrady
 from camviz.panoramas.reprojection import equirectangular_camera
 from camviz.poses import RigidTransform, Rotation

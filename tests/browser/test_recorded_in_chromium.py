@@ -15,7 +15,7 @@ sys.path.append(str(ROOT / "benchmarks"))
 
 from smallest import Smallest
 
-from camviz.record import Axis, Budget, Widget, record, write_player
+from camviz_school.record import Axis, Budget, Widget, record, write_player
 from camviz.views.base import View
 from camviz.views.distortion import DistortionView
 from camviz.views.frustum import FrustumView

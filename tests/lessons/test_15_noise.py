@@ -6,8 +6,8 @@ import pytest
 from quoting import LESSONS
 from scipy.constants import physical_constants
 
-from camviz.course import notebooks
-from camviz.course.material import module
+from camviz_school.course import notebooks
+from camviz_school.course.material import module
 from camviz.scenes import to_display
 from camviz.sensors import decibel
 from camviz.sensors.correction import NoiseModel, merged

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import Arguments, Array, Exercise
+from camviz_school.course.checks import Arguments, Array, Exercise
 from camviz.poses import RigidTransform, Rotation
 
 SINGLE_PRECISION = 1e-5

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
-from camviz.course.trials import Function
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.trials import Function
 from camviz.poses import Rotation
 
 # What several of them need -------------------------------------------------------------------------------------------
