@@ -20,12 +20,12 @@ from math import inf
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.detection import Detections
 from camviz_clinic.calibration.difference import difference
-from camviz.cameras import Camera
 from camviz_clinic.checks import Check, check
 from camviz_clinic.checks.virtual import SetUp, detections, pair, single, spread_boards
-from camviz.poses import RigidTransform, Rotation
 
 Rng = np.random.Generator
 VERDICTS = ("pass", "warn", "inconclusive", "fail")

@@ -33,18 +33,18 @@ import cv2
 import numpy as np
 from kernel import table
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz_clinic.calibration import calibrate, detect
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import board_halves
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.models import poses_from_rays
 from camviz_clinic.calibration.types import Board
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.files import load
 from camviz_clinic.files.corners import load_corners
-from camviz.lenses import BrownConrady, KannalaBrandt
 
 MANIFEST = Path(__file__).with_name("field.toml")
 PAGE = Path(__file__).parents[1] / "docs" / "clinic.md"

@@ -17,8 +17,6 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz_clinic.calibration.boards.picture import whiteness
-from camviz_clinic.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Rig, transform
 from camviz.draw.items import Face, Item, Line, camera_body
 from camviz.draw.shades import Shades
@@ -27,6 +25,8 @@ from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform
 from camviz.scenes import Scene
 from camviz.scenes.surfaces import Mesh
+from camviz_clinic.calibration.boards.picture import whiteness
+from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.views.observations import Observations
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz_clinic.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics, Rig, transform
 from camviz.distortion import displacement
 from camviz.draw.items import Line, camera_body
 from camviz.lenses.base import Array, as_points
 from camviz.twoview.epipolar import epipolar_curve
+from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.views.observations import Observations
 
 __all__ = ["boards", "coverage", "distortion", "epipolar", "frusta", "radial", "residuals"]

@@ -18,10 +18,10 @@ from camviz.sensors import Sensor
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import Level
 from camviz.views.base import View
-from camviz_clinic.views.board_poses import BoardPosesView
-from camviz_clinic.views.catalogue import VIEWS, Case
 from camviz.views.measured_edge import MeasuredEdgeView
 from camviz.views.measured_noise import MeasuredNoiseView
+from camviz_clinic.views.board_poses import BoardPosesView
+from camviz_clinic.views.catalogue import VIEWS, Case
 
 SHARED = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras")
 """Classes of what several views have in common; they draw nothing themselves."""

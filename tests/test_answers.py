@@ -8,7 +8,7 @@ import pytest
 from camviz.draw import prose
 from camviz_school.course.answers import AnswerBook, read_answers
 from camviz_school.course.questions import predict_questions, question, quiz_questions
-from camviz.widgets import quiz
+from camviz_school.widgets import quiz
 from camviz_school.widgets.question import QuestionWidget, Sheet
 
 STATE = (

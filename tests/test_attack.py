@@ -12,16 +12,17 @@ import cv2
 import numpy as np
 import pytest
 
-import camviz
+import camviz_clinic
+from camviz.sensors.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
 from camviz_clinic.calibration import Board, CannotCalibrate, detect
 from camviz_clinic.calibration.finding import look
 from camviz.colour.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
 from camviz_clinic.checks import inspect_file
 from camviz_clinic.checks.pictures import sizes_of
 from camviz_clinic.commands.command import main
-from camviz_school.course.working_copy import MANIFEST, lay_out
 from camviz_clinic.files import CalibrationError
 from camviz_clinic.files.output import as_json, json_text
+from camviz_school.course.working_copy import MANIFEST, lay_out
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import attack

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from camviz import distortion
-from camviz_clinic import plots
-from camviz_clinic.calibration import Board, Detections, calibrate, detect, find_corners
-from camviz_clinic.calibration.zhang import board_pose, focal_lengths
 from camviz.cameras import Camera, Intrinsics, Rig, look_at
-from camviz_clinic.checks import inspect
 from camviz.draw.space import Label, grid_lines, scene_items
-from camviz_clinic.files.corners import load_corners
 from camviz.scenes import textured_scene
 from camviz.views.distortion import DistortionView
 from camviz.widgets import explore
+from camviz_clinic import plots
+from camviz_clinic.calibration import Board, Detections, calibrate, detect, find_corners
+from camviz_clinic.calibration.zhang import board_pose, focal_lengths
+from camviz_clinic.checks import inspect
+from camviz_clinic.files.corners import load_corners
 
 CAMERA = Camera(Intrinsics.from_fov(64, 48, 60))
 BOARD = Board(9, 6, 0.025)

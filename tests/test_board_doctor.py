@@ -11,10 +11,10 @@ from camviz_clinic.calibration import Board, CannotCalibrate, detect, find_corne
 from camviz_clinic.calibration.boards.charuco import detector
 from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.paper import fitted, pdf
-from camviz_clinic.checks.findings.described import CHARUCO, smooth
 from camviz_clinic.checks.doctor import Shown, diagnose, prescription, troubles
 from camviz_clinic.checks.doctor.layout import likeliest, steps_of
 from camviz_clinic.checks.doctor.symmetry import turned_views
+from camviz_clinic.checks.findings.described import CHARUCO, smooth
 from camviz_clinic.checks.snapshots import pictured
 from camviz_clinic.checks.virtual import detections, pair
 from camviz_clinic.commands.command import main

@@ -6,21 +6,21 @@ import cv2
 import numpy as np
 import pytest
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import Board, Detections, calibrate, chessboards, find_corners
 from camviz_clinic.calibration.boards import kinds
 from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.chessboards import everywhere
 from camviz_clinic.calibration.circle_grids import bias
 from camviz_clinic.calibration.paper import black_discs, black_parts, fitted, pdf
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.checks.photographs import photographed
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.commands.command import main
 from camviz_clinic.files import Calibration, CalibrationError, load, write
 from camviz_clinic.files.target import read_target
-from camviz.lenses import BrownConrady
 from camviz_clinic.meshes import board as mesh
-from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.views.chessboard import outline, printed
 
 CAMERA = Camera(Intrinsics.from_fov(480, 360, 60), BrownConrady(-0.2, 0.05))

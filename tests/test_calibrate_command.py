@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 from test_calibration import BOARD, picture
 
-import camviz
+import camviz_clinic
 from camviz_clinic.commands.command import main
 
 ROOT = Path(__file__).parents[1]

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
 from camviz_clinic.calibration import (
     MODELS,
     CannotCalibrate,
@@ -26,9 +28,7 @@ from camviz_clinic.calibration.detection import detect_pair
 from camviz_clinic.calibration.models import pose_from_rays
 from camviz_clinic.calibration.pairing import paired
 from camviz_clinic.calibration.paper import black_parts
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.files import Board
-from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
 from camviz_school.samples import SampleUnavailable, sample
 
 BOARD = Board(9, 6, 0.025)

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera, transform
 from camviz.lenses import BrownConrady
+from camviz_clinic.calibration.types import Board
 from camviz_clinic.views.board_pictures import FREE, TRUTH
 from camviz_clinic.views.calibration import CalibrationView
 

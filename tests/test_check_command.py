@@ -50,7 +50,9 @@ def virtual(room, monkeypatch):
 
     def see(camera):
         seen = replace(after, cameras=(camera,)).observed(np.random.default_rng(2))[0]
-        monkeypatch.setattr("camviz_clinic.calibration.detect", lambda *_, **__: detections(camera, seen), raising=False)
+        monkeypatch.setattr(
+            "camviz_clinic.calibration.detect", lambda *_, **__: detections(camera, seen), raising=False
+        )
 
     return after, see
 

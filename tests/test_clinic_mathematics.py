@@ -8,6 +8,8 @@ from boards import BOARD, CAMERA, RIGHT, board_poses, noisy, truth
 from scipy.spatial.transform import RigidTransform
 from scipy.stats import kstest
 
+from camviz.cameras import transform
+from camviz.twoview import triangulate
 from camviz_clinic.calibration.board_warp import warp_test
 from camviz_clinic.calibration.cross_validation import halves, held_out
 from camviz_clinic.calibration.difference import difference
@@ -26,8 +28,6 @@ from camviz_clinic.calibration.residual_statistics import (
     view_rms,
 )
 from camviz_clinic.calibration.stereo_depth import depth_uncertainty
-from camviz.cameras import transform
-from camviz.twoview import triangulate
 
 SIGMA = 0.2
 

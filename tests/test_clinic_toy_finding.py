@@ -14,9 +14,9 @@ from camviz_clinic.checks import Inspection, faults, inspect, kinds, statistics
 from camviz_clinic.checks import checks
 from camviz_clinic.checks.virtual import healthy
 from camviz_clinic.commands.command import main
-from camviz_school.course.material import module
 from camviz_clinic.report.inspection import report
 from camviz_clinic.report.notebook import inspect as inspect_in_a_notebook
+from camviz_school.course.material import module
 
 DATA = Path(__file__).parent / "data"
 TOY = '''
@@ -142,7 +142,9 @@ def test_a_declaration_that_cannot_be_is_refused_in_words():
 
 def test_every_check_and_every_fault_needs_nothing_that_draws():
     """The modules that declare are found when they are asked for, not when the clinic is imported."""
-    code = "import sys; from camviz_clinic.checks import faults, kinds, laboratory, statistics, words; kinds(), faults(); "
+    code = (
+        "import sys; from camviz_clinic.checks import faults, kinds, laboratory, statistics, words; kinds(), faults(); "
+    )
     code += "print(*{'matplotlib', 'ipywidgets', 'pyvista', 'vtkmodules', 'IPython', 'camviz.views'} & {*sys.modules})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

@@ -12,10 +12,10 @@ from calibrations import BOARD, RIGHT_FROM_LEFT, TRUE, bare, pair, poses, seen, 
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.uncertainty import projection_uncertainty
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.uncertainty import projection_uncertainty
 from camviz_clinic.views.board_residuals import BoardResidualsView
 from camviz_clinic.views.catalogue import VIEWS, Case
 from camviz_clinic.views.correlation import CorrelationView

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from commandline import ROOT, refused, run
 
-import camviz
+import camviz_clinic
 from camviz_clinic.commands import terminal
 from camviz_clinic.commands.command import main, parser
 from camviz_school.course.working_copy import lay_out

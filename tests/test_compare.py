@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from camviz.lenses import BrownConrady
 from camviz_clinic.checks import inspect
 from camviz_clinic.checks.virtual import alone, healthy, single
-from camviz.lenses import BrownConrady
 from camviz_clinic.report.inspection import report
 
 

@@ -15,7 +15,7 @@ from test_calibrate_command import main_captured
 from test_files import sample
 from test_files_fuzzed import overwritten, reworded
 
-import camviz
+import camviz_clinic
 from camviz_clinic.calibration import Board, calibrate, calibrate_pair, detect
 from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.checks.virtual import detections, pair, single

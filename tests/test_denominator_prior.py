@@ -7,18 +7,19 @@ import pytest
 from boards import BOARD, CAMERA, board_poses, noisy, truth
 
 import camviz
+import camviz_clinic
+from camviz.cameras import Camera, Intrinsics
+from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
+from camviz.lenses import BrownConrady
 from camviz_clinic.calibration import calibrate, calibrate_pair, detect
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import held_out
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.difference import difference
 from camviz_clinic.calibration.regularisation import regularised, with_priors
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.checks.inspection import inspect
 from camviz_clinic.checks.virtual import SetUp, detections, spread_boards
-from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
 from camviz_clinic.files.writing import write
-from camviz.lenses import BrownConrady
 from camviz_school.samples import SampleUnavailable, sample
 
 RATIONAL = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")

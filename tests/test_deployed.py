@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz_clinic.calibration.difference import difference
 from camviz_clinic.calibration.jacobian import with_parameters
 from camviz_clinic.checks import check
@@ -17,7 +18,6 @@ from camviz_clinic.checks.gaps import gaps
 from camviz_clinic.checks.judgement import rated
 from camviz_clinic.checks.refit import Refit, bounds, reach
 from camviz_clinic.checks.virtual import SetUp, detections, pair, single, spread_boards
-from camviz.lenses import BrownConrady, KannalaBrandt
 
 ROOT = Path(__file__).parents[1]
 

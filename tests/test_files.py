@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-import camviz
+import camviz_clinic
 from camviz.cameras import transform
 from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
 
@@ -130,7 +130,9 @@ def test_detections_and_board_poses_keep_their_shape(tmp_path, suffix):
 )
 def test_the_usual_spellings_name_the_same_camera(tmp_path, matrix, distortion):
     values = {matrix: np.diag([500.0, 510, 1]), distortion: np.array([0.1, 0.2, 0, 0, 0])}
-    camera = camviz_clinic.load(write(tmp_path / "camera.yml", image_Width=640, image_Height=480, **values)).cameras["camera"]
+    camera = camviz_clinic.load(write(tmp_path / "camera.yml", image_Width=640, image_Height=480, **values)).cameras[
+        "camera"
+    ]
     assert (camera.intrinsics.fx, camera.intrinsics.fy, camera.lens.k2) == (500, 510, 0.2)
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import camviz
+import camviz_clinic
 from camviz_clinic.files import CalibrationError, formats
 from camviz_clinic.files.trees import parse
 

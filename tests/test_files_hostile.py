@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import camviz
+import camviz_clinic
 from camviz_clinic.files import Calibration, CalibrationError
 from camviz_clinic.files.text import MAX_BYTES
 

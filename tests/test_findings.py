@@ -10,20 +10,20 @@ import pytest
 import yaml
 from test_files import sample, write
 
-import camviz
+import camviz_clinic
+from camviz.cameras import Camera, Intrinsics
+from camviz.distortion import valid_region
+from camviz.lenses import BrownConrady, Equidistant, KannalaBrandt, Orthographic, Perspective
 from camviz_clinic.calibration import Detections, calibrate, calibrate_pair, detect
 from camviz_clinic.calibration.adjustment import Adjustment
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
-from camviz_clinic.checks.findings.boards import coverage, held_out_ratio
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.fields import smooth_field, warp_columns
+from camviz_clinic.checks.findings.boards import coverage, held_out_ratio
 from camviz_clinic.checks.observed import explained, parameter_columns
 from camviz_clinic.checks.virtual import single
 from camviz_clinic.commands.command import main
-from camviz.distortion import valid_region
 from camviz_clinic.files import Board, CalibrationError
-from camviz.lenses import BrownConrady, Equidistant, KannalaBrandt, Orthographic, Perspective
 
 DATA = Path(__file__).parent / "data"
 BOARD = Board(9, 6, 0.025)

@@ -6,14 +6,14 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz_clinic.calibration import Detections, calibrate, find_corners
-from camviz_clinic.calibration.focal_xi_ambiguity import focal_xi_ambiguity
 from camviz.cameras import Camera, Intrinsics
-from camviz_clinic.files import Board
 from camviz.lenses import Perspective, UnifiedSphere
 from camviz.scenes import Scene, Texture, render, to_display
 from camviz.scenes.paint import checkerboard
 from camviz.scenes.surfaces import Rectangle
+from camviz_clinic.calibration import Detections, calibrate, find_corners
+from camviz_clinic.calibration.focal_xi_ambiguity import focal_xi_ambiguity
+from camviz_clinic.files import Board
 from camviz_clinic.views.focal_xi_ambiguity import focal_xi_ambiguity_picture
 
 BOARD = Board(8, 5, 0.03)

@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-import camviz
+import camviz_clinic
 from camviz.cameras import transform
+from camviz.lenses import KannalaBrandt, Stereographic
 from camviz_clinic.files import CalibrationError, matlab_binary
 from camviz_clinic.files.colmap import MODELS
 from camviz_clinic.files.models import same_camera
-from camviz.lenses import KannalaBrandt, Stereographic
 
 DATA = Path(__file__).parent / "data"
 POINTS = np.random.default_rng(7).uniform([-0.3, -0.25, 0.9], [0.3, 0.25, 3.0], size=(50, 3))

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-import camviz
 import camviz_clinic.files
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import Perspective
 from camviz_clinic.commands import command
 from camviz_clinic.files import Calibration, CalibrationError, File, Format, format_of, formats, write
 from camviz_clinic.files.models import same_camera
 from camviz_clinic.files.registry import written
-from camviz.lenses import Perspective
 
 PAGE = Path(__file__).parents[1] / "docs" / "formats.md"
 renewed = run_path(str(PAGE.with_suffix(".py")))["renewed"]
@@ -146,7 +145,8 @@ def test_the_help_lists_every_format(capsys):
 
 
 def test_the_help_of_other_commands_loads_no_format(capsys):
-    code = "import sys; from camviz_clinic.commands import command\ntry: command.main(['--help'])\nexcept SystemExit: pass\n"
+    code = "import sys; from camviz_clinic.commands import command\n"
+    code += "try: command.main(['--help'])\nexcept SystemExit: pass\n"
     code += "print('camviz_clinic.files.kalibr' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "False"

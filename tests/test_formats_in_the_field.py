@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-import camviz
+import camviz_clinic
 from camviz.cameras import transform
 from camviz_clinic.files import CalibrationError, formats
 from camviz_clinic.files.models import same_camera
@@ -749,7 +749,8 @@ def test_voxls_distortion_model_tells_the_fisheye(tmp_path):
     assert calibration.notes == ()
     plumb = written(tmp_path / "a.yml", VOXL.replace("fisheye", "plumb_bob"))
     check(
-        camviz_clinic.load(plumb).cameras["camera"], radtan(POINTS, 275.5, 275.75, 320.25, 238.5, 0.005, 0.021, -0.03, 0.012)
+        camviz_clinic.load(plumb).cameras["camera"],
+        radtan(POINTS, 275.5, 275.75, 320.25, 238.5, 0.005, 0.021, -0.03, 0.012),
     )
 
 

@@ -11,12 +11,8 @@ import pytest
 import yaml
 from scipy.spatial.transform import RigidTransform, Rotation
 
-import camviz
+import camviz_clinic
 from camviz.cameras import Camera, Intrinsics, transform
-from camviz_clinic.commands import command
-from camviz_clinic.files import Board, Calibration, CalibrationError, alone, from_first_camera, write, writing
-from camviz_clinic.files.models import same_camera
-from camviz_clinic.files.registry import written
 from camviz.lenses import (
     BrownConrady,
     Cylindrical,
@@ -31,6 +27,10 @@ from camviz.lenses import (
     Stereographic,
     UnifiedSphere,
 )
+from camviz_clinic.commands import command
+from camviz_clinic.files import Board, Calibration, CalibrationError, alone, from_first_camera, write, writing
+from camviz_clinic.files.models import same_camera
+from camviz_clinic.files.registry import written
 
 DATA = Path(__file__).parent / "data"
 POINTS = np.random.default_rng(7).uniform([-0.3, -0.25, 0.9], [0.3, 0.25, 3.0], size=(50, 3))
@@ -363,7 +363,9 @@ def test_convert_takes_one_camera_and_makes_it_the_world(tmp_path):
     words = ["convert", str(DATA / "kalibr_chain.yaml"), str(tmp_path / "o.yml"), "--to", "opencv", "--camera", "cam1"]
     assert command.main(words) == 2
     assert command.main([*words, "--first-as-world"]) == 0
-    assert camviz_clinic.load(tmp_path / "o.yml").cameras["cam1"].lens == KannalaBrandt(-0.0128, 0.0047, -0.0031, 0.0006)
+    assert camviz_clinic.load(tmp_path / "o.yml").cameras["cam1"].lens == KannalaBrandt(
+        -0.0128, 0.0047, -0.0031, 0.0006
+    )
 
 
 @pytest.mark.parametrize(

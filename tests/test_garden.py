@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz_school import server
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, KannalaBrandt, Perspective
 from camviz.views import garden
+from camviz_school import server
 
 VIEW = Intrinsics.from_fov(640, 480, 90).within(garden.DRAFT)
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-import camviz
-from camviz_clinic.calibration.lens_fit import fit_lens
+import camviz_clinic
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, DoubleSphere, FieldOfView, KannalaBrandt, UnifiedSphere
+from camviz_clinic.calibration.lens_fit import fit_lens
 from camviz_clinic.commands import command
 from camviz_clinic.files import Calibration, write
-from camviz.lenses import BrownConrady, DoubleSphere, FieldOfView, KannalaBrandt, UnifiedSphere
 
 GRID = Intrinsics(640, 480, 350.0, 351.0, 322.0, 238.5)
 PAIRS = {

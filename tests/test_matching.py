@@ -6,10 +6,10 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from camviz import twoview
-from camviz_school import samples
 from camviz.cameras import Camera, Intrinsics
-from camviz_school.samples import motorcycle
 from camviz.scenes import snapshot, textured_scene
+from camviz_school import samples
+from camviz_school.samples import motorcycle
 
 EACH = pytest.mark.parametrize("method", twoview.METHODS)
 

@@ -9,9 +9,9 @@ from test_files import sample
 
 from camviz_clinic.calibration import calibrate, detect
 from camviz_clinic.checks import Inspection, faults
+from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.findings import moving
 from camviz_clinic.checks.findings.moving import motion, rolled
-from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.virtual import single
 from camviz_clinic.files import Board
 

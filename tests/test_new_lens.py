@@ -128,5 +128,7 @@ print(*MODELS, f"{found.lens.k:.4f} {found.intrinsics.fx:.2f} {found.intrinsics.
 
 
 def test_the_help_of_camviz_calibrate_lists_it(checkout):
-    said = python(checkout, "import sys; from camviz_clinic.commands.command import main; main(['calibrate', '--help'])")
+    said = python(
+        checkout, "import sys; from camviz_clinic.commands.command import main; main(['calibrate', '--help'])"
+    )
     assert "  sine        k of r = sin(kθ)/k\n" in said

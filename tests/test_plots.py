@@ -7,9 +7,9 @@ import pytest
 from calibrations import RIGHT_FROM_LEFT, TRUE, bare, pair, sick, single
 from mpl_toolkits.mplot3d import proj3d
 
-from camviz_clinic import plots
 from camviz.cameras import Camera, Intrinsics, Rig
 from camviz.lenses import KannalaBrandt
+from camviz_clinic import plots
 from camviz_clinic.views.observations import Missing, Observations
 
 matplotlib.use("agg")

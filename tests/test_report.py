@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from calibrations import bare, pair, sick, single
 
-import camviz
+import camviz_clinic
 from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
 from camviz_clinic.report.inspection import MOST_VIEWS, report, write_report
-from camviz_clinic.views.catalogue import ALIASES, VIEWS
 from camviz_clinic.report.notebook import LiveInspection
+from camviz_clinic.views.catalogue import ALIASES, VIEWS
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 

@@ -5,9 +5,9 @@ import pytest
 
 from camviz_clinic.checks import faults, inspect, kinds
 from camviz_clinic.checks.causes import by_causes
+from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.findings.corners import NEIGHBOUR
 from camviz_clinic.checks.findings.set_aside import pattern, points_one_way
-from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.virtual import single
 
 SEED = 20_003

@@ -11,6 +11,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import IFDRational
 
 import camviz
+import camviz_clinic
 from camviz_clinic.calibration.stamp import Stamp, now
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.checks import check, inspect

@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 from calibrations import bare, pair, sick, single
 
-import camviz
+import camviz_clinic
+from camviz.lenses import BrownConrady
 from camviz_clinic.calibration.detection import Detections
 from camviz_clinic.calibration.solving import calibrate
 from camviz_clinic.checks import inspect
 from camviz_clinic.checks.summary import CORNER, GOOD, MIDDLE, RMS, Summary, measured
 from camviz_clinic.files.writing import write
-from camviz.lenses import BrownConrady
 from camviz_clinic.report.findings import findings_html, glance_html, verdict_html
 from camviz_clinic.report.inspection import report
+from camviz_clinic.report.notebook import CAMERA, LOOK, LiveInspection
 from camviz_clinic.views.catalogue import VIEWS, Case
 from camviz_clinic.views.guidance import GuidanceView
 from camviz_clinic.views.uncertainty import UncertaintyView
-from camviz_clinic.report.notebook import CAMERA, LOOK, LiveInspection
 
 SKIPPED = (
     "10 could not because the file holds one camera, not a pair, and because no pictures of the board were given "

@@ -15,6 +15,9 @@ from boards import BOARD, CAMERA, RIGHT, board_poses, noisy, truth
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from camviz.cameras import Camera, Intrinsics, transform
+from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz.lenses.base import unit
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import aligned, difference, pixel_grid
 from camviz_clinic.calibration.jacobian import pixel_jacobian
@@ -25,9 +28,6 @@ from camviz_clinic.calibration.uncertainty import (
     projection_uncertainty,
     worst_deviation,
 )
-from camviz.cameras import Camera, Intrinsics, transform
-from camviz.lenses import BrownConrady, KannalaBrandt
-from camviz.lenses.base import unit
 
 SIGMA = 0.2
 OPENCV5 = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")

@@ -18,6 +18,7 @@ import pytest
 from classroom import ask, camviz_class, served
 from commandline import ROOT, refused
 
+from camviz.draw import prose
 from camviz_clinic.commands.command import main
 from camviz.draw import prose
 from camviz_school.course.learning import class_scores, normalised_gain

@@ -22,11 +22,11 @@ from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
 from scripts import question_script  # noqa: E402
 
+from camviz.views.frustum import FrustumView  # noqa: E402
+from camviz.widgets import explore  # noqa: E402
 from camviz_school.course.exercises import exercises  # noqa: E402
 from camviz_school.course.glossary import glossary  # noqa: E402
 from camviz_school.course.material import lesson_paths  # noqa: E402
-from camviz.views.frustum import FrustumView  # noqa: E402
-from camviz.widgets import explore  # noqa: E402
 
 LESSONS = lesson_paths()
 PAGES = frozenset(path.relative_to(ROOT).as_posix() for path in [*LESSONS, *(ROOT / "docs").glob("*.md")])

@@ -16,7 +16,6 @@ import numpy as np
 
 from camviz.draw import prose
 from camviz.views.patience import Patience, TimeIsUp
-from camviz_school.course.trials import as_arrays, attribute, contained, explain, stopped
 
 Function = Callable[..., Any]
 

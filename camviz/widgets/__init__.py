@@ -2,9 +2,8 @@
 
 from camviz.views.patience import notices
 from camviz.widgets.explorer import Explorer, explore
-from camviz_school.widgets.question import ask, quiz
 from camviz.widgets.waiting import told_in_its_view
 
-__all__ = ["Explorer", "ask", "explore", "quiz"]
+__all__ = ["Explorer", "explore"]
 
 notices.append(told_in_its_view)

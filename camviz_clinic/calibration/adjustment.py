@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.jacobian import parameter, with_parameters
 from camviz_clinic.calibration.linearisation import Linearisation
 from camviz_clinic.calibration.problem import POSE
 from camviz_clinic.calibration.types import Mask
-from camviz.cameras import Camera
-from camviz.lenses.base import Array
-from camviz.poses import RigidTransform, Rotation
 
 MOST_STEPS = 100
 SETTLED = 1e-12  # of the sum of squares, what a step must still promise to take off

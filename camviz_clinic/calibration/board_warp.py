@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc
 
-from camviz_clinic.calibration.adjustment import Adjustment
 from camviz.lenses.base import Array
+from camviz_clinic.calibration.adjustment import Adjustment
 
 
 @dataclass(frozen=True, eq=False)

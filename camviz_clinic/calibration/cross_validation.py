@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import Difference, difference, pixel_grid
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.calibration.uncertainty import mean_deviation, projection_covariance
-from camviz.lenses.base import Array
 
 FEWEST_VIEWS = 3  # in each half
 

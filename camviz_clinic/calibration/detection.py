@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.boards.charuco import charuco_dictionary
 from camviz_clinic.calibration.chessboards import LEAST_SIDE
@@ -21,7 +22,6 @@ from camviz_clinic.calibration.finding import check_finder, find_corners, look
 from camviz_clinic.calibration.processes import Crew, processors, signals_put_off
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.calibration.wrong_board import another_board, part_of_a_larger
-from camviz.lenses.base import Array
 
 __all__ = ["CannotCalibrate", "Detections", "detect", "detect_pair", "find_corners", "seen"]
 
@@ -42,7 +42,8 @@ class CannotCalibrate(ValueError):  # noqa: N818 - it says what is the case
     >>> board = Board(9, 6, 0.025)
     >>> calibrate(Detections(("a.png", "b.png"), np.zeros((2, 54, 2)), 640, 480), board)
     Traceback (most recent call last):
-    camviz_clinic.calibration.detection.CannotCalibrate: at least 3 views of the board are needed for a calibration, got 2
+    camviz_clinic.calibration.detection.CannotCalibrate: at least 3 views of the board are needed for a calibration, got
+    2
     """
 
 

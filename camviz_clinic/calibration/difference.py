@@ -7,12 +7,12 @@ from math import inf, isinf
 
 import numpy as np
 
-from camviz_clinic.calibration.adjustment import twisted
-from camviz_clinic.calibration.arrowhead import inverse
-from camviz_clinic.calibration.jacobian import twist_jacobian
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.adjustment import twisted
+from camviz_clinic.calibration.arrowhead import inverse
+from camviz_clinic.calibration.jacobian import twist_jacobian
 
 HUBER = np.deg2rad(5) ** 2  # mrcal's: the weighted square of an angle beyond which its cost grows more slowly
 MOST_STEPS = 100

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.lenses import UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Board
 
 STEPS = 6  # of Gauss and Newton for every pose
 HELD = 1e-12  # added to their normal equations: where a board has run away, it has no pose to be solved for

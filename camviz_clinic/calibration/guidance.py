@@ -10,15 +10,15 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.cameras import Camera, transform
+from camviz.lenses.base import Array, as_points
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.arrowhead import inverse
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.problem import moved
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.calibration.uncertainty import projection_jacobian, worst_deviation
-from camviz.cameras import Camera, transform
-from camviz.lenses.base import Array, as_points
-from camviz.poses import RigidTransform, Rotation
 
 POSITIONS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the board's middle, in the image's width and height
 SIZES = (0.25, 0.4, 0.6, 0.85)  # of the board, held straight, in the image's width

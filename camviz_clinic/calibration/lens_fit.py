@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from camviz_clinic.calibration.difference import pixel_grid
-from camviz_clinic.calibration.jacobian import parameter, pixel_jacobian, with_parameters
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import calibration_models
 from camviz.lenses.base import Array
+from camviz_clinic.calibration.difference import pixel_grid
+from camviz_clinic.calibration.jacobian import parameter, pixel_jacobian, with_parameters
 
 FITTED_ON = (60, 40)  # columns × rows of pixels
 JUDGED_ON = 320  # at most so many columns and rows

@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from camviz.cameras import transform
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.arrowhead import Arrowhead
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz_clinic.calibration.problem import POSE, Problem
 from camviz_clinic.calibration.types import Board
-from camviz.cameras import transform
-from camviz.lenses.base import Array
 
 
 @dataclass(frozen=True, eq=False)

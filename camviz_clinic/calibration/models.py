@@ -9,13 +9,13 @@ from typing import Any
 import cv2
 import numpy as np
 
-from camviz_clinic.calibration.detection import CannotCalibrate
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
 from camviz.lenses import CalibrationModel, Lens, calibration_models
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.detection import CannotCalibrate
+from camviz_clinic.calibration.types import Board
 
 PIXELS = ("fx", "fy", "cx", "cy")
 CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)

@@ -9,9 +9,9 @@ from math import floor
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.types import Board
-from camviz.lenses.base import Array
 
 PAPERS = {"a4": (210.0, 297.0), "a3": (297.0, 420.0), "letter": (215.9, 279.4)}  # millimetres
 MARGIN, STRIP = 8.0, 27.0  # millimetres: white around the board, and below it where the ruler and the words are

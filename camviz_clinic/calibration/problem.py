@@ -10,12 +10,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz_clinic.calibration.denominator_prior import DenominatorPrior
-from camviz_clinic.calibration.jacobian import parameter
-from camviz_clinic.calibration.types import Board, Calibration, Mask
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.denominator_prior import DenominatorPrior
+from camviz_clinic.calibration.jacobian import parameter
+from camviz_clinic.calibration.types import Board, Calibration, Mask
 
 LEAST_CORNERS = 4  # that a view must show for its pose to be known
 POSE = ("rotation_x", "rotation_y", "rotation_z", "x", "y", "z")

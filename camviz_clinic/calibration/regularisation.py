@@ -19,9 +19,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from camviz.distortion import image_reach
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.denominator_prior import LIKELY, DenominatorPrior
-from camviz.distortion import image_reach
 
 BROAD, STRICT = 10.0, 1e-6  # deviations of log D: any D, and D within a millionth of 1
 TIGHTENED = tuple(np.geomspace(LIKELY, STRICT, 4).tolist())  # on the way to the strict one

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.cameras import transform
+from camviz.lenses.base import Array, as_points
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.jacobian import twist_jacobian
 from camviz_clinic.calibration.problem import POSE
 from camviz_clinic.calibration.types import Mask
-from camviz.cameras import transform
-from camviz.lenses.base import Array, as_points
 
 NORMAL = 1.4826  # the standard deviation of a normal distribution over its median absolute deviation
 

@@ -9,6 +9,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.jacobian import with_parameters
@@ -16,9 +19,6 @@ from camviz_clinic.calibration.models import MODELS, Model, Views, poses_from_ra
 from camviz_clinic.calibration.outliers import Masks, outliers, sentences
 from camviz_clinic.calibration.regularisation import regularised, with_priors
 from camviz_clinic.calibration.types import Board, Calibration, Mask
-from camviz.cameras import Camera
-from camviz.lenses.base import Array
-from camviz.poses import RigidTransform
 
 __all__ = ["MODELS", "calibrate", "calibrate_pair"]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz.cameras import transform
 from camviz.lenses.base import Array, as_points
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 
 
 @dataclass(frozen=True, eq=False)

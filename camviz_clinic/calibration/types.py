@@ -10,14 +10,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.cameras import Camera, Rig
+from camviz.lenses.base import Array, as_point
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.boards.aprilgrid import FAMILY
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.redundancy import Redundancy
 from camviz_clinic.calibration.stamp import Stamp
-from camviz.cameras import Camera, Rig
-from camviz.lenses.base import Array, as_point
-from camviz.poses import RigidTransform
 
 Mask = NDArray[np.bool_]
 
@@ -65,7 +65,8 @@ class Board:
     dictionary : str, optional
         The markers' dictionary by OpenCV's name, such as "DICT_5X5_100".
     kind : str, optional
-        A name in `camviz_clinic.calibration.boards.kinds()`; a chessboard unless given, or a ChArUco board with a dictionary.
+        A name in `camviz_clinic.calibration.boards.kinds()`; a chessboard unless given, or a ChArUco board with a
+        dictionary.
     legacy : bool, optional
         A ChArUco board laid out as OpenCV before 4.6 did it, white first where the squares' rows are even.
     first_id : int, optional

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ellipe
 
+from camviz.cameras import rotate
+from camviz.lenses.base import Array, as_points
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
-from camviz.cameras import rotate
-from camviz.lenses.base import Array, as_points
 
 
 def projection_covariance(

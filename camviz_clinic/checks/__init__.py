@@ -1,7 +1,7 @@
 """The clinic: what is wrong with a calibration, and what to do about it."""
 
-from camviz_clinic.checks.findings import faults, kinds
 from camviz_clinic.checks.deployed import check
+from camviz_clinic.checks.findings import faults, kinds
 from camviz_clinic.checks.gate import Gate
 from camviz_clinic.checks.inspection import Inspection, inspect, inspect_file
 from camviz_clinic.checks.judgement import Check, Judgement

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camviz.cameras import Intrinsics
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import difference, pixel_grid
 from camviz_clinic.calibration.uncertainty import mean_deviation, projection_covariance
-from camviz.cameras import Intrinsics
 from camviz_clinic.checks.evidence import Evidence
-from camviz.lenses.base import Array
 
 GRID = (60, 40)
 

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from scipy.special import fdtrc
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.cross_validation import halves
 from camviz_clinic.calibration.types import Mask
 from camviz_clinic.checks.observed import BY_CHANCE, Explained, Observed, explained, parameter_columns, projected
 from camviz_clinic.checks.view_by_view import PARTINGS, ViewByView
-from camviz.lenses.base import Array
 
 FEWEST_VIEWS = 6  # to be parted in two
 DRIFTING = 0.003  # of the focal length

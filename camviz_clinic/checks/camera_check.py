@@ -7,6 +7,7 @@ from math import ceil
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.detection import Detections
 from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board, Calibration
@@ -14,7 +15,6 @@ from camviz_clinic.checks.gaps import gaps
 from camviz_clinic.checks.judgement import FEWEST_VIEWS, Judgement, listed, px, rated
 from camviz_clinic.checks.refit import Refit, far_columns, reach
 from camviz_clinic.checks.stamps import SizeChange, size_change
-from camviz.lenses.base import Array
 
 FEWEST_CORNERS = 60  # 120 measurements, for 6 of each pose, 2 of the board's bend and 5 of the camera
 MOST_ASIDE = 0.2  # of the corners; of OpenCV's photographs it is 0.02

@@ -9,14 +9,14 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
-from camviz.cameras import Camera
 from camviz_clinic.checks.doctor.shown import Shown
 from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.rig import StereoPair, board_poses, pairs
-from camviz.poses import RigidTransform
 
 Made = TypeVar("Made")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.jacobian import pixel_jacobian
 from camviz_clinic.calibration.linearisation import sagittas
-from camviz.lenses.base import Array
 
 DEGREE = 5  # of the smooth field over the image, in u and in v
 FARTHER = (7, 9, 11)  # powers of the radius beyond it

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz_clinic.calibration.difference import pixel_grid
 from camviz.cameras import Camera
 from camviz.lenses.base import Array, as_points
+from camviz_clinic.calibration.difference import pixel_grid
 
 FEWEST = 4  # corners in a part of the image, as many as a pose takes
 BORDER = 1 / 8  # of a side: a board's own margin of a square keeps corners from coming much closer

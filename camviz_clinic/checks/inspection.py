@@ -9,16 +9,16 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
+from camviz.cameras import Camera
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
-from camviz.cameras import Camera
 from camviz_clinic.checks import words
 from camviz_clinic.checks.apart import Apart, differences
 from camviz_clinic.checks.causes import by_causes
-from camviz_clinic.checks.findings import kinds
-from camviz_clinic.checks.findings.described import described_wrong
 from camviz_clinic.checks.doctor import Shown
 from camviz_clinic.checks.evidence import Evidence, NotChecked
+from camviz_clinic.checks.findings import kinds
+from camviz_clinic.checks.findings.described import described_wrong
 from camviz_clinic.checks.registry import Finding
 from camviz_clinic.checks.summary import Summary
 from camviz_clinic.files import CalibrationError, load

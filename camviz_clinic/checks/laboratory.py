@@ -1,7 +1,8 @@
 """Experiments with one virtual camera: ten boards, one fault of any strength, and a plain least-squares solution.
 
 It is as small as an inspection allows, so that a slider can move it. Nothing is set aside as an outlier here: a fault
-may do all the harm it can. `LabFault`, beside the findings in `camviz_clinic.checks.findings`, says what each fault changes.
+may do all the harm it can. `LabFault`, beside the findings in `camviz_clinic.checks.findings`, says what each fault
+changes.
 """
 
 from __future__ import annotations
@@ -12,20 +13,20 @@ from pathlib import Path
 
 import numpy as np
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.distortion import image_corner_radius
+from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import Difference, difference, pixel_grid
 from camviz_clinic.calibration.jacobian import with_parameters
 from camviz_clinic.calibration.residual_statistics import view_rms
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.calibration.uncertainty import mean_deviation, projection_covariance
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.checks.findings import faults
 from camviz_clinic.checks.inspection import Inspection, inspect
 from camviz_clinic.checks.registry import LabFault
 from camviz_clinic.checks.virtual import SetUp, spread_boards
-from camviz.distortion import image_corner_radius
-from camviz.lenses import BrownConrady
-from camviz.lenses.base import Array
 
 BOARD = Board(9, 6, 0.025)
 VIEWS = 10

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.jacobian import pixel_jacobian
 from camviz.cameras import Camera, transform
 from camviz.lenses.base import Array
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.jacobian import pixel_jacobian
 
 Mask = NDArray[np.bool_]
 

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.boards.picture import whiteness
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.poses import RigidTransform
 from camviz.scenes import Scene, Texture, render, to_display
 from camviz.scenes.surfaces import Rectangle
+from camviz_clinic.calibration.boards.picture import whiteness
+from camviz_clinic.calibration.types import Board
 
 BLACK, WHITE, BEHIND = 0.03, 0.85, 0.4  # of the light that falls on ink, paper, and what is behind the board
 TEXELS = 80  # along `square_size`

@@ -9,17 +9,17 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri, fdtrc
 
+from camviz.cameras import Camera
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import seen
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.jacobian import PINHOLE, parameter, pixel_jacobian, twist_jacobian
 from camviz_clinic.calibration.types import Board, Mask
-from camviz.cameras import Camera
 from camviz_clinic.checks.fields import smooth_field
 from camviz_clinic.checks.observed import Observed, explained
 from camviz_clinic.checks.rig import board_poses
 from camviz_clinic.checks.view_by_view import ViewByView
-from camviz.lenses.base import Array
 
 SURE = 0.99  # of "surely": how often the true change lies within the bounds
 GRID = (60, 40)  # of pixels over the image, as `--compare` has it

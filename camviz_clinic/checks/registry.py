@@ -1,7 +1,7 @@
 """A finding in one place: its name, its words, the check that makes it, and the faults that must lead to it.
 
-A module of `camviz_clinic.checks.findings` declares a kind of finding by decorating its check. What is declared there is all
-that an inspection, its words, the report, docs/clinic.md, the fault lab and the statistics need.
+A module of `camviz_clinic.checks.findings` declares a kind of finding by decorating its check. What is declared there
+is all that an inspection, its words, the report, docs/clinic.md, the fault lab and the statistics need.
 """
 
 from __future__ import annotations

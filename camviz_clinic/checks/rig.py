@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.models import poses_from_rays
-from camviz_clinic.calibration.types import Board, Calibration
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.models import poses_from_rays
+from camviz_clinic.calibration.types import Board, Calibration
 
 DECLARED = (("left", "right"), ("P0", "P1"), ("P2", "P3"), ("00", "01"), ("02", "03"))  # the last four are KITTI's
 ENOUGH = 6  # corners

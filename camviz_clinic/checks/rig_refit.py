@@ -8,17 +8,17 @@ from functools import cached_property
 
 import numpy as np
 
+from camviz.cameras import Camera, transform
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
+from camviz.twoview.rectify import rectify
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz_clinic.calibration.types import Board, Mask
-from camviz.cameras import Camera, transform
 from camviz_clinic.checks.refit import GRID, bounds
 from camviz_clinic.checks.rig import lone_poses, middlemost
 from camviz_clinic.checks.view_by_view import ViewByView
-from camviz.lenses.base import Array
-from camviz.poses import RigidTransform
-from camviz.twoview.rectify import rectify
 
 Range = tuple[float, float, float]  # a change in pixels, RMS over the image, and its bounds
 

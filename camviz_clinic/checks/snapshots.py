@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.boards.picture import whiteness
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera
-from camviz_clinic.checks.virtual import single, spread_boards
 from camviz.lenses import Lens
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.boards.picture import whiteness
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.checks.virtual import single, spread_boards
 
 SIDE = 480  # pixels along the longer side
 TILT_DEG = (15, 35)

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from camviz_clinic.calibration.types import Calibration
-from camviz_clinic.checks.findings import faults, kinds
 from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.findings import faults, kinds
 from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.checks.registry import Fault, Finding, Kind
 from camviz_clinic.checks.virtual import healthy, healthy_pair
@@ -147,8 +147,8 @@ HEAD = """\
 
 <!-- Made from camviz_clinic/checks/findings by: python -m camviz_clinic.checks.statistics --page -->
 
-`camviz inspect FILE` and `camviz_clinic.inspect(camviz_clinic.load(path))` say what is wrong with a calibration. Every finding has a
-stable id, one sentence, the number that shows it, the view that shows it, its likely causes and a remedy.
+`camviz inspect FILE` and `camviz_clinic.inspect(camviz_clinic.load(path))` say what is wrong with a calibration. Every
+finding has a stable id, one sentence, the number that shows it, the view that shows it, its likely causes and a remedy.
 
 The clinic does not guess. A check whose evidence the file does not hold is listed as not made, with the reason. The
 command `camviz calibrate` writes files that hold all of it: corners, poses of the board, what was estimated and how
@@ -197,15 +197,17 @@ Each bar of "Residuals, view by view" is as high as the RMS written on it: blue 
 those that were set aside. A bar of more than ten times the median is cut, with a break and its number.
 
 A bare `calibration` as the last line of a notebook's cell shows the same table and a still picture. Views show
-photographs where their folder is named: `--images FOLDER`, or `camviz_clinic.inspect(calibration).explore(images=FOLDER)`.
+photographs where their folder is named: `--images FOLDER`, or
+`camviz_clinic.inspect(calibration).explore(images=FOLDER)`.
 
 ## Does it still hold?
 
-`camviz check CALIBRATION IMAGES…` and `camviz_clinic.checks.check(calibration, detections)` judge a calibration in use by new
-pictures of a board. The camera is held as it is, and only the poses are solved for. Poses make up for much of what is
-wrong, so small residuals prove nothing. The check also solves for fx, fy, cx, cy and the lens's first coefficient. How
-far that moves far points over the image is the *change* (RMS, in pixels), once a turn of the whole camera is taken out.
-A smooth pattern in what remains counts with it, such as that of a tilted sensor. The board's bend is always free.
+`camviz check CALIBRATION IMAGES…` and `camviz_clinic.checks.check(calibration, detections)` judge a calibration in use
+by new pictures of a board. The camera is held as it is, and only the poses are solved for. Poses make up for much of
+what is wrong, so small residuals prove nothing. The check also solves for fx, fy, cx, cy and the lens's first
+coefficient. How far that moves far points over the image is the *change* (RMS, in pixels), once a turn of the whole
+camera is taken out. A smooth pattern in what remains counts with it, such as that of a tilted sensor. The board's bend
+is always free.
 
 | verdict | status | when, with 99 % confidence |
 |---|---|---|
@@ -331,7 +333,8 @@ does:
     report_paths: clinic.xml
 ```
 
-In Python: `camviz_clinic.checks.Gate(fail_on=("fault",), ignore=("aspect",)).judge(camviz_clinic.inspect(calibration)).passed`.
+In Python: `camviz_clinic.checks.Gate(fail_on=("fault",),
+ignore=("aspect",)).judge(camviz_clinic.inspect(calibration)).passed`.
 
 ## What a file says twice
 
@@ -355,9 +358,9 @@ rounding can put apart two that agree. An exact zero counts as exact.
 ## Is the board as described?
 
 `camviz calibrate` and `camviz inspect` with pictures say what of a board is not as it was described, with the option
-that mends it. This is the board doctor, one file a fault in `camviz_clinic/checks/doctor`. It counts how many squares the
-markers of a ChArUco board are apart, in up to twelve pictures. Each marker's own outline gives the length of a square,
-so that no camera needs to be known. The board is the one whose layout has these steps.
+that mends it. This is the board doctor, one file a fault in `camviz_clinic/checks/doctor`. It counts how many squares
+the markers of a ChArUco board are apart, in up to twelve pictures. Each marker's own outline gives the length of a
+square, so that no camera needs to be known. The board is the one whose layout has these steps.
 
 | what is wrong | how it is seen | option |
 |---|---|---|

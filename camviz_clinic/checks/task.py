@@ -12,13 +12,13 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.lenses.base import Array, as_points
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.jacobian import pixel_jacobian
 from camviz_clinic.calibration.stereo_depth import depth_uncertainty
 from camviz_clinic.calibration.uncertainty import projection_covariance, worst_deviation
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.rig import pairs
-from camviz.lenses.base import Array, as_points
 
 DEPTHS = (1.0, 2.0, 5.0, 10.0)  # metres, of which a pair's depth error is told
 MATCHING_PX = 0.25  # the standard deviation of a match that is taken for granted; its part of the error grows with it

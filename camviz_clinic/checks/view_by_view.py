@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from scipy.special import fdtrc
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.types import Mask
-from camviz.lenses.base import Array
 
 SAME = 1e-9  # of a view's largest information: less is a direction that the view does not measure
 PARTINGS = 500  # at random, among which a parting of the views is ranked

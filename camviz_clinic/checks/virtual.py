@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from camviz_clinic.calibration import Detections, calibrate, calibrate_pair
-from camviz_clinic.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz_clinic.checks.evidence import Evidence
-from camviz_clinic.files import load
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration import Detections, calibrate, calibrate_pair
+from camviz_clinic.calibration.types import Board, Calibration
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.files import load
 
 SIZES = ((640, 480), (1280, 720), (1280, 960), (1920, 1080))
 BOARDS = (Board(9, 6, 0.025), Board(8, 5, 0.03), Board(11, 8, 0.02))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from camviz.lenses import calibration_models
 from camviz_clinic.commands.boards import add_board, board_of
 from camviz_clinic.commands.common import (
     FOUND,
@@ -33,7 +34,6 @@ from camviz_clinic.commands.common import (
 from camviz_clinic.commands.corners import add_corners, corners_of
 from camviz_clinic.commands.gate import EPILOG as GATE
 from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
-from camviz.lenses import calibration_models
 
 if TYPE_CHECKING:
     from camviz_clinic.calibration import CannotCalibrate

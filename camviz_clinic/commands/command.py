@@ -9,26 +9,11 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.metadata import entry_points
+from types import ModuleType
 
 import camviz
-from camviz_clinic.commands import (
-    board,
-    bundle,
-    calibrate,
-    check,
-    classroom,
-    completion,
-    convert,
-    doctor,
-    inspect,
-    join,
-    lab,
-    mtf,
-    noise,
-    reproject,
-    show,
-    teacher,
-)
+from camviz_clinic.commands import board, calibrate, check, completion, convert, inspect, mtf, noise, reproject, show
 from camviz_clinic.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, did_you_mean, refuse_exhausted
 from camviz_clinic.commands.terminal import say
 
@@ -66,10 +51,8 @@ exit status:
   4    camviz check cannot tell from these pictures
   130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
-COMMANDS = (
-    *(lab, doctor, board, calibrate, inspect, check, show, convert, reproject, noise, mtf, teacher, classroom, join),
-    *(bundle, completion),
-)
+COMMANDS = (board, calibrate, inspect, check, show, convert, reproject, noise, mtf, completion)
+"""The clinic's own. Other packages add theirs by an entry point of the group `camviz.commands`: a tuple of modules."""
 
 
 class Ended(BaseException):
@@ -109,13 +92,15 @@ def _run(words: list[str]) -> int:
     if not words:
         everything.print_help()
         return OK
-    words, beyond = _split(words) if words[0] == "lab" else (words, [])
+    passing = {name for each in commands() for name in getattr(each, "PASSES_ON", ())}
+    given = words[0]
+    words, beyond = _split(words) if words[0] in passing else (words, [])
     options, unknown = everything.parse_known_args(words)
     if unknown:
         near = did_you_mean(unknown[0], options.parser._option_string_actions)
         raise Refusal(f"unrecognized arguments: {' '.join(unknown)}{near}; see `{options.parser.prog} --help`.")
     with _pictures_allowed(getattr(options, "megapixels", None)):
-        return int(options.run(options, beyond) if options.run is lab.lab else options.run(options))
+        return int(options.run(options, beyond) if given in passing else options.run(options))
 
 
 @contextmanager
@@ -169,15 +154,21 @@ def _quiet_libraries(heard: bool) -> Iterator[None]:
     os.dup2(aside, 2)
 
 
+def commands() -> list[ModuleType]:
+    """The module of every command: what other packages bring first, then the clinic's own."""
+    found = {each.name: each for each in entry_points(group="camviz.commands")}
+    return [*(module for name in sorted(found) for module in found[name].load()), *COMMANDS]
+
+
 def parser() -> argparse.ArgumentParser:
-    """All of the command line. A new subcommand is one function here and one that does it."""
+    """All of the command line."""
     everything = Parser(
         "camviz", description=DESCRIPTION, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     everything.add_argument("--version", action="version", version=f"camviz {camviz.__version__}")
-    commands = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    for subcommand in COMMANDS:
-        subcommand.add(commands)
+    subparsers = everything.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
+    for subcommand in commands():
+        subcommand.add(subparsers)
     return everything
 
 

@@ -8,7 +8,15 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camviz_clinic.commands.common import OK, Refusal, add_command, add_megapixels, read_picture, refuse_output, write_whole
+from camviz_clinic.commands.common import (
+    OK,
+    Refusal,
+    add_command,
+    add_megapixels,
+    read_picture,
+    refuse_output,
+    write_whole,
+)
 from camviz_clinic.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:

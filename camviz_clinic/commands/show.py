@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -49,8 +50,6 @@ def show(options: argparse.Namespace) -> int:
 
 
 def refuse_renderer() -> None:
-    from camviz_school.commands.machine import renderer
-
-    finding = renderer()
-    if finding.status != "ok":
-        raise Refusal(f"{finding.name}: {finding.detail}; {finding.remedy}.")
+    asked = os.environ.get("CAMVIZ_RENDERER")
+    if asked not in (None, "", "solid", "wire"):
+        raise Refusal(f"CAMVIZ_RENDERER: {asked!r} is no renderer; set it to solid or wire, or not at all.")

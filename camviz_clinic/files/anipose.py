@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
+from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.section import Section, Size, agreed_size, explained
 from camviz_clinic.files.tables import parse_toml
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import shown
-from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
-from camviz.poses import RigidTransform, Rotation
 
 TITLE = "anipose TOML"
 MODELS = [model for model in models_of("opencv") if model.lens is not UnifiedSphere]

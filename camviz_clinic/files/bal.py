@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady
+from camviz.poses import OPENGL, RigidTransform, Rotation
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import Model
 from camviz_clinic.files.section import Section, agreed_size
 from camviz_clinic.files.trees import MAX_KEYS, scalar
-from camviz.lenses import BrownConrady
-from camviz.poses import OPENGL, RigidTransform, Rotation
 
 TITLE = "BAL problem"
 MODEL = Model("BAL", BrownConrady, "f cx cy k1 k2")

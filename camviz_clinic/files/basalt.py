@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, by_imu, chosen, listed
 from camviz_clinic.files.models import Model, expressed, models_of
 from camviz_clinic.files.output import as_json
 from camviz_clinic.files.section import Section, Size, as_size
-from camviz.poses import RigidTransform
 
 MODELS = models_of("basalt")
 KEYS = {"omega": "w"}

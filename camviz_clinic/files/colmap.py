@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, listed
 from camviz_clinic.files.models import Model, expressed, model_named, models_of
 from camviz_clinic.files.section import COUNT, LARGEST, ROTATION_TOLERANCE, Section, agreed_size, named
 from camviz_clinic.files.text import HEAD, MAX_BYTES, open_bounded, read_bytes, text_of
 from camviz_clinic.files.trees import scalar, shown
-from camviz.poses import RigidTransform, Rotation
 
 FIRST_PIXEL = 0.5  # "the upper left corner is (0, 0), the centre of the first pixel (0.5, 0.5)"
 MAX_IMAGES = 100_000

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from camviz.cameras import Camera
+from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.redundancy import Redundancy, between_rotations, compared
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.redundant import is_rotation
 from camviz_clinic.files.section import Section, Size, agreed_size, explained, named
 from camviz_clinic.files.trees import MAX_KEYS, shown
-from camviz.lenses import BrownConrady
-from camviz.lenses.base import Array
-from camviz.poses import RigidTransform, Rotation
 
 TITLE = "EasyMocap"
 INTRINSICS, EXTRINSICS = "intri.yml", "extri.yml"

@@ -10,14 +10,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.models import Model
 from camviz_clinic.files.section import Section
 from camviz_clinic.files.text import read_bytes, text_of
 from camviz_clinic.files.trees import parse, shown
-from camviz.lenses import BrownConrady
-from camviz.poses import RigidTransform
 
 Content = bytes | dict[str, bytes]  # of a file, or of the files of a folder by name
 

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration.redundancy import Redundancy, between_transforms, compared
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera
 from camviz_clinic.files.format import File, Format, coefficients_of
 from camviz_clinic.files.models import Model, expressed, models_of
 from camviz_clinic.files.opencv import image_size
@@ -18,8 +20,6 @@ from camviz_clinic.files.output import as_rows, as_yaml
 from camviz_clinic.files.redundant import rigid
 from camviz_clinic.files.section import Section, Size
 from camviz_clinic.files.trees import shown
-from camviz.lenses.base import Array
-from camviz.poses import RigidTransform
 
 STEP, TO_CAMERA, TO_IMU = "T_cn_cnm1", "T_cam_imu", "T_imu_cam"
 SAME = 0.1  # ° or mm: transforms that are no farther apart are one

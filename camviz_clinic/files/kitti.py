@@ -8,14 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import Perspective
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.section import Section, agreed_size
 from camviz_clinic.files.trees import scalar, shown
-from camviz.lenses import Perspective
-from camviz.poses import RigidTransform
 
 TITLE = "KITTI calib.txt"
 MODELS = models_of("kitti")

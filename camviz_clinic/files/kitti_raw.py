@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.kitti import as_lines, lines_of
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.section import agreed_size, explained
-from camviz.lenses import BrownConrady
-from camviz.poses import RigidTransform
 
 TITLE = "KITTI calib_cam_to_cam.txt"
 MODELS = models_of("kitti-raw")

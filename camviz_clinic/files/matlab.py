@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration.redundancy import Redundancy, compared
 from camviz_clinic.calibration.types import Calibration
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.output import as_json
 from camviz_clinic.files.section import Section, Size, agreed_size, explained
-from camviz.lenses import BrownConrady
-from camviz.lenses.base import Array
-from camviz.poses import RigidTransform
 
 TITLE = "MATLAB cameraParameters"
 FIRST_PIXEL = 1.0

@@ -8,8 +8,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.section import Section, Size, agreed_size

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from camviz_clinic.calibration.types import CalibrationError
 from camviz.cameras import Camera, Intrinsics
-from camviz_clinic.files.section import explained
 from camviz.lenses import Lens, same_lenses, spelled
+from camviz_clinic.calibration.types import CalibrationError
+from camviz_clinic.files.section import explained
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format, listed
 from camviz_clinic.files.literal import parse_literal
@@ -11,7 +12,6 @@ from camviz_clinic.files.models import expressed, model_named, models_of
 from camviz_clinic.files.section import COUNT, Section, agreed_size
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import shown
-from camviz.poses import RigidTransform, Rotation
 
 TITLE = "mrcal cameramodel"
 MODELS = models_of("mrcal")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, KannalaBrandt, Lens
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.section import Section, Size, agreed_size, explained
 from camviz_clinic.files.trees import shown
-from camviz.lenses import BrownConrady, KannalaBrandt, Lens
-from camviz.poses import RigidTransform
 
 TITLE = "OAK (DepthAI) calibration"
 MOST = 64  # cameras; boards have at most a dozen sockets

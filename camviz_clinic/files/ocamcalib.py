@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses.scaramuzza import Scaramuzza
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.section import Section, agreed_size, as_size, explained
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import scalar
-from camviz.lenses.scaramuzza import Scaramuzza
 
 TITLE = "OCamCalib calib_results.txt"
 MEANINGS = ("the polynomial", "the inverse polynomial", "the centre", "the stretch", "the image size")

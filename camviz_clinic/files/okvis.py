@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, by_imu, chosen, coefficients_of, listed
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.output import as_yaml

@@ -9,16 +9,16 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.stamp import LONGEST, Stamp
 from camviz_clinic.calibration.types import Board, Calibration, CalibrationError
-from camviz.cameras import Camera
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.opencv_redundancy import redundancies
 from camviz_clinic.files.opencv_writing import TITLE, write
 from camviz_clinic.files.section import Section, Size, agreed_size, explained
-from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
-from camviz.poses import RigidTransform, Rotation
 
 # Spellings are compared without capitals and underscores: Camera_Matrix, cameraMatrix and camera_matrix are one.
 MATRIX = "cameramatrix|intrinsicmatrix|intrinsics|mtx|k|m"

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from camviz_clinic.calibration.redundancy import Redundancy, between_directions, between_rotations, compared, share
-from camviz_clinic.calibration.types import CalibrationError
 from camviz.cameras import Camera
-from camviz_clinic.files.redundant import is_rotation
-from camviz_clinic.files.section import Section
 from camviz.lenses.base import Array
 from camviz.twoview import decompose_essential
+from camviz_clinic.calibration.redundancy import Redundancy, between_directions, between_rotations, compared, share
+from camviz_clinic.calibration.types import CalibrationError
+from camviz_clinic.files.redundant import is_rotation
+from camviz_clinic.files.section import Section
 
 SHAPES = {
     **dict.fromkeys(("R", "R1", "R2", "E", "F"), (3, 3)),

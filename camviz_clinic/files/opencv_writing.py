@@ -9,11 +9,11 @@ from urllib.parse import quote
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.lenses import KannalaBrandt
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera
 from camviz_clinic.files.models import expressed, models_of
-from camviz.lenses import KannalaBrandt
 
 GUESSED = ("chessboard", "charuco")  # kinds of boards that the reader knows by their markers
 MODELS = models_of("opencv")

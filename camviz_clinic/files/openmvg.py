@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, KannalaBrandt, Perspective
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import Model
 from camviz_clinic.files.section import COUNT, Section, Size, agreed_size
 from camviz_clinic.files.trees import shown
-from camviz.lenses import BrownConrady, KannalaBrandt, Perspective
-from camviz.poses import RigidTransform
 
 TITLE = "OpenMVG"
 MODELS = {  # by the key of the distortion, which is there only for those that have one

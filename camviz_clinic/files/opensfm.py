@@ -6,16 +6,16 @@ import re
 from math import pi
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import Equirectangular
+from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, chosen, listed, parameters_of
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.output import as_json
 from camviz_clinic.files.section import Section, Size, agreed_size
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import parse
-from camviz.lenses import Equirectangular
-from camviz.poses import RigidTransform, Rotation
 
 TITLE = "OpenSfM"
 MODELS = models_of("opensfm")

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, Perspective
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration.redundancy import Redundancy, compared, share
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera
 from camviz_clinic.files.format import File, Format, parameters_of
 from camviz_clinic.files.models import Model, expressed, models_of
 from camviz_clinic.files.output import as_opencv
 from camviz_clinic.files.section import Section, Size, agreed_size
-from camviz.lenses import BrownConrady, Perspective
-from camviz.poses import RigidTransform
 
 TITLE = "ORB-SLAM settings"
 MODELS = models_of("orbslam")

@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.ros import stereo_note
 from camviz_clinic.files.section import Section, agreed_size, explained
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import scalar
-from camviz.lenses import BrownConrady, KannalaBrandt
 
 TITLE = "ROS ost.txt"
 MAX_LINES = 1000

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady
+from camviz.poses import OPENGL, RigidTransform
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import Model
 from camviz_clinic.files.section import Section, Size, agreed_size, as_size
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import shown
-from camviz.lenses import BrownConrady
-from camviz.poses import OPENGL, RigidTransform
 
 TITLE = "Qualisys QTM calibration"
 SUBPIXELS = 64  # of a pixel: its unit for all that is measured on the sensor

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.types import CalibrationError
 from camviz_clinic.files.section import ROTATION_TOLERANCE, Section, as_rotation
-from camviz.lenses.base import Array
 
 
 def rigid(*places: tuple[Section, str]) -> list[Array] | None:

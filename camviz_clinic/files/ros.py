@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, KannalaBrandt, Lens
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, chosen, listed
 from camviz_clinic.files.models import Model, expressed, models_of
 from camviz_clinic.files.opencv import image_size
 from camviz_clinic.files.output import as_matrix, as_yaml
 from camviz_clinic.files.section import COUNT, Section, explained
-from camviz.lenses import BrownConrady, KannalaBrandt, Lens
 
 TITLE = "ROS CameraInfo"
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz_clinic.calibration.types import CalibrationError
 from camviz.cameras import Intrinsics
-from camviz_clinic.files.trees import MAX_NODES, Repeated, shown
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.types import CalibrationError
+from camviz_clinic.files.trees import MAX_NODES, Repeated, shown
 
 LARGEST = 1e9  # larger magnitudes are damage, not metres or pixels
 LARGEST_SIDE = 32768  # pixels

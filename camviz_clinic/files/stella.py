@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from camviz_clinic.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import Equirectangular
+from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format, parameters_of
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.output import as_yaml
 from camviz_clinic.files.section import Section, agreed_size
-from camviz.lenses import Equirectangular
 
 TITLE = "stella_vslam configuration"
 MODELS = models_of("stella")

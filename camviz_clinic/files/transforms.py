@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
+from camviz.lenses.base import Array
+from camviz.poses import OPENGL
 from camviz_clinic.calibration.redundancy import Redundancy, compared
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.output import as_json, as_rows
 from camviz_clinic.files.section import Section, Size, agreed_size, explained
 from camviz_clinic.files.trees import shown
-from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective
-from camviz.lenses.base import Array
-from camviz.poses import OPENGL
 
 TITLE = "transforms.json"
 FIRST_PIXEL = 0.5

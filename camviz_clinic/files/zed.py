@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady
+from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, parameters_of
 from camviz_clinic.files.models import Model
 from camviz_clinic.files.section import Section, Size, explained
 from camviz_clinic.files.tables import parse_ini
 from camviz_clinic.files.text import HEAD
-from camviz.lenses import BrownConrady
-from camviz.poses import RigidTransform, Rotation
 
 TITLE = "ZED .conf"
 MODEL = Model("ZED", BrownConrady, "fx fy cx cy k1 k2 p1 p2 k3")

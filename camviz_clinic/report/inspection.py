@@ -12,10 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from camviz.cameras import transform
-from camviz_clinic.checks import words
-from camviz_clinic.checks.inspection import Inspection
-from camviz_clinic.checks.registry import Finding
-from camviz_clinic.checks.summary import MOST_CAMERAS
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Label, Line
 from camviz.draw.page import document, figure
@@ -23,10 +19,14 @@ from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import OrbitCamera, axes_triad, camera_body, draw_space, space_panel
 from camviz.poses import RigidTransform
+from camviz_clinic.checks import words
+from camviz_clinic.checks.inspection import Inspection
+from camviz_clinic.checks.registry import Finding
+from camviz_clinic.checks.summary import MOST_CAMERAS
 from camviz_clinic.report.findings import findings_html, verdict_html
 from camviz_clinic.views.board_poses import BoardPosesView
-from camviz_clinic.views.chessboard import outline
 from camviz_clinic.views.catalogue import ALIASES, VIEWS, Case, Entry, title_of
+from camviz_clinic.views.chessboard import outline
 from camviz_clinic.views.missing import MissingView
 from camviz_clinic.views.observations import Observations, short_names
 from camviz_clinic.views.residuals import ResidualsView, bars_panel

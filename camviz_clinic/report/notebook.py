@@ -11,15 +11,15 @@ from typing import Any
 from IPython.display import display
 from ipywidgets import Dropdown, HBox, Layout, VBox
 
+from camviz.views.base import View
+from camviz.views.distortion import DistortionView
+from camviz.widgets.explorer import Explorer, explore
+from camviz.widgets.still import display_kept
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.report.findings import findings_html, verdict_html
-from camviz.views.base import View
 from camviz_clinic.views.catalogue import ALIASES, VIEWS, Case
-from camviz.views.distortion import DistortionView
-from camviz.widgets.explorer import Explorer, explore
-from camviz.widgets.still import display_kept
 
 LOOK, CAMERA = "look at", "of camera"  # what the two choosers are called, and no control of any view
 _LARGEST = 800  # pixels, of the longer side of a photograph

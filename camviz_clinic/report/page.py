@@ -12,12 +12,12 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw.page import document, figure
-from camviz_clinic.files import Calibration
 from camviz.lenses import Lens
 from camviz.poses import RigidTransform
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
+from camviz_clinic.files import Calibration
 
 SIDE_STEP = 0.1  # metres: how far a lone camera is moved to give it a partner
 

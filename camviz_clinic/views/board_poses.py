@@ -10,7 +10,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.types import Board, Calibration
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import rows
@@ -21,6 +20,7 @@ from camviz.draw.space import Item, Label, Line, OrbitCamera, axes_triad, camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import Control, Drawn, OrbitView, choice, slider
+from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.views.chessboard import outline, rim, squares
 
 _LAYOUT = rows((490, {"poses": 620, "picture": 340}))

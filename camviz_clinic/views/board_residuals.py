@@ -8,8 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.board_warp import WarpTest, warp_test
 from camviz.draw import svg
 from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import Item, Label, Line, TexturedMesh
@@ -19,10 +17,12 @@ from camviz.draw.shades import Shades, bar
 from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
 from camviz.views.base import Drawn, OrbitView, slider
+from camviz.views.marks import arrows
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.board_warp import WarpTest, warp_test
 from camviz_clinic.views.observations import Observations
 from camviz_clinic.views.residuals import nice
 from camviz_clinic.views.uncertainty import adjusted
-from camviz.views.marks import arrows
 
 _LAYOUT = rows((374, {"mean residuals": 480, "bend": 480}), (66, {"in words": 960}))
 

@@ -15,6 +15,9 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz.colour.picture_files import PictureError, read_picture
 from camviz_clinic.checks.evidence import Evidence
 from camviz.views.base import View
+from camviz.views.distortion import DistortionView
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.board_residuals import BoardResidualsView, tested
 from camviz_clinic.views.correlation import CorrelationView
@@ -37,7 +40,6 @@ from camviz_clinic.views.residuals import ResidualsView
 from camviz_clinic.views.rig import RigView
 from camviz_clinic.views.uncertainty import UncertaintyRangeView, UncertaintyView, adjusted
 from camviz_clinic.views.undistorted import UndistortedView
-from camviz.views.distortion import DistortionView
 
 LARGEST = 640  # pixels, of the longer side of a photograph as it is shown
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.boards.picture import whiteness
-from camviz_clinic.calibration.types import Board
 from camviz.draw.items import Line, TexturedMesh, closed
 from camviz.lenses.base import Array
+from camviz_clinic.calibration.boards.picture import whiteness
+from camviz_clinic.calibration.types import Board
 
 TEXELS, DETAILED = {"chessboard": 12}, 48  # pixels along `square_size`
 DARK, LIGHT = 40, 245

@@ -9,17 +9,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.cross_validation import Halves, HeldOut, halves, held_out
 from camviz.draw import plot
 from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import Drawn, View, choice
+from camviz.views.view_bars import names_below
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.cross_validation import Halves, HeldOut, halves, held_out
 from camviz_clinic.views.observations import Missing, short_names
 from camviz_clinic.views.uncertainty import adjusted, determined
-from camviz.views.view_bars import names_below
 
 _GRID = (30, 20)
 _PARTS = ("earlier and later", "every other")

@@ -7,15 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.stereo_depth import DepthUncertainty, depth_uncertainty
 from camviz.cameras import transform
-from camviz_clinic.checks.task import length
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
 from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View, slider
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.stereo_depth import DepthUncertainty, depth_uncertainty
+from camviz_clinic.checks.task import length
 from camviz_clinic.views.observations import Missing
 from camviz_clinic.views.uncertainty import adjusted, determined
 

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from camviz_clinic.calibration.difference import Difference, difference
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import rows
@@ -17,10 +16,11 @@ from camviz.draw.picture import Picture
 from camviz.draw.readout import readout
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.views.base import View, choice, slider
+from camviz.views.marks import arrows
+from camviz_clinic.calibration.difference import Difference, difference
 from camviz_clinic.views.observations import Missing
 from camviz_clinic.views.residuals import nice
 from camviz_clinic.views.uncertainty import DISTANCES
-from camviz.views.marks import arrows
 
 LARGE_TURN_DEG, LARGE_SHIFT = 0.5, 0.02  # degrees, and metres per metre of distance
 _LAYOUT = rows((470, {"difference": 680, "numbers": 280}))

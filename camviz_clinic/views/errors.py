@@ -12,8 +12,8 @@ from camviz.draw.flow import Sentences, rows
 from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View
-from camviz_clinic.views.observations import Missing
 from camviz.views.view_bars import bars_of, ceiling, figures_on, names_below
+from camviz_clinic.views.observations import Missing
 
 _LAYOUT = rows((200, {"errors": 960}), (50, {"in words": 960}))
 

@@ -12,9 +12,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz_clinic.checks.laboratory import BOARD, VIEWS, Experiment, experiment, lab_faults
-from camviz_clinic.checks.registry import Finding
-from camviz.views.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_in
@@ -23,6 +20,9 @@ from camviz.draw.readout import listed, true_minus
 from camviz.views.base import choice, slider, switch
 from camviz.views.marks import arrows, shortened
 from camviz.views.view_bars import LABEL, ViewChooser
+from camviz.views.yours import tried
+from camviz_clinic.checks.laboratory import BOARD, VIEWS, Experiment, experiment, lab_faults
+from camviz_clinic.checks.registry import Finding
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
 _MOST = 3  # findings that have room

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from camviz_clinic.calibration.focal_xi_ambiguity import FocalXiAmbiguity
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Tile
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
+from camviz_clinic.calibration.focal_xi_ambiguity import FocalXiAmbiguity
 
 
 def focal_xi_ambiguity_picture(

@@ -9,10 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.boards import kind_of
-from camviz_clinic.calibration.guidance import Candidate, instruction, next_board_poses
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import transform
 from camviz.draw import svg
 from camviz.draw.flow import Sentences, rows
@@ -23,6 +19,10 @@ from camviz.draw.space import OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import Drawn, OrbitView, slider
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.boards import kind_of
+from camviz_clinic.calibration.guidance import Candidate, instruction, next_board_poses
+from camviz_clinic.calibration.types import Board
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.chessboard import outline
 from camviz_clinic.views.observations import Missing

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.pairing import last_number
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import View
+from camviz_clinic.calibration.pairing import last_number
+from camviz_clinic.calibration.types import Board
 
 if TYPE_CHECKING:
     from camviz_clinic.files import Calibration

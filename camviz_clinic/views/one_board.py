@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from camviz_clinic.calibration.types import Board
-from camviz_clinic.calibration.zhang import focal_lengths, homography
 from camviz.cameras import Camera
-from camviz.views.patience import Patience
-from camviz.views.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.panel import Panel
 from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
+from camviz.views.patience import Patience
+from camviz.views.yours import tried
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.calibration.zhang import focal_lengths, homography
 
 Function = Callable[..., Any]
 

@@ -13,8 +13,8 @@ from camviz.draw.flow import Sentences, rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import Drawn, slider
-from camviz_clinic.views.observations import Observations, ObservedView
 from camviz.views.marks import arrows, crop, cross
+from camviz_clinic.views.observations import Observations, ObservedView
 
 _COUNT, _COLUMNS = 12, 6
 _LAYOUT = rows(

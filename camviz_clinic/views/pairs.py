@@ -17,10 +17,10 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
 from camviz.lenses.base import Array
 from camviz.views.base import Drawn, slider
-from camviz_clinic.views.observations import Missing, Photographs, no_photographs, not_at_hand, short_names
-from camviz_clinic.views.residuals import nice
 from camviz.views.marks import arrows, clipped, on_photograph
 from camviz.views.view_bars import LABEL, ViewChooser, bars_of, ceiling, figures_on, names_below
+from camviz_clinic.views.observations import Missing, Photographs, no_photographs, not_at_hand, short_names
+from camviz_clinic.views.residuals import nice
 
 if TYPE_CHECKING:
     from camviz_clinic.files import Calibration

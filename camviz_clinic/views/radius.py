@@ -15,9 +15,9 @@ from camviz.draw.picture import Picture
 from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
 from camviz.views.base import slider
+from camviz.views.marks import arrows
 from camviz_clinic.views.observations import Observations, ObservedView
 from camviz_clinic.views.residuals import nice
-from camviz.views.marks import arrows
 
 _RINGS, _CELLS = 12, (10, 8)
 _FEW = 8  # corners of a ring below which its standard error says little

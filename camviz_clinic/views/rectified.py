@@ -20,10 +20,10 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views import garden
 from camviz.views.base import Control, slider
-from camviz_clinic.views.observations import Missing
-from camviz_clinic.views.pairs import SharedViews, pair_of
 from camviz.views.marks import on_photograph
 from camviz.views.view_bars import ViewChooser
+from camviz_clinic.views.observations import Missing
+from camviz_clinic.views.pairs import SharedViews, pair_of
 
 _SIDE = 480
 _STAND = RigidTransform.from_translation([-0.4, 0.0, 0.0])  # of the left camera in the garden

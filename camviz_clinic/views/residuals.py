@@ -19,8 +19,6 @@ from camviz.draw.readout import listed, readout
 from camviz.draw.space import OrbitCamera, space_panel
 from camviz.lenses.base import Array
 from camviz.views.base import Drawn, OrbitView, slider
-from camviz_clinic.views.board_poses import BoardPosesView
-from camviz_clinic.views.observations import Observations, not_at_hand, short_names
 from camviz.views.marks import arrows, cross, shortened
 from camviz.views.view_bars import (
     LABEL,
@@ -33,6 +31,8 @@ from camviz.views.view_bars import (
     names_below,
     places,
 )
+from camviz_clinic.views.board_poses import BoardPosesView
+from camviz_clinic.views.observations import Observations, not_at_hand, short_names
 
 ARROW = 26.0  # picture units that a view's 90th percentile residual is drawn long, by default
 _LONGEST = 40.0  # picture units of an arrow from a corner that was set aside

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from camviz_clinic.calibration.types import Board
 from camviz.cameras import Camera
 from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import Item, Label, Line
@@ -18,6 +17,7 @@ from camviz.draw.space import OrbitCamera, axes_triad, camera_body, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import OrbitView, choice
+from camviz_clinic.calibration.types import Board
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.observations import Missing
 

@@ -9,8 +9,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.uncertainty import projection_covariance, worst_deviation
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
@@ -20,8 +18,10 @@ from camviz.draw.readout import readout
 from camviz.draw.shades import Shades, bar, contours, heat
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
-from camviz_clinic.views.observations import Missing
 from camviz.views.marks import circle
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.uncertainty import projection_covariance, worst_deviation
+from camviz_clinic.views.observations import Missing
 
 DISTANCES = {"infinity": inf, "30 m": 30.0, "10 m": 10.0, "3 m": 3.0, "1 m": 1.0, "0.5 m": 0.5, "0.3 m": 0.3}
 LEFT_OUT = (

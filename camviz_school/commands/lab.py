@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import camviz
-from camviz_school import server
 from camviz_clinic.commands.common import LACKING, OK, Refusal, add_command
 from camviz_clinic.commands.terminal import tell
+from camviz_school import server
 from camviz_school.course.catalogue import BEGINNING
 from camviz_school.course.material import checkout_lessons, lesson_paths, lessons_folder
 from camviz_school.course.working_copy import edition, lay_out
@@ -21,6 +21,9 @@ Opens the lessons in JupyterLab. In a checkout of the repository these are the l
 laid out in DIR, and laid out again only where you have not changed them: what you wrote is never overwritten. A new
 version of a lesson you did change is put beside it.
 """
+
+PASSES_ON = ("lab",)
+"""The command to which belongs what comes after --."""
 
 
 def add(commands: Any) -> None:

@@ -3,7 +3,8 @@
 python -m camviz_school.commands.lessons check            what departs from the pattern of a lesson
 python -m camviz_school.commands.lessons refresh [05 …]   run and save with static outputs, Colab's cell among them
 python -m camviz_school.commands.lessons fresh            which saved outputs are older than their lesson
-python -m camviz_school.commands.lessons pages            write README's tables, lesson 00's map and both glossaries anew
+python -m camviz_school.commands.lessons pages            write README's tables, lesson 00's map and both glossaries
+anew
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ from camviz_school.course.plots import tell_plots
 class Tutor:
     """Checks exercises for one notebook and remembers how often each was tried, so that its hints grow stronger.
 
-    It is what every lesson begins with: from then on the notebook's plots are shown with words (camviz_school.course.plots).
+    It is what every lesson begins with: from then on the notebook's plots are shown with words
+    (camviz_school.course.plots).
     """
 
     def __init__(self, rng: np.random.Generator | None = None) -> None:

@@ -15,7 +15,8 @@ SETUP = """\
 import numpy as np
 
 from camviz_school.course.exercises import Tutor
-from camviz.widgets import ask, explore, quiz
+from camviz.widgets import explore
+from camviz_school.widgets import ask, quiz
 
 check = Tutor()"""
 """The first code of every lesson; what only one lesson needs is imported where it is used."""

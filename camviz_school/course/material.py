@@ -1,7 +1,7 @@
 """Where the lessons are, and what belongs to one of them alone: `material/NN` beside the notebooks.
 
-A lesson's folder holds its `lesson.toml` (camviz_school.course.catalogue), its `questions.toml`, its `exercises.py`, the
-teacher's `plan.toml`, its own terms for the glossary in `glossary.toml`, and what else only that lesson needs.
+A lesson's folder holds its `lesson.toml` (camviz_school.course.catalogue), its `questions.toml`, its `exercises.py`,
+the teacher's `plan.toml`, its own terms for the glossary in `glossary.toml`, and what else only that lesson needs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 
-import camviz
+import camviz_school
 
 MATERIAL = "material"
 """The folder beside the notebooks that is no lesson."""
@@ -20,7 +20,7 @@ MATERIAL = "material"
 
 def checkout_lessons() -> Path | None:
     """The lessons folder of the source checkout that this package runs from; None when it is installed."""
-    root = Path(camviz.__file__).parents[1]
+    root = Path(camviz_school.__file__).parents[1]
     lessons = root / "lessons"
     return lessons if lessons.is_dir() and (root / "pyproject.toml").is_file() else None
 
@@ -34,7 +34,7 @@ def built_site() -> Path | None:
 
 def lessons_folder() -> Path:
     """Where the lessons are: in the checkout, or inside the installed package."""
-    return checkout_lessons() or Path(camviz.__file__).with_name("_lessons")
+    return checkout_lessons() or Path(camviz_school.__file__).with_name("_lessons")
 
 
 def material(*parts: str) -> Path:

@@ -10,11 +10,11 @@ from typing import Any, Protocol
 import anywidget
 
 from camviz.draw.picture import Picture
+from camviz.views.base import ORBIT_HANDLES, View
+from camviz.widgets import Explorer
 from camviz_school.record.axes import Axis
 from camviz_school.record.hands import PULLS, Reading, hands
 from camviz_school.record.packing import Fitted, Joined
-from camviz.views.base import ORBIT_HANDLES, View
-from camviz.widgets import Explorer
 
 Values = Mapping[str, Any]
 """A position: a value for each axis by its name."""

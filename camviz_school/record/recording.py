@@ -13,10 +13,10 @@ from typing import Any
 
 from camviz.draw.flow import Tile
 from camviz.draw.picture import Picture
+from camviz.widgets import Explorer
 from camviz_school.record.axes import Axis
 from camviz_school.record.packing import Images, Pack, hashed, script, transferred, webp
 from camviz_school.record.panes import Pane, Values, pane
-from camviz.widgets import Explorer
 
 # Of the positions that a budget allows: the last share is drawn first, and tells how many more are possible.
 SHARES = (1.0, 0.75, 0.52, 0.37, 0.27, 0.2, 0.14, 0.1, 0.07)

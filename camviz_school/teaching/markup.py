@@ -1,6 +1,7 @@
 """The lessons' Markdown as HTML that needs nothing: formulas as MathML, links as their words.
 
-mistune and latex2mathml come with `camviz[lab]`; whoever calls this has looked for them (camviz_school.commands.teacher).
+mistune and latex2mathml come with `camviz[lab]`; whoever calls this has looked for them
+(camviz_school.commands.teacher).
 """
 
 from __future__ import annotations

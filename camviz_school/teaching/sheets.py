@@ -12,7 +12,6 @@ from camviz_school.course.checks import Exercise
 from camviz_school.course.exercises import exercises
 from camviz_school.course.notebooks import Notebook, exercise_cells, solution_code
 from camviz_school.course.questions import Question
-from camviz.draw.page import document
 from camviz_school.teaching import markup, parts, plans
 from camviz_school.teaching.edition import place
 from camviz_school.teaching.marking import POINTS, RULE, WrongAnswer, example, wrong_answers

@@ -1,7 +1,7 @@
 """A question's way into the class's room: the choice goes there in the background, and the reply waits for the teacher.
 
-Who has not joined a room (`camviz_school.join`) notices nothing of it. Where the room is not reached, or does not ask this
-question now, the reply comes at once, with one line that says so.
+Who has not joined a room (`camviz_school.join`) notices nothing of it. Where the room is not reached, or does not ask
+this question now, the reply comes at once, with one line that says so.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Questions to commit to before seeing: `ask("05.far_rays")`, and the quiz in two forms.
 
 `quiz("05", "A")` stands before a lesson, takes one choice a question and tells nothing. `quiz("05")`, form B, stands at
-its end and replies to each choice. What is chosen is kept beside the notebook (camviz_school.course.answers). It is there
-again when the cell is run again, after a restart and in a notebook that was closed; "Start again" clears it.
+its end and replies to each choice. What is chosen is kept beside the notebook (camviz_school.course.answers). It is
+there again when the cell is run again, after a restart and in a notebook that was closed; "Start again" clears it.
 
 Live, the answer stays in the kernel until the reader has committed to a choice. Without a kernel, or with
 CAMVIZ_STATIC=1, the same questions are a page of folded replies; of what is asked before a lesson, without any.
@@ -22,7 +22,6 @@ from camviz.draw import prose
 from camviz_school.course.answers import KEPT_IN, AnswerBook, read_answers
 from camviz_school.course.questions import Question, question, quiz_questions
 from camviz_school.widgets.ballot import Ballot
-from camviz.widgets.still import StillWidget
 
 Tries = tuple[int, ...]
 """The choices a reader has committed to, in order; () before the first."""

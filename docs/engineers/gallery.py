@@ -1,6 +1,7 @@
 """The reports of gallery.md: `python docs/engineers/gallery.py FOLDER` writes one HTML file for each, and an index.
 
-The calibrations are virtual, their faults those of camviz_clinic/checks/findings, as strong as the clinic is sure to name.
+The calibrations are virtual, their faults those of camviz_clinic/checks/findings, as strong as the clinic is sure to
+name.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from camviz.draw.page import document
 from camviz_clinic.checks import faults
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.checks.virtual import healthy, healthy_pair
-from camviz.draw.page import document
 from camviz_clinic.report.inspection import write_report
 
 SITE = "https://camviz.github.io/camviz/engineers/reports/"

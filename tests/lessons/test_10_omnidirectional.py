@@ -12,13 +12,13 @@ from quoting import LESSONS
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from camviz.lenses import DoubleSphere, UnifiedSphere
+from camviz.panoramas.cubemap import FACES, face_camera
+from camviz.panoramas.ring import Ring
 from camviz_clinic.commands.command import main
 from camviz_school.course import notebooks
 from camviz_school.course.exercises import exercise
 from camviz_school.course.material import module
-from camviz.lenses import DoubleSphere, UnifiedSphere
-from camviz.panoramas.cubemap import FACES, face_camera
-from camviz.panoramas.ring import Ring
 
 lesson10 = module("10")
 

@@ -6,8 +6,6 @@ import pytest
 from quoting import LESSONS
 from scipy.constants import physical_constants
 
-from camviz_school.course import notebooks
-from camviz_school.course.material import module
 from camviz.scenes import to_display
 from camviz.sensors import decibel
 from camviz.sensors.correction import NoiseModel, merged
@@ -15,6 +13,8 @@ from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import Level
 from camviz.sensors.statistics import pair
 from camviz.views.noise import PhotonTransferView
+from camviz_school.course import notebooks
+from camviz_school.course.material import module
 
 lesson15 = module("15")
 

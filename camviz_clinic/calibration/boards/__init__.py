@@ -1,8 +1,8 @@
 """Kinds of boards: every module of this package that has a KIND.
 
 A kind is one file: where its points are, what of it is black, and how it is found in a picture.
-`camviz_clinic/calibration/boards/kind.py` explains the fields. The modules import OpenCV only where they search, because
-whoever reads a calibration file needs the points alone.
+`camviz_clinic/calibration/boards/kind.py` explains the fields. The modules import OpenCV only where they search,
+because whoever reads a calibration file needs the points alone.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The board doctor: what of a board is not as described, seen in its pictures, with the option that mends it.
 
-A trouble is one file here that declares a Trouble: `camviz_clinic/checks/doctor/trouble.py` explains how. `camviz calibrate`
-says what `diagnose` finds, and an inspection has it as `wrong-board`.
+A trouble is one file here that declares a Trouble: `camviz_clinic/checks/doctor/trouble.py` explains how. `camviz
+calibrate` says what `diagnose` finds, and an inspection has it as `wrong-board`.
 """
 
 from __future__ import annotations

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.doctor.shown import MOST, Shown
 from camviz_clinic.checks.doctor.trouble import trouble
-from camviz.lenses.base import Array
 
 OFF = 0.15  # pixels: the smooth part of how far the corners are off (RMS), in the median of the views
 SMOOTH = 0.75  # of the squares of how far they are off; a finder's own errors are smooth by 0.6 on photographs

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.boards.charuco import marker_dictionary, markers, white_squares
 from camviz_clinic.calibration.types import Board
-from camviz.lenses.base import Array
 
 Steps = Counter[tuple[int, int, int, int]]
 """How often the marker of the second number was seen so many squares to the right of that of the first, and below."""

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.lenses.base import Array
 from camviz_clinic.calibration import CannotCalibrate, Detections, calibrate
 from camviz_clinic.calibration.types import Board
-from camviz.cameras import Camera
 from camviz_clinic.checks.doctor.shown import Shown
 from camviz_clinic.checks.doctor.trouble import trouble
 from camviz_clinic.checks.rig import ENOUGH, lone_poses
-from camviz.lenses.base import Array
 
 SAME_DEG = 10.0  # between what two views say of how the cameras stand; the other order is 180° away
 FEWEST, AGREEING = 3, 0.6  # views, and share of them, that must agree once some are turned

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import log
 
-from camviz_clinic.checks.findings.pair import SAME_LENGTH, UNITS, baseline_scale
 from camviz_clinic.checks.doctor.shown import Shown
 from camviz_clinic.checks.doctor.trouble import trouble
 from camviz_clinic.checks.evidence import Evidence, NotChecked
+from camviz_clinic.checks.findings.pair import SAME_LENGTH, UNITS, baseline_scale
 
 
 @trouble("wrong unit", cause="the side of a square in metres or inches taken for millimetres", finding="baseline-scale")

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import yaml
 
+from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.solving import STOPPED_SHORT
-from camviz.cameras import Camera
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import as_file
 from camviz_clinic.files.opencv import FOUR_COEFFICIENTS
-from camviz.lenses import BrownConrady, KannalaBrandt
 
 HARMLESS_PX = 1.0
 GRID = (60, 40)

@@ -10,15 +10,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.cameras import Camera
+from camviz.distortion import fold_angle
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import held_out
-from camviz.cameras import Camera
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.registry import Finding, LabFault, Rng, finding
 from camviz_clinic.checks.virtual import single, spread_boards
-from camviz.distortion import fold_angle
-from camviz.lenses.base import Array
 
 COVERED = 0.4  # of the image: the outermost corners are a square inside the board
 CELLS = 64  # along the longer side of the image, to measure areas

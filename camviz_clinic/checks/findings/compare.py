@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from camviz.distortion import image_corner_radius
+from camviz.lenses import BrownConrady
 from camviz_clinic.checks.apart import differences
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, healthy
-from camviz.distortion import image_corner_radius
-from camviz.lenses import BrownConrady
 
 APART_PX = 0.5
 APART_SIGMAS = 3.0

@@ -8,13 +8,13 @@ from math import radians
 
 import yaml
 
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.redundancy import Redundancy
-from camviz_clinic.checks.findings.file import without_k3
 from camviz_clinic.checks.evidence import Evidence, NotChecked
+from camviz_clinic.checks.findings.file import without_k3
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import as_file, healthy_pair
 from camviz_clinic.files import kalibr
-from camviz.poses import RigidTransform, Rotation
 
 LARGE = {"°": 0.1, "mm": 1.0, "px": 1.0, "%": 1.0}  # by unit: above it numbers that differ are a fault
 SMALL = {"°": 0.001, "mm": 0.01, "px": 0.01, "%": 0.01}  # below it nobody could tell

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.special import chdtri
 
+from camviz.lenses.base import Array
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.judgement import px
 from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.registry import Finding, LabFault, Rng, finding
-from camviz.lenses.base import Array
 
 MANY_TIMES = 3.0  # the median error: twice happens between sharp and less sharp pictures
 ONCE_IN = 1e-4  # for all views together: how often the error of a view with few corners may be so far out by chance

@@ -10,14 +10,14 @@ from typing import Any
 import cv2
 import numpy as np
 
+from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.doctor import Shown, diagnose
 from camviz_clinic.checks.doctor.interpolated import smooth_errors
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import WRONG_NUMBERS, Finding, Rng, finding
 from camviz_clinic.checks.snapshots import pictured
-from camviz.lenses import BrownConrady
-from camviz.lenses.base import Array
 
 WITHOUT = "no pictures of the board were given (--images)"
 CHARUCO = Board(columns=6, rows=5, square_size=0.035, marker_size=0.026, dictionary="DICT_4X4_50")

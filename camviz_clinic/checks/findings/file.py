@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import yaml
 
-from camviz_clinic.calibration.types import CalibrationError
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt, Perspective
+from camviz_clinic.calibration.types import CalibrationError
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import WRONG_NUMBERS, Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, as_file, healthy, healthy_pair, single, spread_boards
 from camviz_clinic.files import kalibr, ros
-from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt, Perspective
 
 SQUARE = 0.02  # how far fx/fy may be from 1: sensors have square pixels to a few thousandths
 STANDARD_ERRORS = 5.0

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.cameras import Camera
+from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.solving import ANOTHER_WAY_DEG
 from camviz_clinic.calibration.types import Board, Calibration
-from camviz.cameras import Camera
 from camviz_clinic.checks import virtual
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import Finding, Kind, Rng, finding
 from camviz_clinic.checks.rig import FLIPPED, StereoPair, distances, fits_better, lone_poses
 from camviz_clinic.checks.virtual import healthy, healthy_pair
-from camviz.poses import RigidTransform, Rotation
 
 AGAIN_DEG = 10.0
 

@@ -10,12 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz_clinic.checks.evidence import Evidence, NotChecked
-from camviz_clinic.checks.registry import Finding, Rng, finding
-from camviz_clinic.checks.virtual import alone, healthy
 from camviz.distortion import (
     NEARLY_A_POLE,
     ideal_image_radius,
@@ -27,6 +22,11 @@ from camviz.distortion import (
 )
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, Lens, on_plane
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.checks.evidence import Evidence, NotChecked
+from camviz_clinic.checks.registry import Finding, Rng, finding
+from camviz_clinic.checks.virtual import alone, healthy
 
 LOST = 0.01  # of the pixels, fewer than which may fold
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from camviz.cameras import Camera
+from camviz.distortion import image_corner_radius
+from camviz.lenses import BrownConrady
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import NothingSharedError, pixel_grid
 from camviz_clinic.calibration.solving import STOPPED_SHORT
-from camviz.cameras import Camera
 from camviz_clinic.checks.between_views import FEWEST_VIEWS, Drift, Partings
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.fields import smooth_field, warp_columns
 from camviz_clinic.checks.observed import BY_CHANCE, Observed, explained
 from camviz_clinic.checks.registry import Finding, LabFault, Rng, finding
 from camviz_clinic.checks.virtual import SetUp, alone, changed, healthy, single, spread_boards
-from camviz.distortion import image_corner_radius
-from camviz.lenses import BrownConrady
-from camviz.lenses.base import Array
 
 SYSTEMATIC = 0.5  # of the noise: what remains of a real lens under the standard model is a third of it
 VISIBLE_PX = 0.1  # RMS, a pattern smaller than which harms nobody

@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 from scipy.special import fdtrc
 
+from camviz.lenses.base import Array
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.fields import smooth_field, warp_columns
 from camviz_clinic.checks.observed import APART, BY_CHANCE, SAME, Mask, Observed
 from camviz_clinic.checks.registry import Finding, LabFault, Rng, finding
 from camviz_clinic.checks.virtual import SetUp
-from camviz.lenses.base import Array
 
 MOVING = 0.7  # of the noise: in photographs of a global shutter, velocities explain 0.5 to 0.6 of it
 CLEARLY = 0.03  # of the squares left by rows, what other directions leave more: 0.015 in the same photographs at most

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from camviz_clinic.calibration.types import Board, Calibration
 from camviz.cameras import Camera
+from camviz.poses import RigidTransform, Rotation
+from camviz.twoview import RectifiedPair, rectify
+from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks import virtual
-from camviz_clinic.checks.findings.file import named
 from camviz_clinic.checks.evidence import Evidence, NotChecked
+from camviz_clinic.checks.findings.file import named
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.rig import OWN_UNIT, StereoPair, fits_better
 from camviz_clinic.checks.virtual import healthy_pair
-from camviz.poses import RigidTransform, Rotation
-from camviz.twoview import RectifiedPair, rectify
 
 LENGTHS = (0.001, 10.0)  # metres between which the baseline of a pair is not worth a word
 SQUARES = (0.0005, 0.5)  # the same for the side of a square

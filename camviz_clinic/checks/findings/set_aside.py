@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.observed import Mask, Observed
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import single
-from camviz.lenses.base import Array
 
 MANY = 0.05  # of all corners of a camera: fewer are what any set of photographs has
 FEWEST = 3  # corners in a row or column that make a pattern

@@ -10,11 +10,11 @@ from math import atan, degrees
 import numpy as np
 
 from camviz.cameras import Camera
+from camviz.lenses import BrownConrady, Perspective
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.registry import WRONG_NUMBERS, Finding, Rng, finding
 from camviz_clinic.checks.stamps import size_change
 from camviz_clinic.checks.virtual import alone, changed, healthy
-from camviz.lenses import BrownConrady, Perspective
 
 OFF_CENTRE = 0.1  # of the longer side: lenses sit within a few hundredths of the middle of the sensor
 WIDEST_DEG = 170.0  # no lens that keeps lines nearly straight sees more

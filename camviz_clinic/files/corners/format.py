@@ -11,10 +11,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz_clinic.calibration.types import Board, CalibrationError
 from camviz_clinic.files.text import read_bytes, text_of
 from camviz_clinic.files.trees import shown
-from camviz.lenses.base import Array
 
 Said = TypeVar("Said")
 

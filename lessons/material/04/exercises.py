@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz_school.course.checks import Arguments, Array, Exercise
 from camviz.poses import RigidTransform, Rotation
+from camviz_school.course.checks import Arguments, Array, Exercise
 
 SINGLE_PRECISION = 1e-5
 ROUNDING = 1e-6  # how far each element of MᵀM, and the determinant, may be from a rotation's

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from camviz.poses import Rotation
 from camviz_school.course.checks import Arguments, Array, Exercise
 from camviz_school.course.trials import Function
-from camviz.poses import Rotation
 
 # 1: the number everybody quotes --------------------------------------------------------------------------------------
 

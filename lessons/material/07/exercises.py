@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.poses import Rotation
 from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 from camviz_school.course.trials import Function
-from camviz.poses import Rotation
 
 # What several of them need -------------------------------------------------------------------------------------------
 
