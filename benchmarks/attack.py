@@ -290,7 +290,7 @@ def work(pipe: Any, seed: int) -> None:
                 came = f"more than {MEMORY >> 20} MB"
             except BaseException as error:
                 where = traceback.extract_tb(error.__traceback__)[-1]
-                own = [frame for frame in traceback.extract_tb(error.__traceback__) if "/camviz/" in frame.filename]
+                own = [frame for frame in traceback.extract_tb(error.__traceback__) if "/camviz" in frame.filename]
                 frame = (own or [where])[-1]
                 came = f"{type(error).__name__} at {Path(frame.filename).name}:{frame.lineno} {str(error)[:100]!r}"
             pipe.send((came, used() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10))

@@ -17,10 +17,9 @@ Beside it stand two packages: the clinic, which looks at real calibrations, and 
 The names below are imported when they are first used, so that `import camviz` costs next to nothing.
 """
 
+import sys
 from importlib import import_module
 from typing import Any
-
-from camviz import moved as _moved
 
 __version__ = "0.1.0"
 """The version, as three numbers.
@@ -54,12 +53,39 @@ _PARTS = (
 __all__ = ["Camera", "Intrinsics", "Rig", "__version__", "explore", "look_at", *_PARTS]
 
 
+_MOVED = {
+    "camviz_clinic": "Calibration calibration clinic commands files inspect load meshes plots report",
+    "camviz_school": "course join record room samples server teaching",
+}
+"""What stood in camviz before it became three packages."""
+
+
+def _where(name: str) -> str:
+    """Where a name that has moved stands now; empty for every other."""
+    new = {"clinic": "checks"}.get(name, name)
+    homes = [home for home, names in _MOVED.items() if name in names.split()]
+    return f"camviz.{name} is now {homes[0]}.{new}" if homes else ""
+
+
+class _Moved:
+    """Python's import asks it last: whoever imports a module that has moved learns where it is."""
+
+    @staticmethod
+    def find_spec(name: str, path: Any = None, target: Any = None) -> None:
+        house, _, rest = name.partition(".")
+        if house == "camviz" and (where := _where(rest.partition(".")[0])):
+            raise ImportError(where)
+
+
+sys.meta_path.append(_Moved)
+
+
 def __getattr__(name: str) -> Any:
     if name in _PARTS:
         return import_module(f"camviz.{name}")
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
-    raise AttributeError(_moved.sentence(name) or f"module 'camviz' has no attribute {name!r}")
+    raise AttributeError(_where(name) or f"module 'camviz' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import camviz_clinic
-from camviz.sensors.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
+from camviz.colour.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
 from camviz_clinic.calibration import Board, CannotCalibrate, detect
 from camviz_clinic.calibration.finding import look
 from camviz.colour.picture_files import PictureError, allowing, picture_size, read_gray, read_picture

@@ -180,10 +180,10 @@ def test_the_editions_do_not_overwrite_each_other(jupyter, room, lessons, monkey
 
 
 def test_the_lessons_of_a_wheel_are_inside_the_package(tmp_path, monkeypatch):
-    """Where there is no pyproject.toml beside the package, the lessons are in camviz/_lessons."""
-    inside = tmp_path / "site-packages" / "camviz" / "_lessons"
+    """Where there is no pyproject.toml beside the package, the lessons are in camviz_school/_lessons."""
+    inside = tmp_path / "site-packages" / "camviz_school" / "_lessons"
     inside.mkdir(parents=True)
-    monkeypatch.setattr(material.camviz, "__file__", str(inside.parent / "__init__.py"))
+    monkeypatch.setattr(material.camviz_school, "__file__", str(inside.parent / "__init__.py"))
     assert material.checkout_lessons() is None
     assert material.lessons_folder() == inside
 

@@ -27,6 +27,8 @@ def checkout(tmp_path_factory):
             (theirs / path.name).symlink_to(path)
     shutil.copytree(ours / "lenses", theirs / "lenses", ignore=shutil.ignore_patterns("__pycache__"))
     (theirs / "lenses" / "sine_fisheye.py").write_text(SINE, encoding="utf-8")
+    for name in ("camviz_clinic", "camviz_school"):
+        (root / name).symlink_to(ROOT / name)
     return root
 
 

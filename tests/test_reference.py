@@ -31,7 +31,8 @@ import camviz
 
 matplotlib.use("agg")
 
-ROOT = Path(camviz.__file__).parent
+ROOT = Path(camviz.__file__).parents[1]
+PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
 HELD = {  # numpydoc.validate's codes; left out are those that would say twice what the house's form says once
     *("GL01", "GL02", "GL03", "GL05", "GL06", "GL07", "GL08", "GL10", "SS01", "SS03", "SS04", "SS06"),
     *("PR02", "PR05", "PR07", "PR09", "PR10", "RT01", "RT02", "RT03", "RT05", "YD01"),
@@ -51,9 +52,10 @@ SECTION = re.compile(r"^(References|Examples)\n-+$", re.MULTILINE)
 
 @functools.cache
 def sources():
-    """The text of every module of camviz that can be imported without doing anything, by the module's name."""
-    paths = [path for path in sorted(ROOT.rglob("*.py")) if path.stem not in ("__main__", "server")]
-    names = [".".join(path.relative_to(ROOT.parent).with_suffix("").parts) for path in paths]
+    """The text of every module that can be imported without doing anything, by the module's name."""
+    every = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    paths = [path for path in every if path.stem not in ("__main__", "server")]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths]
     texts = [path.read_text("utf-8") for path in paths]
     return {name.removesuffix(".__init__"): text for name, text in zip(names, texts, strict=True)}
 

@@ -36,6 +36,7 @@ from camviz.views.frustum import FrustumView
 from camviz.widgets import explore
 explore(FrustumView(), "hfov_deg", "yaw_deg", "pitch_deg")
 """
+PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
 
 
 class CodeCell(NamedTuple):
@@ -180,6 +181,8 @@ def _shown(root: Path, cells: dict[int, CodeCell]) -> list[tuple[int, Any]]:
 def _loaded(root: Path, name: str) -> set[Path]:
     """The files on which what this process has drawn depends: modules, the package's data, the lesson's material."""
     modules = {Path(module.__file__) for module in list(sys.modules.values()) if getattr(module, "__file__", None)}
-    data = {path for path in (root / "camviz").rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
+    packages = [root / name for name in PACKAGES]
+    files = [path for package in packages for path in package.rglob("*") if path.is_file()]
+    data = {path for path in files if path.suffix not in (".py", ".pyc")}
     material = {path for path in (root / "lessons/material" / name).glob("*") if path.is_file()}
-    return {path for path in modules if path.is_relative_to(root / "camviz")} | data | material
+    return {path for path in modules if any(map(path.is_relative_to, packages))} | data | material

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from camviz.colour.picture_files import read_picture
 from camviz.lightfields.field import LightField
-from camviz.sensors.picture_files import read_picture
 
 _HCI = re.compile(r"input_Cam(\d+)\.png")
 _STANFORD = re.compile(r"out_(\d+)_(\d+)_(-?[\d.]+?)_(-?[\d.]+?)_?\.png")

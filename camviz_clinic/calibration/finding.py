@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.sensors.picture_files import PictureError, read_gray
+from camviz.colour.picture_files import PictureError, read_gray
 from camviz_clinic.calibration.boards import Shape, kind_of
 from camviz_clinic.calibration.chessboards import SMALLEST
 from camviz.colour.picture_files import PictureError, read_gray

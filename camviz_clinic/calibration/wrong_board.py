@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.colour.picture_files import PictureError, read_gray
 from camviz.lenses.base import Array
-from camviz.sensors.picture_files import PictureError, read_gray
 from camviz_clinic.calibration.boards import Shape, kind_of
 from camviz_clinic.calibration.chessboards import goes_on
 from camviz_clinic.calibration.guesses import guesses

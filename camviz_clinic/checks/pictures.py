@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
 
-from camviz.sensors.picture_files import PictureError, picture_size
+from camviz.colour.picture_files import PictureError, picture_size
 from camviz_clinic.calibration import Detections
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz.colour.picture_files import PictureError, picture_size

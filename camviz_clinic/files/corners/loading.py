@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from camviz.sensors.picture_files import PictureError, picture_size
+from camviz.colour.picture_files import PictureError, picture_size
 from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.detection import Detections, seen
 from camviz.colour.picture_files import PictureError, picture_size
