@@ -13,6 +13,7 @@ from commandline import refused, run
 import camviz
 from camviz_school.commands import machine as doctor
 from camviz_clinic.commands.command import main
+from camviz_school.commands import machine as doctor
 
 DATA = Path(__file__).parent / "data"
 MONO = "image_width: 640\nimage_height: 480\nK: [{fx}, 0, 320, 0, 500, 240, 0, 0, 1]\nD: [{d}]\n"

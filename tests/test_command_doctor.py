@@ -9,6 +9,7 @@ from packaging.requirements import Requirement
 
 from camviz_school.commands import machine as doctor
 from camviz_clinic.commands.command import main
+from camviz_school.commands import machine as doctor
 
 
 def test_a_package_is_held_against_its_range():

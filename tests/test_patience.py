@@ -15,7 +15,6 @@ from camviz.views import patience, yours
 from camviz_school.course.checks import Exercise, judge
 from camviz.views.patience import Patience, TimeIsUp
 from camviz.views.yours import attempt_each, tried
-from camviz_school.course import patience, yours
 from camviz_school.course.checks import Exercise, judge
 
 DOUBLE = Exercise("00.double", lambda x: 2 * x, lambda rng: [(rng.normal(size=3),)] * 4, ("a", "b", "c"), "Twice.")
