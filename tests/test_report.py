@@ -195,8 +195,8 @@ def test_the_notebook_chooses_between_cameras():
 @pytest.fixture
 def displayed(monkeypatch):
     shown = []
-    for module in ("inspection", "still"):
-        monkeypatch.setattr(f"camviz.widgets.{module}.display", lambda what, **_: shown.append(what))
+    for module in ("camviz_clinic.report.notebook", "camviz.widgets.still"):
+        monkeypatch.setattr(f"{module}.display", lambda what, **_: shown.append(what))
     return shown
 
 
