@@ -133,8 +133,8 @@ class Case:
 
     def picture(self, rng: Random) -> str:
         """A picture through all that read one."""
-        from camviz_clinic.calibration.finding import look
         from camviz.colour.picture_files import PictureError, picture_size, read_gray, read_picture
+        from camviz_clinic.calibration.finding import look
         from camviz_clinic.calibration.types import Board
 
         name = rng.choice(self.picture_names)

@@ -16,7 +16,6 @@ import camviz_clinic
 from camviz.colour.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
 from camviz_clinic.calibration import Board, CannotCalibrate, detect
 from camviz_clinic.calibration.finding import look
-from camviz.colour.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
 from camviz_clinic.checks import inspect_file
 from camviz_clinic.checks.pictures import sizes_of
 from camviz_clinic.commands.command import main

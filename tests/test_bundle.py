@@ -14,8 +14,8 @@ from zipfile import ZipFile
 import pytest
 from commandline import ROOT, refused
 
-from camviz_school.commands import packing
 from camviz_clinic.commands.command import main
+from camviz_school.commands import packing
 from camviz_school.commands.packing import BundleError, this_machine, write_bundle
 from camviz_school.course import material
 from camviz_school.samples import SampleUnavailable

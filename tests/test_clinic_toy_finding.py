@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camviz_clinic.checks import Inspection, faults, inspect, kinds, statistics
-from camviz_clinic.checks import checks
+from camviz_clinic.checks import Inspection, checks, faults, inspect, kinds, statistics
 from camviz_clinic.checks.virtual import healthy
 from camviz_clinic.commands.command import main
 from camviz_clinic.report.inspection import report

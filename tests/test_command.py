@@ -11,7 +11,6 @@ import pytest
 from commandline import refused, run
 
 import camviz
-from camviz_school.commands import machine as doctor
 from camviz_clinic.commands.command import main
 from camviz_school.commands import machine as doctor
 

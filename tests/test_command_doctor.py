@@ -7,7 +7,6 @@ import pytest
 from commandline import run
 from packaging.requirements import Requirement
 
-from camviz_school.commands import machine as doctor
 from camviz_clinic.commands.command import main
 from camviz_school.commands import machine as doctor
 

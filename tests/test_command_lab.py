@@ -7,8 +7,8 @@ import types
 import pytest
 from commandline import ROOT, refused
 
-from camviz_school.commands import lab
 from camviz_clinic.commands.command import main
+from camviz_school.commands import lab
 from camviz_school.course import material
 from camviz_school.course.working_copy import MANIFEST, lay_out
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from camviz.views import patience, yours
-from camviz_school.course.checks import Exercise, judge
 from camviz.views.patience import Patience, TimeIsUp
 from camviz.views.yours import attempt_each, tried
 from camviz_school.course.checks import Exercise, judge

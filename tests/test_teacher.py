@@ -9,10 +9,10 @@ import nbformat
 import numpy as np
 import pytest
 
-from camviz_school.commands import teacher
-from camviz_clinic.commands.command import main
-from camviz_school.course import notebooks, questions
 from camviz.draw import prose
+from camviz_clinic.commands.command import main
+from camviz_school.commands import teacher
+from camviz_school.course import notebooks, questions
 from camviz_school.course.checks import Exercise
 from camviz_school.course.exercises import exercises
 from camviz_school.course.material import module

@@ -7,8 +7,8 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from camviz_school.course import notebooks
 from camviz.draw import prose
+from camviz_school.course import notebooks
 from camviz_school.teaching import deck, parts, slides
 
 LESSONS = sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))

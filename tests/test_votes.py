@@ -20,7 +20,6 @@ from commandline import ROOT, refused
 
 from camviz.draw import prose
 from camviz_clinic.commands.command import main
-from camviz.draw import prose
 from camviz_school.course.learning import class_scores, normalised_gain
 from camviz_school.course.questions import question, questions
 from camviz_school.room import gain as gain_module

@@ -15,8 +15,8 @@ from pathlib import Path
 import pictures
 from links import REPOSITORY, on_site
 
-from camviz_school.course import colab
 from camviz.draw import prose
+from camviz_school.course import colab
 from camviz_school.course.exercises import exercise
 from camviz_school.course.notebooks import Cell, Notebook, exercise_of, read
 from camviz_school.course.questions import Question, question, quiz_questions

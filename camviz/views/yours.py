@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from camviz.draw import prose
+from camviz.views.calls import as_arrays, attribute, contained, explain, stopped
 from camviz.views.patience import Patience, TimeIsUp
 
 Function = Callable[..., Any]

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from camviz.colour.picture_files import PictureError, read_gray
 from camviz_clinic.calibration.boards import Shape, kind_of
 from camviz_clinic.calibration.chessboards import SMALLEST
-from camviz.colour.picture_files import PictureError, read_gray
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection

@@ -14,8 +14,6 @@ from camviz.lenses.base import Array
 from camviz_clinic.calibration.boards import Shape, kind_of
 from camviz_clinic.calibration.chessboards import goes_on
 from camviz_clinic.calibration.guesses import guesses
-from camviz.colour.picture_files import PictureError, read_gray
-from camviz.lenses.base import Array
 
 LOOKED_AT = 6  # pictures, spread over all of them
 LARGEST = 1000  # pixels along the longer side of what is looked at

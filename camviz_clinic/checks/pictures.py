@@ -9,7 +9,6 @@ from os import PathLike
 from camviz.colour.picture_files import PictureError, picture_size
 from camviz_clinic.calibration import Detections
 from camviz_clinic.calibration.adjustment import Adjustment
-from camviz.colour.picture_files import PictureError, picture_size
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.rig import board_poses
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
-from camviz.lenses import BrownConrady, FieldOfView
-from camviz_clinic.calibration.types import Calibration
+from camviz.lenses import BrownConrady, FieldOfView, KannalaBrandt, Perspective
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, by_imu, listed
 from camviz_clinic.files.models import Model, models_of
 from camviz_clinic.files.section import COUNT, Section, Size, agreed_size
-from camviz.lenses import BrownConrady, FieldOfView, KannalaBrandt, Perspective
 
 TITLE = "SVO camera"
 MODELS = {model.name: model for model in models_of("svo")}

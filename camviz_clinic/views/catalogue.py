@@ -11,9 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.adjustment import Adjustment
 from camviz.colour.picture_files import PictureError, read_picture
-from camviz_clinic.checks.evidence import Evidence
 from camviz.views.base import View
 from camviz.views.distortion import DistortionView
 from camviz_clinic.calibration.adjustment import Adjustment

@@ -325,7 +325,7 @@ def _called(
         return _interrupted(exercise, trial, stop), None
     except BaseException as error:
         complaint = explain(error, function) + f" It was called as {exercise.call(trial.arguments)}."
-        return replace(trial, raised=(type(error), _message(error)), complaint=complaint), None
+        return replace(trial, raised=(type(error), message(error)), complaint=complaint), None
     return (_nothing(exercise, trial) if result is None or result is Ellipsis else trial), result
 
 
@@ -339,7 +339,7 @@ def outcome(exercise: Exercise, function: Function, arguments: Arguments) -> Tri
         with quiet():
             result = function(*deepcopy(arguments))
     except Exception as error:
-        return Trial(arguments, raised=(type(error), _message(error)))
+        return Trial(arguments, raised=(type(error), message(error)))
     if result is None:
         return Trial(arguments, stub=True)
     with quiet():

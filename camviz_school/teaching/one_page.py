@@ -14,11 +14,11 @@ from importlib.resources import files
 from typing import Any
 
 from camviz.draw import prose
+from camviz.draw.page import document
 from camviz_school.course import questions
 from camviz_school.course.catalogue import described
 from camviz_school.course.notebooks import Notebook
 from camviz_school.course.questions import Question
-from camviz.draw.page import document
 from camviz_school.teaching import markup, panels, parts, plans
 from camviz_school.teaching.edition import place
 from camviz_school.teaching.numbering import Numbering

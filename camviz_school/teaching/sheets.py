@@ -7,6 +7,7 @@ from html import escape
 from importlib.resources import files
 
 from camviz.draw import prose
+from camviz.draw.page import document
 from camviz_school.course import questions
 from camviz_school.course.checks import Exercise
 from camviz_school.course.exercises import exercises

@@ -19,6 +19,7 @@ from typing import Any
 import traitlets
 
 from camviz.draw import prose
+from camviz.widgets.still import StillWidget
 from camviz_school.course.answers import KEPT_IN, AnswerBook, read_answers
 from camviz_school.course.questions import Question, question, quiz_questions
 from camviz_school.widgets.ballot import Ballot

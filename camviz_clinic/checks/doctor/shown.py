@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz_clinic.calibration.detection import Detections
 from camviz.colour.picture_files import PictureError, read_gray
+from camviz_clinic.calibration.detection import Detections
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.doctor.layout import BORDERS, Steps, explained, likeliest, steps_of
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz_clinic.checks.findings.lens import border_pixels
+from camviz.lenses import BrownConrady
 from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.findings.lens import border_pixels
 from camviz_clinic.checks.registry import WRONG_NUMBERS, Finding, Rng, finding
 from camviz_clinic.checks.rig import OWN_UNIT
 from camviz_clinic.checks.virtual import alone, healthy
-from camviz.lenses import BrownConrady
 
 OWN_WORLD = (*OWN_UNIT, "BAL problem", "OpenMVG", "OpenSfM")  # formats of scenes whose lengths are not metres
 FARTHEST = 50_000.0  # metres between a camera and the next one

@@ -13,7 +13,6 @@ import numpy as np
 from camviz.colour.picture_files import PictureError, picture_size
 from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.detection import Detections, seen
-from camviz.colour.picture_files import PictureError, picture_size
 from camviz_clinic.calibration.types import Board, CalibrationError, Mask
 from camviz_clinic.files.corners.format import CornerFile, CornerFormat, Corners, Given
 from camviz_clinic.files.corners.registry import corner_formats, corner_titles
