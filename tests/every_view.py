@@ -12,6 +12,7 @@ import numpy as np
 from calibrations import bare, pair, single
 
 import camviz.views
+import camviz_clinic.views
 from camviz.draw.picture import Picture
 from camviz.optics import SlantedEdge
 from camviz.sensors import Sensor
@@ -33,10 +34,12 @@ def words(svg: str) -> str:
 
 
 def classes() -> dict[str, type[View]]:
-    """Every class of view in camviz.views, by name."""
-    modules = [
-        importlib.import_module(found.name) for found in pkgutil.walk_packages(camviz.views.__path__, "camviz.views.")
+    """Every class of view in camviz.views and camviz_clinic.views, by name."""
+    found = [
+        *pkgutil.walk_packages(camviz.views.__path__, "camviz.views."),
+        *pkgutil.walk_packages(camviz_clinic.views.__path__, "camviz_clinic.views."),
     ]
+    modules = [importlib.import_module(each.name) for each in found]
     found = [one for module in modules for one in vars(module).values() if isclass(one) and issubclass(one, View)]
     return {one.__name__: one for one in found if one.__name__ not in SHARED}
 

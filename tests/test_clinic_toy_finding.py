@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camviz_clinic.checks import Inspection, checks, faults, inspect, kinds, statistics
+from camviz_clinic.checks import Inspection, faults, findings, inspect, kinds, statistics
 from camviz_clinic.checks.virtual import healthy
 from camviz_clinic.commands.command import main
 from camviz_clinic.report.inspection import report
@@ -61,7 +61,7 @@ def on_its_side(rng, strength):
 def folder(tmp_path, monkeypatch):
     """A folder of one's own, with the one file in it."""
     (tmp_path / "turned.py").write_text(TOY, encoding="utf-8")
-    monkeypatch.setattr(checks, "__path__", [*checks.__path__, str(tmp_path)])
+    monkeypatch.setattr(findings, "__path__", [*findings.__path__, str(tmp_path)])
     yield tmp_path
     sys.modules.pop("camviz_clinic.checks.findings.turned", None)
 

@@ -211,7 +211,7 @@ BARE = """
 import sys
 from IPython.core.interactiveshell import InteractiveShell
 shell = InteractiveShell.instance()
-shell.run_cell("import camviz; c = camviz_clinic.load({path!r})")
+shell.run_cell("import camviz_clinic; c = camviz_clinic.load({path!r})")
 print("camviz_clinic.report" in sys.modules)
 data, _ = shell.display_formatter.format(shell.user_ns["c"])
 print(sorted(data), data["text/html"].count("<table"), data["text/html"].count("<img"))

@@ -14,8 +14,8 @@ Notebook = Any
 SETUP = """\
 import numpy as np
 
-from camviz_school.course.exercises import Tutor
 from camviz.widgets import explore
+from camviz_school.course.exercises import Tutor
 from camviz_school.widgets import ask, quiz
 
 check = Tutor()"""
