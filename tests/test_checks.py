@@ -62,9 +62,54 @@ def test_a_stub_is_not_solved_yet_rather_than_wrong(stub):
     assert not verdict(stub)
 
 
-def test_a_solution_of_the_shown_numbers_alone_is_found_out():
-    shown = verdict(lambda points: 5 + np.round(points[..., 0] - 3, 12))
-    assert "shown in the lesson" in shown.message
+@pytest.mark.parametrize(
+    ("name", "function", "written_in"),
+    [
+        ("01.project", lambda points, f, cx, cy: 640 * points[..., :2] / points[..., 2:] + (cx, cy), "`f`"),
+        ("01.project", lambda points, f, cx, cy: f * points[..., :2] / points[..., 2:] + (319.5, cy), "`cx`"),
+        (
+            "15.total_noise",
+            lambda electrons, read_noise, prnu: np.sqrt(8**2 + electrons + (prnu * electrons) ** 2),
+            "`read_noise`",
+        ),
+    ],
+)
+def test_a_number_shown_in_the_lesson_and_written_into_a_function_is_found_out(name, function, written_in):
+    answer = verdict(function, of=exercise(name))
+    assert "shown in the lesson" in answer.message
+    assert written_in in answer.message
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda points: 5 + np.round(points[..., 0] - 3, 12),
+        lambda points: np.sqrt(points[..., 0] ** 2 + points[..., 2] ** 2),
+    ],
+)
+def test_who_only_happens_to_be_right_for_the_shown_numbers_is_not_called_a_cheat(function):
+    answer = verdict(function)
+    assert answer.status == "wrong"
+    assert "shown in the lesson" not in answer.message
+
+
+def test_the_same_kind_of_error_is_not_the_same_mistake():
+    """Both stop with ValueError where there is more than one point; only one of them has F on the wrong side."""
+    one = exercise("07.epipolar_line")
+
+    def without_an_axis(F, uv_left):
+        line = np.concatenate([uv_left, np.ones_like(uv_left[..., :1])]) @ F.T
+        return line / np.linalg.norm(line[..., :2], axis=-1, keepdims=True)
+
+    answer = verdict(without_an_axis, of=one)
+    assert answer.message not in {known.explanation for known in one.misconceptions}
+    assert "ValueError" in answer.message
+
+
+def test_a_known_mistake_has_to_agree_in_a_number_and_not_only_in_nan():
+    roots = Exercise("00.roots", lambda x: -x, lambda rng: [(rng.uniform(-2, -1, 3),)], "abc", "-")
+    roots.wrong("You take the root.")(lambda x: np.sqrt(x))
+    assert verdict(lambda x: np.log(x), of=roots).message.startswith("Every number that your function answers is NaN")
 
 
 def test_a_solution_for_one_point_that_does_not_broadcast_is_told_for_which_shapes_it_works():
@@ -281,6 +326,26 @@ def test_an_honest_near_miss_is_not_called_rounding_or_written_in_numbers(name, 
     assert word in message
     assert "shown in the lesson" not in message
     assert "stopped too early" not in message
+
+
+def test_the_best_of_a_grid_is_told_that_the_grid_is_too_coarse():
+    def tried(focal_mm, wavelength_nm):
+        d = np.geomspace(0.05, 2, 400)
+        return d[np.argmin(np.hypot(d, 2.44 * wavelength_nm * 1e-6 * focal_mm / d))]
+
+    assert "a grid that is too coarse" in judge(exercise("01.best_hole"), tried, np.random.default_rng(5)).message
+    assert "too coarse" not in verdict(lambda points: distance(points) + 1e-3 * points[..., 0]).message
+
+
+@pytest.mark.parametrize("guard", [1e-8, 1e-12, 1e-30, 1e-40])
+def test_a_point_however_near_in_front_of_the_hole_has_an_image(guard):
+    one = exercise("01.in_front")
+    assert not verdict(
+        lambda points, f, cx, cy: (
+            one.reference(points * [1, 1, 1], f, cx, cy) + np.where(points[..., 2:] > guard, 0, np.nan)
+        ),
+        of=one,
+    )
 
 
 def test_a_map_of_single_precision_is_good_enough_for_remap_and_one_half_a_pixel_off_is_not():

@@ -4,6 +4,7 @@ import re
 import shlex
 
 import gallery
+import numpy as np
 import pytest
 import symptoms
 from house import ROOT
@@ -48,6 +49,32 @@ def test_half_a_pixel_is_six_millimetres_at_one_metre_and_sixty_centimetres_at_t
     near, far = ((80 / (80 / Z - 0.5) - 80 / (80 / Z + 0.5)) / 2 for Z in (1, 10))
     assert round(1000 * near) == 6
     assert round(far, 1) == 0.6
+
+
+def test_right_near_and_wrong_far_is_an_offset_of_disparity_and_a_wrong_f_is_a_factor():
+    """Points at 0.5 to 10 m, seen by a true pair and located by one in which cx, the right camera's yaw or f is off."""
+    far, factor = (
+        next(each for each in symptoms.symptoms() if each["title"].startswith(title))
+        for title in ("Depth is right near", "Stereo depth is off by one factor")
+    )
+    assert "parallel-boards" not in far["findings"]
+    assert "parallel-boards" in factor["findings"]
+    said = " ".join(far["words"].split())
+    assert "Such an offset comes from one camera's cx, or from a camera that has turned about its upright axis" in said
+    assert "A wrong focal length or baseline errs by the same share at every distance." in said
+    f, base, Z = 800.0, 0.1, np.array([0.5, 10.0])
+    rows = -base / Z  # x/z of a point straight ahead of the left camera, in the right one
+
+    def share(cx=0.0, yaw=0.0, scale=1.0):
+        """How far the distance is off, as a share, where the calibration is off by these and the pictures are not."""
+        right = np.tan(np.arctan((f * rows - cx) / f) - yaw)  # the ray that the pair believes in
+        return np.abs(base / -right * scale / Z - 1)
+
+    for offset in (share(cx=0.5), share(yaw=0.5 / f)):
+        assert offset[0] < 0.005
+        assert offset[1] > 15 * offset[0]
+    near, away = share(scale=1.08)
+    assert near == pytest.approx(away) == pytest.approx(0.08)
 
 
 def test_the_gallerys_page_has_every_report():

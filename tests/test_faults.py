@@ -1,5 +1,6 @@
 """An inspection names every fault of the symptom table at the strength it promises, and nothing in healthy ones."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -175,3 +176,18 @@ def test_the_page_says_what_the_table_of_findings_says():
     """docs/clinic.md, but for the counted tables. To renew it: python -m camviz.clinic.statistics --page"""
     text = PAGE.read_text(encoding="utf-8")
     assert text == page(text.split(TABLES)[1].lstrip())
+
+
+def test_the_scoreboard_counts_its_own_alarms():
+    """The sentences below the table of other people's pictures, counted again in its last column."""
+    _, board = PAGE.read_text(encoding="utf-8").split("## Scoreboard")
+    found: dict[str, str] = {}
+    for line in board.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) == 8 and cells[0] not in ("set", "---"):
+            found[cells[0]] = found.get(cells[0], "") + cells[-1]
+    quiet = sum("(" not in said for said in found.values())
+    assert f"{quiet} of {len(found)} have nothing worse than a note" in board
+    for id in ("low-coverage", "parallel-boards", "split-disagreement"):
+        number = sum(f"`{id}`" in said for said in found.values())
+        assert re.search(rf"`{id}` (is named on {number} sets|\({number}( sets)?\))", board), (id, number)

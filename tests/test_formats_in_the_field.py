@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 import camviz
 from camviz.cameras import transform
@@ -140,6 +140,46 @@ def test_orbslam2s_pair_is_read_as_it_was_before_rectification():
     right_turn = np.array([[1, 0, 0], [0, 0.8, 0.6], [0, -0.6, 0.8]])
     expected = (right_turn.T @ (POINTS @ left_turn.T + [-0.12, 0, 0]).T).T
     np.testing.assert_allclose(transform(right.cam_from_world, POINTS), expected, rtol=0, atol=1e-12)
+
+
+def stereo_settings(folder, size, K, D, right_from_left, header="%YAML:1.0\n\n"):
+    """ORB-SLAM2's settings for EuRoC, with other numbers: cv2.stereoRectify's R and P beside K and D."""
+    R, t = right_from_left.rotation.as_matrix(), right_from_left.translation[:, None]
+    *turned, left_P, right_P = cv2.stereoRectify(K[0], D[0], K[1], D[1], size, R, t, alpha=0)[:4]
+    f, cx, cy = left_P[[0, 0, 1], [0, 2, 2]].tolist()
+    lines = ['Camera.type: "PinHole"', f"Camera.fx: {f}", f"Camera.fy: {f}", f"Camera.cx: {cx}", f"Camera.cy: {cy}"]
+    lines += ["Camera.k1: 0.0", "Camera.bFishEye: 0", f"Camera.width: {size[0]}", f"Camera.height: {size[1]}"]
+    lines += [f"Camera.bf: {float(-right_P[0, 3])}", "Camera.RGB: 1", "ThDepth: 35"]
+    for side, *matrices in zip(("LEFT", "RIGHT"), K, D, turned, (left_P, right_P), strict=True):
+        lines += [f"{side}.height: {size[1]}", f"{side}.width: {size[0]}"]
+        for name, matrix in zip("KDRP", map(np.atleast_2d, matrices), strict=True):
+            rows, cols = matrix.shape
+            lines += [f"{side}.{name}: !!opencv-matrix", f"   rows: {rows}", f"   cols: {cols}", "   dt: d"]
+            lines += [f"   data:{matrix.ravel().tolist()}"]
+    text = header + "\n".join([*lines, "Viewer.PointSize:2", ""])
+    return written(folder / "EuRoC.yaml", text), turned, (left_P, right_P)
+
+
+@pytest.mark.parametrize("header", ["%YAML:1.0\n\n", ""])
+def test_orbslam2s_euroc_settings_show_what_opencvs_maps_take_their_rectified_pictures_from(tmp_path, header):
+    """initUndistortRectifyMap: a rectified pixel looks along R⁻¹ P⁻¹ (u, v, 1) of the picture that was taken.
+
+    A point at the depth Z is seen by the right camera -P_r[0, 3] / Z pixels further to the left.
+    """
+    size, K = (752, 480), np.array([np.diag([458.5, 457.25, 1]), np.diag([457.5, 456.0, 1])])
+    K[:, :2, 2] = (367.25, 248.5), (380.0, 255.25)
+    D = np.array([[-0.2834, 0.07396, 1.94e-4, 1.76e-5, 0], [-0.28368, 0.07451, -1.05e-4, -3.56e-5, 0]])
+    stands = RigidTransform.from_components([-0.11, 0.0003, -0.0008], Rotation.from_rotvec([0.0143, -0.0022, -0.0023]))
+    path, turned, P = stereo_settings(tmp_path, size, K, D, stands, header)
+    rig, disparity = list(camviz.load(path).rig), 40
+    uv = np.array([(u, v) for u in (150, 376, 640) for v in (60, 240, 400)])
+    ahead = np.column_stack([(uv - P[0][:2, 2]) / P[0][0, 0], np.ones(len(uv))])
+    points = -P[1][0, 3] / disparity * ahead @ turned[0]
+    for camera, *side, shift in zip(rig, K, D, turned, P, (0, disparity), strict=True):
+        maps = cv2.initUndistortRectifyMap(*side, size, cv2.CV_32FC1)
+        taken = np.array([[each[v, u - shift] for each in maps] for u, v in uv])
+        np.testing.assert_allclose(camera.project(points), taken, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(rig[1].cam_from_world.as_matrix(), stands.as_matrix(), rtol=0, atol=1e-12)
 
 
 def test_orbslams_baseline_times_fx_is_a_note(tmp_path):
@@ -332,6 +372,54 @@ def test_rpg_svos_atan_is_in_fractions_of_the_image(tmp_path):
     text += "cam_cx: 0.47\ncam_cy: 0.55\ncam_d0: 0.93"
     (camera,) = camviz.load(written(tmp_path / "a.yaml", text)).cameras.values()
     check(camera, fov(POINTS, 0.51 * 752, 0.80 * 480, 0.47 * 752 - 0.5, 0.55 * 480 - 0.5, 0.93))
+
+
+VIKIT = "cam_width: 640\ncam_height: 480\ncam_fx: {}\ncam_fy: {}\ncam_cx: {}\ncam_cy: {}\n"
+
+
+@pytest.mark.parametrize("known", range(5))
+def test_vikits_pinhole_has_zeros_for_the_coefficients_that_are_not_there(tmp_path, known):
+    """camera_loader.h: getParam(ns + "/cam_d0", 0.0). OpenCV's order: k1 k2 p1 p2. `scale` shrinks what it works on."""
+    D = [-0.28, 0.074, 0.0002, 1.75e-05]
+    text = "cam_model: Pinhole\nscale: 0.5\n" + VIKIT.format(458.5, 457.25, 320.5, 248.25)
+    text += "".join(f"cam_d{index}: {value}\n" for index, value in enumerate(D[:known]))
+    (camera,) = camviz.load(written(tmp_path / "a.yaml", text)).cameras.values()
+    check(camera, radtan(POINTS, 458.5, 457.25, 320.5, 248.25, *D[:known]))
+
+
+def test_vikits_equidistant_camera_has_opencvs_fisheye(tmp_path):
+    """EquidistantCamera of FAST-LIVO2's vikit: θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)."""
+    text = "cam_model: EquidistantCamera\nk1: 0.1\nk2: -0.02\nk3: 0.003\nk4: -0.0004\n"
+    text += VIKIT.format(300, 301, 320, 240)
+    (camera,) = camviz.load(written(tmp_path / "a.yaml", text)).cameras.values()
+    check(camera, kannala_brandt(POINTS, 300, 301, 320, 240, 0.1, -0.02, 0.003, -0.0004))
+
+
+@pytest.mark.parametrize("words", ["cam_model: Pinhole\ncam_d1: 0.1", "cam_model: EquidistantCamera\nk1: 0\nk2: 0.1"])
+def test_vikit_leaves_out_a_distortion_whose_first_coefficient_is_zero(tmp_path, words):
+    """distortion_ = fabs(d0) > 0.0000001, of PinholeCamera and of EquidistantCamera."""
+    text = words + "\n" + VIKIT.format(300, 301, 320, 240)
+    (camera,) = camviz.load(written(tmp_path / "a.yaml", text)).cameras.values()
+    check(camera, radtan(POINTS, 300, 301, 320, 240))
+
+
+def test_vikits_atan_is_straight_where_its_angle_is_zero(tmp_path):
+    """ATANCamera: distortion_ = s != 0."""
+    text = "cam_model: ATAN\ncam_d0: 0.0 # 0.9320\n" + VIKIT.format(0.5, 0.8, 0.45, 0.51)
+    (camera,) = camviz.load(written(tmp_path / "a.yaml", text)).cameras.values()
+    check(camera, radtan(POINTS, 320, 384, 287.5, 244.3))
+
+
+def test_vikits_atan_without_its_angle_is_refused(tmp_path):
+    """camera_loader.h has no default for it."""
+    with pytest.raises(CalibrationError, match="cam_d0: expected a number, the key is missing"):
+        camviz.load(written(tmp_path / "a.yaml", "cam_model: ATAN\n" + VIKIT.format(0.5, 0.8, 0.45, 0.51)))
+
+
+def test_a_vikit_file_that_names_ocamcalibs_is_refused_with_the_file_to_give(tmp_path):
+    text = "cam_model: Ocam\ncam_calib_file: /home/me/calib_results.txt\n"
+    with pytest.raises(CalibrationError, match=r"Ocam has .* OCamCalib's calib_results\.txt"):
+        camviz.load(written(tmp_path / "a.yaml", text))
 
 
 EXTRINSICS = """%YAML:1.0

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from camviz.course import notebooks
 from camviz.course.glossary import anchor, glossary, markdown, page, term
 from camviz.course.material import lesson_paths
+from camviz.course.questions import questions
 from camviz.course.reading import LONGEST_SENTENCE, sentences, words
 
 ROOT = Path(__file__).parents[1]
@@ -103,6 +105,57 @@ def test_addresses_are_those_github_gives_a_heading():
     assert anchor("Zhang's calibration algorithm") == "zhangs-calibration-algorithm"
     assert '<a id="shai-shalev-shwartz"></a>' in markdown()
     assert "[05](lessons/05_distortion.ipynb)" in markdown("lessons/")
+
+
+def _order():
+    """The lessons as the README's table lists them."""
+    return re.findall(r"^\| (\d\d) ", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def _pattern(one):
+    names = "|".join(re.escape(name) for name in (one.name, *one.also))
+    return re.compile(rf"(?<![\w-])(?:{names})s?(?![\w-])", re.IGNORECASE)
+
+
+EVERYDAY = {
+    "Checkerboard pattern method": "a chessboard is one for everybody",
+    "Fisheye lenses": "a fisheye is known from photographs, and named in the lesson's title",
+    "Pixel pitch": "how large a pixel is, lesson 01 says",
+    "Colour temperature": "a tint is a cast of colour",
+}
+EXPLAINED = {
+    ("03.first_skew", "Skew coefficient"): "where the second number, the skew, is nearly always 0",
+    ("06.views", "Zhang's calibration algorithm"): "that is Zhang's method",  # just above: Zhang (2000) showed how
+    ("13.first_delta", "Colour difference"): "The measure is ΔE2000, of which 1 is about the least that an eye notices",
+    ("14.fan", "Rolling shutter"): "each of its 480 rows is exposed 64 µs after the one above",
+    ("14.first_shutter", "CMOS sensor"): "Sensors come in two kinds, CCD and CMOS.",
+    ("14.first_decibel", "Dynamic range"): "Dynamic range is saturation divided by the threshold",
+    ("15.dark", "Dark frame"): "a picture taken under the lens cap, a dark frame",
+}
+"""A question that says itself what its term means, and with which words."""
+
+
+@pytest.mark.parametrize("lesson", [path.name[:2] for path in lesson_paths()][1:])
+def test_a_question_asked_before_a_term_is_explained_does_without_it(lesson):
+    """Form A stands before its lesson, a prediction behind the cells above it; its text and choices are read."""
+    order = _order()
+    (path,) = (path for path in lesson_paths() if path.name.startswith(lesson))
+    cells = notebooks.read(path).cells
+    unknown = [one for one in glossary().terms if min(map(order.index, one.lessons)) >= order.index(lesson)]
+    found, excused = set(), set()
+    for asked in questions(lesson).values():
+        if asked.form == "B":
+            continue
+        above = next((i for i, cell in enumerate(cells) if f'ask("{asked.name}")' in cell.source), 0)
+        told = " ".join(cell.source for cell in cells[1:above] if cell.cell_type == "markdown")
+        said = " ".join([asked.text, *(choice.text for choice in asked.choices)])
+        used = {one.name for one in unknown if _pattern(one).search(said) and not _pattern(one).search(told)}
+        for name in used - set(EVERYDAY):
+            (excused if EXPLAINED.get((asked.name, name), "\0") in " ".join(said.split()) else found).add(
+                (asked.name, name)
+            )
+    assert not found
+    assert excused == {one for one in EXPLAINED if one[0].startswith(lesson)}
 
 
 def test_every_glossary_link_in_the_lessons_has_a_target():

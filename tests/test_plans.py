@@ -1,13 +1,18 @@
 """Plans by the minute: they add up, they stand at places that their lesson has, and a wrong one is refused in words."""
 
+import pkgutil
+import re
+from dataclasses import is_dataclass
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from camviz import views
 from camviz.course import notebooks
 from camviz.course.material import material
-from camviz.teaching import plans
+from camviz.teaching import markup, plans
 
 LESSONS = {path.name[:2]: path for path in sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))}
 PLANNED = sorted(path.parent.name for path in material().glob("*/plan.toml"))
@@ -112,3 +117,43 @@ def test_what_a_lesson_does_not_have_is_named(old, new, complaint):
     assert old in PLAN
     found = plans.complaints(plans.parse("05", PLAN.replace(old, new)), notebooks.read(LESSONS["05"]))
     assert any(complaint in one for one in found), found
+
+
+# What a teacher can take in -------------------------------------------------------------------------------------------
+
+
+def said(plan):
+    texts = [plan.bring, plan.network, plan.machine, *(one.text for one in plan.notice)]
+    return [*texts, *(text for step in plan.steps for text in (step.teacher, step.students))]
+
+
+def names_of_controls():
+    """The names of all fields of all views that something else stands on, `hide_fold` for "hide what folds"."""
+    found = set()
+    for module in pkgutil.iter_modules(views.__path__):
+        for one in vars(import_module(f"camviz.views.{module.name}")).values():
+            if isinstance(one, type) and is_dataclass(one) and hasattr(one, "controls"):
+                found |= {name for name, control in one.controls().items() if name != control.label and "_" in name}
+    return found
+
+
+@EACH
+def test_a_plan_calls_controls_what_stands_on_them(number):
+    """Underscores are left to code and to formulas (r_d, r_left)."""
+    names = names_of_controls()
+    assert {"hide_fold", "focal_mm", "spots_px"} <= names
+    words = re.findall(r"\w+", " ".join(re.sub(r"`[^`]*`", "", text) for text in said(plans.plan(number))))
+    assert names & set(words) == set()
+    assert {one for one in words if "_" in one} <= {"r_d", "r_left", "r_right", "X_cam", "K_new"}
+
+
+@EACH
+def test_the_first_minutes_hold_one_thing(number):
+    """The class meets the lesson's question: two sentences of the teacher's, and one thing for the class to do."""
+    first = plans.plan(number).steps[0]
+    assert first.at == "header"
+    assert len(markup.sentences(first.teacher)) <= 2
+    assert len(first.teacher.split()) <= 30
+    assert len(markup.sentences(first.students)) == 1
+    assert len(first.students.split()) <= 12
+    assert "," not in first.students

@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 import nbformat
@@ -10,11 +11,11 @@ import pytest
 
 from camviz.commands import teacher
 from camviz.commands.command import main
-from camviz.course import notebooks, questions
+from camviz.course import notebooks, prose, questions
 from camviz.course.checks import Exercise
 from camviz.course.exercises import exercises
 from camviz.course.material import module
-from camviz.teaching import edition, marking, markup, one_page, parts, plans, sheets
+from camviz.teaching import deck, edition, marking, markup, numbering, one_page, panels, parts, plans, sheets
 
 lesson05 = module("05")
 
@@ -28,6 +29,10 @@ DISTORTION = next(path for path in LESSONS if path.name.startswith("05"))
 def made(path):
     """A lesson's teacher's edition, not to be changed."""
     return edition.teacher_edition(notebooks.read(path))
+
+
+def numbers(path):
+    return numbering.Numbering.of(plans.plan(path.name[:2]), deck.planned_slides(notebooks.read(path)))
 
 
 def cell(source, **output):
@@ -87,7 +92,7 @@ def test_a_lesson_without_a_plan_has_its_keys_all_the_same(monkeypatch):
     cells = edition.teacher_edition(notebooks.read(DISTORTION)).cells
     assert not [one for one in cells if "plan" in one.metadata.get("tags", [])]
     assert [one for one in cells if "key" in one.metadata.get("tags", [])]
-    assert set(sheets.sheets(notebooks.read(DISTORTION), "05")) == {"exercises", "marking"}
+    assert set(sheets.sheets(notebooks.read(DISTORTION), "05", [])) == {"exercises", "marking"}
 
 
 @EACH
@@ -128,8 +133,8 @@ def folder(tmp_path_factory):
 
 def test_an_executed_edition_has_pictures_and_every_solution_is_right_in_it(folder, capsys):
     notebook = notebooks.read(folder / DISTORTION.name)
-    shown = [one for one in notebook.cells if parts.pictures(one)]
-    assert len(shown) == len([one for one in notebooks.read(DISTORTION).cells if parts.pictures(one)])
+    shown = [one for one in notebook.cells if panels.panels(one)]
+    assert len(shown) == len([one for one in notebooks.read(DISTORTION).cells if panels.panels(one)])
     checks = notebooks.tagged(notebook, "check")
     assert len(checks) == len(exercises("05"))
     for one in checks:
@@ -197,7 +202,7 @@ def test_pictures_of_the_lessons_come_along(folder):
 @EACH
 def test_the_sheets_hold_every_exercise_and_the_quiz_and_load_nothing(path):
     number, lesson = path.name[:2], notebooks.read(path)
-    pages = sheets.sheets(lesson, number)
+    pages = sheets.sheets(lesson, number, deck.planned_slides(lesson))
     for name, page in pages.items():
         assert not re.findall(r'(?:src|href)="(?!data:)[^"]*"|url\((?!data:)|@import', page), name
     stubs = notebooks.stubs(lesson)
@@ -305,7 +310,7 @@ def test_the_one_page_says_what_the_lesson_says(path):
     plan = plans.plan(path.name[:2])
     if plan is None:
         pytest.skip("a lesson without a plan has no such page")
-    page = one_page.one_page(notebooks.read(path), plan, path.name)
+    page = one_page.one_page(notebooks.read(path), numbers(path), path.name)
     minutes = [f"{begun}–{ended}" for begun, ended, _ in plan.times(plans.LONG)]
     assert re.findall(r"<tr><td>(\d+–\d+)</td>", page) == minutes
     votes = [step for step in plan.steps if step.kind == "question"][:2]
@@ -318,5 +323,95 @@ def test_the_one_page_names_the_values_that_a_visualizer_opens_with():
     """Lesson 05's first: DistortionView(k1=-0.28, k2=0.07, panels="picture"), "show", k1=(-0.35, 0.35, 0.005)."""
     found = list(one_page.settings(notebooks.read(DISTORTION)))
     assert found[0] == (0, "k1 −0.28, k2 0.07", "show, k1 (−0.35 … 0.35)")
-    page = one_page.one_page(notebooks.read(DISTORTION), plans.plan("05"), DISTORTION.name)
+    page = one_page.one_page(notebooks.read(DISTORTION), numbers(DISTORTION), DISTORTION.name)
     assert "Set k1 −0.28, k2 0.07. Move show, k1 (−0.35 … 0.35)." in page
+
+
+@EACH
+def test_the_one_page_calls_controls_what_stands_on_them(path):
+    """Only formulas of the questions have an underscore; `focal_mm` is "focal length f" on the screen."""
+    found = list(one_page.settings(notebooks.read(path)))
+    assert not [one for one in found if "_" in f"{one[1]}{one[2]}"]
+
+
+def test_a_view_that_another_cell_has_named_is_known_by_its_class():
+    """Lesson 05's last has a name that its own cell gives in a loop; lesson 02's first is made on the spot."""
+    last = {path.name[:2]: list(one_page.settings(notebooks.read(path)))[-1] for path in LESSONS}
+    assert last["05"] == (11, "", "k1, k2, hide what folds, show")
+    first = {path.name[:2]: next(one_page.settings(notebooks.read(path)), None) for path in LESSONS}
+    assert first["02"][2] == "aperture, cover, focus s, f-number N"
+
+
+# The plan and the slides ---------------------------------------------------------------------------------------------
+
+
+@EACH
+def test_a_plan_numbers_the_slides_as_the_deck_does(path):
+    """The numbers of the printed plan, read back: every slide once, in a step or among those to skip."""
+    if plans.plan(path.name[:2]) is None:
+        assert path.name.startswith("00")
+        return
+    made, numbered = deck.planned_slides(notebooks.read(path)), numbers(path)
+    page = sheets.plan_page(notebooks.read(path), numbered)
+    rows = re.findall(
+        r"<tr><td>[^<]*</td><td>[^<]*</td><td>([^<]*)</td>", page.partition("Questions and their keys")[0]
+    )
+    assert len(rows) == len(numbered.plan.steps)
+    in_steps = [counted(row) for row in rows]
+    assert sorted([*chain.from_iterable(in_steps), *numbered.skipped(90)]) == list(range(1, len(made) + 1))
+    for step, slides in zip(numbered.plan.steps, in_steps, strict=True):
+        kinds = {made[number - 1].kind.split()[0] for number in slides}
+        if step.kind == "question":
+            assert kinds == {"question", "key", "reply"}
+            asked = questions.question(f"{path.name[:2]}.{step.name}")
+            assert made[slides[0] - 1].body.startswith(str(prose.to_html(asked.text)))
+        elif step.kind == "exercise":
+            assert "exercise" in kinds
+        elif step.at in ("header", "section Recap"):
+            assert kinds <= {"title", "claim", "recap"}
+    short = sorted(
+        number for step, found in zip(numbered.plan.steps, in_steps, strict=True) for number in found if step.minutes[1]
+    )
+    assert sorted([*short, *numbered.skipped(45)]) == list(range(1, len(made) + 1))
+    assert numbered.sentence in re.sub(r"<[^>]*>", "", page)
+
+
+def counted(text):
+    """The numbers of "3–5, 9": written here anew."""
+    runs = [run.split("–") for run in text.split(", ") if run != "–"]
+    return [number for run in runs for number in range(int(run[0]), int(run[-1]) + 1)]
+
+
+def test_the_edition_has_the_numbers_of_the_deck_beside_it(folder):
+    """Of the lesson as it was run: its pictures may need another number of slides than the open lesson's."""
+    plan = next(one for one in notebooks.read(folder / DISTORTION.name).cells if "plan" in one.metadata.get("tags", []))
+    page = (folder / "05_slides.html").read_text(encoding="utf-8")
+    asked = re.search(r'<section class="slide question" id="s(\d+)"[^>]*><header>2 · ', page)
+    row = next(line for line in plan.source.splitlines() if "Question: far rays" in line).replace("\u2060", "")
+    assert row.split("|")[3].strip() == f"{asked[1]}–{int(asked[1]) + 4}"
+    assert "withheld" not in re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL)
+    assert "In 45 minutes skip slides" in plan.source
+
+
+@EACH
+def test_a_teachers_notebook_and_its_plan_agree_on_minutes(path):
+    """Its note beside the header gives the minutes of a reader, the header's own; those of a class are the plan's."""
+    cells = made(path).cells
+    if plans.plan(path.name[:2]) is None:
+        return
+    header = next(
+        one.source for one in cells if "header" in one.metadata.get("tags", []) or one.source.startswith("# ")
+    )
+    alone = re.search(r"\*About (\d+) minutes\.", header)[1]
+    note = next(
+        one.source
+        for one in cells
+        if one.metadata.get("tags") == ["teacher"] and "minutes" in one.source and "plan" in one.source
+    )
+    assert f"takes a reader about {alone} minutes, and a class 90 or 45, as the plan says" in note
+    assert re.findall(r"\*\*(\d+) minutes", note) == []
+    plan = next(one.source for one in cells if one.metadata.get("tags") == ["plan"])
+    ends = re.findall(r"^\| (?:\d+\u2060–\u2060(\d+)|–) \| (?:\d+\u2060–\u2060(\d+)|–) \|", plan, re.MULTILINE)
+    assert [max(int(one) for one in column if one) for column in zip(*ends, strict=True)] == [90, 45]
+    left_out = [f"section {part}" for part in re.findall(r"leave out part (\d+)", note)]
+    assert not [step for step in plans.plan(path.name[:2]).steps if step.at in left_out and step.minutes[1]]

@@ -47,7 +47,8 @@ def halves(
     The two sets of intrinsics differ by δ, of covariance Σ = Σ₁ + Σ₂ when nothing but noise is at work; `probability`
     is that of a δᵀ Σ⁻¹ δ as large as this or larger, which is χ² in as many degrees of freedom as there are intrinsics.
     A prior that both were solved under draws both the same way, and they lie closer together than that. Raises
-    ValueError where a half has fewer than three views with a say.
+    ValueError where a half has fewer than three views with a say, and NothingSharedError, one too, where the two
+    cameras have fewer than three rays in common.
     """
     views = np.arange(adjustment.views)
     mask = views < adjustment.views // 2 if first is None else np.asarray(first, dtype=bool)

@@ -18,6 +18,10 @@ HUBER = np.deg2rad(5) ** 2  # mrcal's: the weighted square of an angle beyond wh
 MOST_STEPS = 100
 
 
+class NothingSharedError(ValueError):
+    """Two cameras that have no rays in common, so that there is nothing to compare."""
+
+
 @dataclass(frozen=True, eq=False)
 class Difference:
     """The pixels uv (rows, columns, 2) of one camera, and how far off (rows, columns, 2) the other has the same points.
@@ -58,7 +62,7 @@ def difference(
     fall together. They are compared up to `within` pixels from the middle of the image, by default a sixth of its
     shorter side; or, where the two projection uncertainties (rows, columns) of `pixel_grid` are given, everywhere, with
     weights 1/(σ₁σ₂)². That is mrcal's projection_diff, with its cost: Huber's, of squared angles. Raises ValueError
-    for pictures of two sizes, and where fewer than three rays can be compared.
+    for pictures of two sizes, and NothingSharedError, one too, where fewer than three rays can be compared.
     """
     sizes = [(camera.intrinsics.width, camera.intrinsics.height) for camera in (first, second)]
     if sizes[0] != sizes[1]:
@@ -71,7 +75,7 @@ def difference(
     weights = _weights(first.intrinsics, uv, within, uncertainties)
     compared = np.isfinite(points).all(-1) & np.isfinite(rays_second).all(-1) & (weights > 0)
     if compared.sum() < 3:
-        raise ValueError(
+        raise NothingSharedError(
             f"at least three rays must be known to both cameras where they are compared, got {compared.sum()}"
         )
     second_from_first = aligned(points[compared], rays_second[compared], weights[compared], turn_only=isinf(distance))

@@ -45,6 +45,9 @@ SHAPES: tuple[tuple[int, ...], ...] = ((), (1,), (6,), (3, 4))
 NEAR = 1e-4
 """Of 1 + |answer|: closer than this is a matter of rounding, not of understanding."""
 
+ROUGHLY = 0.03
+"""Of |answer|: as near as the best of a few hundred tries."""
+
 _TITLES = {"correct": "✓ *Correct.*", "wrong": "✗ *Not yet.*", "unsolved": "○ *Not tried yet.*", "hint": "*Hint.*"}
 _COLOURS = {
     "correct": "var(--jp-success-color1, #2e7d32)",
@@ -155,6 +158,9 @@ def _judged(exercise: Exercise, function: Any, rng: np.random.Generator, attempt
         return _wrong(exercise, f"{trials[-1].complaint} Does a loop in it never end?", attempt)
     if _untouched(exercise, trials):
         return replace(_unsolved(exercise), printed=printed)
+    other_convention = _known(exercise, exercise.conventions, trials)
+    if other_convention:
+        return Verdict(exercise.name, "correct", other_convention, printed=printed)
     complaint = _complaint(exercise, function, trials, rng, patience)
     verdict = _wrong(exercise, complaint, attempt) if complaint else _correct(exercise)
     return replace(verdict, printed=printed)
@@ -216,7 +222,7 @@ def _complaint(
         mutated = next((trial.mutated for trial in trials if trial.mutated), "")
         return mutated or _broken_law(exercise, function, rng, patience)
     wrong = [trial for trial in trials if not trial.fits]
-    known = _misconception(exercise, trials) or _nothing_but_nan(trials) or _constant(trials)
+    known = _known(exercise, exercise.misconceptions, trials) or _nothing_but_nan(trials) or _constant(trials)
     broken = next((trial.complaint for trial in wrong if trial.complaint), "")
     if broken:
         return known or _only_for_some(exercise, trials) + broken
@@ -226,8 +232,9 @@ def _complaint(
         or _factor(exercise, trials)
         or _misplaced_nan(exercise, wrong)
         or _in_some_shapes(exercise, trials, wrong[0])
+        or _in_steps(exercise, function, trials, patience)
         or _nearly(exercise, trials)
-        or _fits_only_shown(exercise, function, trials, patience)
+        or _without_a_look_at(exercise, function, patience)
         or _difference(exercise, wrong[0])
     )
 
@@ -246,11 +253,14 @@ def _broken_law(exercise: Exercise, function: Function, rng: np.random.Generator
     return ""
 
 
-def _misconception(exercise: Exercise, trials: Sequence[Trial]) -> str:
-    """The explanation of the known mistake that does what the reader's function does in every case."""
-    if not any(trial.actual for trial in trials):
+def _known(exercise: Exercise, functions: Sequence[Misconception], trials: Sequence[Trial]) -> str:
+    """The explanation of the known function that does what the reader's does in every case.
+
+    It has to give a number somewhere: functions that only raise errors, or only answer NaN, have little in common.
+    """
+    if not any((~np.isnan(part)).any() for trial in trials for part in trial.actual):
         return ""
-    for known in exercise.misconceptions:
+    for known in functions:
         if _does_the_same(exercise, known.function, trials):
             return known.explanation
     return ""
@@ -338,11 +348,44 @@ def _nearly(exercise: Exercise, trials: Sequence[Trial]) -> str:
     return f"Close, but not to {exercise.tolerance:g}: is something rounded, or an iteration stopped too early?"
 
 
-def _fits_only_shown(exercise: Exercise, function: Function, trials: Sequence[Trial], patience: Patience) -> str:
-    if any(trial.fits for trial in trials) or not exercise.shown:
+def _in_steps(exercise: Exercise, function: Function, trials: Sequence[Trial], patience: Patience) -> str:
+    """Speaks when every answer is nearly right, and none changes when all numbers change by a ten-millionth."""
+    actual, expected = _joined(t.actual for t in trials), _joined(t.expected for t in trials)
+    if exercise.yes_or_no or not np.isclose(actual, expected, rtol=ROUGHLY, atol=0, equal_nan=True).all():
         return ""
-    if all(run(exercise, function, arguments, patience).fits for arguments in exercise.shown):
-        return "It fits the numbers shown in the lesson, but not others: are some of them written into your function?"
+    for trial in trials:
+        after = run(exercise, function, tuple(map(_nudged, trial.arguments)), patience)
+        if not after.actual or not all(map(np.array_equal, after.actual, trial.actual)):
+            return ""
+    return (
+        "Each answer is nearly right, and stays the same when your function is given slightly other numbers: is it the "
+        "best of a list or a grid that is too coarse, or is something rounded?"
+    )
+
+
+def _nudged(value: Any) -> Any:
+    decimal = isinstance(value, float) or (isinstance(value, np.ndarray) and value.dtype.kind == "f")
+    return value * (1 + 1e-7) if decimal else value
+
+
+def _without_a_look_at(exercise: Exercise, function: Function, patience: Patience) -> str:
+    """Names an argument whose number seems to be written into a function that fits the numbers shown in the lesson.
+
+    Speaks only where another number for the argument changes the right answer, and the function's not at all.
+    """
+    if not exercise.shown or not all(run(exercise, function, shown, patience).fits for shown in exercise.shown):
+        return ""
+    (shown, *_) = exercise.shown
+    before = run(exercise, function, shown, patience)
+    for index, name in enumerate(exercise.parameters):
+        other = shown[:index] + (shown[index] * 1.5,) + shown[index + 1 :]
+        after = run(exercise, function, other, patience)
+        moved = not exercise.same(after.expected, before.expected)
+        if moved and after.actual and all(map(np.array_equal, after.actual, before.actual)):
+            return (
+                f"It fits the numbers shown in the lesson, but its answer does not change with `{name}`: is that "
+                "number written into your function?"
+            )
     return ""
 
 

@@ -66,7 +66,7 @@ class Misconception:
 class Exercise:
     """What is asked, how to recognise the answer, and what to say otherwise.
 
-    Known mistakes and other right ways are written below the exercise, under its decorators.
+    Known mistakes, other right ways and other conventions are written below the exercise, under its decorators.
 
     Parameters
     ----------
@@ -119,6 +119,7 @@ class Exercise:
     as_given: Function | None = None
     misconceptions: list[Misconception] = field(default_factory=list, init=False)
     right_ways: list[Function] = field(default_factory=list, init=False)
+    conventions: list[Misconception] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
         if len(self.hints) != HINTS:
@@ -161,6 +162,26 @@ class Exercise:
         """
         self.right_ways.append(function)
         return function
+
+    def convention(self, explanation: str) -> Callable[[Function], Function]:
+        """Decorates a function that answers by another convention, and is accepted with a word about it.
+
+        Parameters
+        ----------
+        explanation : str
+            Says whose convention it is, and what the task's is.
+
+        Returns
+        -------
+        callable
+            The decorator.
+        """
+
+        def remember(function: Function) -> Function:
+            self.conventions.append(Misconception(function, explanation))
+            return function
+
+        return remember
 
     @property
     def bug(self) -> bool:
@@ -268,8 +289,8 @@ class Exercise:
 class Trial:
     """What came of one call.
 
-    `actual` is () unless numbers came back, `stub` says that nothing did, `raised` is the type of what was raised, and
-    `interrupted` that the reader, or the end of the time there is, stopped the call.
+    `actual` is () unless numbers came back, `stub` says that nothing did, `raised` is the type of what was raised and
+    its message, and `interrupted` that the reader, or the end of the time there is, stopped the call.
     """
 
     arguments: Arguments
@@ -277,7 +298,7 @@ class Trial:
     actual: tuple[Array, ...] = ()
     complaint: str = ""
     stub: bool = False
-    raised: type[BaseException] | None = None
+    raised: tuple[type[BaseException], str] | None = None
     interrupted: bool = False
     mutated: str = ""
     printed: str = ""
@@ -318,7 +339,7 @@ def _called(
         return _interrupted(exercise, trial, stop), None
     except BaseException as error:
         complaint = explain(error, function) + f" It was called as {exercise.call(trial.arguments)}."
-        return replace(trial, raised=type(error), complaint=complaint), None
+        return replace(trial, raised=(type(error), _message(error)), complaint=complaint), None
     return (_nothing(exercise, trial) if result is None or result is Ellipsis else trial), result
 
 
@@ -339,7 +360,7 @@ def outcome(exercise: Exercise, function: Function, arguments: Arguments) -> Tri
         with quiet():
             result = function(*deepcopy(arguments))
     except Exception as error:
-        return Trial(arguments, raised=type(error))
+        return Trial(arguments, raised=(type(error), _message(error)))
     if result is None:
         return Trial(arguments, stub=True)
     with quiet():
@@ -347,7 +368,7 @@ def outcome(exercise: Exercise, function: Function, arguments: Arguments) -> Tri
 
 
 def same_outcome(exercise: Exercise, one: Trial, other: Trial) -> bool:
-    """True where two functions did the same: numbers that agree, or nothing, or an error of the same type."""
+    """True where two functions did the same: numbers that agree, or nothing, or an error with the same message."""
     if one.actual or other.actual:
         return exercise.same(one.actual, other.actual)
     return one.stub == other.stub and one.raised == other.raised
@@ -459,6 +480,8 @@ def _nothing(exercise: Exercise, trial: Trial) -> Trial:
 
 
 def _compared(exercise: Exercise, trial: Trial, result: Any, patience: Patience) -> Trial:
+    if isinstance(result, list) and len(trial.expected) > 1:
+        result = tuple(result)  # two answers in a list are two answers
     try:
         with contained(_Printed()):  # the result's own methods are a reader's, too
             shapes, actual = patience.call(lambda: ([p.shape for p in as_arrays(result)], exercise.normalised(result)))

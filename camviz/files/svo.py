@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from camviz.calibration.types import Calibration
+from camviz.calibration.types import Calibration, CalibrationError
 from camviz.cameras import Camera
 from camviz.files.format import File, Format, by_imu, listed
 from camviz.files.models import Model, models_of
 from camviz.files.section import COUNT, Section, Size, agreed_size
-from camviz.lenses import BrownConrady, FieldOfView
+from camviz.lenses import BrownConrady, FieldOfView, KannalaBrandt, Perspective
 
 TITLE = "SVO camera"
 MODELS = {model.name: model for model in models_of("svo")}
 FIRST = {  # rpg_svo's: ATAN has fx, fy, cx and cy as fractions of the width and the height
-    "Pinhole": Model("Pinhole", BrownConrady, "fx fy cx cy k1 k2 p1 p2"),
-    "ATAN": Model("ATAN", FieldOfView, "fx fy cx cy omega"),
+    "Pinhole": (Model("Pinhole", BrownConrady, "fx fy cx cy k1 k2 p1 p2"), "cam_d0 cam_d1 cam_d2 cam_d3"),
+    "EquidistantCamera": (Model("EquidistantCamera", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"), "k1 k2 k3 k4"),
+    "ATAN": (Model("ATAN", FieldOfView, "fx fy cx cy omega"), "cam_d0"),
 }
+STRAIGHT = Model("straight", Perspective, "fx fy cx cy")
+NO_DISTORTION = 1e-7  # of the first coefficient: vikit then leaves out the others too
+ELSEWHERE = "Ocam"
 
 
 def is_camera(file: File) -> bool:
@@ -55,15 +59,23 @@ def _camera(part: Section, given: Size | None) -> Camera:
 
 
 def _first_camera(section: Section, given: Size | None) -> Camera:
-    model = FIRST[section.choice("cam_model", list(FIRST))]
+    """The camera as vikit's camera_loader.h reads it: coefficients that are missing are 0, but for the one of ATAN."""
+    name = section.choice("cam_model", [*FIRST, ELSEWHERE])
+    if name == ELSEWHERE:
+        raise CalibrationError(
+            "cam_model: Ocam has its numbers in another file, OCamCalib's calib_results.txt, which cam_calib_file "
+            "names: give that one, it is read"
+        )
+    model, keys = FIRST[name]
     size = agreed_size(section.sides("cam_width", "cam_height"), given, "cam_width, cam_height")
     values = [section.number(f"cam_{key}") for key in model.names[:4]]
-    for index in range(len(model.names) - 4):
-        values.append(section.number(f"cam_d{index}") if index == 0 or f"cam_d{index}" in section else 0.0)
-    if model.name == "ATAN":
-        values[:4] = [x * side for x, side in zip(values, size * 2, strict=False)]
-        values[2:4] = [x - 0.5 for x in values[2:4]]
-    return model.camera(values, *size, 0.0, "cam_model")
+    bent = [0.0 if key not in section and name != "ATAN" else section.number(key) for key in keys.split()]
+    if name == "ATAN":
+        values = [x * side for x, side in zip(values, size * 2, strict=True)]
+        values[2:] = [x - 0.5 for x in values[2:]]
+    if abs(bent[0]) <= NO_DISTORTION:
+        return STRAIGHT.camera(values, *size, 0.0, "cam_model")
+    return model.camera(values + bent, *size, 0.0, "cam_model")
 
 
 FORMAT = Format(
@@ -72,7 +84,7 @@ FORMAT = Format(
     file="calib.yaml",
     recognise=is_camera,
     read=read,
-    models=f"{listed(MODELS.values())}; Pinhole and ATAN of rpg_svo",
+    models=f"{listed(MODELS.values())}; Pinhole, ATAN and EquidistantCamera of cam_model",
     says="vikit's too; T_B_C: camera → body; ATAN's numbers are fractions of width and height",
     example=b"""cameras:
 - camera:

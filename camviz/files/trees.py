@@ -25,6 +25,7 @@ _YAML_TAG = "tag:yaml.org,2002:"
 _PLAIN_TAGS = {None, "!", *(_YAML_TAG + name for name in ("map", "seq", "str", "int", "float", "bool", "null"))}
 _OPENCV_TAGS = {_YAML_TAG + name for name in ("opencv-matrix", "opencv-nd-matrix")}
 
+_MATRIX = "!!opencv-matrix"
 _HEADER = re.compile(r"(?:[ \t\r\n]|#[^\n]*\n)*+(%YAML[^\n]*)")
 _NO_SPACE = re.compile(r"^([ \t]*[A-Za-z_][\w.]*):(?=[-+.\d\[\"])", re.MULTILINE)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}")
@@ -146,9 +147,13 @@ def parse_yaml(text: str) -> Any:
 
 
 def _plain_yaml(text: str) -> str:
-    """Without OpenCV's header, comments before it too, and with the space after a colon that OpenCV can do without."""
-    header = _HEADER.match(text)
-    return _NO_SPACE.sub(r"\1: ", text[: header.start(1)] + text[header.end(1) :]) if header else text
+    """Without OpenCV's header, comments before it too, and with the space after a colon that OpenCV can do without.
+
+    OpenCV's matrices tell its dialect too, where the header was lost in copying.
+    """
+    if header := _HEADER.match(text):
+        text = text[: header.start(1)] + text[header.end(1) :]
+    return _NO_SPACE.sub(r"\1: ", text) if header or _MATRIX in text else text
 
 
 def _grow(tree: Tree, event: yaml.Event) -> None:

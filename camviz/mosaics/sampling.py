@@ -138,9 +138,10 @@ def zone_plate(size: int = 256, highest: float = 0.5) -> Array:
 def low_pass(picture: ArrayLike, spots_px: float) -> NDArray[np.float32]:
     """A picture behind a birefringent filter: each point becomes four spots.
 
-    Two plates of quartz do this, one splitting the light to the right and left, one up and down. What is left of a
-    frequency is cos(π d fu) cos(π d fv), nothing at 1/(2d): with d = 1 nothing at the carriers of Bayer's pattern. The
-    picture is taken as mirrored at its borders, and as having no detail finer than its pixels.
+    Two plates of quartz do this, one splitting the light to the right and left, one up and down, with a quarter-wave
+    plate between them, without which the second would split neither ray of the first. What is left of a frequency is
+    cos(π d fu) cos(π d fv), nothing at 1/(2d): with d = 1 nothing at the carriers of Bayer's pattern. The picture is
+    taken as mirrored at its borders, and as having no detail finer than its pixels.
 
     Parameters
     ----------

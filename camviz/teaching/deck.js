@@ -27,7 +27,7 @@
   }
 
   function enlarge() { // twice as large about the pointer, for labels that the last row cannot read
-    slides[now].querySelector("img")?.classList.toggle("near");
+    slides[now].querySelector(".panels")?.classList.toggle("near");
   }
 
   const keys = {
@@ -43,7 +43,10 @@
   document.body.classList.add("shown");
   show(Math.max(0, slides.findIndex((slide) => `#${slide.id}` === location.hash)));
   help.hidden = now !== 0;
-  addEventListener("hashchange", () => show(slides.findIndex((slide) => `#${slide.id}` === location.hash)));
+  addEventListener("hashchange", () => {
+    help.hidden = true;
+    show(slides.findIndex((slide) => `#${slide.id}` === location.hash));
+  });
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const act = keys[event.key] ?? (/^[0-9]$/.test(event.key) ? () => part(event.key) : null);
@@ -58,10 +61,10 @@
   });
 
   addEventListener("mousemove", (event) => {
-    const image = slides[now].querySelector("img");
-    if (!image) return;
+    const shown = slides[now].querySelector(".panels");
+    if (!shown) return;
     const x = 100 * event.clientX / innerWidth, y = 100 * event.clientY / innerHeight;
-    image.style.transformOrigin = `${x}% ${y}%`;
+    shown.style.transformOrigin = `${x}% ${y}%`;
   });
 
   let begun = null;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 
@@ -15,10 +16,13 @@ POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-s
 HELP = "→ or space: next · ←: back · 1–9: part · Home, End · z: enlarge · d: dark or light · f: full screen · p: print"
 
 
-def deck(notebook: Notebook) -> str:
-    """The slides of a lesson as a page."""
-    plan = plans.plan(parts.number_of(notebook))
-    made = slides(notebook, plan.notice if plan else ())
+def deck(notebook: Notebook, *, solved: bool = False) -> str:
+    """The slides of a lesson as a page; `solved` says that the lesson was run with its solutions."""
+    return page(planned_slides(notebook, solved=solved))
+
+
+def page(made: Sequence[Slide]) -> str:
+    """Slides as a page."""
     title = re.sub(r"<[^>]*>", "", made[0].heading)
     body = "".join(_section(number, one, len(made)) for number, one in enumerate(made, start=1))
     return (
@@ -28,6 +32,12 @@ def deck(notebook: Notebook) -> str:
         f'<body><main>{body}</main><p class="help" hidden>{escape(HELP)}</p>'
         f"<script>{_file('deck.js')}</script></body></html>\n"
     )
+
+
+def planned_slides(notebook: Notebook, *, solved: bool = False) -> list[Slide]:
+    """The slides of a lesson, which say in each picture what its plan says, where it has one."""
+    plan = plans.plan(parts.number_of(notebook))
+    return slides(notebook, plan.notice if plan else (), solved=solved)
 
 
 def _section(number: int, slide: Slide, count: int) -> str:

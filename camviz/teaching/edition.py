@@ -14,6 +14,8 @@ from camviz.course.notebooks import Cell, Notebook, exercise_cells, read, soluti
 from camviz.course.questions import Question
 from camviz.course.saved_outputs import tidied
 from camviz.teaching import parts, plans
+from camviz.teaching.deck import planned_slides
+from camviz.teaching.numbering import Numbering
 from camviz.teaching.plans import Plan, Step, Votes
 
 Say = Callable[[str], None]
@@ -40,7 +42,7 @@ def teacher_edition(notebook: Notebook) -> Notebook:
         if details.cell_type == "markdown":
             details.source = details.source.replace("<details>", "<details open>")
     plan = plans.plan(parts.number_of(notebook))
-    beside = [(*_notes(one), *_keys(one, plan)) for one in edition.cells]
+    beside = [(*_notes(one, plan), *_keys(one, plan)) for one in edition.cells]
     cells = [cell for one, more in zip(edition.cells, beside, strict=True) for cell in (one, *more)]
     if plan:
         _anchored(cells, plan, parts.titles(notebook))
@@ -137,14 +139,25 @@ def hidden_test(check: str) -> str:
 
 
 def _planned(plan: Plan | None, notebook: Notebook) -> list[Cell]:
-    return [_cell(plan_markdown(plan, parts.titles(notebook)), f"plan-{plan.lesson}", "plan")] if plan else []
+    if not plan:
+        return []
+    numbering = Numbering.of(plan, planned_slides(notebook))
+    return [_cell(plan_markdown(numbering, parts.titles(notebook)), f"plan-{plan.lesson}", "plan")]
 
 
-def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
-    """The plan as a table of minutes, places, and what teacher and class do; then what to bring, and if it fails."""
-    rows = []
+def renumber(edition: Notebook, numbering: Numbering) -> None:
+    """Puts the numbers of these slides into the edition's plan: a solved lesson may have others than an open one."""
+    for cell in edition.cells:
+        if "plan" in cell.metadata.get("tags", []):
+            cell.source = plan_markdown(numbering, parts.titles(edition))
+
+
+def plan_markdown(numbering: Numbering, titles: dict[str, str]) -> str:
+    """The plan as a table of minutes, slides, places, and what teacher and class do; what to skip; what to bring."""
+    rows, plan = [], numbering.plan
     for long, short, step in plan.timetable(UNBROKEN_DASH):
-        cells = (long, short, _linked(step, titles), _one_line(step.teacher), _one_line(step.students))
+        shown = numbering.slides(step).replace("–", UNBROKEN_DASH)
+        cells = (long, short, shown, _linked(step, titles), _one_line(step.teacher), _one_line(step.students))
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(
         [
@@ -152,11 +165,11 @@ def plan_markdown(plan: Plan, titles: dict[str, str]) -> str:
             "",
             "Keep this file on your own screen, for it shows the keys. Project the slides and the students' lesson.",
             "",
-            f"| {plans.LONG} min | {plans.SHORT} min | Where | You | The class |",
-            "|---|---|---|---|---|",
+            f"| {plans.LONG} min | {plans.SHORT} min | Slides | Where | You | The class |",
+            "|---|---|---|---|---|---|",
             *rows,
             "",
-            "A step marked – is left out in that plan.",
+            f"A step marked – is left out in that plan. {numbering.sentence}",
             "",
             *(f"* **{title}.** {_one_line(text)}" for title, text in plan.cases),
         ]
@@ -219,8 +232,14 @@ def key_markdown(question: Question, votes: Votes | None) -> str:
     return "\n".join([lines[0], "", lines[1], ">", *lines[2:]])
 
 
-def _notes(cell: Cell) -> list[Cell]:
-    note = cell.metadata.get("camviz", {}).get("teacher")
+def _notes(cell: Cell, plan: Plan | None) -> list[Cell]:
+    """The note of a cell. The minutes that one gives are a reader's, who votes with nobody: a class has the plan's."""
+    note = cell.metadata.get("camviz", {}).get("teacher", "")
+    if plan:
+        of_class = f"and a class {plans.LONG} or {plans.SHORT}, as the plan says"
+        note = re.sub(
+            r"\*\*(\d+) minutes(\.?)\*\*", rf"This lesson takes a reader about \1 minutes, {of_class}\2", note
+        )
     text = f"> **For the teacher:** {note.strip()}".replace("\n", "\n> ") if note else ""
     return [_cell(text, f"teacher-{cell.id}", "teacher")] if note else []
 

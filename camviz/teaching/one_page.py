@@ -9,6 +9,7 @@ import ast
 import re
 from collections.abc import Iterator
 from html import escape, unescape
+from importlib import import_module
 from importlib.resources import files
 from typing import Any
 
@@ -17,8 +18,9 @@ from camviz.course.catalogue import described
 from camviz.course.notebooks import Notebook
 from camviz.course.questions import Question
 from camviz.draw.page import document
-from camviz.teaching import markup, parts, plans
+from camviz.teaching import markup, panels, parts, plans
 from camviz.teaching.edition import place
+from camviz.teaching.numbering import Numbering
 from camviz.teaching.plans import Plan
 
 VOTES, PICTURES = 2, 6
@@ -26,11 +28,10 @@ VOTES, PICTURES = 2, 6
 FULL, LARGEST, SMALLEST = 4700, 8.6, 6.5
 """Letters that fill the page when it is set in LARGEST pt; more letters are set smaller, down to SMALLEST."""
 
-_UNSHOWN = {"panels", "yours"}  # which panels are open is seen, and one's own function is not on the projector
 
-
-def one_page(notebook: Notebook, plan: Plan, file: str) -> str:
-    """The page of a lesson with a plan; `file` is the notebook's name."""
+def one_page(notebook: Notebook, numbering: Numbering, file: str) -> str:
+    """The page of a lesson with a plan and numbered slides; `file` is the notebook's name."""
+    plan = numbering.plan
     told = described(notebook, file)
     learned = _learned(notebook.cells[0].source)
     goal = f"<p><b>They learn</b> {markup.inline(learned)}.</p>" if learned else ""
@@ -38,7 +39,7 @@ def one_page(notebook: Notebook, plan: Plan, file: str) -> str:
     right = f"<h2>Two votes, and what students get wrong</h2>{_votes(plan)}"
     body = (
         f"<p>{markup.inline(told.question)} <b>Nobody leaves without:</b> {escape(told.takeaway)}.</p>{goal}"
-        f"{_minutes(notebook, plan)}<div class='halves'>{left}{right}</div>"
+        f"{_minutes(notebook, numbering)}<div class='halves'>{left}{right}</div>"
     )
     letters = len(re.sub(r"<[^>]*>", "", unescape(body)))
     size = min(LARGEST, max(SMALLEST, LARGEST * (FULL / letters) ** 0.5))
@@ -54,16 +55,16 @@ def _learned(header: str) -> str:
     return titled.get("What you'll learn", "").rstrip(".")
 
 
-def _minutes(notebook: Notebook, plan: Plan) -> str:
+def _minutes(notebook: Notebook, numbering: Numbering) -> str:
     titles, rows = parts.titles(notebook), ""
-    for long, short, step in plan.timetable():
+    for long, short, step in numbering.plan.timetable():
         if long != "–":
-            told = prose.inline(_brief(step.teacher, 24))
-            rows += (
-                f"<tr><td>{long}</td><td>{short}</td><td>{markup.inline(place(step, titles))}</td><td>{told}</td></tr>"
-            )
-    head = f"<th>{plans.LONG} min</th><th>{plans.SHORT}</th><th>where</th><th>you</th>"
-    return f"<table class='minutes'><tr>{head}</tr>{rows}</table>"
+            where, told = markup.inline(place(step, titles)), prose.inline(_brief(step.teacher, 24))
+            cells = (long, short, numbering.slides(step), where, told)
+            rows += f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+    heads = (f"{plans.LONG} min", plans.SHORT, "slides", "where", "you")
+    head = "".join(f"<th>{one}</th>" for one in heads)
+    return f"<table class='minutes'><tr>{head}</tr>{rows}</table><p>{numbering.sentence}</p>"
 
 
 def _shown(notebook: Notebook, plan: Plan) -> str:
@@ -71,25 +72,31 @@ def _shown(notebook: Notebook, plan: Plan) -> str:
     titled = [one for one in settings(notebook) if one[1] or one[2]][:PICTURES]
     rows = ""
     for number, setting, moved in titled:
-        noticed = prose.inline(plan.notice[number]) if number < len(plan.notice) else ""
+        noticed = prose.inline(plan.notice[number].text) if number < len(plan.notice) else ""
         start = f"Set {setting}. " if setting else ""
         rows += f"<li>{noticed} <span>{escape(start)}Move {escape(moved)}.</span></li>"
     return f"<ol>{rows}</ol>"
 
 
 def settings(notebook: Notebook) -> Iterator[tuple[int, str, str]]:
-    """Of each visualizer its number among the lesson's pictures, the values it opens with, and its controls."""
-    number = 0
+    """Of each visualizer its number among the lesson's pictures, the values it opens with, and its controls.
+
+    A control is called what stands on it.
+    """
+    number, code = 0, ""
     for cell in notebook.cells:
-        if parts.pictures(cell):
+        code += f"{cell.source}\n" if cell.cell_type == "code" else ""
+        if panels.panels(cell):
             for call in _explored(cell.source):
-                named = {one.arg: one.value for one in call.keywords if one.arg}
+                view = _view(call.args[0], code)
+                labels = _labels(view, code)
+                named = {one.arg: one.value for one in call.keywords if one.arg in labels}
                 controls = [str(ast.literal_eval(one)) for one in call.args[1:]]
-                yield (
-                    number,
-                    _values(_view(call.args[0], cell.source)),
-                    ", ".join([*controls, *map(_ranged, named.items())]),
-                )
+                moved = [
+                    *(labels.get(one, one.replace("_", " ")) for one in controls),
+                    *(_ranged(labels[a], b) for a, b in named.items()),
+                ]
+                yield number, _values(view, labels), ", ".join(moved)
             number += 1
 
 
@@ -100,24 +107,48 @@ def _explored(source: str) -> list[ast.Call]:
     return [call for call in found if all(isinstance(one, ast.Constant) for one in call.args[1:])]
 
 
-def _view(node: ast.expr, source: str) -> ast.expr:
-    """What is explored: the call that makes it, in the cell, where it has a name."""
+def _view(node: ast.expr, code: str) -> ast.expr:
+    """What is explored: the call that makes it, in this cell or before it, where it has a name."""
     if isinstance(node, ast.Name):
-        for statement in ast.parse(source).body:
+        for statement in reversed(ast.parse(code).body):
             if isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == node.id:
                 return statement.value
     return node
 
 
-def _values(view: ast.expr) -> str:
-    """The numbers and words that a view is made with, such as "k1 −0.28, k2 0.07"."""
-    named = [one for one in view.keywords if one.arg not in _UNSHOWN] if isinstance(view, ast.Call) else []
-    told = [(one.arg, _literal(one.value)) for one in named]
+def _labels(view: ast.expr, code: str) -> dict[str, str]:
+    """What stands on each control of a view, by the name that the view's code has for it; {} for no known view.
+
+    `code` is all that has been run before; where the view has a name, its class is what the name was made with.
+    """
+    nodes = list(ast.walk(ast.parse(code)))
+    modules = {name.name: node.module for node in nodes if isinstance(node, ast.ImportFrom) for name in node.names}
+    made = [node for node in nodes if isinstance(node, ast.Assign)]
+    looked, to_look = set(), _names(view)
+    while to_look:
+        name = to_look.pop(0)
+        looked.add(name)
+        found = getattr(import_module(modules[name] or ""), name) if name in modules else None
+        if found is not None and hasattr(found, "controls"):
+            return {field: control.label for field, control in found.controls().items()}
+        before = [one.value for one in reversed(made) if name in _names(*one.targets)]
+        to_look += [one for value in before for one in _names(value) if one not in looked]
+    return {}
+
+
+def _names(*nodes: ast.expr) -> list[str]:
+    return [one.id for node in nodes for one in ast.walk(node) if isinstance(one, ast.Name)]
+
+
+def _values(view: ast.expr, labels: dict[str, str]) -> str:
+    """The numbers and words that a view's controls are set to, such as "k1 −0.28, k2 0.07"."""
+    named = [one for one in view.keywords if one.arg in labels] if isinstance(view, ast.Call) else []
+    told = [(labels[one.arg or ""], _literal(one.value)) for one in named]
     return ", ".join(f"{name} {_written(value)}" for name, value in told if isinstance(value, bool | int | float | str))
 
 
-def _ranged(item: tuple[str, ast.expr]) -> str:
-    name, value = item[0], _literal(item[1])
+def _ranged(name: str, limits: ast.expr) -> str:
+    value = _literal(limits)
     ends = value if isinstance(value, tuple) and len(value) > 1 else ()
     return f"{name} ({_written(ends[0])} … {_written(ends[1])})" if ends and not isinstance(ends[0], str) else name
 

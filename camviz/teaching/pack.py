@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from camviz.course.notebooks import Notebook, read
-from camviz.teaching import plans
-from camviz.teaching.deck import deck
-from camviz.teaching.edition import Say, chosen_lessons, write_teacher_edition
+from camviz.course.notebooks import Notebook, read, write
+from camviz.teaching import parts, plans
+from camviz.teaching.deck import page, planned_slides
+from camviz.teaching.edition import Say, chosen_lessons, renumber, write_teacher_edition
+from camviz.teaching.numbering import Numbering
 from camviz.teaching.one_page import one_page
 from camviz.teaching.sheets import sheets
 
@@ -20,20 +21,29 @@ def write_pack(source: Path, out: Path, only: Sequence[str], *, run: bool, slide
     """
     write_teacher_edition(source, out, run=run, only=only, say=say)
     for path in chosen_lessons(source, only):
-        lesson, number = read(path), path.name.partition("_")[0]
-        pages = sheets(lesson, number)
+        lesson, edition, number = read(path), read(out / path.name), path.name.partition("_")[0]
+        solved = any(cell.outputs for cell in edition.cells if cell.cell_type == "code")
+        made = planned_slides(_with_solved_pictures(lesson, edition), solved=solved)
+        pages = sheets(lesson, number, made)
         if plan := plans.plan(number):
-            pages["one_page"] = one_page(lesson, plan, path.name)
+            numbering = Numbering.of(plan, made)
+            renumber(edition, numbering)
+            write(edition, out / path.name)
+            pages["one_page"] = one_page(lesson, numbering, path.name)
         if slides:
-            pages["slides"] = deck(_with_solved_pictures(lesson, read(out / path.name)))
-        for name, page in pages.items():
-            (out / f"{number}_{name}.html").write_text(page, encoding="utf-8")
+            pages["slides"] = page(made)
+        for name, text in pages.items():
+            (out / f"{number}_{name}.html").write_text(text, encoding="utf-8")
 
 
 def _with_solved_pictures(lesson: Notebook, edition: Notebook) -> Notebook:
-    """The lesson with what its edition shows, where that has been run: the pictures that a solved function makes."""
+    """The lesson with the pictures that its edition, where that has been run, draws with functions that are written.
+
+    A function that is given and wrong draws what students see before they mend it.
+    """
     solved = {cell.id: cell.outputs for cell in edition.cells if cell.cell_type == "code" and cell.outputs}
+    drawn = parts.drawn_by_reader(lesson)
     for cell in lesson.cells:
-        if cell.id in solved:
+        if cell.id in solved and cell.id in drawn:
             cell.outputs = solved[cell.id]
     return lesson

@@ -4,22 +4,12 @@ from __future__ import annotations
 
 import ast
 import re
-from dataclasses import dataclass
 from typing import Any
 
 from camviz.course import notebooks, questions
 from camviz.course.notebooks import Cell, Notebook
 
 _ASKED = re.compile(r"^(ask|quiz)\((.*)\)\s*$", re.MULTILINE)
-_PICTURE = re.compile(r'<img[^>]*?\salt="(?P<alt>[^"]*)"[^>]*?\ssrc="(?P<source>data:[^"]+)"')
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A picture that a cell has shown: a data address, and what it says to someone who cannot see it."""
-
-    source: str
-    description: str
 
 
 def asked(cell: Cell) -> tuple[questions.Question, ...]:
@@ -42,15 +32,58 @@ def is_pretest(cell: Cell) -> bool:
     return cell.source.startswith("quiz(") and any(getattr(one, "form", "") == "A" for one in asked(cell))
 
 
-def pictures(cell: Cell) -> list[Shown]:
-    """The pictures among a code cell's saved outputs."""
-    found = []
-    for output in cell.get("outputs", []) if cell.cell_type == "code" else []:
-        data: dict[str, Any] = output.get("data", {})
-        made = _PICTURE.search("".join(data.get("text/html", "")))
-        if made:
-            found.append(Shown(made["source"], made["alt"]))
+def drawn_by_reader(notebook: Notebook, *, given: bool = False) -> dict[str, str]:
+    """By the id of each code cell that uses what a reader writes, the exercise, such as "distort", it uses last.
+
+    What such a cell assigns is followed into later cells. A stub that does something, a wrong one to be mended, draws
+    its own picture and counts with `given` only.
+    """
+    written: dict[str, str] = {}
+    found: dict[str, str] = {}
+    for cell in notebook.cells:
+        if cell.cell_type != "code":
+            continue
+        tree = ast.parse(cell.source)
+        stub = "stub" in cell.metadata.get("tags", [])
+        exercise = notebooks.exercise_of(cell).partition(".")[2] if stub and (given or is_open(cell)) else ""
+        for statement in tree.body:
+            used = [written[name] for name in written if name in _loaded(statement)]
+            if used and not stub:
+                found[cell.id] = used[-1]
+            for name in _stored(statement):
+                written.pop(name, None)
+                if exercise or (used and not stub):
+                    written[name] = exercise or used[-1]
     return found
+
+
+def is_open(stub: Cell) -> bool:
+    """True for a stub with a lone ellipsis, which stands for lines to be written."""
+    lines = [node.value for node in ast.walk(ast.parse(stub.source)) if isinstance(node, ast.Expr)]
+    return any(isinstance(line, ast.Constant) and line.value is ... for line in lines)
+
+
+def _stored(code: ast.AST) -> set[str]:
+    """The names that code gives values, except those that live in a function or in one comprehension only."""
+    if isinstance(code, ast.FunctionDef):
+        return {code.name}
+    inner = set().union(*map(_stored, ast.iter_child_nodes(code))) - _bound(code, ast.comprehension)
+    return inner | ({code.id} if isinstance(code, ast.Name) and isinstance(code.ctx, ast.Store) else set())
+
+
+def _loaded(code: ast.AST) -> set[str]:
+    """The names whose values code takes from before it."""
+    names = {node.id for node in ast.walk(code) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+    own = {node.arg for node in ast.walk(code) if isinstance(node, ast.arg)}
+    if isinstance(code, ast.FunctionDef):
+        own |= set().union(*map(_stored, code.body))
+    return names - own - _bound(code, ast.comprehension, ast.For)
+
+
+def _bound(code: ast.AST, *kinds: type[ast.comprehension] | type[ast.For]) -> set[str]:
+    """The names that loops of these kinds run through."""
+    targets = [node.target for node in ast.walk(code) if isinstance(node, kinds)]
+    return {node.id for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)}
 
 
 def number_of(notebook: Notebook) -> str:

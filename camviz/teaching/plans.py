@@ -4,7 +4,10 @@
     network = "What to do when the network fails."
     machine = "What to do when a student's machine fails, or the teacher's."
 
-    notice = ["Straight lines bend."]  # optional: for each picture of the lesson, in order, what its slide is to say
+    notice = [                      # optional: for each picture of the lesson, in order, what its slide is to say
+        "Straight lines bend.",
+        { text = "The curve turns back.", panels = ["radial curve"] },  # and which panels this is said of, by name
+    ]
 
     [[step]]                        # in the order of teaching
     at = "question grid"            # where it is in the lesson
@@ -34,7 +37,7 @@ from camviz.course import notebooks, questions
 from camviz.course.exercises import exercises
 from camviz.course.material import material
 from camviz.course.tables import shaped, table_of
-from camviz.teaching import markup, parts
+from camviz.teaching import markup, panels
 
 LONG, SHORT = 90, 45
 GUESS = "a guess"
@@ -80,6 +83,20 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Notice:
+    """What a picture's slide says. Where not all panels fit one slide, those named in `panels` stand under it alone."""
+
+    text: str
+    panels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.text, str) or not 0 < len(self.text.split()) <= MOST_NOTICED:
+            raise ValueError(f"what to notice has at most {MOST_NOTICED} words, got {self.text!r}")
+        if not all(isinstance(one, str) for one in self.panels):
+            raise ValueError(f"panels must be names of panels, got {list(self.panels)}")
+
+
+@dataclass(frozen=True)
 class Votes:
     """How a class is expected to vote at first: percent for each choice of a predict question, and says who."""
 
@@ -109,7 +126,7 @@ class Plan:
     machine: str
     steps: tuple[Step, ...]
     votes: tuple[Votes, ...] = ()
-    notice: tuple[str, ...] = ()
+    notice: tuple[Notice, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("bring", "network", "machine"):
@@ -119,11 +136,6 @@ class Plan:
             total = sum(step.minutes[which] for step in self.steps)
             if total != length:
                 raise ValueError(f"plan of lesson {self.lesson}: the plan for {length} minutes adds up to {total}")
-        for text in self.notice:
-            if not isinstance(text, str) or not 0 < len(text.split()) <= MOST_NOTICED:
-                raise ValueError(
-                    f"plan of lesson {self.lesson}: what to notice has at most {MOST_NOTICED} words, got {text!r}"
-                )
         names = [one.question for one in self.votes]
         for name in names:
             if names.count(name) > 1:
@@ -169,7 +181,8 @@ def parse(lesson: str, toml: str) -> Plan:
     table = shaped(table_of(toml, where), _KEYS, where, {"votes", "notice"})
     steps = tuple(_made(Step, one, f"{where}, step {i}") for i, one in enumerate(table["step"], start=1))
     votes = tuple(_made(Votes, one, f"{where}, votes {i}") for i, one in enumerate(table.get("votes", []), start=1))
-    notice = tuple(table.get("notice", []))
+    told = [one if isinstance(one, dict) else {"text": one} for one in table.get("notice", [])]
+    notice = tuple(_noticed(one, f"{where}, notice {i}") for i, one in enumerate(told, start=1))
     return Plan(lesson, table["bring"], table["network"], table["machine"], steps, votes, notice)
 
 
@@ -192,9 +205,16 @@ def complaints(made: Plan, notebook: notebooks.Notebook) -> list[str]:
         elif len(votes.split) != len(predict[votes.question].choices):
             choices = len(predict[votes.question].choices)
             found.append(f"the plan splits votes for {votes.question} in {len(votes.split)}, it has {choices} choices")
-    pictures = sum(bool(parts.pictures(cell)) for cell in notebook.cells)
-    if made.notice and len(made.notice) != pictures:
-        found.append(f"the plan says what to notice in {len(made.notice)} pictures, and the lesson shows {pictures}")
+    shown = [one for one in map(panels.panels, notebook.cells) if one]
+    if made.notice and len(made.notice) != len(shown):
+        found.append(f"the plan says what to notice in {len(made.notice)} pictures, and the lesson shows {len(shown)}")
+    for number, (noticed, view) in enumerate(zip(made.notice, shown, strict=False), start=1):
+        names = [one.name for one in view]
+        found += [
+            f"the plan names the panel {one!r} of picture {number}, whose panels are {', '.join(names)}"
+            for one in noticed.panels
+            if one not in names
+        ]
     asked = {step.name for step in made.steps if step.kind == "question"}
     found += [f"the plan never asks the predict question {name}" for name in predict if name not in asked]
     known = {votes.question for votes in made.votes}
@@ -215,6 +235,14 @@ def _made(kind: type, table: Mapping[str, Any], where: str) -> Any:
     shaped(table, {one.name: types[str(one.type)] for one in fields(kind)}, where)
     try:
         return kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in table.items()})
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
+
+
+def _noticed(table: dict[str, Any], where: str) -> Notice:
+    shaped(table, {"text": str, "panels": list}, where, {"panels"})
+    try:
+        return Notice(table["text"], tuple(table.get("panels", ())))
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 
@@ -14,35 +15,37 @@ from camviz.draw.page import document
 from camviz.teaching import markup, parts, plans
 from camviz.teaching.edition import place
 from camviz.teaching.marking import POINTS, RULE, WrongAnswer, example, wrong_answers
+from camviz.teaching.numbering import Numbering
+from camviz.teaching.slides import Slide
 
 SPARE_LINES = 4
 """To write on, beyond as many as the solution has."""
 
 
-def sheets(notebook: Notebook, lesson: str) -> dict[str, str]:
-    """The pages to print for a lesson ("05"), as HTML by the end of their file names."""
+def sheets(notebook: Notebook, lesson: str, slides: Sequence[Slide]) -> dict[str, str]:
+    """The pages to print for a lesson ("05") with these slides, as HTML by the end of their file names."""
     plan = plans.plan(lesson)
-    made = {"plan": plan_page(notebook, plan)} if plan else {}
+    made = {"plan": plan_page(notebook, Numbering.of(plan, slides))} if plan else {}
     if exercises(lesson):
         made |= {"exercises": exercise_sheet(notebook, lesson), "marking": marking_scheme(notebook, lesson)}
     return made
 
 
-def plan_page(notebook: Notebook, plan: plans.Plan) -> str:
+def plan_page(notebook: Notebook, numbering: Numbering) -> str:
     """The plan by the minute, then the key to every question: all that a lesson needs when no screen works."""
-    titles = parts.titles(notebook)
-    head = "".join(
-        f"<th>{title}</th>" for title in (f"{plans.LONG} min", f"{plans.SHORT} min", "where", "you", "the class")
-    )
+    titles, plan = parts.titles(notebook), numbering.plan
+    columns = (f"{plans.LONG} min", f"{plans.SHORT} min", "slides", "where", "you", "the class")
+    head = "".join(f"<th>{title}</th>" for title in columns)
     rows = ""
     for long, short, step in plan.timetable():
-        when = f"<td>{long}</td><td>{short}</td>"
+        when = f"<td>{long}</td><td>{short}</td><td>{numbering.slides(step)}</td>"
         texts = "".join(f"<td>{prose.inline(' '.join(one.split()))}</td>" for one in (step.teacher, step.students))
         rows += f"<tr>{when}<td>{markup.inline(place(step, titles))}</td>{texts}</tr>"
     notes = "".join(f"<p><b>{title}.</b> {prose.inline(' '.join(text.split()))}</p>" for title, text in plan.cases)
     keys = "".join(question_key(one, plan.expected(one.name)) for one in _asked(notebook))
     body = (
-        f"{notes}<table class='plan'><tr>{head}</tr>{rows}</table><h2 class='keys'>Questions and their keys</h2>{keys}"
+        f"{notes}<table class='plan'><tr>{head}</tr>{rows}</table><p>{numbering.sentence}</p>"
+        f"<h2 class='keys'>Questions and their keys</h2>{keys}"
     )
     return _page(notebook, "plan", body)
 

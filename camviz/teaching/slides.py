@@ -2,26 +2,30 @@
 
 What becomes a slide: the lesson's question; each picture, under a heading that names one thing to notice; each
 question, its key, and after a vote the reply to each wrong answer; display equations; misconceptions; bold claims;
-exercises; the recap.
+exercises; the recap. A picture has all its panels, on as many slides as they need to be legible.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from html import escape
 
 from camviz.course import prose
 from camviz.course.notebooks import Cell, Notebook, exercise_of
 from camviz.course.questions import Question
-from camviz.teaching import markup, parts
-from camviz.teaching.parts import Shown
+from camviz.teaching import markup, panels, parts
+from camviz.teaching.panels import Panel
+from camviz.teaching.plans import Notice
 
 MOST_WORDS, HEADING_WORDS, LEAST_WORDS = 40, 18, 5
 RECAP_WORDS, RECAP_ROWS = 55, 3
+GIVEN_LINES, CODE_LETTERS = 8, 62
+"""Of a function that is given and wrong, each line so many letters: a longer one is shown by its first line."""
 
 LONGEST_LINE, LONG_QUESTION = 60, 75
+WITHHELD = "<p class='withheld'>Your own function draws this picture. Run its cell in the lesson, and it is there.</p>"
 _SIZES = (("large", 28, 4), ("medium", 42, 6), ("small", 60, 8))
 """Sizes of equations in deck.css, each with the letters that fit across and the rows that fit down."""
 
@@ -34,16 +38,23 @@ _MISCONCEPTION = re.compile(r"\A> \*\*Misconception: (?P<thought>.+?)\*\*\s*(?P<
 _CLAIM = re.compile(r"\*\*([^*]+ [^*]+ [^*]+?)\*\*")  # three words or more: one or two are the name of a control
 _EQUATION = re.compile(r"\$\$(.+?)\$\$", re.DOTALL)
 _QUIET = {"Recap", "Further reading", "Glossary"}
+# What the lesson shows below a text is on a later slide; "below a pixel" is a comparison, and points nowhere.
+_BELOW = re.compile(r"\b[Bb]elow\b(?!,? (?:an?|the|that|one|zero|it)\b|,? \d)|\b[Bb]elow it (?:a|first)\b|lower row")
+_BELOW_STUB = re.compile(r"\bbelow it\b")
 
 
 @dataclass(frozen=True)
 class Slide:
-    """One idea. `kind` is its class on the page, `part` the heading it stands under, `body` HTML."""
+    """One idea. `kind` is its class on the page, `part` the heading it stands under, `body` HTML.
+
+    `at` are the places of the lesson it belongs to, as a plan names them (plans.py), the narrowest first.
+    """
 
     kind: str
     part: str
     heading: str
     body: str = ""
+    at: tuple[str, ...] = ()
 
 
 @dataclass
@@ -53,30 +64,72 @@ class _Place:
     part: str = ""
     heading: str = ""
     said: str = ""
-    notice: list[str] = field(default_factory=list)
+    notice: list[Notice] = field(default_factory=list)
+    withheld: Collection[str] = ()
+    exercises: dict[str, str] = field(default_factory=dict)
+    uses: dict[str, str] = field(default_factory=dict)
+    asked: set[str] = field(default_factory=set)
+
+    @property
+    def at(self) -> tuple[str, ...]:
+        """The places of a plan that the walk is at, the narrowest first; an exercise is part of no section."""
+        if self.heading in self.exercises:
+            return self.exercises[self.heading], f"section {self.heading}"
+        if not self.part:
+            return ("header",)
+        numbered = re.match(r"(\d+) · ", self.part)
+        return tuple(f"section {one}" for one in (self.heading, self.part, *([numbered[1]] if numbered else [])))
+
+    def of_picture(self, cell: Cell) -> tuple[str, ...]:
+        """The places of a picture: first the exercise whose function draws it, where that is asked in this part."""
+        own = f"exercise {self.uses.get(cell.id, '')}"
+        return (own, *self.at) if own in self.asked else self.at
 
 
-def slides(notebook: Notebook, notice: Sequence[str] = ()) -> list[Slide]:
+def slides(notebook: Notebook, notice: Sequence[Notice] = (), *, solved: bool = False) -> list[Slide]:
     """The slides of a lesson with saved outputs, in its order; without outputs, those that need none.
 
-    `notice` has what to notice in each picture, in their order, as the lesson's plan says it.
+    `notice` has what to notice in each picture, in their order, as the lesson's plan says it. Unless the outputs are of
+    a `solved` lesson, a picture drawn by a function that students are to write is left out, and its slide says where
+    it is to be seen.
     """
-    place, found = _Place(notice=list(notice)), [_title(notebook)]
+    exercises = {title: at for at, title in parts.titles(notebook).items() if at.startswith("exercise ")}
+    withheld = {} if solved else parts.drawn_by_reader(notebook)
+    uses = parts.drawn_by_reader(notebook, given=True)
+    place = _Place(notice=list(notice), withheld=withheld, exercises=exercises, uses=uses)
+    found = [_title(notebook)]
     for number, cell in enumerate(notebook.cells):
         tags = set(cell.metadata.get("tags", []))
         if cell.cell_type == "code":
-            found += _of_code(cell, place, notebook.cells[number + 1 :])
+            found += (_placed(one, place) for one in _of_code(cell, place, notebook.cells[number + 1 :]))
         elif number and not tags & {"solution", "glossary"}:
             for block in markup.blocks(cell.source):
-                found += _of_block(block, place)
-    return found
+                found += (_placed(one, place) for one in _of_block(block, place))
+    return list(_pointing(found))
+
+
+def _placed(slide: Slide, place: _Place) -> Slide:
+    return slide if slide.at else replace(slide, at=place.at)
+
+
+def _pointing(found: Sequence[Slide]) -> Iterator[Slide]:
+    """The slides; where one speaks of what the lesson shows below it, it says on which slide that is."""
+    shown = [number for number, one in enumerate(found, start=1) if one.kind == "picture"]
+    for number, one in enumerate(found, start=1):
+        text = re.sub(r"<[^>]*>", "", one.body)
+        points = _BELOW.search(text) or (one.kind == "exercise" and _BELOW_STUB.search(text))
+        after = next((later for later in shown if later > number), 0)
+        if one.kind != "picture" and points and after:
+            yield replace(one, body=f"{one.body}<p class='where'>Below in the lesson: slide {after}.</p>")
+        else:
+            yield one
 
 
 def _title(notebook: Notebook) -> Slide:
     source = notebook.cells[0].source
     asked = re.search(r"\*\*([^*]+\?)\*\*", source)
     title = markup.plain(source.splitlines()[0].lstrip("# "))
-    return Slide("title", "", escape(title), f"<p>{markup.inline(asked[1])}</p>" if asked else "")
+    return Slide("title", "", escape(title), f"<p>{markup.inline(asked[1])}</p>" if asked else "", ("header",))
 
 
 # Code cells: pictures, questions, exercises --------------------------------------------------------------------------
@@ -84,19 +137,31 @@ def _title(notebook: Notebook) -> Slide:
 
 def _of_code(cell: Cell, place: _Place, following: list[Cell]) -> Iterator[Slide]:
     if parts.is_pretest(cell):
-        yield Slide("claim", place.part, "What do you think now?", "<p>Answer the first quiz. Its key comes later.</p>")
+        answer = "<p>Answer the first quiz. Its key comes later.</p>"
+        yield Slide("claim", place.part, "What do you think now?", answer, ("header",))
         return
     for question in parts.asked(cell):
         yield from _question(question, place.part)
-    for shown in parts.pictures(cell)[:1]:
-        noticed = prose.inline(place.notice.pop(0).rstrip(".")) if place.notice else _to_notice(place, following)
-        yield _picture(shown, noticed, place.part)
+    shown = panels.panels(cell)
+    if shown:
+        yield from _picture(cell, shown, place, following)
     if "stub" in cell.metadata.get("tags", []):
+        place.asked.add(f"exercise {exercise_of(cell).partition('.')[2]}")
         yield _exercise(cell, place)
 
 
-def _picture(shown: Shown, heading: str, part: str) -> Slide:
-    return Slide("picture", part, heading, f'<img alt="{shown.description}" src="{shown.source}">')
+def _picture(cell: Cell, shown: list[Panel], place: _Place, following: list[Cell]) -> Iterator[Slide]:
+    noticed = place.notice.pop(0) if place.notice else None
+    heading = prose.inline(noticed.text.rstrip(".")) if noticed else _to_notice(place, following)
+    at = place.of_picture(cell)
+    if cell.id in place.withheld:
+        yield Slide("picture", place.part, heading, WITHHELD, at)
+        return
+    pages = panels.pages(shown, heading, noticed.panels if noticed else ())
+    yield Slide("picture", place.part, heading, pages[0].html, at)
+    for page in pages[1:]:
+        names = ", ".join(escape(panel.name) for row in page.rows for panel in row if panel.name)
+        yield Slide("picture more", place.part, f"<small>The same view: {names}</small>", page.html, at)
 
 
 def _to_notice(place: _Place, following: list[Cell]) -> str:
@@ -138,8 +203,10 @@ def _as_heading(sentence: str) -> str:
 
 def _exercise(cell: Cell, place: _Place) -> Slide:
     task = markup.opening(place.said, MOST_WORDS)
-    signature = next((line for line in cell.source.splitlines() if line.startswith("def ")), exercise_of(cell))
-    body = f"{f'<p>{markup.inline(task)}</p>' if task else ''}<pre>{escape(signature)}</pre>"
+    lines = cell.source[cell.source.find("def ") :].splitlines()
+    given = not parts.is_open(cell) and sum(-(-len(line) // CODE_LETTERS) for line in lines) <= GIVEN_LINES
+    code = "\n".join(lines if given else lines[:1])
+    body = f"{f'<p>{markup.inline(task)}</p>' if task else ''}<pre>{escape(code)}</pre>"
     return Slide("exercise", place.part, markup.inline(place.heading), body)
 
 
@@ -152,13 +219,14 @@ def _question(question: Question, part: str) -> Iterator[Slide]:
     choices = "".join(f"<li>{prose.inline(choice.text)}</li>" for choice in question.choices)
     words = sum(len(one.split()) for one in (question.text, *(choice.text for choice in question.choices)))
     kind = "question long" if words > LONG_QUESTION else "question"
-    yield Slide(kind, part, "", f"{prose.to_html(question.text)}<ol type='a'>{choices}</ol>")
+    at = (f"question {question.name.partition('.')[2]}",) if question.kind == "predict" else ("quiz",)
+    yield Slide(kind, part, "", f"{prose.to_html(question.text)}<ol type='a'>{choices}</ol>", at)
     headings = [f"<b class='letter'>({letter})</b> {prose.inline(one.text)}" for letter, one in question.lettered]
-    yield Slide("key", part, headings[question.answer], prose.to_html(question.choices[question.answer].reply))
+    yield Slide("key", part, headings[question.answer], prose.to_html(question.choices[question.answer].reply), at)
     for heading, choice in zip(headings, question.choices, strict=True):
         if question.kind == "predict" and not choice.correct:
             thought = f"<p class='thought'>{prose.inline(choice.misconception)}</p>"
-            yield Slide("reply", part, heading, thought + prose.to_html(choice.reply))
+            yield Slide("reply", part, heading, thought + prose.to_html(choice.reply), at)
 
 
 # Markdown: equations, misconceptions, claims, the recap --------------------------------------------------------------
@@ -169,7 +237,7 @@ def _of_block(block: str, place: _Place) -> Iterator[Slide]:
     if heading:
         place.heading, place.said = heading[2].strip(), ""
         if len(heading[1]) == 2:
-            place.part = place.heading
+            place.part, place.asked = place.heading, set()
         block = block[heading.end() :].strip()
     misconception = _MISCONCEPTION.match(block)
     if place.heading == "Recap" and block.startswith("|"):

@@ -9,7 +9,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array, as_points, unit
 from camviz.poses import RigidTransform
 
-ROUNDED = 1e-12  # of the terms of a sum: what is left of them is the rounding of F and of the epipole
+ROUNDED = 1e-10  # of the terms of a sum: what is left of them is the rounding of F and of the epipole, by SVD too
 
 
 def to_homogeneous(uv: ArrayLike) -> Array:

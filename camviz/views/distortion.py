@@ -266,7 +266,7 @@ class DistortionView(OrbitView):
         straight = self.show == "undistorted"
         right = _grid_lines(self.intrinsics, _SAMPLES[draft])
         drawn = svg.path(panel.place(self.intrinsics.to_pixels(right if straight else lines)), "orange thin")
-        title = "Straightened by your function" if straight else "The same, bent by your function"
+        title = "Straightened by your function" if straight else "The same, the grid bent by your function"
         return panel.show(self._photograph(panel, "yours") + drawn, title=title), {"yours": self._your_picture(draft)}
 
     def _your_picture(self, draft: bool) -> bytes:

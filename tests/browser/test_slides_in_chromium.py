@@ -3,23 +3,58 @@
 import re
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from laboratory import new_page
 
 from camviz.course import notebooks
 from camviz.teaching.deck import deck
+from camviz.teaching.pack import write_pack
 
 pytestmark = pytest.mark.browser
 
 LESSONS = sorted((Path(__file__).parents[2] / "lessons").glob("*.ipynb"))
 DISTORTION = next(path for path in LESSONS if path.name.startswith("05"))
-WIDE, NARROW = {"width": 1920, "height": 1080}, {"width": 1024, "height": 768}
+PROJECTED, WIDE, NARROW = (
+    {"width": 1280, "height": 720},
+    {"width": 1920, "height": 1080},
+    {"width": 1024, "height": 768},
+)
 OVERFLOWING = """() => [...document.querySelectorAll(".slide")].filter((slide) => {
   const idea = slide.querySelector(".idea"), limits = slide.getBoundingClientRect();
   const inside = [...idea.querySelectorAll("math, img, li, p, h2, td")].map((one) => one.getBoundingClientRect());
   return idea.scrollHeight > idea.clientHeight + 1 || idea.scrollWidth > idea.clientWidth + 1
     || inside.some((box) => box.right > limits.right || box.bottom > limits.bottom || box.top < limits.top);
 }).map((slide) => `${slide.id} ${slide.className}`)"""
+
+LEAST_TEXT = """async () => {  // of each drawing on a slide its smallest words in pixels, and its name
+  const found = [];
+  for (const image of document.querySelectorAll(".panels img[src^='data:image/svg']")) {
+    const box = image.getBoundingClientRect(), frame = document.createElement("iframe");
+    frame.style.cssText = `position:fixed;inset:0 auto auto 0;border:0;width:${box.width}px;height:${box.height}px`;
+    frame.srcdoc = `<!DOCTYPE html><body style="margin:0">${atob(image.src.split(",")[1])}</body>`;
+    document.body.append(frame);
+    await new Promise((resolve) => { frame.onload = resolve; });
+    const drawn = frame.contentDocument.querySelector("svg"), style = frame.contentWindow;
+    drawn.setAttribute("width", box.width), drawn.setAttribute("height", box.height);
+    for (const text of drawn.querySelectorAll("text")) {
+      const { a, b } = text.getScreenCTM();  // of words that stand upright, too
+      const size = parseFloat(style.getComputedStyle(text).fontSize) * Math.hypot(a, b);
+      if (style.getComputedStyle(text).display !== "none") found.push([size, `${image.alt}: ${text.textContent}`]);
+    }
+    frame.remove();
+  }
+  return found;
+}"""
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """The deck of lesson 05 run with its solutions, as a teacher gets it."""
+    folder = tmp_path_factory.mktemp("solved")
+    write_pack(DISTORTION.parent, folder, ["05"], run=True, slides=True, say=lambda sentence: None)
+    return folder / "05_slides.html"
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +135,7 @@ def test_a_swipe_turns_the_page(browser, written):
 def test_a_picture_comes_nearer_and_the_light_can_be_turned(opened):
     for _ in range(kinds(opened).index("picture")):
         opened.keyboard.press("ArrowRight")
-    image = opened.locator(".slide.now img")
+    image = opened.locator(".slide.now img").first
     before = image.bounding_box()["width"]
     opened.keyboard.press("z")
     assert image.bounding_box()["width"] == pytest.approx(2 * before)
@@ -141,3 +176,23 @@ def test_nothing_leaves_its_slide(browser, tmp_path, path):
     page.emulate_media(media="print")
     assert page.evaluate(OVERFLOWING) == []
     page.close()
+
+
+def test_every_picture_of_a_solved_lesson_is_drawn_and_large_enough_to_read(browser, solved):
+    """A picture has paper and ink, none is black, and no letter of a drawing is below 14 pixels of 1280."""
+    page = new_page(browser, viewport=PROJECTED)
+    page.goto(f"{solved.as_uri()}?print")
+    assert page.locator(".withheld").count() == 0
+    assert page.evaluate(OVERFLOWING) == []
+    seen = 0
+    for picture in page.locator(".panels img").all():
+        pixels = cv2.imdecode(np.frombuffer(picture.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
+        black = cv2.boxFilter((pixels < 3).astype(float), -1, (120, 90)).max()
+        assert pixels.std() > 5, picture.get_attribute("alt")
+        assert black < 0.999, picture.get_attribute("alt")
+        seen += 1
+    assert seen > 20
+    sizes = page.evaluate(LEAST_TEXT)
+    page.close()
+    assert len(sizes) > 100
+    assert [one for one in sizes if one[0] < 13.99] == []

@@ -3,9 +3,13 @@
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from camviz.cameras import Intrinsics
 from camviz.colour import spaces
+from camviz.course.glossary import term
+from camviz.scenes import to_linear
+from camviz.views.exposure import ExposureView
 from camviz.views.frustum import FrustumView
 
 EXCEPTIONS: dict[str, str] = {}
@@ -79,6 +83,129 @@ def test_angles_and_decibels(says):
     (twenty,) = says("in decibels 20 times its common logarithm")
     assert twenty.value * np.log10(10.0) == 20
     says("a last number of zero stands for a point at infinity")
+
+
+def test_the_models_of_fisheyes_in_the_glossary_are_those_of_opencv_and_of_the_paper(says):
+    says("the angle θ from the axis lands at a distance r from the middle that is a polynomial of odd powers of θ")
+    k, point = np.array([0.1, -0.03, 0.02, -0.004]), np.array([0.4, -0.7, 0.9])
+    assert "r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)" in term("Kannala–Brandt").formula
+    far = np.hypot(*point[:2])
+    theta = np.arctan2(far, point[2])
+    r = theta * (1 + k @ theta ** np.array([2, 4, 6, 8]))
+    found = cv2.fisheye.projectPoints(point[None, None], np.zeros(3), np.zeros(3), np.eye(3), k)[0][0, 0]
+    np.testing.assert_allclose(found, r * point[:2] / far, atol=1e-12)
+    says("projects a point onto one unit sphere and from there onto a second one, whose centre lies ξ from the first's")
+    formula = "(x, y) = f (X, Y) / (α D2 + (1 − α)(ξ D1 + Z)), D1 = |(X, Y, Z)|, D2 = |(X, Y, ξ D1 + Z)|"
+    assert term("double sphere").formula == formula
+    xi, alpha = -0.2, 0.6
+    first = point / np.linalg.norm(point)  # on one sphere, then seen from ξ away
+    second = (first + [0, 0, xi]) / np.linalg.norm(first + [0, 0, xi])
+    shifted = second + [0, 0, alpha / (1 - alpha)]  # the pinhole behind the second one's centre
+    by_spheres = shifted[:2] / shifted[2] / (1 - alpha)
+    d1 = np.linalg.norm(point)
+    d2 = np.hypot(far, xi * d1 + point[2])
+    np.testing.assert_allclose(by_spheres, point[:2] / (alpha * d2 + (1 - alpha) * (xi * d1 + point[2])), atol=1e-12)
+
+
+def test_a_hand_and_an_eye_need_two_turns_about_axes_that_are_not_parallel(says):
+    """How many directions of R_X the equation R_A R_X = R_X R_B leaves free, for turns about parallel axes or not."""
+    says("It takes at least two turns, about axes that are not parallel.")
+    assert term("hand–eye calibration").formula == "A X = X B"
+    X = Rotation.from_rotvec([0.3, -0.5, 0.2]).as_matrix()
+
+    def free(*axes):
+        rows = []
+        for axis in axes:
+            A = Rotation.from_rotvec(axis).as_matrix()
+            rows.append(np.kron(np.eye(3), A) - np.kron((X.T @ A @ X).T, np.eye(3)))
+        return 9 - np.linalg.matrix_rank(np.vstack(rows), tol=1e-9)
+
+    assert free([0, 0, 0.5], [0, 0, 0.9]) > 1
+    assert free([0, 0, 0.5], [0.4, 0, 0]) == 1  # X alone, up to its scale
+
+
+def test_mixtures_of_the_eye_s_curves_are_unmixed_by_one_matrix_whatever_the_spectrum(says):
+    says("One matrix then turns its counts into tristimulus values exactly, whatever the spectrum.")
+    rng = np.random.default_rng(1)
+    eye, mixing, spectra = rng.uniform(0, 1, (81, 3)), rng.normal(size=(3, 3)), rng.uniform(0, 1, (500, 81))
+    counts, wanted = spectra @ (eye @ mixing), spectra @ eye
+    np.testing.assert_allclose(counts @ np.linalg.inv(mixing), wanted, rtol=1e-9)
+    other = eye @ mixing + 0.1 * rng.uniform(0, 1, (81, 3))  # independent curves that are no such mixtures
+    best = np.linalg.lstsq(spectra @ other, wanted, rcond=None)[0]
+    assert np.abs(spectra @ other @ best / wanted - 1).max() > 1e-3
+
+
+def test_dither_lets_means_tell_apart_what_is_finer_than_a_step(says):
+    says("so that the mean of many samples tells apart what is finer than one step")
+    noise = np.random.default_rng(2).normal(0, 0.5, 100_000)
+    low, high = (np.rint(light + noise).mean() for light in (3.2, 3.4))
+    assert high - low == pytest.approx(0.2, abs=0.01)
+    assert np.rint(3.2) == np.rint(3.4)
+
+
+def test_the_two_telecentric_lenses(says):
+    """A thin lens of 50 mm: which thing keeps its size, with the pupil of either side far away."""
+    says(
+        "With the entrance pupil there (the stop in the rear focal plane), a thing keeps its size when it comes nearer"
+    )
+    says("with the exit pupil there, its image does when the sensor moves")
+    f, sensor, height = 50.0, 70.0, 10.0
+
+    def lands(stop, distance, at):
+        """Where the ray of the thing's top through the stop's middle lands; the stop stands behind the lens, or < 0."""
+        if stop > 0:
+            slope = height * (stop / f - 1) / (distance + stop - distance * stop / f)
+        else:
+            slope = -height / (distance + stop)
+        on_lens = height + slope * distance
+        return on_lens + (slope - on_lens / f) * at
+
+    near, far = (lands(f, distance, sensor) for distance in (150.0, 200.0))
+    assert near == pytest.approx(far)
+    here, there = (lands(-f, 150.0, at) for at in (70.0, 80.0))
+    assert here == pytest.approx(there)
+    assert lands(10.0, 150.0, sensor) != pytest.approx(lands(10.0, 200.0, sensor), rel=0.1)  # an ordinary stop
+
+
+def test_a_symmetric_lens_darkens_as_a_hole_does_and_another_one_by_its_pupils(says):
+    """Two thin lenses about a stop: the ray through the stop's middle, and cos⁴ of the angle at which it lands."""
+    says("The angle alone leaves cos⁴ θ behind a small hole, and behind a symmetric lens whose pupils have no")
+
+    def left(front, back, apart, theta):
+        within = np.tan(theta) / (1 - apart / front)  # the slope at the stop of a ray that came at θ
+        return np.cos(np.arctan(within * (1 - apart / back))) ** 4
+
+    theta = np.radians(40)
+    assert left(60.0, 60.0, 15.0, theta) == pytest.approx(np.cos(theta) ** 4)
+    assert left(-60.0, 30.0, 15.0, theta) > 1.5 * np.cos(theta) ** 4  # a retrofocus lens: its light lands less aslant
+
+
+def test_twice_the_iso_needs_half_the_light(says):
+    says("The number that says how bright a camera renders an exposure: twice the number needs half the light.")
+    says("In most digital cameras it sets how much is amplified after the exposure, and gathers no light.")
+    plain = ExposureView()
+    fast = plain.but(iso=1.0, shutter=plain.shutter - 1)
+    assert fast.recorded(draft=True).mean() == pytest.approx(plain.recorded(draft=True).mean(), rel=0.01)
+    assert fast.electrons_of_white == pytest.approx(plain.electrons_of_white / 2)
+
+
+def test_a_part_of_a_charuco_board_names_its_corners(says):
+    says("So every corner that is seen is known, even where a part of the board is hidden or outside the picture.")
+    codes = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    board = cv2.aruco.CharucoBoard((6, 5), 0.04, 0.03, codes)
+    picture = board.generateImage((600, 500), marginSize=0)[:, 300:]  # its right half
+    uv, ids, *_ = cv2.aruco.CharucoDetector(board).detectBoard(picture)
+    assert len(ids) >= 4
+    truth = 100 * (1 + np.stack([ids.ravel() % 5, ids.ravel() // 5], axis=-1)) - [300, 0]  # 5 inner corners a row
+    np.testing.assert_allclose(uv.reshape(-1, 2), truth, atol=1.5)
+
+
+def test_which_grey_a_meter_makes_is_no_law(says):
+    """Two ways of ISO 12232 to a camera's speed: 10/78 of saturation, and number 118 of 255 in sRGB."""
+    low, high = says("Which grey is the maker's choice, as a rule between 12 and 18 % of white.")
+    saturation_based, output = 100 * 10 / 78, 100 * float(to_linear(np.array(118 / 255)))
+    assert low.value < saturation_based < high.value
+    assert high == output
 
 
 def test_gamma_is_near_a_power_of_1_over_2_2(says):

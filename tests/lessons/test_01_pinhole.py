@@ -219,6 +219,12 @@ def test_where_the_first_pixel_is_and_where_the_picture_ends(says):
     assert blurred[0] == 0.5  # the centre of the first two lies between 0 and 1
 
 
+def test_the_f_number_of_the_box(says):
+    says("under This box is the depth of the box divided by the width of its hole.")
+    view = PinholeView(hole_mm=0.4, depth_mm=60)
+    assert view.numbers()["f-number"] == f"f/{60 / 0.4:.0f}"
+
+
 def test_the_airy_disc(says):
     *constants, green = says(
         "an [Airy disc](00_start_here.ipynb#airy-disc), which is 2.44 λ f/d wide; λ is the wavelength, 550 nm for green"
@@ -479,7 +485,7 @@ def test_before_the_lesson_what_a_hole_shows_sharply(says):
 
 
 def test_before_the_lesson_a_homogeneous_pixel(says):
-    x, y, w = says("A program prints a pixel in homogeneous coordinates: (640, 480, 4).")
+    x, y, w = says("A program writes the place of a pixel as three numbers: (640, 480, 4).")
     pixel = cv2.convertPointsFromHomogeneous(np.array([[x.value, y.value, w.value]]))[0, 0]
     u, v = says("At (160, 120).")
     assert u == pixel[0]

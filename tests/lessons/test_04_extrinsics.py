@@ -412,7 +412,7 @@ def test_the_photographs_know_that_the_camera_stood_still(says, samples):
 
 
 def test_before_the_lesson_what_t_tells(says, rng):
-    (t,) = says("The extrinsics [R | t] of a camera have t = (0, 0, 5) m.")
+    (t,) = says("by X_cam = R X_world + t, with t = (0, 0, 5) m")
     shift = np.array([0, 0, t.value])
     (ahead,) = says("The world's origin lies 5 m straight ahead of the camera.")
     (along,) = says("X_world = 0 becomes X_cam = t, which is 5 m along the camera's own z axis")
@@ -461,7 +461,7 @@ def test_before_the_lesson_a_change_of_units(says, rng):
 
 
 def test_before_the_lesson_three_angles_are_not_enough(says):
-    first, second, _ = angles = says("mounted at Euler angles 40, 20, 10")
+    first, second, _ = angles = says("mounted at the angles 40, 20, 10")
     assert all(0 < one.value < 90 for one in angles)
     about_y, about_x, apart = says(
         "Turning by 40 about y and 20 about x, in one order or the other, ends up 14° apart."

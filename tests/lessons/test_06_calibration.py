@@ -591,6 +591,28 @@ def test_the_rms_over_u_and_v(says):
     assert numbers == CalibrationView().corners.shape[-1]
 
 
+def test_which_vector_a_singular_value_decomposition_finds(says):
+    says("Of all vectors of length one, the last row of `np.linalg.svd(A)[2]` is the one that A makes shortest")
+    says("and the last singular value is the length to which it does")
+    rng = np.random.default_rng(6)
+    A = rng.normal(size=(20, 4))
+    _, values, rows = np.linalg.svd(A)
+    others = rng.normal(size=(4000, 4))
+    lengths = np.linalg.norm(others @ A.T, axis=1) / np.linalg.norm(others, axis=1)
+    assert np.linalg.norm(A @ rows[-1]) == pytest.approx(values[-1])
+    assert values[-1] <= lengths.min() < 1.05 * values[-1]
+
+
+def test_what_rank_and_jacobian_mean(says):
+    says("Their rank counts the independent statements among them: the rows that do not follow from the other rows.")
+    one, other = np.array([1.0, 2, 3]), np.array([0.0, 1, 1])
+    assert np.linalg.matrix_rank([one, other, 2 * one - other]) == 2
+    says("it is the matrix of their derivatives, a row for each residual and a column for each parameter")
+    x = np.arange(5.0)
+    fit = least_squares(lambda p: p[0] * x**2 + p[1] * x - 1, [0.5, 2.0])  # 5 residuals, 2 parameters
+    np.testing.assert_allclose(fit.jac, np.stack([x**2, x], axis=-1), atol=1e-6)  # whose derivatives are these
+
+
 def test_the_third_axis(says):
     (determinant,) = says("det R = −1: r₃ = r₁ × r₂, in this order")
     R = Rotation.from_rotvec((0.3, -0.2, 0.5)).as_matrix()

@@ -558,9 +558,11 @@ def test_sixteenths_in_the_replies(says):
 
 
 def test_before_the_lesson_which_f(says):
-    f, B = says("A rectified pair has f = 700 px and a baseline of 0.12 m.")
-    before, lens = says("The left camera's own K, found before rectifying, has fx = 820, and its lens says 4 mm.")
-    (d,) = says("A point has a disparity of 35 px.")
+    f, B = says("now both have f = 700 px, and the cameras stand 0.12 m apart")
+    before, lens = says("Before that, the left camera's own K had fx = 820, and its lens says 4 mm.")
+    (d,) = says("A point lies 35 px farther left in the right picture.")
+    (named,) = says("The 35 px, the disparity, are in pixels")
+    assert named.value == d.value
     for focal, claim, sum_ in (
         (f, says("2.4 m."), says("Yes: 700 · 0.12/35.")),
         (before, says("2.8 m."), says("That is 820 · 0.12/35.")),

@@ -315,7 +315,9 @@ def test_before_the_lesson_alpha_is_not_the_slope(says):
 
 
 def test_before_the_lesson_what_stands_still_is_in_focus(says):
-    (focus, views) = says("was focused at 3 m. A bird stands in the same pixel of all 81 views")
+    views, focus = says(
+        "A camera takes 81 pictures at once, each through another part of its main lens, which is focused at 3 m."
+    )
     (at,) = says("At 3 m.")
     assert views == PLACES**2
     assert at == depth(0.0, z_f=focus.value)

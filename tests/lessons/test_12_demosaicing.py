@@ -620,6 +620,42 @@ def test_quartz_takes_false_colour_and_detail(says, plate):
     assert psnr[0] < psnr[0.5] > psnr[1] > psnr[end.value]
 
 
+def spots(*plates):
+    """Where unpolarised light lands, and how much of it, behind plates: (how far, the axis' angle), or (None, …)."""
+    landed = {}
+    for field in ([1, 0], [0, 1]):  # unpolarised: both, without interference
+        rays = {(0.0, 0.0): np.array(field, dtype=complex)}
+        for distance, angle in plates:
+            axis, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+            split = {}
+            for place, one in rays.items():
+                if distance is None:  # a quarter wave later along the axis
+                    parts = [(place, 1j * (one @ axis) * axis + (one @ across) * across)]
+                else:
+                    aside = tuple(np.round(np.array(place) + distance * axis, 9) + 0.0)
+                    parts = [(aside, (one @ axis) * axis), (place, (one @ across) * across)]
+                for where, part in parts:
+                    split[where] = split.get(where, 0) + part
+            rays = split
+        for place, one in rays.items():
+            landed[place] = landed.get(place, 0) + np.sum(np.abs(one) ** 2) / 2
+    return {place: share for place, share in landed.items() if share > 1e-9}
+
+
+def test_two_crossed_plates_make_two_spots_and_a_quarter_wave_plate_between_them_four(says):
+    """By the field of each ray, plate after plate (Jones)."""
+    says("One plate of quartz splits light into two rays, which are polarised across each other.")
+    assert spots((1, 0)) == pytest.approx({(1, 0): 0.5, (0, 0): 0.5})
+    (turn,) = says("A second plate, turned by 90°, would move only one of them: two spots still.")
+    crossed = np.radians(turn.value)
+    assert len(spots((1, 0), (1, crossed))) == 2
+    says("So a thin layer stands between the two, a quarter-wave plate")
+    says("Then the second plate splits both, and four spots stand in a square, d pixels wide.")
+    square = spots((1, 0), (None, np.pi / 4), (1, crossed))
+    assert square == pytest.approx({(0, 0): 0.25, (1, 0): 0.25, (0, 1): 0.25, (1, 1): 0.25})
+    says("a stack of thin plates of quartz, which splits every point of light into four")
+
+
 def test_blurring_afterwards_does_nothing(says):
     f, wide = says("after sampling, stripes of 0.48 cycles per pixel have become bands 50 pixels wide")
     assert wide == 1 / beat(f.value)
@@ -802,19 +838,20 @@ def test_nothing_above_a_question_answers_it(question, words):
 
 
 def test_before_the_lesson_the_jacket(says):
-    (f,) = says("A jacket has vertical stripes, 0.46 cycles per pixel.")
+    pairs, pixels = says("46 pairs of a light and a dark one lie side by side on 100 pixels")
+    f = pairs.value / pixels.value
     (wide,) = says("Bands of orange and blue, about 25 pixels from orange to orange.")
     (too,) = says("Bands of green and magenta, about 25 pixels from green to green.")
     half, minus, away, width = says("Yes: 0.5 − 0.46 = 0.04 cycles per pixel, a band in 25 pixels.")
-    assert minus.value == f.value
-    assert away == half.value - f.value
-    assert width == 1 / beat(f.value)
+    assert minus.value == f
+    assert away == half.value - f
+    assert width == 1 / beat(f)
     assert wide.value == too.value == width.value
     (fine,) = says("Coloured stripes as fine as those of the jacket, about 2 pixels each.")
-    assert fine == 1 / f.value
+    assert fine == 1 / f
     (middle,) = says("the nearer to 0.5, the wider its bands")
     assert middle.value == half.value
-    assert beat(0.48) < beat(f.value) < beat(0.44)
+    assert beat(0.48) < beat(f) < beat(0.44)
 
 
 def test_before_the_lesson_the_first_column_cut_off(says):

@@ -469,6 +469,21 @@ def test_a_camera_that_sees_as_the_eye_leaves_nothing(says):
         assert delta((raw * gains) @ matrix.T, truth).mean() < most
 
 
+def test_a_camera_that_sees_as_the_eye_needs_its_matrix_too(says):
+    """The eye's own curves, white balanced in the light of the bulb, and shown without and with a matrix."""
+    says(
+        "A camera whose curves are mixtures of the eye's (Luther's condition) needs a matrix too, and then it is exact."
+    )
+    says(
+        "Because its curves are not those that belong to the screen's red, green and blue: colours must be translated."
+    )
+    says("what the camera's three curves count is not the red, green and blue of a screen")
+    raw, gains, matrix, truth = shot(BULB, None, "bulb", "eye")
+    balanced = raw * gains
+    assert delta(balanced, truth).mean() > 10
+    assert delta(balanced @ matrix.T, truth).max() < 1e-6
+
+
 def test_the_null_space(says):
     sums, unknowns, left = says(
         "what it does not notice lies in the null space of 3 equations in 81 unknowns, and 78 dimensions are left"
@@ -714,7 +729,7 @@ def test_nothing_above_a_question_answers_it(question, words):
 def test_before_the_lesson_d65_is_no_glowing_body(says):
     white = colour.xy_to_UCS_uv((0.3127, 0.3290))
     nearest, duv = colour.temperature.uv_to_CCT_Ohno2013(white)
-    (kelvin,) = says("its nearest colour temperature is about 6504 K")
+    (kelvin,) = says("the glowing body that comes nearest to it has about 6504 K")
     assert kelvin == nearest
     (off,) = says("No glowing body has this colour: its Duv is +0.003, a little towards green.")
     assert off == duv
@@ -731,7 +746,7 @@ def test_before_the_lesson_a_mean_hides_a_red(says):
     mean, red = says("a mean of 0.96 goes with a red patch that is off by 3.3")
     assert mean == off.mean()
     assert red == off[NAMES.index("red")]
-    left, patches = says("A camera's matrix leaves a ΔE2000 of 0.8 on average over 24 patches of a chart")
+    left, patches = says("A camera's colours are off by 0.8 on average over the 24 patches of a chart.")
     (claimed,) = says("They are right to about 0.8.")
     assert claimed.value == left.value < 1
     same, spectra_, surfaces = (

@@ -117,9 +117,26 @@ def test_four_times_the_rows_halve_the_error(says):
 
 
 def test_what_the_strips_blur(says):
-    (factor,) = says("a factor of 0.987 at half a cycle")
+    (factor,) = says("Both dim a grating, by a factor of 0.987 at half a cycle, which it takes out")
     eighth = np.sin(np.pi / 16) / (np.pi / 16)
     assert factor == eighth**2  # a mean over a strip, and a difference of strips
+
+
+def test_what_the_standard_of_2014_does_otherwise(says):
+    """Differences of every second quarter, the filter (−1/2, 0, 1/2), and the window of a cosine on a pedestal."""
+    (left,) = says("ISO 12233 of 2014 takes quarters and differences of every second one, which alone leave 0.900")
+    x = np.arange(400) / 4
+    wave = np.sin(np.pi * x)  # half a cycle per pixel
+    steps = np.convolve(wave, [0.5, 0, -0.5], "valid") * 4
+    assert left == np.abs(steps).max() / np.pi
+    says("and a Hamming window, which fades from the middle on")
+    assert np.all(np.diff(np.hamming(65)[32:]) < 0)
+    says("its window is flat over the edge")
+    v, u = np.mgrid[:64, :64]
+    edge = SlantedEdge.of(np.clip(u - 32 - 0.0875 * (v - 32) + 0.5, 0, 1))
+    (x, spread), (_, rise) = edge.line_spread, edge.edge_spread
+    flat = np.abs(x) < edge.rise
+    np.testing.assert_allclose(spread[flat], 8 * np.diff(rise)[flat])
 
 
 def test_how_long_an_edge_must_be(says):
@@ -217,6 +234,23 @@ def test_diffraction_and_defocus_do_not_multiply(says):
     np.testing.assert_allclose(at, np.abs(exact * np.sinc(f * 0.004)), atol=1e-6)
 
 
+def test_why_an_opening_s_overlap_with_its_copy_is_its_mtf(says):
+    """Two slits at distance d before a screen at v, and the pairs of points of a disc that stand so far apart."""
+    says("Two points of the opening draw stripes on the sensor, as two slits do: the farther apart they are, the finer")
+    says(
+        "Their share is the area that a round opening has in common with a copy of itself, moved aside by that distance"
+    )
+    v, N, f = 50.0, 8.0, 100.0  # mm and cycles per mm
+    apart = f * GREEN * v
+    at = np.linspace(0, 0.2, 2001)  # on the screen: 20 stripes
+    light = np.abs(sum(np.exp(2j * np.pi / GREEN * np.hypot(v, at - slit)) for slit in (-apart / 2, apart / 2))) ** 2
+    strongest = np.argmax(np.abs(np.fft.rfft(light[:-1] - light[:-1].mean()))) / 0.2
+    assert strongest == pytest.approx(f)
+    y, x = np.mgrid[-1:1:801j, -1:1:801j] * v / N / 2
+    inside, moved = (np.hypot(x - shift, y) <= v / N / 2 for shift in (0, apart))
+    assert (inside & moved).sum() / inside.sum() == pytest.approx(lens(f, N), abs=2e-3)
+
+
 def test_half_a_wave_is_a_path_difference_of_c_over_8_n(says):
     says("at the rim, by W = c/(8N) more than in the middle")
     N, dz = 8.0, 0.02
@@ -279,6 +313,16 @@ def test_the_corners(says):
     assert drawn == pytest.approx(corner.value / 100, abs=5e-3)
     open_, closed = says("At f/1.4 the corners of your pictures are much darker than the middle. You stop down to f/8")
     assert open_share(open_.value) < open_share(closed.value)
+    says("Behind a small hole, light that comes at an angle θ is weaker by cos⁴ θ.")
+    x, y = np.meshgrid(np.linspace(-0.01, 0.01, 41), np.linspace(-0.01, 0.01, 41))
+    bright = []
+    for aside in (0.0, slope):  # patches of a round hole light a sensor at distance 1: two cosines over d²
+        d2 = 1 + (aside - x) ** 2 + y**2
+        bright.append(np.sum((np.hypot(x, y) <= 0.01) / d2**2))  # cos · cos / d², both cosines 1/d
+    assert bright[1] / bright[0] == pytest.approx(cos4, rel=1e-4)
+    says(
+        "A lens that is symmetric about its aperture does the same, as far as its glasses show the aperture in one size"
+    )
     (angle,) = says("at 45° a quarter of the light is left")
     assert np.cos(np.radians(angle.value)) ** 4 == pytest.approx(0.25)
 
@@ -325,6 +369,23 @@ def test_iso_frees_no_electrons(says):
     assert views[1].sensor.gain_dn_per_e / views[0].sensor.gain_dn_per_e == pytest.approx(16)
 
 
+def test_gain_lifts_the_noise_before_the_amplifier_and_no_other(says):
+    """Shot noise and read noise of either kind, amplified 1 and 16 times, drawn 40,000 times."""
+    says("Each electron counts for sixteen times as much, and so does all noise that comes before the amplifier")
+    says("Noise that comes after it is not lifted (lesson 14); the camera below has none of that kind.")
+    says("A high ISO lifts the noise of the light as well, by the same factor.")
+    rng = np.random.default_rng(3)
+    light, before, after = rng.poisson(400, 40_000), rng.normal(0, 3, 40_000), rng.normal(0, 30, 40_000)
+    once, often = (gain * (light + before) for gain in (1, 16))
+    assert often.std() / once.std() == pytest.approx(16)
+    assert (often + after).std() / (once + after).std() < 16 / 1.5
+    electrons = [(gain * (light + before) + after).std() / gain for gain in (1, 16)]
+    assert electrons[1] < 0.7 * electrons[0]
+    dark = ExposureView(light_ev=3.0)
+    noise = [dark.but(iso=iso).sensor for iso in (0.0, 4.0)]
+    assert noise[0].read_noise_e == noise[1].read_noise_e  # in electrons: all of it comes before the amplifier
+
+
 def test_the_shutter_s_stops(says):
     one, other = says("from f/8 to f/16, how much longer?")
     assert (other.value / one.value) ** 2 == 4
@@ -355,12 +416,17 @@ def test_the_meter_s_constants(says):
     mean, heading = says("18 %, or 12.8 %?")
     assert mean == 18
     metered, saturated, share, grey, white = says(
-        "so that a surface metered as the mean comes out at 10/78 = 12.8 % of saturation. 18 % of a white surface at "
+        "a surface metered as the mean comes out at 10/78 = 12.8 % of saturation. 18 % of a white surface at "
         "100 % would be half a stop more"
     )
     assert share == 100 * metered.value / saturated.value
     assert heading == share.value
     assert np.log2(grey.value / 100 / (share.value / white.value)) == pytest.approx(0.5, abs=0.02)
+    number, largest, of_white = says(
+        "the metered surface is number 118 of 255 in the sRGB file, which is 18 % of white"
+    )
+    assert of_white == 100 * to_linear(np.array(number.value / largest.value))
+    assert abs(share.value - of_white.value) > 5  # one standard, two greys
     factor, base, K = says("A meter reads the luminance L = 0.125 · 2^EV cd/m² at ISO 100 (its constant K is 12.5).")
     assert factor == K.value / 100  # ISO 2720: N²/t = L S / K
     ev, sun, room, times = says(
@@ -392,7 +458,7 @@ def test_snow_and_coal_come_out_as_the_same_grey(says):
         "Yes: 18 % of white, whatever it is. Snow needs more exposure than the meter says, by two stops and more"
     )
     (shortened,) = says("But the meter shortens the exposure until the mean is 18 %")
-    (recap,) = says("it makes everything 18 % grey")
+    (recap,) = says("it makes everything one grey, here of 18 %")
     for subject in ("garden", "snow", "coal"):
         recorded = ExposureView(subject=subject, metering="average").recorded(draft=True)
         assert mean == 100 * recorded.mean()
@@ -431,14 +497,14 @@ def test_the_quiz_about_two_causes(says):
 
 
 def test_before_the_lesson_what_an_mtf_says(says):
-    left, frequency = says("A magazine says of a camera: its MTF is 0.6 at 0.1 cycles per pixel.")
+    says("A magazine tested a camera with black and white stripes that repeat every ten pixels.")
+    (left,) = says("Its mark is 0.6, where 1 is perfect.")
     (share,) = says("As stripes everywhere, with 60 % of their contrast.")
     (sharp,) = says("Sharp in 60 % of the pixels, and blurred in the others.")
     assert share.value == sharp.value == 100 * left.value
-    says("They repeat every ten pixels, and the difference between bright and dark")
-    (seen,), (again,) = says("Where 0.6 is left, you see"), says("is 0.6 of what it was in the scene")
-    assert seen.value == again.value == left.value
-    assert 1 / frequency.value == 10
+    (seen,), (again,) = says("Where 0.6 is left, you see"), says("the difference is 0.6 of what it was")
+    assert seen.value == again.value == left.value < 1
+    says("Such a mark for every fineness is the modulation transfer function, MTF.")
 
 
 def test_before_the_lesson_two_stages(says):

@@ -63,6 +63,15 @@ def test_no_right_way_is_refused(one, seeds):
     print(f"{one.name}: {len(ways)} right ways × {len(seeds)} seeds, 0 refused")
 
 
+@pytest.mark.parametrize("one", [one for one in ALL if one.conventions], ids=lambda one: one.name)
+def test_an_answer_by_another_convention_is_accepted_and_told_which(one, seeds):
+    for seed in seeds:
+        for known in one.conventions:
+            answer = judge(one, known.function, np.random.default_rng(seed))
+            assert answer.correct
+            assert answer.message == known.explanation
+
+
 @pytest.mark.parametrize("one", [one for one in ALL if one.bug], ids=lambda one: one.name)
 def test_the_function_given_to_be_mended_is_not_tried_yet_and_gives_nothing_away(one, seeds):
     for seed in seeds:

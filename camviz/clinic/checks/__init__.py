@@ -17,7 +17,7 @@ from typing import Any
 from camviz.clinic.registry import Fault, Kind
 
 ORDER = (
-    *("compare", "assumed", "file", "contradiction", "size", "settings", "lens"),
+    *("compare", "assumed", "file", "impossible", "contradiction", "size", "settings", "lens"),
     *("corners", "set_aside", "boards", "moving", "model", "pair", "frames", "described"),
 )
 """The modules in the order of their checks; others come after them, by name. Within one the order is as written."""

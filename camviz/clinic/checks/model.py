@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.difference import pixel_grid
+from camviz.calibration.difference import NothingSharedError, pixel_grid
 from camviz.calibration.solving import STOPPED_SHORT
 from camviz.cameras import Camera
 from camviz.clinic.between_views import FEWEST_VIEWS, Drift, Partings
@@ -174,8 +174,15 @@ def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
     enough = [each for each in evidence.with_corners().values() if each.best.posed.sum() >= FEWEST_VIEWS]
     if not enough:
         raise NotChecked(f"it needs at least {FEWEST_VIEWS} views")
+    found, apart = list[Finding](), list[str]()
     for observed in enough:
-        yield from list(_drift(observed)) or _disagreement(observed)
+        try:
+            found += list(_drift(observed)) or list(_disagreement(observed))
+        except NothingSharedError:
+            apart.append(observed.name)
+    if apart and not found:
+        raise NotChecked(f"the cameras that halves of the views lead to have no rays in common ({', '.join(apart)})")
+    yield from found
 
 
 def _drift(observed: Observed) -> Iterator[Finding]:

@@ -14,6 +14,12 @@ def _pixels(rng: np.random.Generator) -> tuple[float, float, float]:
     return float(rng.uniform(300, 900)), float(rng.uniform(250, 400)), float(rng.uniform(180, 240))
 
 
+def _shifted_pixels(rng: np.random.Generator) -> tuple[float, float, float]:
+    """The same of a picture cut out to the right of and below the axis: its principal point lies beyond its corner."""
+    f, cx, cy = _pixels(rng)
+    return f, -cx, -cy
+
+
 def _points(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
     """In front of the camera, beside the axis and above or below it."""
     sides = rng.choice([-1.0, 1.0], (*shape, 2)) * rng.uniform(0.3, 2, (*shape, 2))
@@ -42,6 +48,7 @@ def project(points: Array, f: float, cx: float, cy: float) -> Array:
 def _project_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (_points(rng, shape), *_pixels(rng))
+    yield (_points(rng, (4,)), *_shifted_pixels(rng))
 
 
 PROJECT = Exercise(
@@ -179,7 +186,7 @@ def _direction_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (_points(rng, shape) * rng.choice([-1.0, 1.0], (*shape, 1)) / 4, *_pixels(rng))
     yield (-_points(rng, ()), *_pixels(rng))
-    yield (_points(rng, (3,)) * [[1], [-1], [1]], *_pixels(rng))
+    yield (_points(rng, (3,)) * [[1], [-1], [1]], *_shifted_pixels(rng))
 
 
 VANISHING = Exercise(
@@ -298,8 +305,8 @@ def _front_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     yield (_points(rng, (4,)) * behind, *_pixels(rng))
     yield (_points(rng, ()) * behind, *_pixels(rng))
     yield (_points(rng, (3,)) * [[1, 1, 1], behind, within], *_pixels(rng))
-    depths = np.array([0.4, 0.03, 1e-4, 1e-9, -1e-9, -0.2]) * rng.uniform(0.5, 1, 6)  # near the hole, on both sides
-    yield (np.column_stack([_points(rng, (6,))[:, :2], depths]), *_pixels(rng))
+    depths = np.array([0.4, 0.03, 1e-4, 1e-9, 1e-45, -1e-45, -1e-9, -0.2])  # near the hole, on both sides
+    yield (np.column_stack([_points(rng, (8,))[:, :2], depths * rng.uniform(0.5, 1, 8)]), *_shifted_pixels(rng))
 
 
 IN_FRONT = Exercise(
@@ -427,6 +434,15 @@ def infinity_for_no_image(points, f, cx, cy):
     return np.where(points[..., 2:] > 0, project(points, f, cx, cy), np.inf)
 
 
+@IN_FRONT.wrong(
+    "For most points this is right. Very near the hole you answer NaN: a point in front of the camera has an image "
+    "however near it is. Compare Z with 0."
+)
+def only_from_some_depth_on(points, f, cx, cy):
+    z = np.where(points[..., 2:] > 1e-12, points[..., 2:], np.nan)
+    return f * points[..., :2] / z + (cx, cy)
+
+
 # 4: the ray of a pixel -----------------------------------------------------------------------------------------------
 
 
@@ -441,6 +457,8 @@ def _ray_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         f, cx, cy = _pixels(rng)
         yield (project(_points(rng, shape), f, cx, cy), f, cx, cy)
+    f, cx, cy = _shifted_pixels(rng)
+    yield (np.vstack([project(_points(rng, (3,)), f, cx, cy), [cx, cy]]), f, cx, cy)  # the last along the axis
 
 
 def _at_depth_one(uv, f, cx, cy):

@@ -269,6 +269,8 @@ def _blur_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         f, N = float(rng.uniform(20, 120)), float(rng.uniform(1.4, 16))
         yield (f, N, f * float(rng.uniform(15, 60)), f * rng.uniform(70, 200, shape))
     yield (f, N, f * float(rng.uniform(15, 60)), f * rng.uniform(3, 12, 4))  # nearer than the focus
+    s = f * float(rng.uniform(15, 60))
+    yield (f, N, s, s * np.array([0.5, 1.0, 2.0]))  # in front of the focus, in it and behind it
 
 
 BLUR = Exercise(
@@ -381,12 +383,15 @@ def _limit_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         f, N, c = (float(rng.uniform(*ends)) for ends in ((20, 100), (2, 16), (0.005, 0.03)))
         yield (f, N, f**2 / (N * c) * rng.uniform(0.1, 0.9, shape), c)
     yield (f, N, f**2 / (N * c) * np.array([0.4, 1.5, 4.0]), c)
+    f, N, c = float(rng.integers(20, 100)), 2.0 ** rng.integers(1, 4), 2.0 ** -rng.integers(5, 8)
+    yield (f, N, (f**2 / (N * c) + f) * np.array([0.5, 1.0, 2.0]), c)  # exactly at the hyperfocal distance, too
 
 
 LIMITS = Exercise(
     name="02.limits",
     reference=limits,
     cases=_limit_cases,
+    canonical=lambda mm: np.where(mm > 1e12, np.inf, mm),  # what rounding leaves of infinity at the hyperfocal distance
     shown=((50.0, 8.0, np.array(5233.33), 0.03),),
     hints=(
         "H and both limits stand in part 3 as formulas. What does the far one become when s reaches H, and then?",
@@ -560,12 +565,17 @@ def _matrix(surfaces: Array, refraction=_refraction) -> Array:
 
 
 def _lens_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for elements in (1, 1, 2, 3):
+    """Converging lenses, two that make light diverge, and two glasses cemented together."""
+    for elements, sign in ((1, 1), (1, -1), (2, 1), (3, 1), (2, -1)):
         rows = []
         for _ in range(elements):
-            glass, power = float(rng.uniform(1.45, 1.8)), float(rng.uniform(60, 200))
-            rows += [(power, float(rng.uniform(2, 9)), glass), (-power * float(rng.uniform(1.2, 4)), 4.0, 1.0)]
+            glass, radius = float(rng.uniform(1.45, 1.8)), sign * float(rng.uniform(60, 200))
+            way = float(rng.uniform(2, 9))
+            rows += [(radius, float(rng.uniform(2, 9)), glass), (-radius * float(rng.uniform(1.2, 4)), way, 1.0)]
         yield (np.array(rows),)
+    crown, flint = float(rng.uniform(1.45, 1.55)), float(rng.uniform(1.6, 1.8))
+    R = float(rng.uniform(60, 90))
+    yield (np.array([(R, 6.0, crown), (-R * float(rng.uniform(0.7, 1)), 2.5, flint), (-8 * R, 1.0, 1.0)]),)
 
 
 ELEMENTS = Exercise(
@@ -689,7 +699,10 @@ def slopes_unchanged_on_the_axis(surfaces):
     return -1 / _matrix(surfaces, refraction)[1, 0]
 
 
-@ELEMENTS.wrong("`*` multiplies entry by entry, so that C stays 0 and f infinite. Matrices are multiplied by `@`.")
+@ELEMENTS.wrong(
+    "Your C stays 0, and f infinite. `*` does that, which multiplies entry by entry: matrices take `@`. So does "
+    "`before = after` ahead of the row's matrix, for then no index changes at the surface."
+)
 def entry_by_entry(surfaces):
     M, before = np.eye(2), 1.0
     for radius, _, after in surfaces:
@@ -705,6 +718,14 @@ def entry_by_entry(surfaces):
 def back_focal_distance(surfaces):
     M = _matrix(surfaces)
     return -M[0, 0] / M[1, 0]
+
+
+@ELEMENTS.wrong(
+    "For lenses that make light converge this is right. A lens that makes it diverge has a *negative* focal length: "
+    "keep the sign of −1/C."
+)
+def always_positive(surfaces):
+    return abs(effective_focal_length(surfaces))
 
 
 @ELEMENTS.wrong("For a single lens this is right. You stop after two surfaces: go on to the last row.")

@@ -21,6 +21,11 @@ def _camera_matrix(rng: np.random.Generator) -> Array:
     return np.array([[fx, skew, rng.uniform(250, 400)], [0, fy, rng.uniform(180, 240)], [0, 0, 1]])
 
 
+def _shifted_matrix(rng: np.random.Generator) -> Array:
+    """The same with a skew below 0, and with its principal point beyond the picture's upper left corner."""
+    return _camera_matrix(rng) * [[1, -1, -1], [1, 1, -1], [1, 1, 1]]
+
+
 def _append(uv: Array, last: float) -> Array:
     """(u, v, last) of pixels (..., 2)."""
     return np.concatenate([uv, np.full_like(uv[..., :1], last)], axis=-1)
@@ -41,6 +46,7 @@ def ray(uv: Array, K: Array) -> Array:
 def _ray_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (rng.uniform(0, 480, (*shape, 2)), _camera_matrix(rng))
+    yield (rng.uniform(-480, 0, (3, 2)), _shifted_matrix(rng))
 
 
 RAY = Exercise(
@@ -233,9 +239,10 @@ def as_if_centred(width, fx, cx):
     return np.degrees(2 * np.arctan(width / (2 * fx)))
 
 
-@FIELD_OF_VIEW.wrong(
-    "Half a pixel is missing: this counts pixels from the corner of the first one. With centres at integers "
-    "the edges lie at −0.5 and width − 0.5."
+@FIELD_OF_VIEW.convention(
+    "The two triangles are right. You count pixels from the corner of the first one, as `cv2.calibrationMatrixValues` "
+    "does. With *centres* at integers, as everywhere in this lesson, the edges lie at −0.5 and width − 0.5: add half a "
+    "pixel on the left and take it away on the right."
 )
 def counted_from_the_corner(width, fx, cx):
     return np.degrees(np.arctan(cx / fx) + np.arctan((width - cx) / fx))
@@ -321,6 +328,7 @@ def resized_as_given(K, s):
 def _resized_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for low, high in ((0.2, 0.4), (0.4, 0.8), (1.5, 3.0)):
         yield (_camera_matrix(rng), float(rng.uniform(low, high)))
+    yield (_shifted_matrix(rng), float(rng.uniform(0.4, 0.8)))
 
 
 def _with_centre(K: Array, cx: float, cy: float) -> Array:
@@ -462,6 +470,7 @@ def _cropped(K: Array, x0: float, y0: float) -> Array:
 def _binned_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for n in (2, 3, 4, 8):
         yield (_camera_matrix(rng), int(rng.integers(100, 200)), int(rng.integers(5, 90)), n)
+    yield (_shifted_matrix(rng), int(rng.integers(100, 200)), int(rng.integers(5, 90)), 2)
 
 
 CROPPED_THEN_BINNED = Exercise(

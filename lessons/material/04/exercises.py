@@ -21,10 +21,15 @@ def _rotation(rng: np.random.Generator) -> Array:
     return np.asarray(Rotation.random(rng=rng).as_matrix())
 
 
+def _way(rng: np.random.Generator) -> Array:
+    """To either side along each axis, and always somewhere."""
+    return rng.choice([-1.0, 1.0], 3) * rng.uniform(1, 3, 3)
+
+
 def _rigid(rng: np.random.Generator, *shape: int) -> Array:
     transforms = np.zeros((*shape, 4, 4))
     for index in np.ndindex(shape):
-        transforms[index][:3, :3], transforms[index][:3, 3] = _rotation(rng), rng.uniform(1, 3, 3)
+        transforms[index][:3, :3], transforms[index][:3, 3] = _rotation(rng), _way(rng)
     transforms[..., 3, 3] = 1
     return transforms
 
@@ -50,7 +55,7 @@ def centre(R: Array, t: Array) -> Array:
 
 def _centre_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for _ in range(4):
-        yield _rotation(rng), rng.uniform(1, 3, 3)
+        yield _rotation(rng), _way(rng)
 
 
 CENTRE = Exercise(
@@ -308,10 +313,15 @@ def _rotations_and_others(rng: np.random.Generator) -> list[Array]:
         _rotation(rng),
         np.eye(3)[rng.permutation([[2, 0, 1], [1, 2, 0]])[0]],  # axes renamed, without any rounding
         _rotation(rng) @ np.diag([1.0, -1.0, 1.0]),  # a mirror
+        (1 - 1e-7) * _rotation(rng) @ np.diag([1.0, -1.0, 1.0]),  # a mirror, rounded
         stretch * _rotation(rng),
         _rotation(rng) @ np.diag([stretch, 1 / stretch, 1.0]),  # keeps volumes, not lengths
+        _rotation(rng) @ np.diag([1.2, 1 / 1.2, 1.0]),
+        _rotation(rng) @ np.diag([1 + 2.5e-6, 1 - 2.5e-6, 1.0]),  # five times as far off as is allowed
+        (1 + 2e-7) * _rotation(rng),  # 4e-7 and 6e-7 off, which is allowed
         _leaning(rng, float(rng.uniform(2e-7, 4e-7))),  # as single precision leaves a rotation
         _leaning(rng, float(rng.uniform(6e-6, 9e-6))),
+        _leaning(rng, -float(rng.uniform(6e-6, 9e-6))),
         _leaning(rng, float(rng.uniform(4e-4, 6e-4))),
         _leaning(rng, float(rng.uniform(4e-4, 6e-4))).T,  # rows that lean
         _leaning(rng, float(rng.uniform(0.3, 0.6))),
@@ -333,6 +343,14 @@ IS_ROTATION = Exercise(
     ),
     praise="Lengths, angles and handedness: whatever keeps these three is a rotation.",
 )
+
+
+@IS_ROTATION.wrong(
+    "`np.allclose` adds its `rtol`, 1e-5 unless told otherwise, to your `atol`, so that MᵀM may be off by 1.1e-5 on "
+    "its diagonal: give it `rtol=0`."
+)
+def with_the_relative_tolerance_left_on(M):
+    return np.allclose(M.T @ M, np.eye(3), atol=1e-6) and abs(np.linalg.det(M) - 1) < 1e-6
 
 
 @IS_ROTATION.right

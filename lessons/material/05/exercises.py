@@ -21,8 +21,11 @@ def distort(xy: Array, k1: float, k2: float, k3: float) -> Array:
 
 
 def _distort_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        yield (rng.uniform(-0.8, 0.8, (*shape, 2)), *rng.uniform(-0.4, 0.4, 3).tolist())
+    """Each coefficient with either sign; the last points so far out that the factor is below 0."""
+    signs = ((1, -1, 1), (-1, 1, -1), (1, 1, -1), (-1, -1, 1))
+    for shape, sign in zip(SHAPES, signs, strict=True):
+        yield (rng.uniform(-0.8, 0.8, (*shape, 2)), *(rng.uniform(0.1, 0.4, 3) * sign).tolist())
+    yield (rng.choice([-1.0, 1.0], (4, 2)) * rng.uniform(1.5, 2.5, (4, 2)), -0.4, -float(rng.uniform(0.01, 0.1)), 0.0)
 
 
 DISTORT = Exercise(
@@ -333,9 +336,17 @@ def _undistort_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         k1 = float(rng.uniform(-0.4, -0.1))
         yield (rng.uniform(0.05, 0.6 * fold_radius(k1), shape), k1)
     yield (rng.uniform(0.3, 1.0, 5), float(rng.uniform(0.1, 0.3)))
+    yield (rng.uniform(4, 8, 3), float(rng.uniform(0.4, 0.6)))  # a strong pincushion, where dividing does not settle
+    yield (np.append(rng.uniform(0.1, 3, 2), 0.0), 0.0)
     k1 = float(rng.uniform(-0.4, -0.2))
+    fold = fold_radius(k1)
     beyond = np.linspace(0.7, 3.0, 20) * rng.uniform(0.98, 1.02, 20)  # of the fold; the image ends at 2/3 of it
-    yield (fold_radius(k1) * np.append(beyond, rng.uniform(0.3, 0.5, 3)), k1)
+    yield (fold * np.concatenate([[0.0], beyond, rng.uniform(0.3, 0.5, 3)]), k1)
+    for k1 in (float(rng.uniform(-0.3, -0.2)), float(rng.uniform(-4, -3))):
+        fold = fold_radius(k1)
+        r = fold * np.array([*rng.uniform(0.8, 0.9, 3), 0.935, 0.97, 0.985, 0.992, 0.998])  # up to the fold itself
+        outside = 2 / 3 * fold * (1 + np.append(rng.uniform(1e-5, 1e-4, 24), [0.1, 1.0]))  # and just beyond it
+        yield (np.append(r + k1 * r**3, outside), k1)
 
 
 UNDISTORT = Exercise(
@@ -373,16 +384,18 @@ def by_newton_from_r_d(r_d, k1):
 
 
 @UNDISTORT.right
-def by_fixed_point(r_d, k1):
-    r = np.asarray(r_d, dtype=float)
+def by_newton_from_where_the_picture_ends(r_d, k1):
+    r = np.minimum(r_d, 2 / 3 * fold_radius(k1)) + np.zeros_like(r_d)
     for _ in range(100):
-        r = r_d / (1 + k1 * r**2)
+        r = r - (r + k1 * r**3 - r_d) / (1 + 3 * k1 * r**2)
     return _kept(r, r_d, k1)
 
 
 @UNDISTORT.right
 def by_the_cubic_formula(r_d, k1):
     """r³ + p r + q = 0 with p = 1/k1, q = -r_d/k1: Viète's cosine for k1 < 0, Cardano's roots for k1 > 0."""
+    if k1 == 0:
+        return r_d
     p, q = 1 / k1, -np.asarray(r_d, dtype=float) / k1
     if k1 < 0:
         cosine = 3 * q / (2 * p) * np.sqrt(-3 / p)
@@ -420,8 +433,9 @@ def distorted_again(r_d, k1):
 
 
 @UNDISTORT.wrong(
-    "Inside the image this is right. Beyond it no ray lands, and dividing goes on for ever without settling: put the "
-    "result back into r + k1 r³, and answer NaN where r_d does not come out."
+    "Near the axis this is right. But dividing settles only while k1 r² is below 1, and ever more slowly towards the "
+    "fold. Beyond the image no ray lands, and there it never settles: take Newton's steps, put the result back into "
+    "r + k1 r³, and answer NaN where r_d does not come out."
 )
 def divided_without_a_look_back(r_d, k1):
     r = np.asarray(r_d, dtype=float)
@@ -448,6 +462,51 @@ def five_divisions(r_d, k1):
     for _ in range(5):
         r = r_d / (1 + k1 * r**2)
     return r
+
+
+@UNDISTORT.wrong(
+    "You divide again and again, and where that has not settled you answer NaN, though there is a point: for a strong "
+    "pincushion, say r_d = 6 with k1 = 0.5, it never settles, and near the fold it takes thousands of rounds. Newton's "
+    "steps arrive in a dozen."
+)
+def divided_and_looked_back(r_d, k1):
+    r = np.asarray(r_d, dtype=float)
+    for _ in range(100):
+        r = r_d / (1 + k1 * r**2)
+    return _kept(r, r_d, k1)
+
+
+@UNDISTORT.wrong(
+    "Twenty rounds of dividing, and NaN where they have not arrived, though there is a point. Newton's steps arrive."
+)
+def twenty_divisions_and_a_look_back(r_d, k1):
+    r = np.asarray(r_d, dtype=float)
+    for _ in range(20):
+        r = r_d / (1 + k1 * r**2)
+    return _kept(r, r_d, k1)
+
+
+@UNDISTORT.wrong(
+    "Five steps of Newton's method are enough near the axis. Near the fold the slope is almost 0, and they have not "
+    "arrived; there you answer NaN, though there is a point: iterate until nothing changes."
+)
+def five_steps_of_newton(r_d, k1):
+    return _kept(_newton(r_d, k1, 5), r_d, k1)
+
+
+@UNDISTORT.wrong(
+    "Just below the fold you answer NaN. Rays land there, too: the limit is the fold itself, 1/sqrt(−3 k1), and no "
+    "part of it."
+)
+def nothing_beyond_nine_tenths_of_the_fold(r_d, k1):
+    r = undistort(r_d, k1)
+    return np.where(r <= 0.9 * fold_radius(k1), r, np.nan)
+
+
+@UNDISTORT.wrong("The centre of the picture has an answer, too: r_d = 0 comes from r = 0. Yours is NaN.")
+def nothing_in_the_centre(r_d, k1):
+    r = undistort(r_d, k1)
+    return np.where(r > 0, r, np.nan)
 
 
 @UNDISTORT.wrong("Two steps of Newton's method are not enough far from the axis: iterate until nothing changes.")
@@ -497,8 +556,10 @@ def _map(width, height, f, bend, offset=0.0):
 
 
 def _map_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for width, height in ((8, 6), (5, 9)):
-        yield (width, height, float(rng.uniform(6, 12)), float(rng.uniform(0.1, 0.3) * rng.choice([-1, 1])))
+    """A pincushion that reaches beyond the photograph, a barrel, and one so strong that its corners fold over."""
+    yield (8, 6, float(rng.uniform(4, 6)), float(rng.uniform(0.2, 0.3)))
+    yield (5, 9, float(rng.uniform(6, 12)), -float(rng.uniform(0.1, 0.3)))
+    yield (9, 8, float(rng.uniform(1.5, 2)), -float(rng.uniform(0.25, 0.3)))
 
 
 UNDISTORT_MAP = Exercise(

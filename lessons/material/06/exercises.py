@@ -27,6 +27,8 @@ def _rms_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         projected = found + rng.normal(0, 0.4, found.shape)
         found[(*(rng.integers(0, n) for n in shape),)] = np.nan
         yield found, projected
+    found = np.column_stack([rng.uniform(-20, 0, 5), rng.uniform(0, 20, 5)])
+    yield found, found + rng.normal(0, 0.4, found.shape)  # all found, and beside the picture
 
 
 RMS = Exercise(
@@ -170,9 +172,13 @@ def _H(K: Array, R: Array, t: Array) -> Array:
 
 
 def _focal_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for _ in range(4):
-        K = _K(rng)
-        yield float(rng.uniform(0.2, 5) * rng.choice([-1, 1])) * _H(K, *_pose(rng)), K[:2, 2]
+    """Boards turned by quarters, H of either sign, and a principal point beyond the picture's upper left corner."""
+    for quarters in range(4):
+        K, (R, t) = _K(rng), _pose(rng)
+        R = R @ Rotation.from_rotvec([0, 0, quarters * np.pi / 2]).as_matrix()
+        yield float(rng.uniform(0.2, 5)) * (-1) ** quarters * _H(K, R, t), K[:2, 2]
+    K = _K(rng) * [[1, 1, -1], [1, 1, -1], [1, 1, 1]]
+    yield _H(K, *_pose(rng)), K[:2, 2]
 
 
 FOCAL_LENGTHS = Exercise(
@@ -455,10 +461,14 @@ def _nearest_rotation(M: Array) -> Array:
 
 def _pose_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     """H times positive and negative numbers, of boards that are upright, and of boards held on their heads."""
-    for sign, turn in ((1, 0.0), (-1, 0.0), (1, np.pi), (-1, np.pi)):
+    sides = ((1, 1), (-1, -1), (1, -1), (-1, 1))
+    for (sign, turn), side in zip(((1, 0.0), (-1, 0.0), (1, np.pi), (-1, np.pi)), sides, strict=True):
         K, (R, t) = _K(rng), _pose(rng)
+        t = t * [*side, 1]
         R = R @ Rotation.from_rotvec([0, 0, turn]).as_matrix()
         yield sign * float(rng.choice([rng.uniform(0.2, 0.8), rng.uniform(1.3, 5)])) * _H(K, R, t), K
+    K = _K(rng) * [[1, 1, -1], [1, 1, -1], [1, 1, 1]]  # the principal point beyond the upper left corner
+    yield _H(K, *_pose(rng)), K
 
 
 def _a_rotation(function: Function, rng: np.random.Generator) -> str:

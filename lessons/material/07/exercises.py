@@ -42,6 +42,11 @@ def _K(rng: np.random.Generator) -> Array:
     )
 
 
+def _shifted_K(rng: np.random.Generator) -> Array:
+    """The same of a picture whose principal point lies beyond its upper left corner."""
+    return _K(rng) * [[1, 1, -1], [1, 1, -1], [1, 1, 1]]
+
+
 def _motion(rng: np.random.Generator) -> tuple[Array, Array]:
     """A right camera beside the left one and a little in front of it or behind it, looking much the same way."""
     R = Rotation.from_rotvec(rng.uniform(0.05, 0.3, 3) * rng.choice([-1, 1], 3)).as_matrix()
@@ -71,6 +76,7 @@ def fundamental(K_left: Array, K_right: Array, R: Array, t: Array) -> Array:
 def _fundamental_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for _ in range(4):
         yield (_K(rng), _K(rng), *_motion(rng))
+    yield (_shifted_K(rng), _shifted_K(rng), *_motion(rng))
 
 
 FUNDAMENTAL = Exercise(
@@ -182,6 +188,9 @@ def _one_sign(lines: Array) -> Array:
 def _line_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (_F(rng), rng.uniform(0, 480, (*shape, 2)))
+    F = fundamental(_shifted_K(rng), _shifted_K(rng), *_motion(rng))
+    yield (F, rng.uniform(-480, 0, (4, 2)))
+    yield (F * [[-1], [1], [1]], rng.uniform(-480, 0, (4, 2)))  # its lines fall where those of the last one rise
 
 
 LINE = Exercise(
@@ -594,12 +603,15 @@ def _distances(R: Array, t: Array, rays_left: Array, rays_right: Array) -> Array
 
 
 def _in_front_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """In random order the true motion, the opposite one and the two that are turned by 180° about the baseline.
+    """Of two scenes, one of them small, in random order the true motion, the opposite one and the two turned by 180°.
 
-    Some of the pairs are mistakes: their rays meet behind both cameras if the motion is the true one.
+    They turn about the baseline. Some of the pairs are mistakes: their rays meet behind both cameras if the motion is
+    the true one.
     """
-    for n in rng.integers(4, 12, 2):
+    for n, size in zip(rng.integers(8, 16, 2), (1.0, 0.01), strict=True):  # of a garden, and of a watch
         (R, t), points = _motion(rng), rng.uniform([-2, -1.5, 3], [2, 1.5, 8], (n, 3))
+        t = t * [1, 1, 0.2]  # much to the side: about as far as to the front it could be taken for its reverse
+        t, points = size * t, size * points
         points[: n // 2] *= -1
         left, right = _looking_forward(points), _looking_forward(points @ R.T + t)
         half_turn = Rotation.from_rotvec(np.pi * t / np.linalg.norm(t)).as_matrix()
@@ -672,6 +684,14 @@ def left_only(R, t, rays_left, rays_right):
 )
 def right_only(R, t, rays_left, rays_right):
     return _distances(R, t, rays_left, rays_right)[:, 1] > 0
+
+
+@IN_FRONT.wrong(
+    "You ask for more than some distance. In front of both is where both distances are above 0, in whatever unit: the "
+    "world may be a watch."
+)
+def farther_than_one(R, t, rays_left, rays_right):
+    return (_distances(R, t, rays_left, rays_right) > 1).all(axis=-1)
 
 
 @IN_FRONT.wrong("One camera is enough for yours. The point must be in front of *both*: `all`, where you have `any`.")

@@ -31,6 +31,7 @@ def _depth_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         d = rng.uniform(0, 100, shape) + max(0, 1 - doffs)
         if d.size > 1:
             d.flat[:3] = -doffs, -doffs - rng.uniform(1, 4), -doffs + rng.uniform(1, 4)
+            d.flat[3:5] = -doffs - rng.uniform(1e-3, 0.1), -doffs + rng.uniform(1e-3, 0.1)
         yield d, float(rng.uniform(300, 900)), float(rng.uniform(0.05, 0.5)), doffs
 
 
@@ -318,6 +319,12 @@ def _rectified_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         yield rng.uniform(0, 480, (*shape, 2)), _K(rng), R, _K(rng)
     R = Rotation.from_rotvec([0, rng.choice([-1, 1]) * rng.uniform(1.42, 1.5), 0]).as_matrix()
     yield rng.uniform(0, 640, (40, 2)), _K(rng), R, _K(rng)
+    shift = np.array([[1, 1, -1], [1, 1, -1], [1, 1, 1]])  # principal points beyond the upper left corner
+    R = Rotation.from_rotvec(rng.uniform(0.05, 0.25, 3) * rng.choice([-1, 1], 3)).as_matrix()
+    yield rng.uniform(-480, 0, (4, 2)), _K(rng) * shift, R, _K(rng) * shift
+    beside = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # looks along what was x: the ray of cx is exactly beside
+    K = np.array([[512.0, 0, 320], [0, 512, 240], [0, 0, 1]])
+    yield np.array([320.0, 240]) + [[-64, 8], [0, 32], [0, -16], [64, 8]], K, beside, K
 
 
 RECTIFIED = Exercise(
@@ -479,7 +486,11 @@ def _metric_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         found = rng.integers(17, 1500, (6, 8)).astype(np.int16)
         found[rng.random((6, 8)) < 0.2] = -16
         found[0, :3] = -16, 320, 331
+        found[1, :5] = -16, -1, 0, 1, 2  # 0 is a disparity like others
         yield found, K, P_left, P_right
+    doffs = -rng.uniform(5, 10)  # a left picture cut out far to the right, and everything near
+    P_left = P_left - [[0, 0, 500, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
+    yield np.where(found < 0, found, found + 300), K, P_left, P_left + [[0, 0, doffs, -f * B], [0] * 4, [0] * 4]
 
 
 METRIC_DEPTH = Exercise(
@@ -609,7 +620,8 @@ def no_match_kept(found, K, P_left, P_right):
 
 
 @METRIC_DEPTH.wrong(
-    "The baseline stands in the *right* camera's P. The left one stands at the origin, and its entry is 0."
+    "All your depths are 0. Is the baseline taken from P_left? It stands in the *right* camera's P: the left one "
+    "stands at the origin, and its entry is 0."
 )
 def baseline_of_the_left_camera(found, K, P_left, P_right):
     return np.where(found < 0, np.nan, 0.0)
@@ -617,7 +629,15 @@ def baseline_of_the_left_camera(found, K, P_left, P_right):
 
 @METRIC_DEPTH.wrong("The baseline has gone. f / d alone is a depth in baselines, not in metres.")
 def baseline_left_out(found, K, P_left, P_right):
-    return K[0, 0] / found
+    return _metric(found, P_left[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 16) * P_right[0, 0] / -P_right[0, 3]
+
+
+@METRIC_DEPTH.wrong(
+    "Where `found` is 0 you answer NaN. Nothing was found where it is *negative*; 0 is a disparity like others, and "
+    "with doffs not even at infinity."
+)
+def nothing_where_found_is_zero(found, K, P_left, P_right):
+    return np.where(found > 0, metric_depth(found, K, P_left, P_right), np.nan)
 
 
 # 5: the left–right check ---------------------------------------------------------------------------------------------
@@ -638,6 +658,17 @@ def _left_right_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     right[-6:] += 20  # where the right picture reaches farther, it shows another thing
     yield left, right, tolerance
     yield _each_column_by_itself(rng, 50)
+    yield from _whole_disparities_of_either_sign(rng)
+
+
+def _whole_disparities_of_either_sign(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Partners in the first and in the last column and one beyond either, and differences of just the tolerance."""
+    for tolerance in (1.0, 0.0):
+        left, right = rng.integers(-4, 5, (2, 16)).astype(float)
+        left[[0, 1, 2, -3, -2, -1]] = 0, 2, -1, 1, -2, 0
+        right[0], right[3], right[12], right[-1] = tolerance, -1 + tolerance, 1, -tolerance
+        left[[7, 8]], right[9] = (-2, 3), -2
+        yield left, right, tolerance
 
 
 def _near_thing_before_a_wall(rng: np.random.Generator, n: int, tolerance: float) -> Arguments:
@@ -766,6 +797,12 @@ def fraction_cut_off(d_left, d_right, tolerance):
 def one_sided(d_left, d_right, tolerance):
     back, inside = _led_back(d_left, d_right, np.rint(np.arange(len(d_left)) - d_left))
     return np.where(inside & (back - d_left <= tolerance), d_left, np.nan)
+
+
+@LEFT_RIGHT.wrong("A difference of *exactly* the tolerance is kept, too: it is to differ by at most that, `<=`.")
+def less_than_the_tolerance(d_left, d_right, tolerance):
+    back, inside = _led_back(d_left, d_right, np.rint(np.arange(len(d_left)) - d_left))
+    return np.where(inside & (np.abs(back - d_left) < tolerance), d_left, np.nan)
 
 
 @LEFT_RIGHT.wrong("Your threshold is one pixel whatever is asked for: compare with `tolerance`.")

@@ -46,7 +46,14 @@ def equidistant(points: Array, f: float, cx: float, cy: float) -> Array:
 def _equidistant_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (_all_round(rng, shape), *rng.uniform([100, 200, 320], [400, 300, 500]).tolist())
-    yield (np.array([[0.3, -0.2, -1.0], [-0.5, 0.1, -0.4]]), *rng.uniform([100, 200, 320], [400, 300, 500]).tolist())
+    beside = [
+        [0.3, -0.2, -1.0],
+        [-0.5, 0.1, -0.4],
+        [1.0, 0.0, 0.0],
+        [-0.7, 0.4, 0.0],
+        [0.0, -0.3, 0.2],
+    ]  # 90° and behind, left of the picture and above it
+    yield (np.array(beside) * rng.uniform(0.5, 2), *rng.uniform([200, 20, 30], [400, 60, 50]).tolist())
 
 
 EQUIDISTANT = Exercise(
@@ -84,10 +91,30 @@ def as_opencv_does_it_in_front_and_turned_round_behind(points, f, cx, cy):
     import cv2
 
     K, front = np.array([[f, 0, 0], [0, f, 0], [0, 0, 1]]), points * [1, 1, -1]
-    ahead = np.where(points[..., 2:] > 0, points, front).reshape(1, -1, 3)
+    ahead = np.where(points[..., 2:] > 0, points, front)
+    ahead[..., 2] = np.maximum(ahead[..., 2], 1e-12)  # it divides by z
+    ahead = ahead.reshape(1, -1, 3)
     uv = cv2.fisheye.projectPoints(ahead, np.zeros(3), np.zeros(3), K, np.zeros(4))[0].reshape(*points.shape[:-1], 2)
     r = np.linalg.norm(uv, axis=-1, keepdims=True)
     return np.where(points[..., 2:] > 0, uv, uv / r * (f * np.pi - r)) + (cx, cy)
+
+
+@EQUIDISTANT.right
+def point_by_point_as_a_list(points, f, cx, cy):
+    import math
+
+    pixels = []
+    for x, y, z in points.reshape(-1, 3).tolist():
+        r, around = f * math.atan2(math.sqrt(x * x + y * y), z), math.atan2(y, x)
+        pixels.append([cx + r * math.cos(around), cy + r * math.sin(around)])
+    return np.reshape(pixels, (*points.shape[:-1], 2)).tolist()
+
+
+@EQUIDISTANT.right
+def with_half_the_angle(points, f, cx, cy):
+    unit = points / np.linalg.norm(points, axis=-1, keepdims=True)
+    theta = 2 * np.arcsin(np.sqrt((1 - unit[..., 2:]) / 2))
+    return f * theta * unit[..., :2] / np.sqrt(np.sum(unit[..., :2] ** 2, axis=-1, keepdims=True)) + np.array([cx, cy])
 
 
 @EQUIDISTANT.wrong(
@@ -106,6 +133,11 @@ def pinhole(points, f, cx, cy):
 @EQUIDISTANT.wrong("This is r = f sin θ, the orthographic lens, which folds at 90°. The equidistant lens has r = f θ.")
 def orthographic(points, f, cx, cy):
     return f * _placed(points, np.sin(_theta(points))) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("This is r = 2f sin(θ/2), the equisolid lens. The equidistant one has r = f θ.")
+def equisolid(points, f, cx, cy):
+    return f * _placed(points, 2 * np.sin(_theta(points) / 2)) + (cx, cy)
 
 
 @EQUIDISTANT.wrong("This is r = 2f tan(θ/2), the stereographic lens. The equidistant one has r = f θ.")
@@ -139,6 +171,41 @@ def not_a_unit_direction(points, f, cx, cy):
 )
 def divided_by_the_whole_length(points, f, cx, cy):
     return f * points[..., :2] * (_theta(points) / np.linalg.norm(points, axis=-1))[..., None] + (cx, cy)
+
+
+@EQUIDISTANT.wrong(
+    "The arcsine never exceeds a right angle, so that points behind the camera come out in front. np.arctan2(r, z) "
+    "knows the sign of z."
+)
+def by_the_arc_sine(points, f, cx, cy):
+    return f * _placed(points, np.arcsin(np.minimum(_off_axis(points) / np.linalg.norm(points, axis=-1), 1))) + (cx, cy)
+
+
+@EQUIDISTANT.wrong(
+    "arccos(z) is the angle only of a ray of length 1. Divide z by the length of the whole point (x, y, z) first."
+)
+def arc_cosine_of_z_itself(points, f, cx, cy):
+    return f * _placed(points, np.arccos(points[..., 2])) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("Your θ comes from x and z alone. How far a ray is from the axis depends on y too: √(x² + y²).")
+def angle_of_x_alone(points, f, cx, cy):
+    return f * _placed(points, np.arctan2(np.abs(points[..., 0]), points[..., 2])) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("You add |x| and |y|. The distance from the axis is √(x² + y²), `np.hypot(x, y)`.")
+def sides_added(points, f, cx, cy):
+    return f * _placed(points, np.arctan2(np.abs(points[..., :2]).sum(axis=-1), points[..., 2])) + (cx, cy)
+
+
+@EQUIDISTANT.wrong("You turn v round. In the camera's frame y points down already, as v does: add r y / √(x² + y²).")
+def v_upwards(points, f, cx, cy):
+    return equidistant(points * [1, -1, 1], f, cx, cy)
+
+
+@EQUIDISTANT.wrong("The sign of x and y is lost: every point lands to the right of the middle and below it.")
+def to_one_side(points, f, cx, cy):
+    return equidistant(np.concatenate([np.abs(points[..., :2]), points[..., 2:]], axis=-1), f, cx, cy)
 
 
 @EQUIDISTANT.wrong(
@@ -197,8 +264,9 @@ def _coefficients(rng: np.random.Generator) -> list[float]:
 
 
 def _polynomial_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        yield (_all_round(rng, shape), *_coefficients(rng))
+    for shape, signs in zip(SHAPES, ((1, 1), (1, -1), (-1, 1), (-1, -1)), strict=True):
+        k1, k2 = (signs * np.abs(_coefficients(rng))).tolist()
+        yield (_all_round(rng, shape), k1, k2)
     yield (np.array([[0.3, -0.2, -1.0], [-0.5, 0.1, 0.4]]), *_coefficients(rng))
 
 
@@ -312,7 +380,7 @@ def arc_cosine_of_z(points, k1, k2):
 def angle(radius: Array, k1: float, k2: float) -> Array:
     """The θ in 0 … π with θ (1 + k1 θ² + k2 θ⁴) = radius ≥ 0, by Newton's method; NaN where there is none."""
     theta = np.array(radius, dtype=float)
-    for _ in range(12):
+    for _ in range(20):
         error = theta * (1 + k1 * theta**2 + k2 * theta**4) - radius
         theta = theta - error / (1 + 3 * k1 * theta**2 + 5 * k2 * theta**4)
     found = np.abs(theta * (1 + k1 * theta**2 + k2 * theta**4) - radius) < 1e-9
@@ -320,13 +388,18 @@ def angle(radius: Array, k1: float, k2: float) -> Array:
 
 
 def _angle_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """Angles below 90°, behind the camera up to nearly 180°, on the axis, and radii that no ray has."""
+    """Angles below 90°, behind the camera, on the axis, radii that no ray has, and either side of π."""
     for shape in SHAPES:
         yield (rng.uniform(0.4, 1.8, shape), *rng.uniform([0.01, 0.001], [0.03, 0.003]).tolist())
     k1, k2 = rng.uniform([0.01, 0.001], [0.03, 0.003]).tolist()
     behind = _polynomial(rng.uniform([1.7, 2.4, 3.0], [2.2, 2.9, 3.1]), k1, k2)
     beyond = _polynomial(rng.uniform(3.3, 4.0, 2), k1, k2)
     yield (np.concatenate([[0.0], behind, beyond]), k1, k2)
+    k1, k2 = rng.uniform([0.04, 0.003], [0.08, 0.008]).tolist()  # a strong bend
+    yield (_polynomial(np.concatenate([np.pi + 3e-6 * np.array([-1, 1]), rng.uniform(0.5, 3.1, 4)]), k1, k2), k1, k2)
+    yield (_polynomial(np.array([0.3, 2.9, 3.16]), k1, 0.0), k1, 0.0)
+    yield (_polynomial(np.array([0.3, 2.9, 3.16]), 0.0, k2), 0.0, k2)
+    yield (np.array([0.2, 3.0, np.pi, 3.15]), 0.0, 0.0)  # θ = r, and π itself is the angle of a ray
 
 
 ANGLE = Exercise(
@@ -357,7 +430,7 @@ def _newton(radius, k1, k2, steps):
 
 @ANGLE.right
 def by_newton_and_half_a_circle(radius, k1, k2):
-    theta = _newton(radius, k1, k2, 12)
+    theta = _newton(radius, k1, k2, 30)
     return np.where(theta <= np.pi, theta, np.nan)
 
 
@@ -400,7 +473,7 @@ def signs_flipped(radius, k1, k2):
     "The angles are right. But some of them are above π: no ray is farther from the axis than straight behind, so NaN."
 )
 def beyond_half_a_turn(radius, k1, k2):
-    return _newton(radius, k1, k2, 12)
+    return _newton(radius, k1, k2, 20)
 
 
 @ANGLE.wrong(
@@ -408,7 +481,19 @@ def beyond_half_a_turn(radius, k1, k2):
     "NaN."
 )
 def clamped_at_half_a_turn(radius, k1, k2):
-    return np.minimum(_newton(radius, k1, k2, 12), np.pi)
+    return np.minimum(_newton(radius, k1, k2, 20), np.pi)
+
+
+@ANGLE.wrong("You let angles a little above π pass. The limit is π itself, `np.pi`: no ray has an angle beyond it.")
+def three_point_two_for_pi(radius, k1, k2):
+    theta = _newton(radius, k1, k2, 20)
+    return np.where(theta <= 3.2, theta, np.nan)
+
+
+@ANGLE.wrong("π itself is the angle of a ray, the one straight behind. NaN is for what is *beyond* π.")
+def without_pi_itself(radius, k1, k2):
+    theta = _newton(radius, k1, k2, 20)
+    return np.where(theta < np.pi, theta, np.nan)
 
 
 @ANGLE.wrong("Radii that no ray has are answered by 0, which is the axis itself. The answer is NaN.")
@@ -430,7 +515,7 @@ def nothing_beyond_90_degrees(radius, k1, k2):
 
 @ANGLE.wrong("You ask whether the *radius* is above π. The bent radius of a ray from behind may well be: ask it of θ.")
 def radius_asked_instead_of_angle(radius, k1, k2):
-    return np.where(radius <= np.pi, _newton(radius, k1, k2, 12), np.nan)
+    return np.where(radius <= np.pi, _newton(radius, k1, k2, 20), np.nan)
 
 
 @ANGLE.wrong("This is the pinhole's inverse, θ = atan r. Here it is θ itself that the polynomial bends.")
@@ -459,7 +544,13 @@ def wrong_slope(radius, k1, k2):
 
 def window_map(width: int, height: int, f_window: float, yaw: float, f: float, cx: float, cy: float) -> Array:
     """For each pixel (height, width, 2) of a perspective window turned right by `yaw`, its pixel in an r = f θ lens."""
-    return equidistant(_turned(_rays(width, height, f_window), yaw), f, cx, cy)
+    return _seen(_turned(_rays(width, height, f_window), yaw), f, cx, cy)
+
+
+def _seen(rays, f, cx, cy):
+    """Pixels (..., 2) of rays (..., 3) through the equidistant fisheye; the axis itself is seen at (cx, cy)."""
+    on_axis = _off_axis(rays)[..., None] == 0
+    return np.where(on_axis, (cx, cy), equidistant(np.where(on_axis, (1, 0, 0), rays), f, cx, cy))
 
 
 def _rays(width, height, f_window, middle=0.5):
@@ -475,11 +566,13 @@ def _turned(rays, yaw):
 
 
 def _window_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """A window to one side, and one that looks backwards over the other shoulder."""
+    """A window to one side, one that looks backwards over the other shoulder, and two that look straight ahead."""
     side = rng.choice([-1, 1])
     for width, height, yaw in ((8, 6, side * rng.uniform(0.4, 1.2)), (4, 10, -side * rng.uniform(1.9, 2.5))):
         f_window, f, cx, cy = rng.uniform([3, 90, 150, 210], [9, 200, 200, 260]).tolist()
         yield (width, height, f_window, float(yaw), f, cx, cy)
+    for width, height in ((5, 5), (7, 3)):  # its middle pixel looks along the axis
+        yield (width, height, float(rng.uniform(3, 5)), 0.0, *rng.uniform([150, 3, 5], [200, 8, 9]).tolist())
 
 
 WINDOW_MAP = Exercise(
@@ -505,7 +598,7 @@ def with_a_rotation_matrix(width, height, f_window, yaw, f, cx, cy):
 
     rays = _rays(width, height, f_window).reshape(-1, 3)
     turned = Rotation.from_euler("y", yaw).apply(rays)
-    return equidistant(turned, f, cx, cy).reshape(height, width, 2)
+    return _seen(turned, f, cx, cy).reshape(height, width, 2)
 
 
 @WINDOW_MAP.right
@@ -515,7 +608,7 @@ def with_k_inverse_and_rodrigues(width, height, f_window, yaw, f, cx, cy):
     K = np.array([[f_window, 0, (width - 1) / 2], [0, f_window, (height - 1) / 2], [0, 0, 1]])
     v, u = np.mgrid[:height, :width]
     R, _ = cv2.Rodrigues(np.array([0.0, yaw, 0.0]))
-    return equidistant(np.stack([u, v, 1 + 0 * u], axis=-1) @ np.linalg.inv(K).T @ R.T, f, cx, cy)
+    return _seen(np.stack([u, v, 1 + 0 * u], axis=-1) @ np.linalg.inv(K).T @ R.T, f, cx, cy)
 
 
 @WINDOW_MAP.right
@@ -525,8 +618,38 @@ def pixel_by_pixel(width, height, f_window, yaw, f, cx, cy):
         for u in range(width):
             x, y = (u - (width - 1) / 2) / f_window, (v - (height - 1) / 2) / f_window
             ray = np.array([np.cos(yaw) * x + np.sin(yaw), y, np.cos(yaw) - np.sin(yaw) * x])
-            uv[v, u] = equidistant(ray, f, cx, cy)
+            uv[v, u] = _seen(ray, f, cx, cy)
     return uv
+
+
+@WINDOW_MAP.right
+def with_the_azimuth_of_each_ray(width, height, f_window, yaw, f, cx, cy):
+    x, y, z = np.moveaxis(_turned(_rays(width, height, f_window), yaw), -1, 0)
+    r, around = f * np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)  # which is 0 on the axis, and so is r
+    return np.dstack([cx + r * np.cos(around), cy + r * np.sin(around)]).tolist()
+
+
+@WINDOW_MAP.right
+def with_a_very_small_number_beside_zero(width, height, f_window, yaw, f, cx, cy):
+    rays = _turned(_rays(width, height, f_window), yaw)
+    off_axis = np.maximum(_off_axis(rays), 1e-12)
+    return f * rays[..., :2] * (np.arctan2(off_axis, rays[..., 2]) / off_axis)[..., None] + (cx, cy)
+
+
+@WINDOW_MAP.wrong(
+    "The pixel in the middle of a window that looks straight ahead may lie on the axis itself, and there yours "
+    "is 0/0, NaN. The fisheye has that ray at (cx, cy): divide by something else where √(x² + y²) is 0."
+)
+def nothing_on_the_axis(width, height, f_window, yaw, f, cx, cy):
+    return equidistant(_turned(_rays(width, height, f_window), yaw), f, cx, cy)
+
+
+@WINDOW_MAP.wrong(
+    "The pixel that looks along the axis itself comes out at (0, 0), the corner of the fisheye's picture. It is at "
+    "(cx, cy): only its r is 0."
+)
+def the_corner_on_the_axis(width, height, f_window, yaw, f, cx, cy):
+    return np.nan_to_num(nothing_on_the_axis(width, height, f_window, yaw, f, cx, cy))
 
 
 @WINDOW_MAP.wrong(
@@ -543,7 +666,7 @@ def not_turned(width, height, f_window, yaw, f, cx, cy):
 
 @WINDOW_MAP.wrong("Half a pixel off: the middle of pixels 0 … width − 1 is (width − 1)/2, not width/2.")
 def half_a_pixel_off(width, height, f_window, yaw, f, cx, cy):
-    return equidistant(_turned(_rays(width, height, f_window, middle=0), yaw), f, cx, cy)
+    return _seen(_turned(_rays(width, height, f_window, middle=0), yaw), f, cx, cy)
 
 
 @WINDOW_MAP.wrong(
@@ -563,7 +686,8 @@ def row_first(width, height, f_window, yaw, f, cx, cy):
 )
 def mirrored_behind(width, height, f_window, yaw, f, cx, cy):
     rays = _turned(_rays(width, height, f_window), yaw)
-    return f * _placed(rays, _mirrored(rays)) + (cx, cy)
+    behind = rays[..., 2:] < 0
+    return np.where(behind, f * _placed(rays, _mirrored(rays)) + (cx, cy), _seen(rays, f, cx, cy))
 
 
 @WINDOW_MAP.wrong(
@@ -572,7 +696,7 @@ def mirrored_behind(width, height, f_window, yaw, f, cx, cy):
 )
 def perspective_on_both_sides(width, height, f_window, yaw, f, cx, cy):
     rays = _turned(_rays(width, height, f_window), yaw)
-    return f * _placed(rays, np.tan(_theta(rays))) + (cx, cy)
+    return f * rays[..., :2] / rays[..., 2:] + (cx, cy)
 
 
 @WINDOW_MAP.wrong(
@@ -580,7 +704,7 @@ def perspective_on_both_sides(width, height, f_window, yaw, f, cx, cy):
 )
 def pitched(width, height, f_window, yaw, f, cx, cy):
     x, y, z = np.moveaxis(_rays(width, height, f_window), -1, 0)
-    return equidistant(
+    return _seen(
         np.stack([x, np.cos(yaw) * y + np.sin(yaw) * z, np.cos(yaw) * z - np.sin(yaw) * y], axis=-1), f, cx, cy
     )
 
@@ -598,7 +722,7 @@ def focal_lengths_swapped(width, height, f_window, yaw, f, cx, cy):
 )
 def corner_for_the_middle(width, height, f_window, yaw, f, cx, cy):
     u, v = np.meshgrid(np.arange(width), np.arange(height))
-    return equidistant(_turned(np.stack([u / f_window, v / f_window, np.ones(u.shape)], axis=-1), yaw), f, cx, cy)
+    return _seen(_turned(np.stack([u / f_window, v / f_window, np.ones(u.shape)], axis=-1), yaw), f, cx, cy)
 
 
 @WINDOW_MAP.wrong("The fisheye's principal point is missing: add (cx, cy) to what its lens says.")

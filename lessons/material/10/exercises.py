@@ -34,8 +34,10 @@ def _project_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     behind = rng.uniform([0.1, 0.1, -0.9], [0.6, 0.6, -0.7], (6, 3))
     yield np.concatenate([behind, _in_front(rng, (3,))]), float(rng.uniform(0.05, 0.3))  # these have no image
     yield rng.uniform([0.5, 0.5, -0.4], [1.0, 1.0, -0.1], (4, 3)), float(rng.uniform(0.7, 0.95))  # behind, and seen
-    yield np.concatenate([_in_front(rng, (3,)), -_in_front(rng, (2,))]), 0.0
-    yield np.concatenate([_in_front(rng, (3,)), -_in_front(rng, (2,))]), 1.0
+    beside = rng.choice([-1, 1], (2, 3)) * rng.uniform(0.3, 1, (2, 3)) * [1, 1, 0]  # where Z + ξ D is exactly 0
+    yield np.concatenate([_in_front(rng, (3,)), -_in_front(rng, (2,)), beside]), 0.0
+    axis = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]) * rng.uniform(0.5, 2)
+    yield np.concatenate([_in_front(rng, (3,)), -_in_front(rng, (2,)), axis]), 1.0
 
 
 PROJECT = Exercise(
@@ -99,6 +101,15 @@ def pinhole(points, xi):
 )
 def mirror_images_kept(points, xi):
     return points[..., :2] / (points[..., 2:] + xi * np.linalg.norm(points, axis=-1, keepdims=True))
+
+
+@PROJECT.wrong(
+    "Where Z + ξ D is *exactly* 0 you divide by it, and the image is infinitely far away. The task asks for NaN there "
+    "too: only what is above 0 has an image."
+)
+def infinity_at_zero(points, xi):
+    depth = points[..., 2:] + xi * np.linalg.norm(points, axis=-1, keepdims=True)
+    return points[..., :2] / np.where(depth < 0, np.nan, depth)
 
 
 @PROJECT.wrong("You drop everything behind the camera, as a pinhole must. The sphere shows what has Z + ξ D > 0.")
@@ -182,6 +193,8 @@ def _unproject_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         yield rng.uniform(0.2, 0.9, (*shape, 2)) * rng.choice([-1, 1], (*shape, 2)), float(rng.uniform(0.2, 0.95))
     yield rng.uniform(0.2, 0.6, (5, 2)), float(rng.uniform(1.1, 1.4))
     yield rng.uniform(1.1, 2.0, (5, 2)), 1.0  # rays that look backwards
+    yield np.concatenate([np.zeros((1, 2)), rng.uniform(-0.9, 0.9, (3, 2))]), float(rng.choice([0.0, 0.6, 1.2]))
+    yield np.concatenate([np.zeros((1, 2)), rng.uniform(-0.9, 0.9, (3, 2))]), 0.0
 
 
 UNPROJECT = Exercise(
@@ -335,6 +348,9 @@ def _double_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape, sign in zip(SHAPES, (1, -1, 1, -1), strict=True):
         alpha = float(rng.choice([rng.uniform(0.35, 0.45), rng.uniform(0.55, 0.65)]))
         yield _in_front(rng, shape), sign * float(rng.uniform(0.1, 0.3)), alpha
+    beside = rng.uniform(0.5, 1.0, (4, 3)) * rng.choice([-1, 1], (4, 3)) * [1, 1, 0]
+    behind = beside - np.array([0.0, 0.0, 0.4]) * np.arange(4)[:, None] / 3  # from beside the camera to behind it
+    yield behind * rng.uniform(0.5, 2), float(rng.uniform(0.1, 0.2)), float(rng.uniform(0.55, 0.65))
 
 
 DOUBLE_SPHERE = Exercise(
@@ -357,6 +373,13 @@ def sphere_after_sphere(points, xi, alpha):
     first = points / np.linalg.norm(points, axis=-1, keepdims=True) + np.array([0, 0, xi])
     second = first / np.linalg.norm(first, axis=-1, keepdims=True) + np.array([0, 0, alpha / (1 - alpha)])
     return second[..., :2] / second[..., 2:] / (1 - alpha)
+
+
+@DOUBLE_SPHERE.right
+def by_moving_the_points(points, xi, alpha):
+    moved = points + [0, 0, xi] * np.linalg.norm(points, axis=-1, keepdims=True)
+    depth = alpha * np.sqrt(np.einsum("...i,...i", moved, moved)) + (1 - alpha) * moved[..., 2]
+    return np.stack([points[..., 0] / depth, points[..., 1] / depth], axis=-1)
 
 
 @DOUBLE_SPHERE.right
@@ -458,6 +481,7 @@ def _cube_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         yield (rng.uniform(0.2, 1, (*shape, 3)) * rng.choice([-1, 1], (*shape, 3)) * rng.uniform(1.5, 4),)
     yield (rng.uniform(0.2, 0.9, (6, 3)) * signs,)
     yield (np.concatenate([np.eye(3), -np.eye(3)]) * rng.uniform(2, 3, (6, 1)),)
+    yield (np.array([[1, -1, 0.5], [-1, -1, -1], [0.2, 1, 1], [-1, 0, 1]]) * rng.uniform(2, 3),)  # edges and corners
 
 
 CUBE = Exercise(

@@ -26,7 +26,9 @@ def _sensor_cases(rng: np.random.Generator) -> Iterator[Arguments]:
             (v, u) for v, u in np.ndindex(n, n) if v != u and (n == 2 or v + u != n - 1)
         ]  # no mirror image is right
         v, u = rng.choice(places).tolist()
-        yield (rng.random((n * height, n * width)), n, v, u)
+        yield (rng.normal(0, 2, (n * height, n * width)), n, v, u)
+    yield (rng.normal(0, 2, (12, 8)), 4, 3, 1)  # the last row under each microlens, and then the first
+    yield (rng.normal(0, 2, (8, 20)), 4, 0, 2)
 
 
 SUB_APERTURE = Exercise(
@@ -139,7 +141,12 @@ def _disparity_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         z_f = float(rng.uniform(2.5, 4))
         z = z_f * rng.choice([rng.uniform(0.4, 0.8), rng.uniform(1.3, 2.5)], shape)
         yield z * rng.uniform(0.95, 1.05, shape), *rng.uniform((0.005, 200), (0.06, 1500)).tolist(), z_f
-    yield np.array([1.5, 6.0]), 0.05, 300.0, 3.2
+    z_f = float(rng.uniform(2.5, 4))
+    yield (
+        z_f * np.array([0.5, 1.0, 2.0]),
+        *rng.uniform((0.005, 200), (0.06, 1500)).tolist(),
+        z_f,
+    )  # z_f itself stands still
 
 
 DISPARITY = Exercise(
@@ -260,8 +267,8 @@ def _rolled(views, shift):
 
 
 def _view_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape, d in (((3, 5, 9, 7), -2), ((5, 3, 8, 8), 2), ((1, 3, 4, 9), 1)):
-        yield (rng.random(shape), d)
+    for shape, d in (((3, 5, 9, 7), -2), ((5, 3, 8, 8), 2), ((1, 3, 4, 9), 1), ((3, 3, 5, 6), 0), ((3, 1, 7, 4), 3)):
+        yield (rng.normal(0, 2, shape), d)
 
 
 REFOCUSED = Exercise(
@@ -392,6 +399,8 @@ def _slice_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         yield (_noisy(rng, _waves(rng, views, width, sign * float(rng.uniform(0.2, 0.7)))),)
     for views, sign in ((5, 1), (3, -1)):
         yield (_noisy(rng, _spot(rng, views, sign * float(rng.uniform(0.55, 0.7)))),)
+    steep = _waves(rng, 7, 160, float(rng.choice([-1, 1]) * rng.uniform(1.2, 1.6)), 50)  # more than a pixel a view
+    yield (_noisy(rng, steep),)
     yield (np.full((5, 12), float(rng.random())),)
 
 
@@ -400,9 +409,9 @@ def _steps(views: int, width: int, d: float) -> Array:
     return np.arange(width) + d * (np.arange(views) - (views - 1) / 2)[:, None]
 
 
-def _waves(rng: np.random.Generator, views: int, width: int, d: float) -> Array:
+def _waves(rng: np.random.Generator, views: int, width: int, d: float, shortest: float = 25) -> Array:
     """A few slow waves that move by d pixels to the left from view to view."""
-    period, turn = rng.uniform(25, 60, (4, 1, 1)), rng.uniform(0, 2 * np.pi, (4, 1, 1))
+    period, turn = rng.uniform(shortest, 60, (4, 1, 1)), rng.uniform(0, 2 * np.pi, (4, 1, 1))
     return np.asarray(np.sum(np.sin(2 * np.pi * _steps(views, width, d) / period + turn), axis=0))
 
 
@@ -413,7 +422,7 @@ def _spot(rng: np.random.Generator, views: int, d: float) -> Array:
 
 
 def _noisy(rng: np.random.Generator, epi: Array) -> Array:
-    return epi + rng.normal(0, 1e-3, epi.shape)
+    return 5 + epi + rng.normal(0, 1e-3, epi.shape)  # light is never negative
 
 
 SLOPE = Exercise(
@@ -545,6 +554,8 @@ def _alpha_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         z_f = float(rng.uniform(2, 4))
         yield z_f * rng.uniform(0.4, 0.7, shape), float(rng.uniform(0.06, 0.2)), z_f
     yield rng.uniform(5, 9, 4), float(rng.uniform(0.06, 0.2)), float(rng.uniform(2, 4))
+    z_f = float(rng.uniform(2, 4))
+    yield z_f * np.array([0.6, 1.0, 3.0]), float(rng.uniform(0.06, 0.2)), z_f
 
 
 ALPHA = Exercise(

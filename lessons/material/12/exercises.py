@@ -31,7 +31,7 @@ def mosaic(picture: Array, tile: Array) -> Array:
 def _mosaic_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     tiles = (RGGB, RGGB[:, ::-1], X_TRANS, np.array([[0, 1, 2]]), UNEVEN)
     for tile, (height, width) in zip(tiles, ((6, 8), (5, 7), (13, 9), (4, 7), (8, 11)), strict=True):
-        yield (rng.random((height, width, 3)), tile)
+        yield (rng.normal(0.5, 1, (height, width, 3)), tile)
 
 
 MOSAIC = Exercise(
@@ -155,7 +155,7 @@ def cropped_tile_as_given(tile, x0, y0):
 
 def _tile_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for tile in (RGGB, X_TRANS, UNEVEN):
-        for x0, y0 in ((1, 0), (0, 1), rng.integers(1, 12, 2).tolist()):
+        for x0, y0 in ((0, 0), (1, 0), (0, 1), rng.integers(1, 12, 2).tolist()):
             yield tile, int(x0), int(y0)
     yield X_TRANS, int(rng.choice([1, 2])), 4
     yield UNEVEN, int(rng.choice([1, 5])), int(rng.choice([1, 4]))
@@ -272,7 +272,7 @@ def mean_of_four(around: Array, distance: int) -> Array:
 
 def _window_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
-        yield (rng.random((*shape, 5, 5)),)
+        yield (rng.normal(0.5, 1, (*shape, 5, 5)),)
 
 
 def _malvar_cases(rng: np.random.Generator) -> Iterator[Arguments]:
@@ -280,6 +280,7 @@ def _malvar_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     bright = rng.uniform(0.8, 1, (5, 5, 5))  # among greens of 0.8 and more, a red that stands out by as much
     bright[:, [0, 4], 2], bright[:, 2, [0, 4]] = rng.uniform(0, 0.2, (2, 5, 2))
     yield (bright,)
+    yield (-bright,)
 
 
 MALVAR_GREEN = Exercise(
@@ -405,7 +406,7 @@ def _frequency_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (rng.uniform(0.05, 0.95, shape),)
     yield (rng.uniform(1.05, 2.95, 6),)
-    yield (np.array([0.0, 0.25, 0.3, 0.5, 0.7, 0.9, 1.0, 1.4, 2.2]),)
+    yield (np.array([0.0, 0.25, 0.3, 0.5, 0.7, 0.9, 1.0, 1.4, 1.5, 2.0, 2.2, 2.5]),)
 
 
 FALSE_FREQUENCY = Exercise(
@@ -439,6 +440,17 @@ def the_nearest_of_a_list(f):
     return np.min(np.abs(np.asarray(f)[..., None] - np.arange(-0.5, 5)), axis=-1)
 
 
+@FALSE_FREQUENCY.right
+def the_rest_up_to_a_half(f):
+    return 0.5 - np.abs(np.asarray(f) - np.rint(f))
+
+
+@FALSE_FREQUENCY.right
+def number_by_number_as_a_list(f):
+    away = [abs(one % 1 - 0.5) for one in np.ravel(f).tolist()]
+    return np.reshape(away, np.shape(f)).tolist()
+
+
 @FALSE_FREQUENCY.wrong(
     "This is the frequency that the stripes themselves seem to have on pixels, their alias. Colour beats with the "
     "distance from ½."
@@ -453,6 +465,34 @@ def alias_of_the_stripes(f):
 )
 def first_carrier_only(f):
     return np.abs(np.asarray(f) - 0.5)
+
+
+@FALSE_FREQUENCY.wrong(
+    "½ − f is right for stripes coarser than ½ cycle per pixel. Finer ones beat as well: take the size of the distance "
+    "from the nearest of ½, 1½, …."
+)
+def coarser_stripes_only(f):
+    return 0.5 - np.asarray(f)
+
+
+@FALSE_FREQUENCY.wrong(
+    "½ − f is right for stripes coarser than ½ cycle per pixel. You answer 0 for finer ones, and they beat as well."
+)
+def nothing_beyond_a_half(f):
+    return np.maximum(0.5 - np.asarray(f), 0)
+
+
+@FALSE_FREQUENCY.wrong(
+    "You take the whole cycles off the *distance* from ½. The nearest of ½, 1½, … may lie beyond: round, or take the "
+    "whole cycles off f first."
+)
+def whole_cycles_off_the_distance(f):
+    return np.mod(np.abs(np.asarray(f) - 0.5), 1)
+
+
+@FALSE_FREQUENCY.wrong("The sizes are right, with the sign turned round above ½. A frequency is not negative.")
+def signed_the_other_way(f):
+    return 0.5 - np.mod(f, 1)
 
 
 @FALSE_FREQUENCY.wrong("The sizes are right. A frequency is not negative: bands to the left or right of ½ look alike.")
@@ -545,9 +585,10 @@ def _edge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     peaked[:, :, 2] = (1, 0.4, 1, 0.6, 1)
     peaked[2:] = np.swapaxes(peaked[2:], 1, 2)
     yield (peaked + rng.uniform(0, 0.02, peaked.shape),)
-    draw = rng.integers(0, 8, (6, 5, 5)) / 8
+    draw = rng.integers(-8, 8, (6, 5, 5)) / 8
     draw[..., :, 2] = 2 * draw[..., 2, 2, None] - draw[..., 2, :]  # upside down, the column changes as much as the row
     yield (draw,)
+    yield (draw - 4,)
 
 
 EDGE_GREEN = Exercise(

@@ -33,6 +33,8 @@ def _response_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         n = int(rng.integers(7, 15))
         light, sensitivity = spectra(rng, n)
         yield light, rng.uniform(0, 1, (*shape, n)), sensitivity
+    light, sensitivity = spectra(rng, 9)
+    yield light, np.array([[0.0], [1.0], [rng.uniform(0.1, 0.9)]]) * np.ones(9), sensitivity  # black, white and grey
 
 
 RESPONSE = Exercise(
@@ -151,7 +153,7 @@ def grey_world(raw: Array) -> Array:
 def _grey_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     casts = ((0.5, 0.9, 1.5), (0.9, 1.5, 0.5), (1.5, 0.5, 0.9), (1.5, 0.9, 0.5))
     for shape, cast in zip(((6, 5), (4,), (3, 2, 4), (9, 1)), casts, strict=True):
-        yield (rng.gamma(2.0, 0.15, (*shape, 3)) * cast,)
+        yield (rng.gamma(2.0, 0.15, (*shape, 3)) * cast - 0.03,)  # noise may lie below black
 
 
 GREY_WORLD = Exercise(
@@ -384,7 +386,7 @@ def fit_matrix(raw: Array, target: Array) -> Array:
 
 def _matrix_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for n in (3, 6, 24):
-        raw = rng.uniform(0.05, 0.6, (n, 3)) + np.eye(3)[np.arange(n) % 3]
+        raw = rng.uniform(-0.1, 0.6, (n, 3)) + np.eye(3)[np.arange(n) % 3]
         matrix = np.eye(3) + rng.uniform(-0.4, 0.4, (3, 3))
         yield raw, raw @ matrix.T + rng.normal(0, 0.02, (n, 3))
 

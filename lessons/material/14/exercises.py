@@ -23,6 +23,7 @@ def _electron_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         others = (rng.uniform(1.4, 8), rng.uniform(2, 9), rng.uniform(1e-3, 0.1), rng.uniform(0.1, 0.9))
         yield (rng.uniform(100, 1000, shape), *(float(one) for one in others))
+    yield (np.array([0.0, 1e-3, 1e5]), 2.0, 5.0, 0.02, 0.5)  # no light, hardly any, and the sun's
 
 
 EXPECTED_ELECTRONS = Exercise(
@@ -170,6 +171,17 @@ def by_the_period(stripes, rows, mains_hz):
     return period_s / 2 * np.asarray(stripes) / rows
 
 
+@ROW_TIME.right
+def stripe_by_stripe_as_a_list(stripes, rows, mains_hz):
+    return np.reshape([one / 2 / mains_hz / rows for one in np.ravel(stripes).tolist()], np.shape(stripes)).tolist()
+
+
+@ROW_TIME.right
+def by_the_frames_in_a_second(stripes, rows, mains_hz):
+    frames_per_s = 2 * mains_hz / np.asarray(stripes)
+    return np.reciprocal(frames_per_s * rows)
+
+
 @ROW_TIME.wrong("A factor of 2 too long: the current flows both ways, so the lamp is bright *twice* in each period.")
 def bright_once_in_a_period(stripes, rows, mains_hz):
     return np.asarray(stripes) / mains_hz / rows
@@ -248,6 +260,9 @@ def dynamic_range_as_given(saturation_e, dark_noise_e):
 def _range_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield rng.uniform(3000, 90_000, shape), rng.uniform(2, 15, shape)
+    noise = rng.uniform(2, 15, 3)
+    yield np.array([0.1, 1, 10]) * (noise + 0.5), noise  # below the threshold, at it, and ten times above
+    yield np.array([3000.0, 9000.0]), np.array([0.0, 0.7])  # without any noise the threshold is ½
 
 
 DYNAMIC_RANGE_DB = Exercise(
@@ -362,6 +377,8 @@ def arriving(electrons: Array, efficiency: float) -> Array:
 def _brigade_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for height in (1, 2, 7, 40):
         yield rng.uniform(100, 9000, height), float(rng.uniform(0.9, 0.999))
+    yield np.array([0.0, 5000.0, 0.0, 1.0]), float(rng.uniform(0.5, 0.9))  # empty buckets, and much that is left behind
+    yield rng.uniform(100, 9000, 3), 1.0  # nothing is left behind
 
 
 ARRIVING = Exercise(

@@ -23,6 +23,8 @@ def _noise_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (rng.uniform(50, 9_000, shape), float(rng.uniform(2, 30)), float(rng.uniform(0.005, 0.03)))
     yield (np.zeros(3), float(rng.uniform(2, 30)), 0.01)
+    yield (np.array([0.0, 100.0, 1e4]), 0.0, float(rng.uniform(0.005, 0.03)))  # a perfect amplifier
+    yield (np.array([0.0, 100.0, 1e4]), float(rng.uniform(2, 30)), 0.0)  # pixels that are all alike
 
 
 NOISE = Exercise(
@@ -131,10 +133,12 @@ def gain(bright: Array, dark: Array) -> float:
 
 
 def _gain_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in ((60, 80), (80, 60)):
-        K, light = rng.uniform(0.4, 0.8), rng.uniform(600, 2_000)
-        response = 1 + 0.02 * rng.standard_normal(shape)
-        offset = 60 + 3 * rng.standard_normal(shape)
+    for shape, low, high, most in (((60, 80), 0.4, 0.8, 2_000), ((80, 60), 1.4, 2.2, 2_000), ((80, 60), 0.4, 0.6, 200)):
+        K, light = rng.uniform(low, high), rng.uniform(most / 2, most)
+        response = 1.1 - np.minimum(
+            rng.exponential(0.1, shape), 1
+        )  # a few pixels answer much less: the median is no mean
+        offset = 150 + K * rng.exponential(30, shape)
         noise = 12 * rng.standard_normal((2, 2, *shape))
         bright = K * (rng.poisson(light * response, (2, *shape)) + noise[0]) + offset
         yield (_steady(bright), _steady(K * noise[1] + offset))
@@ -261,10 +265,12 @@ def flat_field(frame: Array, dark: Array, flat: Array) -> Array:
 def _flat_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in ((4, 6), (7, 5), (6, 6)):
         dark, response = rng.uniform(55, 65, shape), rng.uniform(0.6, 1.1, shape)
+        light = rng.uniform(100, 700, shape)
+        light.flat[rng.choice(light.size, 3, replace=False)] = 0, -1, -20  # noise may lie below black
         if shape == (6, 6):
             dead, deader = rng.choice(36, 2, replace=False)
             response.flat[dead], response.flat[deader] = 0, -0.01  # the second's flat is even below its dark
-        yield (dark + rng.uniform(100, 400, shape) * response, dark, dark + 500 * response)
+        yield (dark + light * response, dark, dark + rng.uniform(300, 600) * response)
 
 
 FLAT_FIELD = Exercise(
@@ -346,6 +352,28 @@ def scaled_by_the_frame(frame, dark, flat):
     return (frame - dark) * np.mean(frame - dark) / np.where(flat > dark, flat - dark, np.nan)
 
 
+@FLAT_FIELD.wrong(
+    "What lies below black is cut off at 0. Noise goes either way, and a sum of many frames needs both: keep the sign."
+)
+def cut_off_at_black(frame, dark, flat):
+    return np.maximum(flat_field(frame, dark, flat), 0)
+
+
+@FLAT_FIELD.wrong(
+    "The size of the difference is taken: a pixel below black looks as bright as one above. Keep the sign."
+)
+def size_of_the_difference(frame, dark, flat):
+    return np.abs(flat_field(frame, dark, flat))
+
+
+@FLAT_FIELD.wrong(
+    "You call a pixel dead when the *frame* is not above its dark. It is the flat that tells: there was light on it."
+)
+def dead_by_the_frame(frame, dark, flat):
+    answer = np.where(frame > dark, flat - dark, np.nan)
+    return (frame - dark) * np.nanmean(answer) / answer
+
+
 @FLAT_FIELD.wrong("You scale by the strongest pixel's answer. The exercise asks that the *mean* answer becomes 1.")
 def scaled_by_the_largest(frame, dark, flat):
     answer = np.where(flat > dark, flat - dark, np.nan)
@@ -420,12 +448,19 @@ def _merge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         exposures = np.sort(rng.uniform(0.01, 1, rng.integers(2, 5)))
         rate = np.exp(rng.uniform(4, 11, shape))
         t = exposures.reshape(-1, *[1] * len(shape))
-        yield (np.minimum(rate * t * rng.uniform(0.9, 1.1, (len(t), *shape)), 12_000), exposures, 6.0, 12_000.0)
-    full = 12_000.0
-    sure = np.array(  # in columns: full in all frames, in two, in one, in none; and next to no light
-        [[full, 3_000, 2_000, 400, 0], [full, full, 8_100, 1_570, 1], [full, full, full, 3_900, 3]]
+        full = float(rng.integers(5_000, 40_000))
+        electrons = np.minimum(rate * t * rng.uniform(0.9, 1.1, (len(t), *shape)), full)
+        yield (electrons, exposures, float(rng.uniform(3, 9)), full)
+    full = float(rng.integers(9_000, 30_000))
+    over, under = full + 40, full - 1
+    sure = np.array(  # in columns: full in all frames, in two, in one, in none; next to no light, none, and less
+        [
+            [full, 3_000, 2_000, 400, 0, 0, -2],
+            [over, full, 8_100, 1_570, 1, 0, 1],
+            [full, over, full, under, 3, 0, -3],
+        ]
     )
-    yield (sure, np.array([0.1, 0.4, 1.0]), float(rng.uniform(3, 9)), full)
+    yield (sure, rng.uniform([0.08, 0.3, 0.9], [0.12, 0.5, 1.1]), float(rng.uniform(3, 9)), full)
 
 
 MERGE = Exercise(
@@ -462,6 +497,51 @@ def pixel_by_pixel(electrons, exposures, dark_noise, full_well):
             e, t = counts[good], exposures[good]
             merged[index] = np.average(e / t, weights=t**2 / (dark_noise**2 + e.sum() / t.sum() * t))
     return merged
+
+
+@MERGE.right
+def by_matrix_products(electrons, exposures, dark_noise, full_well):
+    e, t = electrons.reshape(len(exposures), -1), exposures[:, None]
+    good = (e < full_well).astype(float)
+    x = np.sum(good * e, axis=0) / (exposures @ good)
+    weight = good / (dark_noise**2 / t**2 + x / t)
+    return (np.sum(weight * e / t, axis=0) / np.sum(weight, axis=0)).reshape(electrons.shape[1:])
+
+
+@MERGE.right
+def frame_after_frame(electrons, exposures, dark_noise, full_well):
+    counted, time, total, weights = (np.zeros(electrons.shape[1:]) for _ in range(4))
+    for e, t in zip(electrons, exposures, strict=True):
+        counted += np.where(e >= full_well, 0, e)
+        time += np.where(e >= full_well, 0, t)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x = counted / time
+        for e, t in zip(electrons, exposures, strict=True):
+            weight = np.where(e >= full_well, 0, t * t / (dark_noise * dark_noise + x * t))
+            total += np.where(weight > 0, weight * e / t, 0)
+            weights += np.where(weight > 0, weight, 0)
+        return (total / weights).tolist()
+
+
+@MERGE.wrong("The full well is written into your function. Other sensors hold more or less: use `full_well`.")
+def full_well_written_in(electrons, exposures, dark_noise, full_well):
+    return merge(electrons, exposures, dark_noise, 12_000)
+
+
+@MERGE.wrong("A count *of* `full_well` is saturated too: usable is what lies below it.")
+def full_well_itself_usable(electrons, exposures, dark_noise, full_well):
+    return merge(electrons, exposures, dark_noise, np.nextafter(full_well, np.inf))
+
+
+@MERGE.wrong("Only counts that equal `full_well` are left out in yours. What lies above it is saturated as well.")
+def only_the_full_well_itself(electrons, exposures, dark_noise, full_well):
+    t, usable = _times(electrons, exposures), electrons != full_well
+    return _weighed(usable * t**2 / (dark_noise**2 + _light(electrons, t, usable) * t), electrons / t)
+
+
+@MERGE.wrong("Counts below 0 are cut off in yours. Noise goes either way, and a mean needs both.")
+def negative_counts_cut_off(electrons, exposures, dark_noise, full_well):
+    return merge(np.maximum(electrons, 0), exposures, dark_noise, full_well)
 
 
 @MERGE.wrong("All usable frames count alike in yours. The short ones are noisier by far: weigh by 1 / variance.")
@@ -565,6 +645,9 @@ def dynamic_range_as_given(saturation, dark_noise):
 def _decibel_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (rng.uniform(3_000, 90_000, shape), rng.uniform(2, 30, shape))
+    noise = rng.uniform(2, 30, 3)
+    yield (np.array([0.1, 1, 1000]) * (noise + 0.5), noise)  # below the threshold, at it, and 60 dB above
+    yield (np.array([3000.0, 9000.0]), np.array([0.0, 0.7]))  # without any noise the threshold is ½
 
 
 DECIBELS = Exercise(

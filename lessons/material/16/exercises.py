@@ -6,8 +6,10 @@ Residuals are observed less projected, in pixels, (views, corners, 2) or (rows, 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camviz.course.checks import Arguments, Array, Exercise
 from camviz.poses import Rotation
@@ -16,7 +18,7 @@ RAYLEIGH = np.sqrt(2 * np.log(2))  # the median length of a residual over the σ
 
 
 def _residuals(rng: np.random.Generator, *shape: int) -> Array:
-    return rng.normal(0, rng.uniform(0.1, 0.4), (*shape, 2))
+    return rng.normal(0, np.exp(rng.uniform(-3, 1)), (*shape, 2))  # from a twentieth of a pixel to nearly three
 
 
 def _unseen(rng: np.random.Generator, residuals: Array) -> Array:
@@ -40,6 +42,10 @@ def _view_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     yield (_residuals(rng, 5, 24),)
     yield (_residuals(rng, 1, 54),)
     yield (_unseen(rng, _residuals(rng, 7, 30)),)
+    wild = _unseen(rng, _residuals(rng, 4, 20))
+    wild[1] += rng.uniform(5, 30, 2)
+    wild[2, 1:] = 0  # a view without any error
+    yield (wild,)
 
 
 VIEW_RMS = Exercise(
@@ -69,6 +75,19 @@ def view_by_view(residuals):
 def from_lengths(residuals):
     lengths = np.linalg.norm(residuals, axis=-1)
     return np.sqrt(np.nansum(lengths**2, axis=-1) / np.sum(np.isfinite(lengths), axis=-1))
+
+
+@VIEW_RMS.right
+def with_a_masked_array(residuals):
+    squares = np.ma.masked_invalid(residuals[..., 0] ** 2 + residuals[..., 1] ** 2)
+    return np.ma.sqrt(squares.mean(axis=1))
+
+
+@VIEW_RMS.right
+def from_deviation_and_mean(residuals):
+    x, y = np.moveaxis(residuals, -1, 0)
+    squares = np.nanvar(x, axis=1) + np.nanmean(x, axis=1) ** 2 + np.nanvar(y, axis=1) + np.nanmean(y, axis=1) ** 2
+    return list(np.sqrt(squares))
 
 
 @VIEW_RMS.wrong("This is the RMS of one *coordinate*: too small by √2. OpenCV, like its users, counts a corner once.")
@@ -174,6 +193,21 @@ def from_squares(residuals):
     return np.sqrt(np.nanquantile(np.sum(residuals**2, axis=-1), 0.5) / (2 * np.log(2)))
 
 
+@ROBUST_SIGMA.right
+def by_sorting(residuals):
+    lengths = np.sort(np.sqrt(np.nansum(residuals**2, axis=-1))[~np.isnan(residuals).any(axis=-1)])
+    middle = len(lengths) // 2
+    median = lengths[middle] if len(lengths) % 2 else (lengths[middle - 1] + lengths[middle]) / 2
+    return median / 1.17741
+
+
+@ROBUST_SIGMA.right
+def by_scipy_s_rayleigh(residuals):
+    from scipy.stats import rayleigh
+
+    return np.nanpercentile(np.abs(residuals[..., 0] + 1j * residuals[..., 1]), 50) / rayleigh.median()
+
+
 @ROBUST_SIGMA.wrong("This is the ordinary standard deviation: the wild view, which you want to find, has moved it.")
 def standard_deviation(residuals):
     return np.nanstd(residuals)
@@ -246,6 +280,7 @@ def _line_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for rows, columns in ((6, 9), (5, 8), (4, 4)):
         grid = _residuals(rng, rows, columns)
         grid[:, rng.integers(columns)] += rng.uniform(3, 8, 2)
+        grid[rng.integers(rows), rng.integers(columns)] -= rng.uniform(20, 40, 2)
         yield (grid.reshape(-1, 2), rows, columns)
 
 
@@ -279,6 +314,27 @@ def by_strides(residuals, rows, columns):
         np.array([np.median(lengths[row * columns : (row + 1) * columns]) for row in range(rows)]),
         np.array([np.median(lengths[column::columns]) for column in range(columns)]),
     )
+
+
+@LINES.right
+def as_a_list_of_two(residuals, rows, columns):
+    lengths = np.sqrt(np.sum(residuals**2, axis=1)).reshape((rows, columns))
+    return [np.median(lengths, axis=1), np.median(lengths, axis=0)]
+
+
+@LINES.right
+def with_lists_and_the_statistics_module(residuals, rows, columns):
+    from statistics import median
+
+    lengths = [(x * x + y * y) ** 0.5 for x, y in residuals.tolist()]
+    across = [median(lengths[row * columns : (row + 1) * columns]) for row in range(rows)]
+    return across, [median(lengths[column::columns]) for column in range(columns)]
+
+
+@LINES.right
+def column_by_column_in_fortran_s_order(residuals, rows, columns):
+    lengths = np.linalg.norm(residuals, axis=-1).reshape((columns, rows), order="F")
+    return np.median(lengths, axis=0), np.median(lengths, axis=1)
 
 
 @LINES.wrong("The grid is right now. But the median of a *row* runs along axis 1, over its columns.")
@@ -339,7 +395,11 @@ def triage(residuals: Array) -> int:
 
 
 def _triage(residuals, sigma=robust_sigma, times=6.0, share=0.5, rows=True, columns=True):
-    off = np.linalg.norm(residuals, axis=-1) > times * sigma(residuals)
+    return _largest(np.linalg.norm(residuals, axis=-1) > times * sigma(residuals), share, rows, columns)
+
+
+def _largest(off, share=0.5, rows=True, columns=True):
+    """The largest thing of which a mask of corners (views, rows, columns) has the share."""
     if (off.mean(axis=(1, 2)) >= share).any():
         return 3
     if (columns and (off.mean(axis=1) >= share).any()) or (rows and (off.mean(axis=2) >= share).any()):
@@ -348,26 +408,57 @@ def _triage(residuals, sigma=robust_sigma, times=6.0, share=0.5, rows=True, colu
 
 
 def _triage_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """Nothing, a corner, whole lines and views, lines and views of which most is off, and lines of which little is."""
-    marks = (
-        (slice(0), slice(0), slice(0)),
+    """Nothing, corners, lines and views, on either side of each limit: 6 σ, and half of what there is."""
+    rows, columns = 6, 10
+    half = np.arange(rows * columns) % 2 == 0
+    marks: tuple[Any, ...] = (
+        (slice(0),),
         (3, 2, 4),
         (1, 2, slice(None)),
         (2, slice(None), 7),
-        (5, slice(None), slice(None)),
-        (4, 3, slice(1, 8)),
-        (6, slice(2, 6), 3),
-        (0, slice(None), slice(2, 8)),
-        (7, 1, slice(0, 3)),
-        (3, slice(1, 3), 5),
+        (5,),
+        (4, 3, slice(1, 8)),  # most of a row, half of one, and one corner fewer
+        (4, 3, slice(0, 5)),
+        (7, 1, slice(3, 7)),
+        (6, slice(2, 6), 3),  # most of a column, half of one, and one corner fewer
+        (6, slice(1, 4), 3),
+        (3, slice(4, 6), 5),
+        (0, slice(None), slice(2, 9)),  # most of a view
+        (0, rng.permutation(half).reshape(rows, columns)),  # half of a view
+        (1, (np.arange(columns) + np.arange(rows)[:, None]) % 3 == 0),  # a third of a view, and of its lines
+        (2, *np.divmod(rng.permutation(rows * columns)[: rows * columns // 2 - 1], columns)),
         (slice(None), 2, slice(None)),
+        (slice(0, 7), 5, 9),  # the last corner of all views but one
     )
-    for mark in rng.permutation(np.array(marks, dtype=object)):
-        residuals = np.clip(rng.normal(0, 1, (8, 6, 9, 2)), -3, 3)
-        residuals[7, 5, 8] = 3.2, -3.2  # 4.5 σ: far, and not off
-        residuals *= rng.uniform(0.1, 0.4)
-        residuals[tuple(mark)] += rng.uniform(15, 40) * np.array([np.cos(a := rng.uniform(0, 6.3)), np.sin(a)])
-        yield (residuals,)
+    for mark in (marks[i] for i in rng.permutation(len(marks))):
+        off, near = np.zeros((2, 8, rows, columns), dtype=bool)
+        near[5:7, 4] = True  # two rows of corners that are far, and not off
+        off[mark] = True
+        yield (_at_a_limit(rng, off, near & ~off, rng.choice([1.003, rng.uniform(2, 40)])),)
+    whole = np.arange(8)[:, None, None] == np.full((rows, columns), rng.integers(8))
+    yield (_at_a_limit(rng, whole, whole & False, float(rng.uniform(5, 40))),)  # a view that is wildly off
+    for times in (0.53, 0.7, 0.84, 0.92, 1.1, 1.28, 1.55, 1.87):  # of 6 σ: a corner between every two usual limits
+        off = np.arange(8 * rows * columns).reshape(8, rows, columns) == rng.integers(8 * rows * columns)
+        yield (_at_a_limit(rng, off, off & False, times, aslant=0.25),)
+
+
+def _at_a_limit(
+    rng: np.random.Generator, off: NDArray[np.bool_], near: NDArray[np.bool_], times: float, aslant: float = 0.0
+) -> Array:
+    """Residuals of which those that are `off` are about `times` 6 σ long, and those that are `near` almost 6 σ.
+
+    σ is robust: the lengths above the median may be any, as long as they stay above it.
+    """
+    residuals = rng.normal(0, 1, (*off.shape, 2)) * np.exp(rng.uniform(-3, 1))
+    lengths = np.clip(np.linalg.norm(residuals, axis=-1), 0, 3.1 * np.std(residuals))
+    lengths[off | near] = np.inf
+    limit = 6 * np.median(lengths) / RAYLEIGH
+    lengths[near] = limit * rng.uniform(0.996, 0.999, near.sum())
+    lengths[off] = limit * times * rng.uniform(0.998, 1.002, off.sum())
+    around = rng.uniform(0, 2 * np.pi, off.shape)
+    direction = np.pi * (aslant + rng.choice([0, 0.5, 1, 1.5]))  # along x or y, either way
+    around[off | near] = direction + rng.normal(0, 0.1)
+    return np.asarray(lengths[..., None] * np.stack([np.cos(around), np.sin(around)], axis=-1))
 
 
 TRIAGE = Exercise(
@@ -405,6 +496,104 @@ def view_by_view_by_hand(residuals):
         found = 3 if view.mean() >= 0.5 else 2 if max(line.mean() for line in lines) >= 0.5 else int(view.any())
         worst = max(worst, found)
     return worst
+
+
+@TRIAGE.right
+def by_middle_lengths(residuals):
+    """Half of something is off when the upper one of its middle lengths is."""
+    times = np.hypot(residuals[..., 0], residuals[..., 1])
+    times = times / np.median(times) * np.sqrt(np.log(4)) / 6
+    _, rows, columns = times.shape
+
+    def upper(of, count):
+        return np.sort(of.reshape(-1, count), axis=-1)[:, count // 2].max()
+
+    largest = (times.max(), max(upper(times, columns), upper(times.swapaxes(1, 2), rows)), upper(times, rows * columns))
+    return max(place + 1 if one > 1 else 0 for place, one in enumerate(largest))
+
+
+@TRIAGE.right
+def with_the_rounded_factor_of_the_lesson(residuals):
+    lengths = np.linalg.norm(residuals, axis=-1)
+    off = 1.177 * lengths > 6 * np.median(lengths)
+    if any(np.mean(view) >= 0.5 for view in off):
+        return np.int64(3)
+    lines = max(off.mean(axis=1).max(), off.mean(axis=2).max())
+    return np.int64(2) if lines >= 0.5 else np.int64(off.max())
+
+
+@TRIAGE.wrong(
+    "You compare with multiples of the *median length*, which is longer than σ: divide it by its factor first."
+)
+def rayleigh_s_factor_forgotten(residuals):
+    return _triage(residuals, times=6 * RAYLEIGH)
+
+
+@TRIAGE.wrong("You multiply the median by its factor. The median length is *longer* than σ: divide.")
+def multiplied_by_rayleigh_s_factor(residuals):
+    return _triage(residuals, times=6 * RAYLEIGH**2)
+
+
+@TRIAGE.wrong("You divide the median by the square of its factor: a *root* is missing.")
+def without_the_root_of_the_factor(residuals):
+    return _triage(residuals, times=6 / RAYLEIGH)
+
+
+@TRIAGE.wrong(
+    "Your factor belongs to the median of the *absolute values* of one coordinate. A median *length* in the plane has "
+    "another."
+)
+def factor_of_a_single_coordinate(residuals):
+    return _triage(residuals, times=6 * 1.4826 * RAYLEIGH)
+
+
+@TRIAGE.wrong("Your limit is twice as far as the one that is asked for. Corners between the two are off as well.")
+def twelve_sigma(residuals):
+    return _triage(residuals, times=12.0)
+
+
+@TRIAGE.wrong("Your limit is nearer than the one that is asked for. A corner between the two is far, and not yet off.")
+def five_sigma(residuals):
+    return _triage(residuals, times=5.0)
+
+
+@TRIAGE.wrong("You ask for *more* than half of a line or a view. Exactly half is enough: ≥, not >.")
+def more_than_half(residuals):
+    return _triage(residuals, share=0.5 + 1e-9)
+
+
+@TRIAGE.wrong("A third of its corners is enough for a line or a view in yours. The task asks for half.")
+def a_third(residuals):
+    return _triage(residuals, share=1 / 3)
+
+
+@TRIAGE.wrong(
+    "You have a limit in pixels. What is far depends on how well corners are found, a tenth of a pixel here and three "
+    "there: compare with 6 σ, and take σ from the residuals."
+)
+def a_limit_in_pixels(residuals):
+    return _largest(np.linalg.norm(residuals, axis=-1) > 2.5)
+
+
+@TRIAGE.wrong("You look at x alone. A corner may be off along y: take the length of both coordinates together.")
+def x_alone(residuals):
+    return _triage(residuals * [1, 0])
+
+
+@TRIAGE.wrong("A corner is off in yours when one coordinate is beyond 6 σ. It is the *length* that is compared.")
+def coordinate_by_coordinate(residuals):
+    return _largest(np.abs(residuals).max(axis=-1) > 6 * robust_sigma(residuals))
+
+
+@TRIAGE.wrong("Your σ comes from the *mean* length. One view that is off moves a mean as far as it likes.")
+def sigma_from_the_mean_length(residuals):
+    return _triage(residuals, sigma=from_the_mean_length)
+
+
+@TRIAGE.wrong("Half of *all* views have to be off in yours. One view is enough, and one line of one view.")
+def shares_over_all_views(residuals):
+    off = np.linalg.norm(residuals, axis=-1) > 6 * robust_sigma(residuals)
+    return _largest(off.mean(axis=0, keepdims=True)) if off.any() else 0
 
 
 @TRIAGE.wrong("Columns, corners and views are found; a bad *row* goes as single corners.")
@@ -474,9 +663,25 @@ def _rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         turn = Rotation.from_rotvec(rng.uniform(0.1, 0.3, 3) * rng.choice([-1, 1], 3))
         other = turn.apply(rays) + rng.normal(0, 0.002, (n, 3))
         yield rays, other / np.linalg.norm(other, axis=1, keepdims=True)
+    yield _two_mirrors(rng)
     angle, tilt = np.linspace(-1, 1, 7), 0.01 * np.array([1, -1, 1, -1, 1, -1, 1])
     flat = np.stack([np.sin(angle), tilt, np.cos(angle)], axis=-1)  # almost one plane, where noise may ask for a mirror
     yield flat, Rotation.from_rotvec([0.1, -0.2, rng.uniform(0.2, 0.5)]).apply(flat * [1, -1, 1])
+
+
+def _two_mirrors(rng: np.random.Generator) -> Arguments:
+    """Rays and the same turned, of whose decomposition U and Vᵀ are both mirrors: together they are a rotation."""
+    for _ in range(300):  # one in ten is such a pair
+        rays = np.array([[x, y, 1] for x in (-1, 1) for y in (-1, 1)]) * [
+            rng.uniform(0.1, 0.3),
+            rng.uniform(0.4, 0.6),
+            1,
+        ]
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        turned = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3)).apply(rays)
+        if np.linalg.det(np.linalg.svd(turned.T @ rays)[0]) < 0:
+            break
+    return rays, turned
 
 
 ROTATION = Exercise(

@@ -21,7 +21,7 @@ def line_spread(profile: Array, step: float) -> Array:
 
 
 def _edges(rng: np.random.Generator) -> Iterator[Arguments]:
-    for n, step, falling in ((12, 0.25, False), (20, 0.125, True), (9, 0.5, False)):
+    for n, step, falling in ((12, 0.25, False), (20, 0.125, True), (9, 0.5, False), (8, 1.0, True)):
         x = np.linspace(-3, 3, n)
         rise = 1 / (1 + np.exp(-rng.uniform(1.5, 2.5) * x)) + rng.uniform(0.15, 0.3) * x * np.exp(-(x**2))
         rise = rise + 0.1 * np.cos(3 * x)  # it overshoots, as a sharpened picture does
@@ -67,6 +67,43 @@ def bare_differences(profile, step):
 @LINE_SPREAD.wrong("The slope is right. A stronger edge is not a sharper one: divide by the edge's whole rise too.")
 def slope(profile, step):
     return np.diff(profile) / step
+
+
+@LINE_SPREAD.right
+def by_places_as_a_list(profile, step):
+    x = step * np.arange(len(profile))
+    slopes = np.diff(profile) / np.diff(x)
+    return (slopes / sum(slopes * np.diff(x))).tolist()
+
+
+@LINE_SPREAD.wrong(
+    "You divide by the whole range, greatest less smallest. A sharpened edge overshoots, so that its range is more "
+    "than its rise: from the first value to the last, with its sign."
+)
+def by_the_whole_range(profile, step):
+    return np.diff(profile) / step / (np.max(profile) - np.min(profile))
+
+
+@LINE_SPREAD.wrong(
+    "You divide by the last value. An edge need not begin at 0: its rise is the last value *less the first*."
+)
+def by_the_last_value(profile, step):
+    return np.diff(profile) / step / profile[-1]
+
+
+@LINE_SPREAD.wrong("You divide by the brightest value. An edge rises from its dark side: last value less first.")
+def by_the_brightest_value(profile, step):
+    return np.diff(profile) / step / np.max(profile)
+
+
+@LINE_SPREAD.wrong("You take the differences backwards, earlier less later: the area comes out negative.")
+def backwards(profile, step):
+    return (profile[:-1] - profile[1:]) / step / (profile[-1] - profile[0])
+
+
+@LINE_SPREAD.wrong("The order is turned round: the first value belongs between samples 0 and 1.")
+def turned_round(profile, step):
+    return line_spread(profile, step)[::-1]
 
 
 @LINE_SPREAD.wrong("Your values add up to 1, but their *area* is to be 1: each stands for a strip as wide as the step.")
@@ -130,6 +167,11 @@ def _spreads(rng: np.random.Generator) -> Iterator[Arguments]:
         x = np.linspace(-2.2, 1.8, n)
         light = rng.uniform(2, 5) * (np.exp(-(x**2) * rng.uniform(1, 3)) + 0.3 * np.exp(-((x - 1) ** 2) * 6))
         yield light, step, rng.uniform(0.1, 0.5, shape)
+    x = np.linspace(-2.2, 1.8, 20)
+    sharpened = np.exp(-3 * x**2) - rng.uniform(0.25, 0.35) * (np.exp(-4 * (x - 1) ** 2) + np.exp(-4 * (x + 1) ** 2))
+    yield rng.uniform(2, 5) * sharpened, 0.2, np.array([0.0, 0.1, 0.2, 0.3, 0.45, 0.9])  # above 1 in the middle
+    box = float(rng.uniform(1, 3))  # a pixel's own spread, of which nothing is left at 1 cycle per pixel
+    yield np.full(8, box), 0.125, np.array([[0.0, 0.5], [1.0, 2.0]])
 
 
 MTF = Exercise(
@@ -166,6 +208,51 @@ def frequency_by_frequency(light, step, frequency):
     x = step * np.arange(len(light))
     one_by_one = [abs(np.sum(light * np.exp(-2j * np.pi * f * x))) for f in np.ravel(frequency)]
     return np.reshape(one_by_one, np.shape(frequency)) / sum(light)
+
+
+@MTF.right
+def as_scipy_s_response_of_a_filter(light, step, frequency):
+    from scipy.signal import freqz
+
+    size = np.abs(freqz(light, worN=2 * np.pi * step * np.ravel(frequency))[1])
+    return np.reshape(size, np.shape(frequency)) / np.add.reduce(light)
+
+
+@MTF.right
+def by_horner_s_rule(light, step, frequency):
+    turn, total = np.exp(-2j * np.pi * step * np.asarray(frequency)), 0
+    for value in light[::-1]:
+        total = total * turn + value
+    return (abs(total) / sum(light)).tolist()
+
+
+@MTF.wrong(
+    "You divide by the sum of the *sizes*. Beside a sharpened edge the light is negative, and the MTF is 1 at "
+    "frequency 0 only when it is divided by the plain sum."
+)
+def divided_by_the_sum_of_sizes(light, step, frequency):
+    return np.abs(_transform(light, step, frequency)) / np.sum(np.abs(light))
+
+
+@MTF.wrong(
+    "You take the sizes of the light's values first. Beside a sharpened edge they are negative, and their sign belongs "
+    "to the edge."
+)
+def sizes_of_the_light(light, step, frequency):
+    return mtf(np.abs(light), step, frequency)
+
+
+@MTF.wrong(
+    "Negative light is cut off at 0 in yours. There is none in a scene, but a sharpened edge has it beside its peak, "
+    "and without it the MTF is another."
+)
+def negative_light_cut_off(light, step, frequency):
+    return mtf(np.maximum(light, 0), step, frequency)
+
+
+@MTF.wrong("You hold the MTF at 1. A sharpened edge has more contrast than the scene, and its MTF is above 1.")
+def held_at_one(light, step, frequency):
+    return np.minimum(mtf(light, step, frequency), 1)
 
 
 def _transform(light, step, frequency, turn=2 * np.pi):
@@ -279,6 +366,27 @@ def with_where_for_the_cut_off(per_mm, f_number, wavelength_mm, pitch_mm):
 
 
 @SYSTEM.right
+def number_by_number_as_a_list(per_mm, f_number, wavelength_mm, pitch_mm):
+    import math
+
+    def one(f):
+        s, x = f * wavelength_mm * f_number, math.pi * f * pitch_mm
+        if s >= 1:
+            return 0.0
+        lens = 2 * (math.acos(s) - s * math.sqrt(1 - s * s)) / math.pi
+        return lens * abs(math.sin(x) / x) if f > 0 else 1.0
+
+    return np.reshape([one(f) for f in np.ravel(per_mm)], np.shape(per_mm)).tolist()
+
+
+@SYSTEM.right
+def as_the_overlap_of_two_openings(per_mm, f_number, wavelength_mm, pitch_mm):
+    apart = np.minimum(np.asarray(per_mm) * (wavelength_mm * f_number), 1)  # of two circles of diameter 1
+    segment = (np.arctan2(np.sqrt(1 - apart**2), apart) - apart * np.sqrt(1 - apart**2)) / 4
+    return 2 * segment / (np.pi / 4) * np.sqrt(np.sinc(np.asarray(per_mm) * pitch_mm) ** 2)
+
+
+@SYSTEM.right
 def by_the_angle(per_mm, f_number, wavelength_mm, pitch_mm):
     angle = np.arccos(np.clip(np.asarray(per_mm) * wavelength_mm * f_number, 0, 1))
     return np.abs((2 * angle - np.sin(2 * angle)) / np.pi * np.sinc(np.asarray(per_mm) * pitch_mm))
@@ -372,6 +480,8 @@ def falloff(r: Array, v: float) -> Array:
 def _heights(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield rng.uniform(6, 22, shape), float(rng.uniform(20, 60))
+    v = float(rng.uniform(15, 60))
+    yield v * np.array([0.0, -0.4, 1.0, -1.0, 8.0]), v  # the middle, below it, at 45°, and very far out
 
 
 FALLOFF = Exercise(
@@ -396,6 +506,19 @@ def without_an_angle(r, v):
 @FALLOFF.right
 def by_the_slant_distance(r, v):
     return (v / np.hypot(r, v)) ** 4
+
+
+@FALLOFF.right
+def from_the_double_angle(r, v):
+    return ((1 + np.cos(2 * np.arctan2(r, v))) / 2) ** 2
+
+
+@FALLOFF.right
+def height_by_height_as_a_list(r, v):
+    import math
+
+    left = [math.cos(math.atan(one / v)) ** 3 * v / math.hypot(one, v) for one in np.ravel(r)]
+    return np.reshape(left, np.shape(r)).tolist()
 
 
 @FALLOFF.wrong(
@@ -475,6 +598,8 @@ def _settings(rng: np.random.Generator) -> Iterator[Arguments]:
         S, gain = float(rng.choice([100.0, 200.0, 400.0])), float(rng.uniform(1.7, 5.0))
         yield rng.uniform(0.01, 2.0, shape), float(N), S, float(N * ratio), S * gain
     yield 0.5, 8.0, 800.0, 2.8, 100.0
+    yield np.array([1 / 4000, 1 / 60]), 5.6, 200.0, 2.0, 1600.0  # shorter than a thousandth of a second
+    yield np.array([0.0, 8.0]), 4.0, 100.0, 4.0, 100.0  # nothing is changed
 
 
 SHUTTER = Exercise(
@@ -495,6 +620,18 @@ SHUTTER = Exercise(
 def by_exposure_values(t, N, S, new_N, new_S):
     stops = 2 * np.log2(new_N / N) - np.log2(new_S / S)
     return t * 2**stops
+
+
+@SHUTTER.right
+def stop_by_stop(t, N, S, new_N, new_S):
+    opening = (N / new_N) ** 2  # the share of the light that the new opening lets through
+    return np.asarray(t) / opening / (new_S / S)
+
+
+@SHUTTER.right
+def by_diameters_and_as_a_list(t, N, S, new_N, new_S):
+    old, new = (np.pi * (25 / f_number / 2) ** 2 for f_number in (N, new_N))  # areas, of a lens of 25 mm
+    return (np.multiply(t, old * S) / (new * new_S)).tolist()
 
 
 @SHUTTER.right

@@ -1,0 +1,170 @@
+"""Numbers that are finite and absurd: whichever of a file has them, it is inspected or refused, and the clinic says so.
+
+What is put in the place of a number is a million of its unit, its negative, a hundred thousand, next to nothing, none.
+"""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import calibrations
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from camviz.calibration.difference import NothingSharedError, difference
+from camviz.cameras import Camera, Intrinsics
+from camviz.clinic import inspect, inspect_file
+from camviz.clinic.checks.impossible import FARTHEST, FOCAL, STRETCHED, stretched
+from camviz.files import Calibration, CalibrationError, formats, write
+from camviz.lenses import (
+    BrownConrady,
+    DoubleSphere,
+    Equidistant,
+    KannalaBrandt,
+    Perspective,
+    Stereographic,
+    UnifiedSphere,
+)
+
+ABSURD = (b"1e6", b"-1e6", b"1e5", b"1e-9", b"0")
+NUMBER = re.compile(rb"(?<![\w.#])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?(?![\w.])")
+SIZE = (640, 480)
+IMU = RigidTransform.from_components([0.05, 0.02, -0.01], Rotation.from_rotvec([-0.2, 0.1, 1.4]))
+APART = RigidTransform.from_components([0.11, 0.002, -0.001], Rotation.from_rotvec([0.01, 0.02, -0.005]))
+CAMERA = Camera(Intrinsics(*SIZE, 500.0, 500.0, 321.25, 239.5), BrownConrady(-0.2, 0.05, 1e-3, -1e-3))
+PLAIN = replace(CAMERA, lens=Perspective())
+BINARY = ("mat", "colmap-bin")
+PAIR = {"left": CAMERA, "right": CAMERA.at(APART)}
+SHIFTED = {"left": PLAIN, "right": PLAIN.at(RigidTransform.from_translation([0.11, 0, 0]))}
+
+
+def rig(cameras, imu=None):
+    return Calibration(cameras, Path("made.yml"), "made", world_from_imu=imu)
+
+
+RIGS = (rig(PAIR, IMU), rig(PAIR), rig(SHIFTED), rig({"camera": CAMERA}, IMU), rig({"camera": PLAIN}))
+
+
+def text_files(name, folder):
+    """A format's example as its files by name: its own, or what it writes of a pair where it holds one."""
+    if held := formats()[name].example:
+        return {"": held}
+    for made in RIGS:
+        try:
+            write(made, folder / "made.yml", name)
+        except CalibrationError:
+            continue
+        path = folder / "made.yml"
+        return {each.name: each.read_bytes() for each in path.iterdir()} if path.is_dir() else {"": path.read_bytes()}
+    raise AssertionError(f"{name} writes none of the rigs")
+
+
+def refusal(path, **options):
+    """The sentence that a file is refused with; empty where it is inspected."""
+    try:
+        inspect_file(path, **options)
+    except CalibrationError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("name", sorted(set(formats()) - set(BINARY)))
+def test_a_file_with_an_absurd_number_is_inspected_or_refused(name, tmp_path, thorough):
+    """Whatever else is raised fails the test."""
+    files = text_files(name, tmp_path)
+    places = [(file, match.span()) for file, text in files.items() for match in NUMBER.finditer(text)]
+    draws = [(place, value) for place in places for value in ABSURD]
+    if not thorough:
+        draws = [draws[index] for index in np.random.default_rng(len(draws)).choice(len(draws), 2, replace=False)]
+    path = tmp_path / "damaged.yml"
+    for (file, (start, end)), value in draws:
+        changed = files | {file: files[file][:start] + value + files[file][end:]}
+        path.mkdir(exist_ok=True) if "" not in files else None
+        for each, text in changed.items():
+            (path / each if each else path).write_bytes(text)
+        said = refusal(path, size=SIZE)
+        said = refusal(path) if "leave the size out" in said else said
+        assert said == "" or (path.name in said and "\n" not in said), said
+
+
+def findings(calibration):
+    return [each for each in inspect(calibration).findings if each.id == "impossible-numbers"]
+
+
+def with_lens(**values):
+    return replace(CAMERA, lens=replace(CAMERA.lens, **values))
+
+
+def test_a_pair_whose_halves_share_no_rays_is_inspected_and_its_numbers_are_named():
+    """The corners of the left camera, solved anew from a skew of 100,000, lead nowhere: not checked, and why."""
+    pair = calibrations.pair()
+    left, right = pair.cameras.values()
+    broken = replace(left, intrinsics=replace(left.intrinsics, skew=1e5))
+    inspection = inspect(replace(pair, cameras={"left": broken, "right": right}))
+    (found,) = [each for each in inspection.findings if each.id == "impossible-numbers"]
+    points = np.stack([pose.apply(pair.board.corners) for pose in pair.cam_from_board["left"]])
+    off = np.linalg.norm(broken.project(points) - pair.detections["left"], axis=-1)
+    assert found.value == pytest.approx(np.nanmedian(off), rel=1e-6)
+    assert found.camera == "left"
+    assert "have no rays in common (left)" in dict(inspection.skipped)["split-disagreement"]
+
+
+def test_two_cameras_that_share_no_rays_have_no_difference():
+    beside = replace(PLAIN, intrinsics=replace(PLAIN.intrinsics, cx=1e8))
+    lens = BrownConrady(k1=-1e5)
+    with pytest.raises(NothingSharedError, match="at least three rays must be known to both cameras"):
+        difference(replace(PLAIN, lens=lens), replace(beside, lens=lens))
+
+
+@pytest.mark.parametrize("key", ["fx", "fy"])
+@pytest.mark.parametrize(("low", "high"), [(FOCAL[0] * (1 - 1e-9), FOCAL[1] * (1 + 1e-9)), FOCAL])
+def test_a_focal_length_outside_the_range_of_lenses_is_named_and_its_ends_are_not(key, low, high):
+    """A hundredth of 640 pixels is 6.4, and a thousand times is 640,000."""
+    for share in (low, high):
+        camera = replace(PLAIN, intrinsics=replace(PLAIN.intrinsics, **{key: 640 * share}))
+        named = [each.sentence for each in findings(rig({"camera": camera})) if f"{key} = " in each.sentence]
+        assert len(named) == (share not in FOCAL)
+
+
+@pytest.mark.parametrize("others", [[], [0.3]])
+def test_a_camera_that_stands_beyond_any_rig_is_named_and_one_at_the_limit_is_not(others):
+    for away in (FARTHEST, FARTHEST * 1.001):
+        places = [0.0, *others, away + max(others, default=0)]
+        cameras = {f"cam{i}": CAMERA.at(RigidTransform.from_translation([0, x, 0])) for i, x in enumerate(places)}
+        found = findings(rig(cameras))
+        assert [each.value for each in found] == pytest.approx([away] * (away > FARTHEST))
+        assert [each.camera for each in found] == ["cam2" if others else None] * len(found)
+
+
+def test_a_scene_in_its_own_unit_may_be_as_wide_as_it_likes():
+    cameras = {"a": CAMERA, "b": CAMERA.at(RigidTransform.from_translation([1e6, 0, 0]))}
+    assert len(findings(rig(cameras))) == 1
+    assert findings(Calibration(cameras, Path("made"), "COLMAP")) == []
+
+
+@pytest.mark.parametrize("beyond", [1 - 1e-6, 1 + 1e-6])
+def test_a_border_that_is_stretched_beyond_any_lens_is_named_and_one_at_the_limit_is_not(beyond):
+    """r_d = r + k1 r³ is three times r where k1 = 2/r², at the pixel farthest from the principal point."""
+    r_d = np.linalg.norm(np.array([321.25, 239.5]) / 500)
+    camera = replace(CAMERA, lens=BrownConrady(k1=beyond * 18 / r_d**2))
+    assert stretched(camera) == pytest.approx(3, rel=1e-6)
+    assert [each.value > STRETCHED for each in findings(rig({"camera": camera}))] == [True] * (beyond > 1)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        Perspective(),
+        BrownConrady(0.1, 0.02),
+        KannalaBrandt(0.07, -0.01, 0.002, -0.0005),
+        Equidistant(),
+        Stereographic(),
+        UnifiedSphere(1.7, -0.2, 0.04),
+        DoubleSphere(-0.2, 0.55),
+    ],
+    ids=lambda lens: type(lens).__name__,
+)
+@pytest.mark.parametrize("focal", [150.0, 500.0, 4000.0])
+def test_lenses_that_there_are_stretch_the_border_less(lens, focal):
+    assert stretched(Camera(replace(CAMERA.intrinsics, fx=focal, fy=focal), lens)) < 1.6
