@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
 from camviz.lenses.base import Array
-
-if TYPE_CHECKING:
-    from camviz.optics.slanted_edge import SlantedEdge
 
 PROCESSED = 1.3  # times the sides' noise: more scatter than that near the edge is no noise of the sensor's
 SHARE_OF_PROCESSED = 0.2  # of a row's scatter, that all rows have alike: found on JPEGs, benchmarks/mtf_troubles.py
@@ -30,7 +27,7 @@ class EdgeError:
         Cycles per pixel.
     """
 
-    edge: SlantedEdge
+    edge: Any  # a SlantedEdge, whose module imports this one
     frequency: float
 
     # Noise -----------------------------------------------------------------------------------------------------------

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from camviz.optics.slanted_edge import SlantedEdge
 
 LEAST_ANGLE_DEG, MOST_ANGLE_DEG = 1.0, 30.0  # outside, phases repeat too early or rows blur the edge
 FEWEST_ROWS = 16
@@ -19,7 +16,7 @@ MOST_UNEXPLAINED = 0.04  # of the contrast: scatter at the edge beyond the sides
 MOST_BENT = 0.15  # of ln MTF at MTF50: what rows off the line may take of it
 
 
-def refuse_what_spoils(edge: SlantedEdge) -> None:
+def refuse_what_spoils(edge: Any) -> None:
     """Say what is wrong with an edge that cannot be measured.
 
     Raises
@@ -61,7 +58,7 @@ def refuse_what_spoils(edge: SlantedEdge) -> None:
         )
 
 
-def _refuse_clipped(edge: SlantedEdge) -> None:
+def _refuse_clipped(edge: Any) -> None:
     shares = edge.clipped_shares
     if max(shares) > MOST_CLIPPED:
         side = "dark" if shares[0] > shares[1] else "bright"

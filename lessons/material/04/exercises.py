@@ -626,8 +626,10 @@ def _parts(r: Array) -> tuple[float, Array, Array]:
 
 
 def _rodrigues_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    sides = rng.choice([-1, 1], 3)
     for low, high in ((0.4, 1.4), (1.7, 3.0), (3.3, 6.0), (1e-4, 1e-3)):
-        axis = rng.uniform(0.2, 1, 3) * rng.choice([-1, 1], 3)
+        sides = -sides  # to either side of each axis
+        axis = rng.uniform(0.2, 1, 3) * sides
         yield (float(rng.uniform(low, high)) * axis / np.linalg.norm(axis),)
     yield (np.array([np.pi, 0, 0])[rng.permutation(3)],)
     yield (np.zeros(3),)
