@@ -42,27 +42,14 @@ Colours = NDArray[np.uint8]
 def camera(camera: Camera, depth: float = 0.3, *, colour: str = "blue") -> pyvista.PolyData:
     """What a camera sees: its rim bends with the lens, a triangle marks its upper side.
 
-    Parameters
-    ----------
-    camera : Camera
-        Where it stands.
-    depth : float, optional
-        How far the volume reaches, in metres.
-    colour : str, optional
-        A name such as "blue" or "orange", or "#rrggbb".
+    Args:
+        camera: Where it stands.
+        depth: How far the volume reaches, in metres.
+        colour: A name such as "blue" or "orange", or "#rrggbb".
 
-    Returns
-    -------
-    pyvista.PolyData
-        Lines and faces in metres.
+    Returns: Lines and faces in metres.
+    Raises: ValueError for an unknown colour.
 
-    Raises
-    ------
-    ValueError
-        For an unknown colour.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> mesh = camera(Camera(Intrinsics.from_fov(640, 480, 90)), depth=2)
     >>> f"{mesh.bounds.x_min:.1f} … {mesh.bounds.x_max:.1f} m"  # 2 tan 45° to either side
@@ -76,22 +63,13 @@ def rig(
 ) -> pyvista.MultiBlock:
     """The cameras of a rig or a calibration, each a block under its name.
 
-    Parameters
-    ----------
-    cameras : Rig, Calibration or mapping of str to Camera
-        Where they stand.
-    depth : float, optional
-        How far their volumes reach, in metres.
-    colour : str, optional
-        As of `camera`.
+    Args:
+        cameras: Where they stand.
+        depth: How far their volumes reach, in metres.
+        colour: As of `camera`.
 
-    Returns
-    -------
-    pyvista.MultiBlock
-        Meshes of `camera`.
+    Returns: Meshes of `camera`.
 
-    Examples
-    --------
     >>> from camviz.poses import RigidTransform
     >>> from camviz.cameras import Camera, Intrinsics
     >>> one = Camera(Intrinsics.from_fov(640, 480, 90))
@@ -107,20 +85,12 @@ def rig(
 def board(board: Board, world_from_board: RigidTransform | None = None) -> pyvista.PolyData:
     """A board with its squares, tags or circles, the first of its points at the board's origin.
 
-    Parameters
-    ----------
-    board : Board
-        What is drawn.
-    world_from_board : RigidTransform, optional
-        Where it is, in metres; the board's own frame unless given.
+    Args:
+        board: What is drawn.
+        world_from_board: Where it is, in metres; the board's own frame unless given.
 
-    Returns
-    -------
-    pyvista.PolyData
-        Faces in metres.
+    Returns: Faces in metres.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration import Board
     >>> board(Board(9, 6, 0.025)).n_cells  # squares: 10 by 7
     70
@@ -140,25 +110,13 @@ def board(board: Board, world_from_board: RigidTransform | None = None) -> pyvis
 def boards(calibration: Calibration, camera: str = "") -> pyvista.MultiBlock:
     """The board at every pose from which a camera saw it.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        With a board and its poses.
-    camera : str, optional
-        The first unless named.
+    Args:
+        calibration: With a board and its poses.
+        camera: The first unless named.
 
-    Returns
-    -------
-    pyvista.MultiBlock
-        A block for each view.
+    Returns: A block for each view.
+    Raises: ValueError where the calibration holds no board or no poses.
 
-    Raises
-    ------
-    ValueError
-        Where the calibration holds no board or no poses.
-
-    Examples
-    --------
     >>> from camviz_clinic.checks import virtual
     >>> calibration = virtual.healthy(np.random.default_rng(1))
     >>> boards(calibration).n_blocks == len(calibration.detections["camera"])
@@ -180,20 +138,12 @@ def scene(scene: Scene, detail: int = 128) -> pyvista.MultiBlock:
 
     A surface is cut finer, so that its points carry its picture. The sky is not among them.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is drawn.
-    detail : int, optional
-        About so many quadrilaterals along each side of a surface.
+    Args:
+        scene: What is drawn.
+        detail: About so many quadrilaterals along each side of a surface.
 
-    Returns
-    -------
-    pyvista.MultiBlock
-        Faces in metres.
+    Returns: Faces in metres.
 
-    Examples
-    --------
     >>> from camviz.scenes import Rectangle, Scene, Texture
     >>> wall = Rectangle((0, 0, 2), (4, 0, 0), (0, 3, 0), Texture.plain((0.2, 0.5, 0.2)), name="wall")
     >>> scene(Scene([wall]), detail=8)[0].n_cells
@@ -209,27 +159,16 @@ def residuals(calibration: Calibration, camera: str = "", *, scale: float = 100)
 
     The lines are coloured by the residual in pixels, which stands in the array "pixels".
 
-    Parameters
-    ----------
-    calibration : Calibration
-        With corners and poses.
-    camera : str, optional
-        The first unless named.
-    scale : float, optional
-        How many times as long as the residuals the lines are.
+    Args:
+        calibration: With corners and poses.
+        camera: The first unless named.
+        scale: How many times as long as the residuals the lines are.
 
-    Returns
-    -------
-    pyvista.PolyData
-        Lines in metres.
+    Returns: Lines in metres.
 
-    Raises
-    ------
-    Missing
-        A ValueError, where the calibration holds no corners or poses.
+    Raises:
+        Missing: A ValueError, where the calibration holds no corners or poses.
 
-    Examples
-    --------
     >>> from camviz_clinic.checks import virtual
     >>> calibration = virtual.healthy(np.random.default_rng(1))
     >>> residuals(calibration).n_cells == calibration.used("camera").sum()
@@ -254,25 +193,13 @@ def residuals(calibration: Calibration, camera: str = "", *, scale: float = 100)
 def points(positions: ArrayLike, colours: ArrayLike | None = None) -> pyvista.PolyData:
     """A cloud of points.
 
-    Parameters
-    ----------
-    positions : array_like (n, 3)
-        Points in metres.
-    colours : array_like (n, 3), optional
-        RGB, 0 to 255; grey unless given.
+    Args:
+        positions: (n, 3), points in metres.
+        colours: (n, 3), RGB, 0 to 255; grey unless given.
 
-    Returns
-    -------
-    pyvista.PolyData
-        Vertices in metres.
+    Returns: Vertices in metres.
+    Raises: ValueError where a position has not 3 coordinates, or colours are not one for each position.
 
-    Raises
-    ------
-    ValueError
-        Where a position has not 3 coordinates, or colours are not one for each position.
-
-    Examples
-    --------
     >>> points([[0, 0, 1], [0, 0, 2]], colours=[[255, 0, 0], [0, 0, 255]])["rgba"].tolist()
     [[255, 0, 0, 255], [0, 0, 255, 255]]
     """
@@ -286,23 +213,12 @@ def points(positions: ArrayLike, colours: ArrayLike | None = None) -> pyvista.Po
 def joined(meshes: Iterable[pyvista.PolyData]) -> pyvista.PolyData:
     """Several meshes as one: for a file that holds one mesh, such as PLY.
 
-    Parameters
-    ----------
-    meshes : iterable of pyvista.PolyData
-        At least one, such as the blocks of a scene.
+    Args:
+        meshes: At least one, such as the blocks of a scene.
 
-    Returns
-    -------
-    pyvista.PolyData
-        With the colours of all.
+    Returns: pyvista.PolyData with the colours of all.
+    Raises: ValueError without a mesh.
 
-    Raises
-    ------
-    ValueError
-        Without a mesh.
-
-    Examples
-    --------
     >>> joined([points([[0, 0, 1]]), points([[0, 0, 2]])]).n_points
     2
     """

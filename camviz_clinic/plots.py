@@ -38,33 +38,17 @@ def residuals(
 ) -> Any:
     """Arrows from every detected corner towards its projection.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        With corners and poses.
-    ax : Axes, optional
-        Where to draw; new ones unless given.
-    camera : str, optional
-        The first unless named.
-    view : int, optional
-        Counts from 1; all views unless given.
-    scale : float, optional
-        How many times as long as the residuals the arrows are.
-    **options
-        Go to `Axes.quiver`.
+    Args:
+        calibration: With corners and poses.
+        ax: Axes, where to draw; new ones unless given.
+        camera: The first unless named.
+        view: Counts from 1; all views unless given.
+        scale: How many times as long as the residuals the arrows are.
+        **options: Go to `Axes.quiver`.
 
-    Returns
-    -------
-    Axes
-        In pixels.
+    Returns: Axes, in pixels.
+    Raises: ValueError for a view that there is not; as `Missing`, where the calibration holds no corners or poses.
 
-    Raises
-    ------
-    ValueError
-        For a view that there is not; as `Missing`, where the calibration holds no corners or poses.
-
-    Examples
-    --------
     >>> from camviz_clinic.checks import virtual
     >>> calibration = virtual.healthy(np.random.default_rng(1))
     >>> residuals(calibration).get_title() == f"residuals × 100, {calibration.rms('camera'):.3g} px RMS"
@@ -82,29 +66,17 @@ def residuals(
 def coverage(calibration: Calibration, ax: Any = None, *, camera: str = "", **options: Any) -> Any:
     """Every corner that a camera detected, a colour for each view.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        With corners.
-    ax : Axes, optional
-        Where to draw; new ones unless given.
-    camera : str, optional
-        The first unless named.
-    **options
-        Go to `Axes.plot`.
+    Args:
+        calibration: With corners.
+        ax: Axes, where to draw; new ones unless given.
+        camera: The first unless named.
+        **options: Go to `Axes.plot`.
 
-    Returns
-    -------
-    Axes
-        In pixels.
+    Returns: Axes, in pixels.
 
-    Raises
-    ------
-    Missing
-        A ValueError, where the calibration holds no corners.
+    Raises:
+        Missing: A ValueError, where the calibration holds no corners.
 
-    Examples
-    --------
     >>> from camviz_clinic.checks import virtual
     >>> calibration = virtual.healthy(np.random.default_rng(1))
     >>> len(coverage(calibration, marker="+").lines) == len(calibration.detections["camera"])
@@ -121,24 +93,14 @@ def coverage(calibration: Calibration, ax: Any = None, *, camera: str = "", **op
 def distortion(camera: Camera, ax: Any = None, *, step_px: float | None = None, **options: Any) -> Any:
     """Arrows from where a perspective lens puts a point to where this lens does, with contours of their length.
 
-    Parameters
-    ----------
-    camera : Camera
-        With any lens.
-    ax : Axes, optional
-        Where to draw; new ones unless given.
-    step_px : float, optional
-        Distance of neighbouring arrows in pixels; a sixteenth of the picture's width unless given.
-    **options
-        Go to `Axes.quiver`.
+    Args:
+        camera: With any lens.
+        ax: Axes, where to draw; new ones unless given.
+        step_px: Distance of neighbouring arrows in pixels; a sixteenth of the picture's width unless given.
+        **options: Go to `Axes.quiver`.
 
-    Returns
-    -------
-    Axes
-        In pixels.
+    Returns: Axes, in pixels.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.lenses import BrownConrady
     >>> ax = distortion(Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2)), step_px=100)
@@ -160,24 +122,14 @@ def radial(camera: Camera, ax: Any = None, *, relative: bool = False, **options:
 
     Of a lens that is not round, along the picture's x axis.
 
-    Parameters
-    ----------
-    camera : Camera
-        With any lens.
-    ax : Axes, optional
-        Where to draw; new ones unless given.
-    relative : bool, optional
-        Draw how much farther than behind a perspective lens, which needs angles below 90°.
-    **options
-        Go to `Axes.plot`.
+    Args:
+        camera: With any lens.
+        ax: Axes, where to draw; new ones unless given.
+        relative: Draw how much farther than behind a perspective lens, which needs angles below 90°.
+        **options: Go to `Axes.plot`.
 
-    Returns
-    -------
-    Axes
-        Degrees, and pixels.
+    Returns: Axes, degrees, and pixels.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> ax = radial(Camera(Intrinsics.from_fov(640, 480, 90)), label="perspective")
     >>> degrees, pixels = ax.lines[0].get_data()
@@ -202,29 +154,15 @@ def epipolar(left: Camera, right: Camera, uv_left: ArrayLike, ax: Any = None, **
 
     `ax.imshow` shows the right photograph below it.
 
-    Parameters
-    ----------
-    left, right : Camera
-        In place.
-    uv_left : array_like (n, 2)
-        Pixels of the left picture.
-    ax : Axes, optional
-        Where to draw; new ones unless given.
-    **options
-        Go to `Axes.plot`.
+    Args:
+        left, right: In place.
+        uv_left: (n, 2), pixels of the left picture.
+        ax: Axes, where to draw; new ones unless given.
+        **options: Go to `Axes.plot`.
 
-    Returns
-    -------
-    Axes
-        In pixels.
+    Returns: Axes, in pixels.
+    Raises: ValueError where the last axis of `uv_left` has not 2 coordinates.
 
-    Raises
-    ------
-    ValueError
-        Where the last axis of `uv_left` has not 2 coordinates.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.poses import RigidTransform
     >>> left = Camera(Intrinsics.from_fov(640, 480, 90))
@@ -243,29 +181,15 @@ def frusta(
 ) -> Any:
     """What cameras see, in space, a colour for each.
 
-    Parameters
-    ----------
-    cameras : Camera, Rig, Calibration or mapping of str to Camera
-        Where they stand.
-    ax : Axes3D, optional
-        Where to draw; new ones unless given.
-    depth : float, optional
-        How far their volumes reach, in metres.
-    **options
-        Go to `Axes.plot`.
+    Args:
+        cameras: Where they stand.
+        ax: Axes3D, where to draw; new ones unless given.
+        depth: How far their volumes reach, in metres.
+        **options: Go to `Axes.plot`.
 
-    Returns
-    -------
-    Axes3D
-        In metres.
+    Returns: Axes3D, in metres.
+    Raises: ValueError for axes that are not 3D.
 
-    Raises
-    ------
-    ValueError
-        For axes that are not 3D.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> one = Camera(Intrinsics.from_fov(640, 480, 90))
     >>> [line.get_label() for line in frusta({"left": one, "right": one}).lines]
@@ -283,29 +207,15 @@ def frusta(
 def boards(calibration: Calibration, ax: Any = None, *, camera: str = "", **options: Any) -> Any:
     """The outline of the board at every pose from which a camera saw it, in space.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        With corners and poses.
-    ax : Axes3D, optional
-        Where to draw; new ones unless given.
-    camera : str, optional
-        The first unless named.
-    **options
-        Go to `Axes.plot`.
+    Args:
+        calibration: With corners and poses.
+        ax: Axes3D, where to draw; new ones unless given.
+        camera: The first unless named.
+        **options: Go to `Axes.plot`.
 
-    Returns
-    -------
-    Axes3D
-        In metres.
+    Returns: Axes3D, in metres.
+    Raises: ValueError for axes that are not 3D; as `Missing`, where the calibration holds no corners or poses.
 
-    Raises
-    ------
-    ValueError
-        For axes that are not 3D; as `Missing`, where the calibration holds no corners or poses.
-
-    Examples
-    --------
     >>> from camviz_clinic.checks import virtual
     >>> calibration = virtual.healthy(np.random.default_rng(1))
     >>> len(boards(calibration).lines) == len(calibration.detections["camera"])

@@ -29,8 +29,9 @@ import camviz
 
 matplotlib.use("agg")
 
-ROOT = Path(camviz.__file__).parent
-sys.path.insert(0, str(ROOT.parent / "website"))
+ROOT = Path(camviz.__file__).parents[1]
+PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
+sys.path.insert(0, str(ROOT / "website"))
 
 import docstrings  # noqa: E402
 
@@ -330,7 +331,7 @@ def test_every_public_name_is_documented(part):
 
 
 def test_contributing_shows_a_docstring_as_it_is():
-    shown = re.search(r'```python\ndef project.*?"""(.*?)"""', (ROOT.parent / "CONTRIBUTING.md").read_text(), re.DOTALL)
+    shown = re.search(r'```python\ndef project.*?"""(.*?)"""', (ROOT / "CONTRIBUTING.md").read_text(), re.DOTALL)
     assert shown
     assert inspect.cleandoc(shown[1]) == inspect.getdoc(camviz.Camera.project)
 

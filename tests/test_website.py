@@ -26,9 +26,6 @@ from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
 from scripts import question_script  # noqa: E402
 
-from camviz.course.exercises import exercises  # noqa: E402
-from camviz.course.glossary import glossary  # noqa: E402
-from camviz.course.material import lesson_paths  # noqa: E402
 from camviz.twoview import ransac_fundamental  # noqa: E402
 from camviz.views.frustum import FrustumView  # noqa: E402
 from camviz.widgets import explore  # noqa: E402

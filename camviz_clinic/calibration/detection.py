@@ -36,8 +36,6 @@ WORTH_A_PROCESS = 4  # pictures: a process takes as long to start as three pictu
 class CannotCalibrate(ValueError):  # noqa: N818 - it says what is the case
     """Pictures or corners that no camera can be calibrated from; the message is one sentence.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration import Board, calibrate
     >>> board = Board(9, 6, 0.025)
     >>> calibrate(Detections(("a.png", "b.png"), np.zeros((2, 54, 2)), 640, 480), board)
@@ -59,26 +57,15 @@ class NoBoard(CannotCalibrate):
 class Detections:
     """The board's corners in pictures of one size.
 
-    Parameters
-    ----------
-    pictures : tuple of str
-        Names of the views.
-    corners : array (views, corners, 2)
-        Pixels, NaN where a corner was not seen.
-    width, height : int
-        Size of the pictures in pixels.
-    skipped : tuple of (str, str), optional
-        Pictures without a view, each with the reason.
-    places : tuple of int, optional
-        The views' indices among all the pictures that were looked at, by which those of a pair find each other.
+    Args:
+        pictures: Names of the views.
+        corners: (views, corners, 2), pixels, NaN where a corner was not seen.
+        width, height: Size of the pictures in pixels.
+        skipped: tuple of (str, str), pictures without a view, each with the reason.
+        places: The views' indices among all the pictures that were looked at, by which those of a pair find each other.
 
-    Raises
-    ------
-    ValueError
-        Where corners or places are not one for each picture.
+    Raises: ValueError where corners or places are not one for each picture.
 
-    Examples
-    --------
     >>> found = Detections(("a.png",), np.array([[[10, 20], [np.nan, np.nan]]]), 640, 480)
     >>> seen(found.corners)
     array([[ True, False]])
@@ -117,36 +104,21 @@ def detect(
 
     Pictures without the board, those that cannot be read and those of another size than most are skipped.
 
-    Parameters
-    ----------
-    paths : sequence of path
-        The pictures.
-    board : Board
-        What they show.
-    finder : {"auto", "sectors", "classic"}, optional
-        How a chessboard is found: see `find_corners`.
-    workers : int, optional
-        Processes; unless given, as many as there are processors, for many pictures.
-    progress : callable, optional
-        Called with the numbers of pictures done and in all.
-    seconds : float, optional
-        A search that takes longer is ended, and its picture skipped. Unless given, that is so after two minutes, and
-        only where there are enough pictures for several processes.
+    Args:
+        paths: The pictures.
+        board: What they show.
+        finder: {"auto", "sectors", "classic"}, how a chessboard is found: see `find_corners`.
+        workers: Processes; unless given, as many as there are processors, for many pictures.
+        progress: callable, called with the numbers of pictures done and in all.
+        seconds: A search that takes longer is ended, and its picture skipped. Unless given, that is so after two
+            minutes, and only where there are enough pictures for several processes.
 
-    Returns
-    -------
-    Detections
-        One view for each picture that shows the board.
+    Returns: One view for each picture that shows the board.
 
-    Raises
-    ------
-    CannotCalibrate
-        Where the board is in none of the pictures or most show a larger one, or a process is lost.
-    ValueError
-        For another finder, and for one path in place of a list.
+    Raises:
+        CannotCalibrate: Where the board is in none of the pictures or most show a larger one, or a process is lost.
+        ValueError: For another finder, and for one path in place of a list.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration import Board
     >>> from PIL import Image
     >>> from camviz_clinic.calibration.boards.picture import whiteness
@@ -171,31 +143,19 @@ def detect_pair(
 ) -> tuple[Detections, Detections]:
     """`detect` in the pictures of two cameras at once; those with the same index are of one moment.
 
-    Parameters
-    ----------
-    left, right : sequence of path
-        The pictures of either camera, as many of the one as of the other.
-    board : Board
-        What they show.
-    finder, workers, progress, seconds : optional
-        As of `detect`.
+    Args:
+        left, right: The pictures of either camera, as many of the one as of the other.
+        board: What they show.
+        finder, workers, progress, seconds: As of `detect`.
 
-    Returns
-    -------
-    left : Detections
-        Of the left camera.
-    right : Detections
-        Of the right camera.
+    Returns:
+        left: Of the left camera.
+        right: Of the right camera.
 
-    Raises
-    ------
-    ValueError
-        Where there are not as many pictures of both.
-    CannotCalibrate
-        Where `detect` would.
+    Raises:
+        ValueError: Where there are not as many pictures of both.
+        CannotCalibrate: Where `detect` would.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration import Board
     >>> detect_pair(["left1.png", "left2.png"], ["right1.png"], Board(9, 6, 0.025))
     Traceback (most recent call last):
@@ -213,18 +173,11 @@ def detect_pair(
 def seen(corners: Array) -> Mask:
     """Which corners were seen.
 
-    Parameters
-    ----------
-    corners : array (..., 2)
-        Pixels, NaN where a corner was not seen.
+    Args:
+        corners: (..., 2), pixels, NaN where a corner was not seen.
 
-    Returns
-    -------
-    array (...) of bool
-        True where both coordinates are numbers.
+    Returns: (...) of bool, True where both coordinates are numbers.
 
-    Examples
-    --------
     >>> seen(np.array([[10, 20], [np.nan, 20]]))
     array([ True, False])
     """

@@ -35,32 +35,21 @@ def find_corners(image: NDArray[Any], board: Shape, finder: str = "auto") -> Arr
     In the order of `board.corners`, a chessboard's beginning at a black square in the board's corner; if both such
     squares are black, either of them may come first. Chessboards and circle grids count only as a whole.
 
-    Parameters
-    ----------
-    image : array (height, width) or (height, width, 3)
-        Grey or RGB, 8 bits.
-    board : Board
-        What to look for.
-    finder : {"auto", "sectors", "classic"}, optional
-        How a chessboard is found. "sectors" is OpenCV's findChessboardCornersSB, "classic" is findChessboardCorners
-        with cornerSubPix, "auto" the first of the two that finds it.
+    Args:
+        image: (height, width) or (height, width, 3), grey or RGB, 8 bits.
+        board: Board, what to look for.
+        finder: {"auto", "sectors", "classic"}, how a chessboard is found. "sectors" is OpenCV's
+            findChessboardCornersSB, "classic" is findChessboardCorners with cornerSubPix, "auto" the first of the two
+            that finds it.
 
-    Returns
-    -------
-    array (columns * rows, 2) or None
-        Pixels, NaN for points of a ChArUco board or of an AprilGrid that are not seen; None without the board.
+    Returns:
+        (columns * rows, 2) or None, pixels, NaN for points of a ChArUco board or of an AprilGrid that are not seen;
+        None without the board.
 
-    Raises
-    ------
-    ValueError
-        For another finder, and for a picture of another form.
+    Raises: ValueError for another finder, and for a picture of another form.
+    Source: A. Duda & U. Frese, *Accurate detection and localization of checkerboard corners for calibration*, BMVC
+    (2018).
 
-    References
-    ----------
-    A. Duda & U. Frese, *Accurate detection and localization of checkerboard corners for calibration*, BMVC (2018).
-
-    Examples
-    --------
     >>> from camviz_clinic.calibration.types import Board
     >>> squares = np.add.outer(np.arange(7), np.arange(10)) % 2 * 255  # of ten by seven, the first one black
     >>> picture = np.pad(squares, 1, constant_values=255).repeat(30, axis=0).repeat(30, axis=1).astype(np.uint8)

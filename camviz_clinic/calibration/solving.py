@@ -42,34 +42,20 @@ def calibrate(
 ) -> Calibration:
     """The camera that saw a board in at least three views.
 
-    Parameters
-    ----------
-    detections : Detections
-        The corners.
-    board : Board
-        Their places.
-    model : str, optional
-        One of MODELS.
-    fixed : sequence of str, optional
-        Parameters that are not solved for: the principal point (cx, cy) stays in the middle of the image, all others
-        stay 0.
-    robust : bool, optional
-        Set aside corners and views that the rest contradicts: see `camviz_clinic.calibration.outliers`.
+    Args:
+        detections: The corners.
+        board: Their places.
+        model: One of MODELS.
+        fixed: Parameters that are not solved for: the principal point (cx, cy) stays in the middle of the image, all
+            others stay 0.
+        robust: Set aside corners and views that the rest contradicts: see `camviz_clinic.calibration.outliers`.
 
-    Returns
-    -------
-    Calibration
-        With one camera, named "camera".
+    Returns: Calibration with one camera, named "camera".
 
-    Raises
-    ------
-    CannotCalibrate
-        Where the views do not give a camera.
-    ValueError
-        For an unknown model or parameter, and for corners of another board.
+    Raises:
+        CannotCalibrate: Where the views do not give a camera.
+        ValueError: For an unknown model or parameter, and for corners of another board.
 
-    Examples
-    --------
     >>> from camviz_clinic.checks import virtual
     >>> rng = np.random.default_rng(1)
     >>> truth = virtual.single(rng)  # a camera and boards before it, whose corners are seen with noise
@@ -97,36 +83,21 @@ def calibrate_pair(
     Views are of one moment that have the same place among the pictures (`Detections.places`). All is solved for
     together: both cameras, where the right one stands, and one pose of the board for each view.
 
-    Parameters
-    ----------
-    left, right : Detections
-        The corners that either camera saw.
-    board : Board
-        Their places.
-    model : str, optional
-        One of MODELS.
-    fixed : sequence of str, optional
-        Parameters that are not solved for, as of `calibrate`.
-    robust : bool, optional
-        Set aside what the rest contradicts, as of `calibrate`.
-    joint : bool, optional
-        Otherwise each camera stays as it is when calibrated alone, and only the poses are solved for (OpenCV's
-        CALIB_FIX_INTRINSIC).
+    Args:
+        left, right: The corners that either camera saw.
+        board: Their places.
+        model: One of MODELS.
+        fixed: Parameters that are not solved for, as of `calibrate`.
+        robust: Set aside what the rest contradicts, as of `calibrate`.
+        joint: Otherwise each camera stays as it is when calibrated alone, and only the poses are solved for (OpenCV's
+            CALIB_FIX_INTRINSIC).
 
-    Returns
-    -------
-    Calibration
-        With the cameras "left" and "right".
+    Returns: Calibration with the cameras "left" and "right".
 
-    Raises
-    ------
-    CannotCalibrate
-        Where fewer than three views are common, or the views do not give a camera.
-    ValueError
-        For an unknown model or parameter, and for corners of another board.
+    Raises:
+        CannotCalibrate: Where fewer than three views are common, or the views do not give a camera.
+        ValueError: For an unknown model or parameter, and for corners of another board.
 
-    Examples
-    --------
     >>> from camviz_clinic.checks import virtual
     >>> rng = np.random.default_rng(1)
     >>> truth = virtual.pair(rng, views=6)

@@ -25,17 +25,11 @@ Mask = NDArray[np.bool_]
 class CalibrationError(ValueError):
     """A file that cannot be read as a calibration.
 
-    Parameters
-    ----------
-    sentence : str
-        The message: where, what was expected, what came.
-    id : str, optional
-        The clinic's finding that this is, such as "bad-k"; empty where the file is simply unreadable.
-    value : float, optional
-        The number that shows it.
+    Args:
+        sentence: The message: where, what was expected, what came.
+        id: The clinic's finding that this is, such as "bad-k"; empty where the file is simply unreadable.
+        value: The number that shows it.
 
-    Examples
-    --------
     >>> from camviz_clinic.files import load
     >>> load("none.yaml")
     Traceback (most recent call last):
@@ -54,33 +48,20 @@ class Board:
     A chessboard's points are its inner corners. The markers of a ChArUco board lie in its white squares. An AprilGrid
     is made by `aprilgrid`; a grid of circles has its circles' centres as points.
 
-    Parameters
-    ----------
-    columns, rows : int
-        Number of points along a row and along a column.
-    square_size : float
-        Distance of two neighbouring points, in metres or the file's unit: of a chessboard the side of a square.
-    marker_size : float, optional
-        Side of a marker, or diameter of a circle, in the same unit.
-    dictionary : str, optional
-        The markers' dictionary by OpenCV's name, such as "DICT_5X5_100".
-    kind : str, optional
-        A name in `camviz_clinic.calibration.boards.kinds()`; a chessboard unless given, or a ChArUco board with a
-        dictionary.
-    legacy : bool, optional
-        A ChArUco board laid out as OpenCV before 4.6 did it, white first where the squares' rows are even.
-    first_id : int, optional
-        Number of a ChArUco board's first marker.
-    border_bits : int, optional
-        Border of a ChArUco board's markers, in cells.
+    Args:
+        columns, rows: Number of points along a row and along a column.
+        square_size: Distance of two neighbouring points, in metres or the file's unit: of a chessboard the side of a
+            square.
+        marker_size: Side of a marker, or diameter of a circle, in the same unit.
+        dictionary: The markers' dictionary by OpenCV's name, such as "DICT_5X5_100".
+        kind: A name in `camviz_clinic.calibration.boards.kinds()`; a chessboard unless given, or a ChArUco board with a
+            dictionary.
+        legacy: A ChArUco board laid out as OpenCV before 4.6 did it, white first where the squares' rows are even.
+        first_id: Number of a ChArUco board's first marker.
+        border_bits: Border of a ChArUco board's markers, in cells.
 
-    Raises
-    ------
-    ValueError
-        For fewer than one point, a length that is not positive, or what no board of its kind can have.
+    Raises: ValueError for fewer than one point, a length that is not positive, or what no board of its kind can have.
 
-    Examples
-    --------
     >>> board = Board(columns=9, rows=6, square_size=0.025)
     >>> board.kind, board.length  # eight squares of 25 mm
     ('chessboard', 0.2)
@@ -117,22 +98,13 @@ class Board:
     def aprilgrid(cls, columns: int, rows: int, tag_size: float, spacing: float = 0.3) -> Self:
         """Kalibr's AprilGrid, whose tags have two points along each side.
 
-        Parameters
-        ----------
-        columns, rows : int
-            Number of tags.
-        tag_size : float
-            Side of a tag in metres.
-        spacing : float, optional
-            Gap between two tags as a share of `tag_size`.
+        Args:
+            columns, rows: Number of tags.
+            tag_size: Side of a tag in metres.
+            spacing: Gap between two tags as a share of `tag_size`.
 
-        Returns
-        -------
-        Board
-            With two points a tag along each side.
+        Returns: Board with two points a tag along each side.
 
-        Examples
-        --------
         >>> Board.aprilgrid(6, 6, 0.088, 0.3).corners.shape  # 36 tags of 4 points
         (144, 3)
         """
@@ -157,24 +129,12 @@ class Board:
     def warped(self, warp: ArrayLike) -> Array:
         """The corners of a bent board: z = warp_x (1 - ξ²) + warp_y (1 - η²), ξ and η from -1 to 1.
 
-        Parameters
-        ----------
-        warp : array_like (2,)
-            Sagittas in metres at the middle, along the rows and along the columns.
+        Args:
+            warp: (2,), sagittas in metres at the middle, along the rows and along the columns.
 
-        Returns
-        -------
-        array (columns * rows, 3)
-            Points in metres in the board's frame.
-
-        Raises
-        ------
-        ValueError
-            For other than two sagittas.
-
-        References
-        ----------
-        mrcal's documentation, "Board deformation".
+        Returns: (columns * rows, 3), points in metres in the board's frame.
+        Raises: ValueError for other than two sagittas.
+        Source: mrcal's documentation, "Board deformation".
         """
         corners = self.corners
         half = np.maximum(corners[:, :2].max(axis=0), self.square_size) / 2
@@ -191,54 +151,29 @@ class Calibration:
     COLMAP's, mrcal's, nerfstudio's and Metashape's do. What was recorded of a camera is kept by its name and left out
     where the file has none; the cameras of a rig have the same views.
 
-    Parameters
-    ----------
-    cameras : mapping of str to Camera
-        The cameras by name.
-    source : Path
-        The file.
-    format : str
-        The program that wrote it.
-    board : Board, optional
-        What was photographed.
-    detections : mapping of str to array (views, corners, 2), optional
-        Detected corners in pixels, NaN where one was not seen.
-    cam_from_board : mapping of str to RigidTransform, optional
-        One pose of the board for each view, in metres.
-    per_view_errors : mapping of str to array (views,), optional
-        RMS in pixels.
-    world_from_imu : RigidTransform, optional
-        Where an inertial sensor stands.
-    notes : tuple of str, optional
-        What a reader should know about the file.
-    pictures : mapping of str to tuple of str, optional
-        A file name for each view.
-    set_aside : mapping of str to array (views, corners) of bool, optional
-        True where a corner was seen and not used.
-    estimated : mapping of str to tuple of str, optional
-        The intrinsics that were solved for.
-    intrinsics_covariance : mapping of str to array (n, n), optional
-        Of the n parameters in `estimated`, in their units squared.
-    priors : mapping of str to DenominatorPrior, optional
-        What the solution assumed beforehand.
-    board_warp : array (2,), optional
-        Sagittas in metres, see `Board.warped`.
-    skipped : tuple of (str, str), optional
-        Pictures that were not used, and why.
-    faults : tuple of CalibrationError, optional
-        What was mended in reading, where `load` was asked to mend.
-    redundant : tuple of Redundancy, optional
-        What the file says twice, in its order.
-    stamps : mapping of str to Stamp, optional
-        What the calibration of each camera holds for.
+    Args:
+        cameras: The cameras by name.
+        source: The file.
+        format: The program that wrote it.
+        board: What was photographed.
+        detections: mapping of str to (views, corners, 2), detected corners in pixels, NaN where one was not seen.
+        cam_from_board: One pose of the board for each view, in metres.
+        per_view_errors: mapping of str to (views,), RMS in pixels.
+        world_from_imu: Where an inertial sensor stands.
+        notes: What a reader should know about the file.
+        pictures: A file name for each view.
+        set_aside: mapping of str to (views, corners) of bool, True where a corner was seen and not used.
+        estimated: The intrinsics that were solved for.
+        intrinsics_covariance: mapping of str to (n, n), of the n parameters in `estimated`, in their units squared.
+        priors: What the solution assumed beforehand.
+        board_warp: (2,), sagittas in metres, see `Board.warped`.
+        skipped: tuple of (str, str), pictures that were not used, and why.
+        faults: What was mended in reading, where `load` was asked to mend.
+        redundant: What the file says twice, in its order.
+        stamps: What the calibration of each camera holds for.
 
-    Raises
-    ------
-    ValueError
-        Without any camera.
+    Raises: ValueError without any camera.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz.cameras import Camera, Intrinsics
     >>> one = Calibration({"left": Camera(Intrinsics.from_fov(640, 480, 60))}, Path("left.yaml"), "a data sheet")
@@ -278,15 +213,10 @@ class Calibration:
     def used(self, name: str) -> Mask:
         """Which corners of a camera were seen and not set aside.
 
-        Parameters
-        ----------
-        name : str
-            A camera.
+        Args:
+            name: A camera.
 
-        Returns
-        -------
-        array (views, corners) of bool
-            True where a corner counts; (0, 0) where none are known.
+        Returns: (views, corners) of bool, True where a corner counts; (0, 0) where none are known.
         """
         if name not in self.detections:
             return np.zeros((0, 0), bool)
@@ -298,15 +228,10 @@ class Calibration:
 
         Where the corners are not known, all views count alike.
 
-        Parameters
-        ----------
-        name : str
-            A camera.
+        Args:
+            name: A camera.
 
-        Returns
-        -------
-        float or None
-            In pixels; None where the errors are not known.
+        Returns: In pixels; None where the errors are not known.
         """
         errors = np.asarray(self.per_view_errors.get(name, ()), dtype=float)
         counts = self.used(name).sum(axis=1)

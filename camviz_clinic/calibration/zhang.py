@@ -27,27 +27,13 @@ def constraints(H: ArrayLike) -> Array:
 
     h₁ᵀ B h₂ = 0, and h₁ᵀ B h₁ = h₂ᵀ B h₂. With H[2, 2] = 1 a row weighs as much as its board is large in the image.
 
-    Parameters
-    ----------
-    H : array_like (3, 3)
-        From the board's plane in metres to pixels.
+    Args:
+        H: (3, 3), from the board's plane in metres to pixels.
 
-    Returns
-    -------
-    array (2, 6)
-        The two rows.
+    Returns: (2, 6), the two rows.
+    Raises: ValueError for a matrix of another shape, or with a number that is not finite.
+    Source: Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), eq. 3, 4 and 8.
 
-    Raises
-    ------
-    ValueError
-        For a matrix of another shape, or with a number that is not finite.
-
-    References
-    ----------
-    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), eq. 3, 4 and 8.
-
-    Examples
-    --------
     >>> from camviz.poses import Rotation
     >>> R = Rotation.from_rotvec([0.5, 0.2, 0]).as_matrix()
     >>> H = np.column_stack([R[:, :2], (0, 0, 1)])  # seen by a camera of K = 1, so that B = 1
@@ -64,30 +50,19 @@ def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Arra
 
     Boards that are parallel count as one, and boards tilted about one and the same row or column leave K undetermined.
 
-    Parameters
-    ----------
-    homographies : sequence of array_like (3, 3)
-        From the board's plane in metres to pixels: at least two, or three where skew is unknown too.
-    skew : bool, optional
-        Solve for skew as well; otherwise it is 0.
+    Args:
+        homographies: sequence of (3, 3), from the board's plane in metres to pixels: at least two, or three where skew
+            is unknown too.
+        skew: Solve for skew as well; otherwise it is 0.
 
-    Returns
-    -------
-    array (3, 3)
-        K in pixels, with K[2, 2] = 1.
+    Returns: (3, 3), K in pixels, with K[2, 2] = 1.
 
-    Raises
-    ------
-    ValueError
-        For too few homographies, for those that determine no K, or where no K fits them (with noise, nearly parallel
-        boards).
+    Raises:
+        ValueError: For too few homographies, for those that determine no K, or where no K fits them (with noise, nearly
+            parallel boards).
 
-    References
-    ----------
-    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
+    Source: Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
 
-    Examples
-    --------
     >>> from camviz.poses import Rotation
     >>> K = np.array([[500, 0, 320], [0, 510, 240], [0, 0, 1]])
     >>> turns = Rotation.from_rotvec([[0.5, 0.1, 0], [0.1, -0.6, 0.2]])  # of two boards, 1 m away
@@ -112,31 +87,17 @@ def focal_lengths(homographies: Sequence[ArrayLike], centre: ArrayLike) -> tuple
     Two unknowns, two constraints: one board is enough, if it is tilted about a slanting axis. One that faces the
     camera, or is tilted about a row or a column of the picture, loses a constraint.
 
-    Parameters
-    ----------
-    homographies : sequence of array_like (3, 3)
-        From the board's plane in metres to pixels: one or more.
-    centre : array_like (2,)
-        The principal point in pixels.
+    Args:
+        homographies: sequence of (3, 3), from the board's plane in metres to pixels: one or more.
+        centre: (2,), the principal point in pixels.
 
-    Returns
-    -------
-    fx : float
-        In pixels.
-    fy : float
-        In pixels.
+    Returns:
+        fx: In pixels.
+        fy: In pixels.
 
-    Raises
-    ------
-    ValueError
-        Without a homography, where they determine no focal length, and for a centre of another shape.
+    Raises: ValueError without a homography, where they determine no focal length, and for a centre of another shape.
+    Source: Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
 
-    References
-    ----------
-    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
-
-    Examples
-    --------
     >>> from camviz.poses import Rotation
     >>> R = Rotation.from_rotvec([0.5, 0.3, 0]).as_matrix()  # about a slanting axis
     >>> H = [[500, 0, 320], [0, 510, 240], [0, 0, 1]] @ np.column_stack([R[:, :2], (0, 0, 1)])
@@ -160,29 +121,14 @@ def board_pose(H: ArrayLike, K: ArrayLike) -> RigidTransform:
 
     K⁻¹ H = λ [r₁ r₂ t]; with noise r₁ and r₂ are not quite perpendicular, and the nearest rotation is taken.
 
-    Parameters
-    ----------
-    H : array_like (3, 3)
-        From the board's plane in metres to pixels.
-    K : array_like (3, 3)
-        The camera matrix in pixels.
+    Args:
+        H: (3, 3), from the board's plane in metres to pixels.
+        K: (3, 3), the camera matrix in pixels.
 
-    Returns
-    -------
-    RigidTransform
-        cam_from_board, in metres.
+    Returns: cam_from_board, in metres.
+    Raises: ValueError for a matrix of another shape, with a number that is not finite, and for a K without an inverse.
+    Source: Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
 
-    Raises
-    ------
-    ValueError
-        For a matrix of another shape, with a number that is not finite, and for a K without an inverse.
-
-    References
-    ----------
-    Z. Zhang, *A flexible new technique for camera calibration*, IEEE PAMI 22 (2000), section 3.1.
-
-    Examples
-    --------
     >>> K = np.array([[500, 0, 320], [0, 500, 240], [0, 0, 1]])
     >>> H = K @ [[1, 0, 0.1], [0, 1, 0], [0, 0, 2]]  # it faces the camera, 2 m away and 0.1 m to the right
     >>> board_pose(H, K).translation.round(6)

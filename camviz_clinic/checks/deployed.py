@@ -40,32 +40,19 @@ def check(
     "warn" where it is surely beyond half of it, and "inconclusive" where the pictures do not tell. Corners of both
     cameras of a pair judge the pair, too.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        What is in use.
-    detections : Detections or mapping of str to Detections
-        The corners, of one camera or of cameras by name.
-    board : Board, optional
-        That of the calibration unless given.
-    limit : float, optional
-        How far it may be off over the image, in pixels: the RMS of far points, once a turn of the whole camera is taken
-        out.
-    taken : mapping of str to Stamp, optional
-        How the new pictures were taken, by camera: what of it contradicts the calibration's stamp is told.
+    Args:
+        calibration: What is in use.
+        detections: The corners, of one camera or of cameras by name.
+        board: That of the calibration unless given.
+        limit: How far it may be off over the image, in pixels: the RMS of far points, once a turn of the whole camera
+            is taken out.
+        taken: How the new pictures were taken, by camera: what of it contradicts the calibration's stamp is told.
 
-    Returns
-    -------
-    Check
-        The verdict, with its reasons and numbers.
+    Returns: The verdict, with its reasons and numbers.
 
-    Raises
-    ------
-    ValueError
-        Without a board, for an unknown camera, for corners of another board, and for a limit not above 0.
+    Raises:
+        ValueError: Without a board, for an unknown camera, for corners of another board, and for a limit not above 0.
 
-    Examples
-    --------
     >>> from dataclasses import replace
     >>> import numpy as np
     >>> from camviz_clinic.checks.virtual import detections, single

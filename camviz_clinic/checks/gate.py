@@ -36,24 +36,14 @@ LIMITS = {
 class Gate:
     """What makes a calibration fail, and what does not count.
 
-    Parameters
-    ----------
-    fail_on : tuple of str, optional
-        Ids of findings, and severities, which mean themselves and what is worse; "warning" unless given.
-    ignore : tuple of str, optional
-        Ids of findings that are set aside.
-    limits : mapping of str to float, optional
-        The largest numbers allowed, by the names of LIMITS.
-    source : str, optional
-        Where it was asked for.
+    Args:
+        fail_on: Ids of findings, and severities, which mean themselves and what is worse; "warning" unless given.
+        ignore: Ids of findings that are set aside.
+        limits: The largest numbers allowed, by the names of LIMITS.
+        source: Where it was asked for.
 
-    Raises
-    ------
-    UnknownName
-        For what is no finding, severity or limit.
+    Raises: UnknownName for what is no finding, severity or limit.
 
-    Examples
-    --------
     >>> Gate(("fold",), ignore=("fodl",))
     Traceback (most recent call last):
     camviz_clinic.checks.gate.UnknownName: ignore: expected the id of a finding, got 'fodl'
@@ -78,15 +68,10 @@ class Gate:
     def told(self, failed_by: tuple[str, ...]) -> str:
         """The line that says by what the gate is failed, or that it is passed.
 
-        Parameters
-        ----------
-        failed_by : tuple of str
-            What decided, a name each.
+        Args:
+            failed_by: What decided, a name each.
 
-        Returns
-        -------
-        str
-            One sentence.
+        Returns: One sentence.
         """
         source = f" ({self.source})" if self.source else ""
         by = ", ".join(failed_by)
@@ -95,15 +80,10 @@ class Gate:
     def decides(self, finding: Finding) -> bool:
         """Whether a calibration with this finding fails.
 
-        Parameters
-        ----------
-        finding : Finding
-            What was found.
+        Args:
+            finding: What was found.
 
-        Returns
-        -------
-        bool
-            True where `fail_on` has its id, its severity or a milder one.
+        Returns: True where `fail_on` has its id, its severity or a milder one.
         """
         return finding.id in self.fail_on or self._decided_by(finding.severity)
 
@@ -114,15 +94,10 @@ class Gate:
     def judge(self, inspection: Inspection) -> Outcome:
         """The inspection without what is ignored, and what decides about it.
 
-        Parameters
-        ----------
-        inspection : Inspection
-            What was found.
+        Args:
+            inspection: What was found.
 
-        Returns
-        -------
-        Outcome
-            Whether it passed, and by what it failed.
+        Returns: Whether it passed, and by what it failed.
         """
         seen = inspection.ignoring(self.ignore)
         return Outcome(
@@ -134,15 +109,10 @@ class Gate:
 
         Ids of findings do not concern it.
 
-        Parameters
-        ----------
-        check : Check
-            What new pictures say of the calibration.
+        Args:
+            check: What new pictures say of the calibration.
 
-        Returns
-        -------
-        Audit
-            Whether it passed, and by what it failed.
+        Returns: Whether it passed, and by what it failed.
         """
         severity = {"fail": "fault", "warn": "warning"}
         decided = (each for each in check.judgements if each.verdict in severity)

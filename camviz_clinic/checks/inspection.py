@@ -31,31 +31,18 @@ class Inspection:
 
     The worst cause comes first, and what follows from a cause comes after it: see `camviz_clinic.checks.causes`.
 
-    Attributes
-    ----------
-    calibration : Calibration, optional
-        None where the file has a fault that leaves nothing to look at.
-    findings : tuple of Finding
-        What was found, and is not ignored.
-    checked : tuple of str
-        Ids of the findings that were looked for.
-    skipped : tuple of (str, str)
-        Ids of the others, each with the reason.
-    compare : Calibration, optional
-        What it was compared with.
-    source : Path, optional
-        The file, where it could not be read.
-    differences : tuple of Apart
-        By camera, from the calibration that it is compared with.
-    at : float, optional
-        A distance in metres at which errors are told.
-    ignored : tuple of Finding
-        What was found and is left out of `findings`.
-    made : tuple of Finding
-        What the checks made, before causes are told.
+    Attributes:
+        calibration: None where the file has a fault that leaves nothing to look at.
+        findings: What was found, and is not ignored.
+        checked: Ids of the findings that were looked for.
+        skipped: tuple of (str, str), ids of the others, each with the reason.
+        compare: What it was compared with.
+        source: The file, where it could not be read.
+        differences: By camera, from the calibration that it is compared with.
+        at: A distance in metres at which errors are told.
+        ignored: What was found and is left out of `findings`.
+        made: What the checks made, before causes are told.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz_clinic.calibration import Calibration
     >>> from camviz.cameras import Camera, Intrinsics
@@ -79,15 +66,10 @@ class Inspection:
     def of(cls, evidence: Evidence) -> Self:
         """Make every check for which there is evidence.
 
-        Parameters
-        ----------
-        evidence : Evidence
-            The calibration, and what is known beside it.
+        Args:
+            evidence: The calibration, and what is known beside it.
 
-        Returns
-        -------
-        Inspection
-            What they found.
+        Returns: Inspection, what they found.
         """
         findings: list[Finding] = []
         checked, skipped = [], []
@@ -111,15 +93,10 @@ class Inspection:
     def ignoring(self, ids: Collection[str]) -> Self:
         """The same without the findings of some ids, which neither count nor explain others; `ignored` has them.
 
-        Parameters
-        ----------
-        ids : collection of str
-            What to leave out.
+        Args:
+            ids: What to leave out.
 
-        Returns
-        -------
-        Inspection
-            Without them.
+        Returns: Inspection without them.
         """
         kept = tuple(each for each in self.made if each.id not in ids)
         left = by_causes((each for each in self.made if each.id in ids), kinds())
@@ -133,20 +110,14 @@ class Inspection:
     def as_json(self) -> str:
         """For programs, as strict JSON: cameras, findings, checked, skipped, ignored, as docs/clinic.md has them.
 
-        Returns
-        -------
-        str
-            JSON.
+        Returns: JSON.
         """
         return json_text(self.as_tree())
 
     def as_tree(self) -> dict[str, Any]:
         """What `as_json` writes, as dicts and lists.
 
-        Returns
-        -------
-        dict
-            Of what JSON can hold.
+        Returns: A dict of what JSON can hold.
         """
         cameras = self.calibration.cameras if self.calibration else {}
         return {
@@ -188,10 +159,7 @@ class Inspection:
     def as_text(self) -> str:
         """For people: the findings or that there are none, the calibration at a glance, and what was checked.
 
-        Returns
-        -------
-        str
-            Several lines.
+        Returns: Several lines.
         """
         glance = tuple(self.summary.lines()) if self.summary else ()
         said = words.text(self.findings, self.checked, self.skipped, self.next_step, glance, self.ignored)
@@ -213,35 +181,18 @@ def inspect(
 ) -> Inspection:
     """What is wrong with a calibration.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        What to look at.
-    compare : Calibration, optional
-        Another calibration of the same cameras.
-    pictures : mapping of str to tuple of int, optional
-        Sizes (width, height) in pixels of pictures, by their names, that the calibration is meant for.
-    board : Board, optional
-        The board as it was measured, where that is known.
-    at : float, optional
-        A distance in metres at which the error of a place is told.
-    baseline : float, optional
-        The length in metres of a pair's baseline as it was measured.
-    photographs : sequence of path, optional
-        Files that show the board.
+    Args:
+        calibration: What to look at.
+        compare: Another calibration of the same cameras.
+        pictures: Sizes (width, height) in pixels of pictures, by their names, that the calibration is meant for.
+        board: The board as it was measured, where that is known.
+        at: A distance in metres at which the error of a place is told.
+        baseline: The length in metres of a pair's baseline as it was measured.
+        photographs: Files that show the board.
 
-    Returns
-    -------
-    Inspection
-        Findings, with their remedies, and what was checked.
+    Returns: Findings, with their remedies, and what was checked.
+    Raises: ValueError for what is no Calibration, such as a path.
 
-    Raises
-    ------
-    ValueError
-        For what is no Calibration, such as a path.
-
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz_clinic.calibration import Calibration
     >>> from camviz.cameras import Camera, Intrinsics
@@ -288,29 +239,15 @@ def inspect_file(
 ) -> Inspection:
     """What is wrong with a calibration file, also with one that every other command refuses.
 
-    Parameters
-    ----------
-    path : str or PathLike
-        The file.
-    size : tuple of int, optional
-        Width and height in pixels, for files that do not hold them.
-    compare, pictures, board, at, baseline, photographs : optional
-        As of `inspect`.
-    prepare : callable, optional
-        May add to the Calibration that was read, such as the corners in pictures.
+    Args:
+        path: The file.
+        size: Width and height in pixels, for files that do not hold them.
+        compare, pictures, board, at, baseline, photographs: As of `inspect`.
+        prepare: May add to the Calibration that was read, such as the corners in pictures.
 
-    Returns
-    -------
-    Inspection
-        As of `inspect`; without a calibration where a fault leaves nothing to look at.
+    Returns: As of `inspect`; without a calibration where a fault leaves nothing to look at.
+    Raises: CalibrationError where the file is not a calibration at all.
 
-    Raises
-    ------
-    CalibrationError
-        Where the file is not a calibration at all.
-
-    Examples
-    --------
     >>> from pathlib import Path
     >>> _ = Path("calib.txt").write_text("P0: 700 0 600 0 0 700 180 0 0 0 1 0")
     >>> [finding.severity for finding in inspect_file("calib.txt", size=(1242, 375)).findings]

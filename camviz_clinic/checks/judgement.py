@@ -17,23 +17,14 @@ VERDICTS = ("fail", "warn", "inconclusive", "pass")  # the worst first
 class Judgement:
     """The verdict on one camera or pair, why, what evidence would settle it, and the numbers behind it.
 
-    Attributes
-    ----------
-    of : str
-        The camera, or the pair.
-    verdict : str
-        One of "fail", "warn", "inconclusive" and "pass".
-    reason : str
-        Why, in a sentence.
-    settle : str
-        What would settle it; empty where nothing is open.
-    facts : tuple of str
-        What was measured, in sentences.
-    numbers : mapping of str to Any
-        The same for programs.
+    Attributes:
+        of: The camera, or the pair.
+        verdict: One of "fail", "warn", "inconclusive" and "pass".
+        reason: Why, in a sentence.
+        settle: What would settle it; empty where nothing is open.
+        facts: What was measured, in sentences.
+        numbers: The same for programs.
 
-    Examples
-    --------
     >>> Judgement("camera", "pass", "camera: it holds.").verdict
     'pass'
     """
@@ -50,21 +41,13 @@ class Judgement:
 class Check:
     """What new pictures say of a calibration.
 
-    Attributes
-    ----------
-    limit : float
-        How far it may be off, in pixels.
-    judgements : tuple of Judgement
-        One for each camera or pair.
-    notes : tuple of str
-        What a reader should know.
-    holds : tuple of str
-        What the calibration holds for, in sentences.
-    contradictions : mapping of str to tuple of Contradiction
-        What the new pictures say against it, by camera.
+    Attributes:
+        limit: How far it may be off, in pixels.
+        judgements: One for each camera or pair.
+        notes: What a reader should know.
+        holds: What the calibration holds for, in sentences.
+        contradictions: What the new pictures say against it, by camera.
 
-    Examples
-    --------
     >>> Check(1.0, (Judgement("left", "pass", "left: 0.1 px."), Judgement("right", "warn", "right: 0.6 px."))).verdict
     'warn'
     """
@@ -88,10 +71,7 @@ class Check:
     def as_text(self) -> str:
         """For people: each verdict with its reason, what would settle it, and the numbers.
 
-        Returns
-        -------
-        str
-            Several lines.
+        Returns: Several lines.
         """
         lines = []
         for each in self.judgements:
@@ -106,10 +86,7 @@ class Check:
     def as_tree(self) -> dict[str, Any]:
         """For programs: verdict, limit_px, judgements, contradictions, holds and notes, as docs/clinic.md has them.
 
-        Returns
-        -------
-        dict
-            Of what JSON can hold.
+        Returns: A dict of what JSON can hold.
         """
         judgements = [asdict(each) | {"facts": list(each.facts)} for each in self.judgements]
         found = [{"of": name} | asdict(each) for name, several in self.contradictions.items() for each in several]
@@ -125,10 +102,7 @@ class Check:
     def as_json(self) -> str:
         """The same as strict JSON.
 
-        Returns
-        -------
-        str
-            JSON.
+        Returns: JSON.
         """
         return json_text(self.as_tree())
 

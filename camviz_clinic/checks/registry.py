@@ -32,37 +32,21 @@ STAGES = ("", "set-up", "corners", "solution")
 class Finding:
     """What is wrong, in one plain sentence, with the number that shows it.
 
-    Attributes
-    ----------
-    id : str
-        Its kind, one of `camviz_clinic.checks.kinds()`.
-    severity : str
-        "fault", "warning" or "note".
-    sentence : str
-        What is wrong.
-    value : float, optional
-        The number that shows it.
-    unit : str
-        Of the value.
-    camera : str, optional
-        The camera's name; None where the finding concerns all of them.
-    view : str
-        The name of the view that shows it.
-    causes : tuple of str
-        The most likely first.
-    remedy : str
-        What to do.
-    pictures : tuple of int
-        Indices of the views that it concerns.
-    consequence_of : str, optional
-        The id of the finding that explains it.
-    count : int
-        How many findings alike it stands for.
-    reach : float, optional
-        Pixels: what a cause explains is no more than that off.
+    Attributes:
+        id: Its kind, one of `camviz_clinic.checks.kinds()`.
+        severity: "fault", "warning" or "note".
+        sentence: What is wrong.
+        value: The number that shows it.
+        unit: Of the value.
+        camera: The camera's name; None where the finding concerns all of them.
+        view: The name of the view that shows it.
+        causes: The most likely first.
+        remedy: What to do.
+        pictures: Indices of the views that it concerns.
+        consequence_of: The id of the finding that explains it.
+        count: How many findings alike it stands for.
+        reach: Pixels: what a cause explains is no more than that off.
 
-    Examples
-    --------
     >>> from camviz_clinic.checks import kinds
     >>> finding = kinds()["fold"].found("camera: it folds.", 1.05, "focal lengths", "camera")
     >>> finding.severity, finding.value

@@ -32,17 +32,11 @@ class File:
 
     Its content is read once, when asked for.
 
-    Parameters
-    ----------
-    path : Path
-        Where it is.
-    size : tuple of int, optional
-        Width and height in pixels, for files that hold none.
-    mended : list of CalibrationError, optional
-        Takes the faults that were cured in reading. Without it a fault is an error.
+    Args:
+        path: Where it is.
+        size: Width and height in pixels, for files that hold none.
+        mended: Takes the faults that were cured in reading. Without it a fault is an error.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> _ = Path("camera.yaml").write_text("image_width: 640")
     >>> File(Path("camera.yaml")).section.number("image_width")
@@ -71,20 +65,11 @@ class File:
     def mapping(self, tree: Any) -> Section:
         """A tree that was read from this file, as a section.
 
-        Parameters
-        ----------
-        tree : Any
-            What a parser gave.
+        Args:
+            tree: What a parser gave.
 
-        Returns
-        -------
-        Section
-            Its keys.
-
-        Raises
-        ------
-        CalibrationError
-            Where it is no mapping.
+        Returns: Its keys.
+        Raises: CalibrationError where it is no mapping.
         """
         if not isinstance(tree, dict):
             what = _KINDS.get(type(tree)) or shown(tree)
@@ -98,39 +83,22 @@ class Format:
 
     `load` and `write`, the help of the commands, the table in docs/formats.md and the tests read these fields.
 
-    Parameters
-    ----------
-    name : str
-        One word, which `camviz convert --to` takes.
-    title : str
-        The program, or its file, as sentences name it: "ROS CameraInfo".
-    file : str
-        What such a file is usually called: "camera.yaml".
-    recognise : callable
-        True for a File of this format; may raise CalibrationError.
-    read : callable
-        From a File to a Calibration; raises CalibrationError for what it cannot take.
-    write : callable, optional
-        From a Calibration to the content; none where the format is only read.
-    endings : tuple of str, optional
-        Where these choose between forms, `write` takes the ending as its second argument.
-    most_cameras : int, optional
-        How many cameras such a file holds at most.
-    own_world : bool, optional
-        Whether the first camera may stand elsewhere than in the world's origin.
-    models : str, optional
-        The camera models it has.
-    says : str, optional
-        Its own conventions, in which it differs from ours.
-    lacks : str, optional
-        What beside `most_cameras` and `own_world` it has no place for.
-    example : bytes, optional
-        A small file, where `write` cannot make one.
-    rank : int, optional
-        Lower ranks are asked first: below 20 by name or first bytes, below 40 by text, then by keys.
+    Args:
+        name: One word, which `camviz convert --to` takes.
+        title: The program, or its file, as sentences name it: "ROS CameraInfo".
+        file: What such a file is usually called: "camera.yaml".
+        recognise: True for a File of this format; may raise CalibrationError.
+        read: From a File to a Calibration; raises CalibrationError for what it cannot take.
+        write: From a Calibration to the content; none where the format is only read.
+        endings: Where these choose between forms, `write` takes the ending as its second argument.
+        most_cameras: How many cameras such a file holds at most.
+        own_world: Whether the first camera may stand elsewhere than in the world's origin.
+        models: The camera models it has.
+        says: Its own conventions, in which it differs from ours.
+        lacks: What beside `most_cameras` and `own_world` it has no place for.
+        example: A small file, where `write` cannot make one.
+        rank: Lower ranks are asked first: below 20 by name or first bytes, below 40 by text, then by keys.
 
-    Examples
-    --------
     >>> from camviz_clinic.files import formats
     >>> formats()["kitti"].title, formats()["kitti"].lacks
     ('KITTI calib.txt', 'turned cameras, distortion, sizes that differ')
@@ -160,22 +128,12 @@ class Format:
     def content(self, calibration: Calibration, ending: str) -> Content:
         """What is written of a calibration.
 
-        Parameters
-        ----------
-        calibration : Calibration
-            What to write.
-        ending : str
-            Of the file, such as ".yaml".
+        Args:
+            calibration: What to write.
+            ending: Of the file, such as ".yaml".
 
-        Returns
-        -------
-        bytes or dict of str to bytes
-            Of a file, or of the files of a folder by name.
-
-        Raises
-        ------
-        CalibrationError
-            For what the format has no place for, and where it is only read.
+        Returns: bytes or dict of str to bytes, of a file, or of the files of a folder by name.
+        Raises: CalibrationError for what the format has no place for, and where it is only read.
         """
         if self.write is None:
             raise CalibrationError(f"{self.title} is read here, and not written")

@@ -22,27 +22,17 @@ def load(path: str | PathLike[str], *, size: Size | None = None, mend: bool = Fa
 
     The file is data: nothing in it is run.
 
-    Parameters
-    ----------
-    path : str or PathLike
-        The file. A COLMAP model may be named by its folder.
-    size : tuple of int, optional
-        Width and height in pixels, for files that do not hold them.
-    mend : bool, optional
-        Cure faults that have an obvious cure, such as a transposed K, and list them in `Calibration.faults`.
+    Args:
+        path: The file. A COLMAP model may be named by its folder.
+        size: tuple of int, width and height in pixels, for files that do not hold them.
+        mend: Cure faults that have an obvious cure, such as a transposed K, and list them in `Calibration.faults`.
 
-    Returns
-    -------
-    Calibration
-        The cameras in place, and what else the file holds.
+    Returns: The cameras in place, and what else the file holds.
 
-    Raises
-    ------
-    CalibrationError
-        For everything that is not such a calibration. It is a ValueError, and its message is one sentence.
+    Raises:
+        CalibrationError: For everything that is not such a calibration. It is a ValueError, and its message is one
+            sentence.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> rows = "P0: 700 0 600 0 0 700 180 0 0 0 1 0", "P1: 700 0 600 -350 0 700 180 0 0 0 1 0"
     >>> _ = Path("calib.txt").write_text("\n".join(rows))
@@ -60,23 +50,12 @@ def load(path: str | PathLike[str], *, size: Size | None = None, mend: bool = Fa
 def format_of(file: File) -> Format:
     """The format of a file or folder.
 
-    Parameters
-    ----------
-    file : File
-        What is to be read.
+    Args:
+        file: What is to be read.
 
-    Returns
-    -------
-    Format
-        The first one that recognises it.
+    Returns: The first one that recognises it.
+    Raises: CalibrationError where none knows it: it says what the file looks like.
 
-    Raises
-    ------
-    CalibrationError
-        Where none knows it: it says what the file looks like.
-
-    Examples
-    --------
     >>> from pathlib import Path
     >>> _ = Path("calib.txt").write_text("P0: 700 0 600 0 0 700 180 0 0 0 1 0")
     >>> format_of(File(Path("calib.txt"))).name

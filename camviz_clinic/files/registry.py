@@ -13,18 +13,9 @@ from camviz_clinic.files.format import Format
 def formats() -> Mapping[str, Format]:
     """The formats by name, in alphabetical order.
 
-    Returns
-    -------
-    mapping of str to Format
-        One for each module of `camviz_clinic.files` that has a FORMAT.
+    Returns: One for each module of `camviz_clinic.files` that has a FORMAT.
+    Raises: ValueError where two modules use one name.
 
-    Raises
-    ------
-    ValueError
-        Where two modules use one name.
-
-    Examples
-    --------
     >>> [name for name in formats() if name.startswith("co")]
     ['colmap', 'colmap-bin']
     """

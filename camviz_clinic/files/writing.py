@@ -39,27 +39,17 @@ def write(calibration: Calibration, path: str | PathLike[str], format: str) -> t
     Pixels, lenses and poses are written so that they are read back the same. The file appears under its name when it is
     complete; COLMAP's is a folder.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        What to write.
-    path : str or PathLike
-        Where to.
-    format : str
-        One of `formats()` that can be written.
+    Args:
+        calibration: What to write.
+        path: Where to.
+        format: One of `formats()` that can be written.
 
-    Returns
-    -------
-    tuple of str
-        In sentences what the format could not hold beside the cameras.
+    Returns: In sentences what the format could not hold beside the cameras.
 
-    Raises
-    ------
-    CalibrationError
-        For what the format has no place for, an unknown format, and a place that cannot be written to.
+    Raises:
+        CalibrationError: For what the format has no place for, an unknown format, and a place that cannot be written
+            to.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz.cameras import Camera, Intrinsics
     >>> one = Calibration({"camera": Camera(Intrinsics.from_fov(640, 480, 90))}, Path(), "a data sheet")
@@ -101,25 +91,13 @@ def _refuse_cameras(calibration: Calibration, format: Format) -> None:
 def alone(calibration: Calibration, name: str) -> Calibration:
     """One of the cameras and what was recorded of it, where it stands.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        Of several cameras.
-    name : str
-        The camera.
+    Args:
+        calibration: Of several cameras.
+        name: The camera.
 
-    Returns
-    -------
-    Calibration
-        Of this camera alone.
+    Returns: Calibration of this camera alone.
+    Raises: CalibrationError for a name that is none of theirs.
 
-    Raises
-    ------
-    CalibrationError
-        For a name that is none of theirs.
-
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz.cameras import Camera, Intrinsics
     >>> camera = Camera(Intrinsics.from_fov(640, 480, 90))
@@ -139,18 +117,11 @@ def alone(calibration: Calibration, name: str) -> Calibration:
 def from_first_camera(calibration: Calibration) -> Calibration:
     """The same cameras with the first one's frame as the world.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        Whose cameras stand anywhere.
+    Args:
+        calibration: Whose cameras stand anywhere.
 
-    Returns
-    -------
-    Calibration
-        With the first camera in the origin, looking along z.
+    Returns: Calibration with the first camera in the origin, looking along z.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz.cameras import Camera, Intrinsics, look_at
     >>> away = Camera(Intrinsics.from_fov(640, 480, 90), world_from_cam=look_at((3, 0, 0), (0, 0, 0)))

@@ -46,24 +46,14 @@ def inspect(
 ) -> ShownInspection:
     """What is wrong with a calibration, and what to do: `camviz_clinic.checks.inspect` for a notebook.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        What to look at.
-    compare : Calibration, optional
-        Another calibration of the same cameras.
-    pictures : mapping of str to tuple of int, optional
-        Sizes (width, height) in pixels of pictures, by their names, that the calibration is meant for.
-    board : Board, optional
-        The board as it was measured, where that is known.
+    Args:
+        calibration: What to look at.
+        compare: Another calibration of the same cameras.
+        pictures: Sizes (width, height) in pixels of pictures, by their names, that the calibration is meant for.
+        board: The board as it was measured, where that is known.
 
-    Returns
-    -------
-    ShownInspection
-        An Inspection that a notebook shows with every view of the clinic.
+    Returns: An Inspection that a notebook shows with every view of the clinic.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz.cameras import Camera, Intrinsics
     >>> camera = Camera(Intrinsics.from_fov(640, 480, 60))

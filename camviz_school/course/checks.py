@@ -61,21 +61,13 @@ _COLOURS = {
 class Verdict:
     """What the checker says. Shown by a notebook as a box in words, by a terminal as text; true when correct.
 
-    Attributes
-    ----------
-    exercise : str
-        Its name.
-    status : {"correct", "wrong", "unsolved", "hint"}
-        What the function is.
-    message : str
-        What to say.
-    hint : str
-        What to say next; empty where it is correct.
-    printed : str
-        What the function printed.
+    Attributes:
+        exercise: Its name.
+        status: What the function is.
+        message: What to say.
+        hint: What to say next; empty where it is correct.
+        printed: What the function printed.
 
-    Examples
-    --------
     >>> Verdict("00.double", "correct", "Twice.")
     ✓ Correct. Twice.
     """
@@ -113,24 +105,14 @@ def judge(exercise: Exercise, function: Any, rng: np.random.Generator | None = N
     Never raises for what the function does, and stops it when all its calls together take longer than
     camviz.views.patience allows.
 
-    Parameters
-    ----------
-    exercise : Exercise
-        What was asked.
-    function : Any
-        What the reader wrote; a function or not.
-    rng : Generator, optional
-        Where the cases are drawn from; unless given, one seeded by the operating system.
-    attempt : int, optional
-        1 is the first.
+    Args:
+        exercise: What was asked.
+        function: What the reader wrote; a function or not.
+        rng: Where the cases are drawn from; unless given, one seeded by the operating system.
+        attempt: 1 is the first.
 
-    Returns
-    -------
-    Verdict
-        With a stronger hint at each attempt.
+    Returns: Verdict with a stronger hint at each attempt.
 
-    Examples
-    --------
     >>> hints = "What is x by x?", "Multiply.", "x * ___"
     >>> square = Exercise("00.square", lambda x: x * x, lambda rng: [(rng.normal(),)], hints, "Yes.")
     >>> judge(square, lambda x: x**2, np.random.default_rng(1))

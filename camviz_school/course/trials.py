@@ -31,15 +31,10 @@ HINTS = 3
 class Misconception:
     """A known mistake.
 
-    Attributes
-    ----------
-    function : callable
-        Makes it.
-    explanation : str
-        What to say to someone whose answers match the function's everywhere.
+    Attributes:
+        function: Makes it.
+        explanation: What to say to someone whose answers match the function's everywhere.
 
-    Examples
-    --------
     >>> Misconception(lambda x: x**2, "This is the square.").explanation
     'This is the square.'
     """
@@ -54,36 +49,20 @@ class Exercise:
 
     Known mistakes, other right ways and other conventions are written below the exercise, under its decorators.
 
-    Parameters
-    ----------
-    name : str
-        "LESSON.FUNCTION".
-    reference : callable
-        Gives the answer, an array or a tuple of arrays.
-    cases : callable
-        From a Generator to fresh argument tuples, different each time and of several shapes.
-    hints : tuple of str
-        Three, one per try.
-    praise : str
-        What to say to a right answer.
-    tolerance : float, optional
-        Relative to 1 + the size of the answer.
-    shown : tuple of tuple, optional
-        The arguments printed in the lesson.
-    canonical : callable, optional
-        Brings answers that mean the same (a matrix up to scale) to one form before they are compared.
-    laws : tuple of callable, optional
-        Further statements, law(function, rng) -> complaint in words, or "" where it holds.
-    as_given : callable, optional
-        The faulty function with which the search for a bug begins.
+    Args:
+        name: "LESSON.FUNCTION".
+        reference: Gives the answer, an array or a tuple of arrays.
+        cases: From a Generator to fresh argument tuples, different each time and of several shapes.
+        hints: Three, one per try.
+        praise: What to say to a right answer.
+        tolerance: Relative to 1 + the size of the answer.
+        shown: The arguments printed in the lesson.
+        canonical: Brings answers that mean the same (a matrix up to scale) to one form before they are compared.
+        laws: Further statements, law(function, rng) -> complaint in words, or "" where it holds.
+        as_given: The faulty function with which the search for a bug begins.
 
-    Raises
-    ------
-    ValueError
-        For other than three hints, and a tolerance that is not positive.
+    Raises: ValueError for other than three hints, and a tolerance that is not positive.
 
-    Examples
-    --------
     >>> double = Exercise("00.double", lambda x: 2 * x, lambda rng: [(rng.normal(),)], ("a", "b", "c"), "Twice.")
     >>> @double.wrong("This is the square: it agrees at 2 and nowhere else.")
     ... def squared(x):
@@ -116,15 +95,10 @@ class Exercise:
     def wrong(self, explanation: str) -> Callable[[Function], Function]:
         """Decorates a wrong function that readers write.
 
-        Parameters
-        ----------
-        explanation : str
-            Speaks to the thought behind it.
+        Args:
+            explanation: Speaks to the thought behind it.
 
-        Returns
-        -------
-        callable
-            The decorator.
+        Returns: The decorator.
         """
 
         def remember(function: Function) -> Function:
@@ -136,15 +110,10 @@ class Exercise:
     def right(self, function: Function) -> Function:
         """Decorates another right way: OpenCV's function, the lesson's own formula, another order of the terms.
 
-        Parameters
-        ----------
-        function : callable
-            The other way.
+        Args:
+            function: The other way.
 
-        Returns
-        -------
-        callable
-            The same.
+        Returns: The same.
         """
         self.right_ways.append(function)
         return function
@@ -152,15 +121,10 @@ class Exercise:
     def convention(self, explanation: str) -> Callable[[Function], Function]:
         """Decorates a function that answers by another convention, and is accepted with a word about it.
 
-        Parameters
-        ----------
-        explanation : str
-            Says whose convention it is, and what the task's is.
+        Args:
+            explanation: Says whose convention it is, and what the task's is.
 
-        Returns
-        -------
-        callable
-            The decorator.
+        Returns: The decorator.
         """
 
         def remember(function: Function) -> Function:
@@ -188,17 +152,11 @@ class Exercise:
     def answer(self, arguments: Arguments, reference: Function | None = None) -> tuple[Array, ...]:
         """The right answer in canonical form.
 
-        Parameters
-        ----------
-        arguments : tuple
-            Of one call.
-        reference : callable, optional
-            Another reference.
+        Args:
+            arguments: tuple, of one call.
+            reference: Another reference.
 
-        Returns
-        -------
-        tuple of array (...)
-            One for each array of the answer.
+        Returns: tuple of (...), one for each array of the answer.
         """
         with quiet():
             return self.normalised((reference or self.reference)(*deepcopy(arguments)))
@@ -206,15 +164,10 @@ class Exercise:
     def normalised(self, result: Any) -> tuple[Array, ...]:
         """A result as float64 arrays in canonical form. Raises whatever numpy does for what is not numbers.
 
-        Parameters
-        ----------
-        result : Any
-            What a function returned.
+        Args:
+            result: What a function returned.
 
-        Returns
-        -------
-        tuple of array (...)
-            One for each array of the result.
+        Returns: tuple of (...), one for each array of the result.
         """
         parts = as_arrays(result)
         if self.canonical is None:
@@ -224,15 +177,10 @@ class Exercise:
     def same(self, actual: tuple[Array, ...], expected: tuple[Array, ...]) -> bool:
         """Whether two answers have the same shapes and agree to the tolerance; NaN equals NaN.
 
-        Parameters
-        ----------
-        actual, expected : tuple of array (...)
-            Answers in canonical form, in the exercise's unit.
+        Args:
+            actual, expected: tuple of (...), answers in canonical form, in the exercise's unit.
 
-        Returns
-        -------
-        bool
-            True where they are the same.
+        Returns: True where they are the same.
         """
         if [part.shape for part in actual] != [part.shape for part in expected]:
             return False
@@ -241,15 +189,10 @@ class Exercise:
     def close(self, actual: Array, expected: Array) -> NDArray[np.bool_]:
         """Element by element, whether an answer agrees to the tolerance.
 
-        Parameters
-        ----------
-        actual, expected : array (...)
-            Answers in the exercise's unit.
+        Args:
+            actual, expected: (...), answers in the exercise's unit.
 
-        Returns
-        -------
-        array (...) of bool
-            True where they agree; NaN equals NaN.
+        Returns: (...) of bool, True where they agree; NaN equals NaN.
         """
         with quiet():
             return np.isclose(actual, expected, rtol=self.tolerance, atol=self.tolerance, equal_nan=True)
@@ -257,15 +200,10 @@ class Exercise:
     def call(self, arguments: Arguments) -> str:
         """The call as a reader would write it; a larger array stands as its shape.
 
-        Parameters
-        ----------
-        arguments : tuple
-            Of the call.
+        Args:
+            arguments: tuple, of the call.
 
-        Returns
-        -------
-        str
-            Python within double backquotes.
+        Returns: Python within double backquotes.
         """
         pairs = zip(self.parameters, arguments, strict=False)
         return f"``{self.name.split('.')[-1]}({', '.join(f'{name}={_short(value)}' for name, value in pairs)})``"

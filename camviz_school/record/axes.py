@@ -13,24 +13,14 @@ class Axis:
 
     Numbers lie on a slider and can be thinned; words and switches are recorded all.
 
-    Parameters
-    ----------
-    name : str
-        By which the widget's JavaScript sends it.
-    first : object
-        The value to begin with.
-    values : tuple
-        All values, in order.
-    period : float, optional
-        Of an angle in degrees, 360; 0 for what does not come round.
+    Args:
+        name: By which the widget's JavaScript sends it.
+        first: The value to begin with.
+        values: All values, in order.
+        period: Of an angle in degrees, 360; 0 for what does not come round.
 
-    Raises
-    ------
-    ValueError
-        Where the first value is none of the values.
+    Raises: ValueError where the first value is none of the values.
 
-    Examples
-    --------
     >>> Axis.choice("show", ("left", "right"), "left").is_number
     False
     """
@@ -48,26 +38,15 @@ class Axis:
     def slider(cls, name: str, low: float, high: float, step: float, first: float, most: int = 41) -> Axis:
         """At most so many values from one end to the other, each on a step, and the first value among them.
 
-        Parameters
-        ----------
-        name : str
-            Of the axis.
-        low, high : float
-            The ends, in the slider's own unit.
-        step : float
-            From one place of the slider to the next.
-        first : float
-            The value to begin with.
-        most : int, optional
-            How many values, at least 3.
+        Args:
+            name: Of the axis.
+            low, high: The ends, in the slider's own unit.
+            step: From one place of the slider to the next.
+            first: The value to begin with.
+            most: How many values, at least 3.
 
-        Returns
-        -------
-        Axis
-            With its values in order.
+        Returns: Axis with its values in order.
 
-        Examples
-        --------
         >>> Axis.slider("k1", -0.5, 0.5, 0.1, 0.25, most=5).values
         (-0.5, -0.3, 0.0, 0.25, 0.5)
         """
@@ -84,19 +63,12 @@ class Axis:
     def choice(cls, name: str, values: Iterable[Any], first: Any) -> Axis:
         """Words of which one is chosen, or False and True.
 
-        Parameters
-        ----------
-        name : str
-            Of the axis.
-        values : iterable of object
-            What can be chosen.
-        first : object
-            What is chosen to begin with.
+        Args:
+            name: Of the axis.
+            values: What can be chosen.
+            first: What is chosen to begin with.
 
-        Returns
-        -------
-        Axis
-            With all the values.
+        Returns: Axis with all the values.
         """
         return cls(name, first, tuple(values))
 
@@ -104,22 +76,13 @@ class Axis:
     def turn(cls, name: str, first: float, most: int = 24) -> Axis:
         """Angles in degrees, all around, from the first on.
 
-        Parameters
-        ----------
-        name : str
-            Of the axis.
-        first : float
-            The angle to begin with, in degrees.
-        most : int, optional
-            How many angles.
+        Args:
+            name: Of the axis.
+            first: The angle to begin with, in degrees.
+            most: How many angles.
 
-        Returns
-        -------
-        Axis
-            With a period of 360.
+        Returns: Axis with a period of 360.
 
-        Examples
-        --------
         >>> Axis.turn("eye", 30.0, most=4).values
         (30.0, 120.0, 210.0, 300.0)
         """
@@ -133,18 +96,11 @@ class Axis:
     def thinned(self, count: int) -> tuple[Any, ...]:
         """Some of the values, evenly, the first one among them; of words, all.
 
-        Parameters
-        ----------
-        count : int
-            How many at most, at least 3.
+        Args:
+            count: How many at most, at least 3.
 
-        Returns
-        -------
-        tuple
-            In order.
+        Returns: In order.
 
-        Examples
-        --------
         >>> Axis.slider("x", 0, 10, 1, 3).thinned(3)
         (0, 3, 10)
         """

@@ -26,8 +26,6 @@ EYE = "eye"
 class Pane(Protocol):
     """A widget as `record` takes it. `Explored` is that of an `Explorer`, `Widget` that of any anywidget.
 
-    Examples
-    --------
     >>> class Clock(Widget):  # a pane of one's own begins with another's
     ...     @property
     ...     def traits(self):
@@ -55,24 +53,16 @@ class Pane(Protocol):
     def frame(self, values: Values) -> dict[str, Any]:
         """The traits that change, as the kernel answers to these values. Bytes among them must be JPEG or PNG.
 
-        Parameters
-        ----------
-        values : mapping of str to object
-            A value for each axis by its name.
+        Args:
+            values: mapping of str to object, a value for each axis by its name.
 
-        Returns
-        -------
-        dict of str to object
-            The traits by their names.
+        Returns: The traits by their names.
         """
 
     def still(self) -> Picture | None:
         """What stands on the page before any script.
 
-        Returns
-        -------
-        Picture or None
-            None for nothing.
+        Returns: None for nothing.
         """
 
 
@@ -80,22 +70,14 @@ class Pane(Protocol):
 class Widget:
     """Any anywidget whose kernel answers to values: those of its traits are set, others are sent in one message.
 
-    Parameters
-    ----------
-    widget : AnyWidget
-        Whose kernel is asked.
-    axes : tuple of Axis
-        What is moved.
-    title : str
-        The pane's name.
-    together : tuple of str, optional
-        Axes whose combinations are recorded.
-    send : callable, optional
-        Makes the message of the values, where the widget's JavaScript sends another one than {name: value, …}. It must
-        have the values in a dict of its own, under "values", for the page to find them.
+    Args:
+        widget: Whose kernel is asked.
+        axes: What is moved.
+        title: The pane's name.
+        together: Axes whose combinations are recorded.
+        send: Makes the message of the values, where the widget's JavaScript sends another one than {name: value, …}. It
+            must have the values in a dict of its own, under "values", for the page to find them.
 
-    Examples
-    --------
     >>> import anywidget, traitlets
     >>> class Dot(anywidget.AnyWidget):
     ...     _esm = "export default { render() {} }"
@@ -123,15 +105,10 @@ class Widget:
     def frame(self, values: Values) -> dict[str, Any]:
         """The traits as the kernel answers to these values.
 
-        Parameters
-        ----------
-        values : mapping of str to object
-            A value for each axis by its name.
+        Args:
+            values: mapping of str to object, a value for each axis by its name.
 
-        Returns
-        -------
-        dict of str to object
-            All traits that are synchronised, by their names.
+        Returns: All traits that are synchronised, by their names.
         """
         own = set(self.widget.traits(sync=True)) - set(anywidget.AnyWidget.class_traits(sync=True))
         own = {name for name in own if name not in ("_esm", "_css", "_anywidget_id")}
@@ -145,10 +122,7 @@ class Widget:
     def still(self) -> Picture | None:
         """Nothing: only the widget's JavaScript knows how to draw.
 
-        Returns
-        -------
-        None
-            Nothing stands on the page before the script.
+        Returns: Nothing stands on the page before the script.
         """
         return None
 

@@ -26,8 +26,6 @@ PLAYER = "replay.js"
 class BudgetError(ValueError):
     """A pane that is too large for its budget, even with the fewest positions.
 
-    Examples
-    --------
     >>> issubclass(BudgetError, ValueError)
     True
     """
@@ -37,17 +35,12 @@ class BudgetError(ValueError):
 class Budget:
     """What a pane may cost, and how many positions it may have.
 
-    Parameters
-    ----------
-    size : int, optional
-        In bytes as transferred (gzip), all its photographs included.
-    positions : int, optional
-        States that are drawn. A pane whose fewest positions are more keeps those.
-    slider, grid, orbit : int, optional
-        Positions at most: of a slider, of a slider among those that belong together, of the onlooker all around.
+    Args:
+        size: In bytes as transferred (gzip), all its photographs included.
+        positions: States that are drawn. A pane whose fewest positions are more keeps those.
+        slider, grid, orbit: Positions at most: of a slider, of a slider among those that belong together, of the
+            onlooker all around.
 
-    Examples
-    --------
     >>> Budget().count(Axis.slider("k1", -1, 1, 0.01, 0), 0.5, together=False)
     20
     """
@@ -61,19 +54,12 @@ class Budget:
     def count(self, axis: Axis, share: float, *, together: bool) -> int:
         """At how many positions an axis is recorded, of a slider at least its ends and its first value.
 
-        Parameters
-        ----------
-        axis : Axis
-            What is moved.
-        share : float
-            Of the most positions, 0 … 1.
-        together : bool
-            Whether the axis is one of those whose combinations are recorded.
+        Args:
+            axis: What is moved.
+            share: Of the most positions, 0 … 1.
+            together: Whether the axis is one of those whose combinations are recorded.
 
-        Returns
-        -------
-        int
-            At least 3.
+        Returns: At least 3.
         """
         most = self.grid if together else self.orbit if axis.period else self.slider
         return max(3, round(share * most))
@@ -96,29 +82,17 @@ class Sheet:
 class Recording:
     """A recorded pane: its files in a folder, what it holds, what it cost, and how it stands on a page.
 
-    Attributes
-    ----------
-    title : str
-        The pane's name.
-    folder : Path
-        Where the files are.
-    pack : str
-        The name of the script that holds all texts.
-    files : tuple of str
-        The names of all files that the page needs, `pack` and photographs among them.
-    positions : int
-        States that were drawn.
-    counts : dict of str to int
-        Positions of each axis by its name.
-    size : int
-        Bytes as transferred (gzip) once all photographs are there; the stills of `html` come on top.
-    still : Picture or None
-        What stands on the page before any script.
-    controls : int, optional
-        Of the pane, for which `html` keeps room.
+    Attributes:
+        title: The pane's name.
+        folder: Where the files are.
+        pack: The name of the script that holds all texts.
+        files: The names of all files that the page needs, `pack` and photographs among them.
+        positions: States that were drawn.
+        counts: Positions of each axis by its name.
+        size: Bytes as transferred (gzip) once all photographs are there; the stills of `html` come on top.
+        still: What stands on the page before any script.
+        controls: Of the pane, for which `html` keeps room.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> Recording("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, None).html("dots/")[:63]
     '<div class="camviz-recorded" data-recording="dots/d.js" data-po'
@@ -140,20 +114,11 @@ class Recording:
         Before any script, and without JavaScript, it is the first picture: an external SVG a tile, with its alternative
         text.
 
-        Parameters
-        ----------
-        base : str, optional
-            The folder's address from the page, with its "/".
+        Args:
+            base: The folder's address from the page, with its "/".
 
-        Returns
-        -------
-        str
-            HTML, one element.
-
-        Raises
-        ------
-        OSError
-            Where the folder cannot be written.
+        Returns: HTML, one element.
+        Raises: OSError where the folder cannot be written.
         """
         stills = _room(self.controls) + _stills(self.still, self.folder, base) if self.still else ""
         words = f"A still picture. With JavaScript it moves: {self.positions} positions are recorded."
@@ -170,27 +135,14 @@ def record(widget: Explorer | Pane, folder: str | Path, *, budget: Budget | None
     in each of its values, the axes that belong together in all combinations, and the onlooker from all around. Where
     they would be too many or too large, positions are thinned. The same budget gives the same positions on any machine.
 
-    Parameters
-    ----------
-    widget : Explorer or Pane
-        What is recorded.
-    folder : str or Path
-        Where the files go; it is made if need be.
-    budget : Budget, optional
-        What the pane may cost.
+    Args:
+        widget: What is recorded.
+        folder: Where the files go; it is made if need be.
+        budget: What the pane may cost.
 
-    Returns
-    -------
-    Recording
-        What is in the folder.
+    Returns: What is in the folder.
+    Raises: BudgetError where the fewest positions are still too large.
 
-    Raises
-    ------
-    BudgetError
-        Where the fewest positions are still too large.
-
-    Examples
-    --------
     >>> import anywidget, traitlets
     >>> from camviz_school.record import Axis, Widget
     >>> class Dot(anywidget.AnyWidget):
@@ -206,18 +158,11 @@ def record(widget: Explorer | Pane, folder: str | Path, *, budget: Budget | None
 def write_player(folder: str | Path) -> Path:
     """Write `replay.js` into a folder; a page loads it as <script src="replay.js" defer></script>.
 
-    Parameters
-    ----------
-    folder : str or Path
-        It is made if need be.
+    Args:
+        folder: It is made if need be.
 
-    Returns
-    -------
-    Path
-        Of the script.
+    Returns: Path of the script.
 
-    Examples
-    --------
     >>> write_player("recorded").name
     'replay.js'
     """

@@ -66,27 +66,17 @@ class Membership:
 def join(word: str, address: str = "") -> Membership:
     """Join the room that has this word, and keep the way in for this user's notebooks, in place of another.
 
-    Parameters
-    ----------
-    word : str
-        What the projector shows; a whole link such as `http://192.168.4.1:8787/#prism-4817` can stand in its place.
-    address : str, optional
-        What the projector shows; without it CAMVIZ_ROOM says it, else it is this machine.
+    Args:
+        word: What the projector shows; a whole link such as `http://192.168.4.1:8787/#prism-4817` can stand in its
+            place.
+        address: What the projector shows; without it CAMVIZ_ROOM says it, else it is this machine.
 
-    Returns
-    -------
-    Membership
-        Where, with which word, and until when.
+    Returns: Where, with which word, and until when.
 
-    Raises
-    ------
-    RefusedError
-        For a wrong word.
-    NotReachedError
-        Where no room answers.
+    Raises:
+        RefusedError: For a wrong word.
+        NotReachedError: Where no room answers.
 
-    Examples
-    --------
     >>> try:
     ...     join("prism-4817", "http://127.0.0.1:9")
     ... except OSError as error:

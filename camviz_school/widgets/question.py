@@ -212,23 +212,12 @@ class QuestionWidget(StillWidget):
 def ask(name: str) -> QuestionWidget | Sheet:
     """A question to be answered before going on.
 
-    Parameters
-    ----------
-    name : str
-        "LESSON.ID".
+    Args:
+        name: "LESSON.ID".
 
-    Returns
-    -------
-    QuestionWidget or Sheet
-        Live in a notebook; a page of folded replies elsewhere.
+    Returns: Live in a notebook; a page of folded replies elsewhere.
+    Raises: ValueError where there is no such question.
 
-    Raises
-    ------
-    ValueError
-        Where there is no such question.
-
-    Examples
-    --------
     >>> print(str(ask("05.far_rays")).splitlines()[0])
     Predict
     """
@@ -238,27 +227,14 @@ def ask(name: str) -> QuestionWidget | Sheet:
 def quiz(lesson: str, form: str = "B", when: str = "") -> QuestionWidget | Sheet:
     """A form of a lesson's quiz: A before it, without replies, B after it, with replies and a score.
 
-    Parameters
-    ----------
-    lesson : str
-        Its two digits.
-    form : {"B", "A"}, optional
-        Which form.
-    when : {"", "before", "after"}, optional
-        Asks a form at the other end: half of a class can so answer B first and A last.
+    Args:
+        lesson: Its two digits.
+        form: {"B", "A"}, which form.
+        when: {"", "before", "after"}, asks a form at the other end: half of a class can so answer B first and A last.
 
-    Returns
-    -------
-    QuestionWidget or Sheet
-        Live in a notebook; a page elsewhere, with folded replies where they may be seen.
+    Returns: Live in a notebook; a page elsewhere, with folded replies where they may be seen.
+    Raises: ValueError where the lesson has no such form, and for another `when`.
 
-    Raises
-    ------
-    ValueError
-        Where the lesson has no such form, and for another `when`.
-
-    Examples
-    --------
     >>> quiz("05", "A").silent, quiz("05").silent  # before the lesson nothing is told
     (True, False)
     """

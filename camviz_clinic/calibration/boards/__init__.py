@@ -24,13 +24,8 @@ COMMONEST = "chessboard"
 def kinds() -> Mapping[str, Kind]:
     """The kinds by name, the chessboard first and the others in alphabetical order.
 
-    Returns
-    -------
-    mapping of str to Kind
-        One for each module of this package that has a KIND.
+    Returns: One for each module of this package that has a KIND.
 
-    Examples
-    --------
     >>> list(kinds())
     ['chessboard', 'aprilgrid', 'asymmetric-circles', 'charuco', 'circles']
     """
@@ -43,23 +38,12 @@ def kinds() -> Mapping[str, Kind]:
 def kind_of(board: Shape) -> Kind:
     """The kind of a board.
 
-    Parameters
-    ----------
-    board : Shape
-        A `Board`, or what has its fields.
+    Args:
+        board: A `Board`, or what has its fields.
 
-    Returns
-    -------
-    Kind
-        The one of its name.
+    Returns: The one of its name.
+    Raises: ValueError for a name that is none.
 
-    Raises
-    ------
-    ValueError
-        For a name that is none.
-
-    Examples
-    --------
     >>> from camviz_clinic.calibration import Board
     >>> board = Board(9, 6, 0.025)
     >>> kind_of(board).says(board)

@@ -17,8 +17,6 @@ Area = tuple[float, float, float, float]
 class Shape(Protocol):
     """The fields of a `Board`, which is also what a process that looks for boards is sent.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration.boards.kind import regular
     >>> from camviz_clinic.calibration import Board
     >>> regular(Board(2, 2, 0.025))  # a function of a Shape takes a Board
@@ -52,15 +50,10 @@ class Shape(Protocol):
 class Drawing:
     """What of a board is black, in its own frame: x to the right, y down, its first point at (0, 0).
 
-    Parameters
-    ----------
-    rectangles : array (n, 4), optional
-        x and y of the upper left, width and height, in metres.
-    discs : array (n, 3), optional
-        x and y of the middle and the diameter, in metres.
+    Args:
+        rectangles: (n, 4), x and y of the upper left, width and height, in metres.
+        discs: (n, 3), x and y of the middle and the diameter, in metres.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration import Board
     >>> board = Board(9, 6, 0.025)
     >>> from camviz_clinic.calibration.boards import kind_of
@@ -78,40 +71,24 @@ class Kind:
 
     The functions take a `Shape`. People count a board by what `counts` says and measure what `sized` says.
 
-    Parameters
-    ----------
-    name, title : str
-        One word, and the words for people.
-    counts : str
-        What people count: `per` points stand along each side of one.
-    points : callable
-        Gives the points (columns * rows, 2) in metres, row by row from the upper left, y down; the first is (0, 0).
-    area : callable
-        Gives left, top, right and bottom in metres of the board with the white that its finder needs.
-    drawn : callable
-        Gives what is black, a Drawing.
-    find : callable
-        Takes a grey picture (height, width) of 8 bits, a shape and one of `finding.FINDERS`. Gives the points in
-        pixels, (columns * rows, 2), NaN where one was not seen, or None.
-    check : callable
-        Raises ValueError for a board that cannot be.
-    says, measures : callable
-        Describe a board, and its sizes, in words.
-    options : callable
-        Says how the commands are told of it.
-    sized : str
-        What people measure, such as "squares".
-    size : callable
-        Gives that in metres.
-    advice : str
-        What to look at where it is not found.
-    partial : bool, optional
-        Whether the board need not be seen as a whole.
-    per : int, optional
-        Points along each side of a thing that is counted.
+    Args:
+        name, title: One word, and the words for people.
+        counts: What people count: `per` points stand along each side of one.
+        points: Gives the points (columns * rows, 2) in metres, row by row from the upper left, y down; the first is (0,
+            0).
+        area: Gives left, top, right and bottom in metres of the board with the white that its finder needs.
+        drawn: Gives what is black, a Drawing.
+        find: Takes a grey picture (height, width) of 8 bits, a shape and one of `finding.FINDERS`. Gives the points in
+            pixels, (columns * rows, 2), NaN where one was not seen, or None.
+        check: Raises ValueError for a board that cannot be.
+        says, measures: Describe a board, and its sizes, in words.
+        options: Says how the commands are told of it.
+        sized: What people measure, such as "squares".
+        size: Gives that in metres.
+        advice: What to look at where it is not found.
+        partial: Whether the board need not be seen as a whole.
+        per: Points along each side of a thing that is counted.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration.boards import kinds
     >>> kinds()["aprilgrid"].counts, kinds()["aprilgrid"].per
     ('tags', 2)

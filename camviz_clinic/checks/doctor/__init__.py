@@ -22,13 +22,8 @@ __all__ = ["Diagnosis", "Shown", "Trouble", "diagnose", "prescription", "trouble
 def troubles() -> Mapping[str, Trouble]:
     """Every trouble by its name, in alphabetical order of the files.
 
-    Returns
-    -------
-    mapping of str to Trouble
-        One for each that a module of this package declares.
+    Returns: One for each that a module of this package declares.
 
-    Examples
-    --------
     >>> troubles()["legacy pattern"].cause[:15]
     'a ChArUco board'
     """
@@ -40,20 +35,12 @@ def troubles() -> Mapping[str, Trouble]:
 def diagnose(shown: Shown, finding: str | None = None) -> tuple[Diagnosis, ...]:
     """What of a board is not as described, as its pictures show it.
 
-    Parameters
-    ----------
-    shown : Shown
-        The pictures, and the board as it was described.
-    finding : str, optional
-        Look only for what is this finding.
+    Args:
+        shown: The pictures, and the board as it was described.
+        finding: Look only for what is this finding.
 
-    Returns
-    -------
-    tuple of Diagnosis
-        Each with the option that mends it; empty where the pictures show nothing.
+    Returns: Each with the option that mends it; empty where the pictures show nothing.
 
-    Examples
-    --------
     >>> from dataclasses import replace
     >>> from camviz_clinic.calibration import Board
     >>> from camviz_clinic.calibration.boards.picture import whiteness
@@ -69,18 +56,11 @@ def diagnose(shown: Shown, finding: str | None = None) -> tuple[Diagnosis, ...]:
 def prescription(diagnoses: Sequence[Diagnosis]) -> str:
     """What diagnoses say, in one line that ends with the options to try.
 
-    Parameters
-    ----------
-    diagnoses : sequence of Diagnosis
-        Of one board.
+    Args:
+        diagnoses: Of one board.
 
-    Returns
-    -------
-    str
-        One line; empty where there is none.
+    Returns: One line; empty where there is none.
 
-    Examples
-    --------
     >>> prescription([Diagnosis("sides swapped", "a slip", "The board has 8×5 inner corners.", "--board 8x5")])
     'The board has 8×5 inner corners: try --board 8x5.'
     """

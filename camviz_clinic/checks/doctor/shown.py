@@ -27,21 +27,13 @@ FEWEST = 3  # inner corners along a side: no finder takes a smaller board
 class Shown:
     """Pictures that should show a board, and the board as it was described.
 
-    Parameters
-    ----------
-    board : Board
-        As it was described.
-    pictures : mapping of str to array (height, width) or path
-        Grey, 8 bits, or files, by the names that they have.
-    calibration : Calibration, optional
-        What was solved from them.
-    baseline : float, optional
-        The distance of its pair's cameras in metres as somebody measured it.
-    both : tuple of Detections, optional
-        The corners that a pair's left and right camera saw, where they gave no calibration.
+    Args:
+        board: As it was described.
+        pictures: mapping of str to (height, width) or path, grey, 8 bits, or files, by the names that they have.
+        calibration: What was solved from them.
+        baseline: The distance of its pair's cameras in metres as somebody measured it.
+        both: The corners that a pair's left and right camera saw, where they gave no calibration.
 
-    Examples
-    --------
     >>> from camviz_clinic.calibration import Board
     >>> Shown(Board(9, 6, 0.025), {"a.png": np.zeros((480, 640), np.uint8)}).gray("a.png").shape
     (480, 640)
@@ -57,32 +49,21 @@ class Shown:
     def of(cls, paths: Sequence[str | PathLike[str]], board: Board) -> Shown:
         """The pictures in files.
 
-        Parameters
-        ----------
-        paths : sequence of path
-            The files.
-        board : Board
-            As it was described.
+        Args:
+            paths: The files.
+            board: As it was described.
 
-        Returns
-        -------
-        Shown
-            The files by their paths; they are read when asked for.
+        Returns: The files by their paths; they are read when asked for.
         """
         return cls(board, {fspath(path): path for path in paths})
 
     def gray(self, name: str) -> NDArray[np.uint8] | None:
         """A picture by its name, or by the last part of it where that is the name of one alone.
 
-        Parameters
-        ----------
-        name : str
-            A name, or the last part of a path.
+        Args:
+            name: A name, or the last part of a path.
 
-        Returns
-        -------
-        array (height, width) of uint8, or None
-            Grey; None where there is no such picture, or it cannot be read.
+        Returns: (height, width) of uint8, or None, grey; None where there is no such picture, or it cannot be read.
         """
         alike = [each for each in self.pictures if name == each] or [
             each for each in self.pictures if PurePath(each).name == PurePath(name).name

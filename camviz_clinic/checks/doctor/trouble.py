@@ -15,23 +15,14 @@ Seen = tuple[str, str] | tuple[str, str, float, str]
 class Diagnosis:
     """What the pictures show, in one sentence, and the option of the commands that mends it.
 
-    Attributes
-    ----------
-    trouble : str
-        The name of the Trouble.
-    cause : str
-        What it comes from.
-    sentence : str
-        What the pictures show.
-    option : str
-        What mends it; "no …" for an option that is to be left out.
-    value : float, optional
-        A number that shows it.
-    unit : str
-        Of the value.
+    Attributes:
+        trouble: The name of the Trouble.
+        cause: What it comes from.
+        sentence: What the pictures show.
+        option: What mends it; "no …" for an option that is to be left out.
+        value: A number that shows it.
+        unit: Of the value.
 
-    Examples
-    --------
     >>> Diagnosis("sides swapped", "a slip", "The board has 8×5 inner corners.", "--board 8x5").option
     '--board 8x5'
     """
@@ -48,20 +39,13 @@ class Diagnosis:
 class Trouble:
     """One way in which a board is not as described.
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    cause : str
-        What it comes from.
-    examine : callable
-        Takes Shown; gives a sentence, an option, and perhaps a number and its unit for what it sees, and nothing where
-        it sees nothing.
-    finding : str, optional
-        The id under which an inspection has it.
+    Args:
+        name: Its name.
+        cause: What it comes from.
+        examine: Takes Shown; gives a sentence, an option, and perhaps a number and its unit for what it sees, and
+            nothing where it sees nothing.
+        finding: The id under which an inspection has it.
 
-    Examples
-    --------
     >>> from camviz_clinic.checks.doctor import troubles
     >>> troubles()["wrong unit"].finding
     'baseline-scale'
@@ -75,15 +59,10 @@ class Trouble:
     def diagnoses(self, shown: Shown) -> Iterable[Diagnosis]:
         """What of this the pictures show.
 
-        Parameters
-        ----------
-        shown : Shown
-            The pictures, and the board as it was described.
+        Args:
+            shown: The pictures, and the board as it was described.
 
-        Yields
-        ------
-        Diagnosis
-            Each with the option that mends it.
+        Yields: Each with the option that mends it.
         """
         for seen in self.examine(shown):
             yield Diagnosis(self.name, self.cause, *seen)

@@ -26,13 +26,8 @@ ORDER = (
 def kinds() -> Mapping[str, Kind]:
     """Every kind of finding by its id, in the order of the checks.
 
-    Returns
-    -------
-    mapping of str to Kind
-        With the words of each and its check.
+    Returns: With the words of each and its check.
 
-    Examples
-    --------
     >>> kinds()["fold"].severity
     'fault'
     """
@@ -42,13 +37,8 @@ def kinds() -> Mapping[str, Kind]:
 def faults() -> Mapping[str, Fault]:
     """Every fault that can be put into a virtual calibration, by its name.
 
-    Returns
-    -------
-    mapping of str to Fault
-        Each with the id of the finding that must name it.
+    Returns: Each with the id of the finding that must name it.
 
-    Examples
-    --------
     >>> faults()["warped board"].finding
     'board-warp'
     """

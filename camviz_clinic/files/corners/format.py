@@ -28,13 +28,9 @@ MISSING = ("-", "", "nan")  # what stands for a coordinate where no corner was s
 class CornerFile:
     r"""A text file that may hold corners. Its content is read once, when asked for.
 
-    Parameters
-    ----------
-    path : Path
-        Where it is.
+    Args:
+        path: Where it is.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> _ = Path("corners.vnl").write_text("# filename x y\n\nleft.png 10 20\n")
     >>> list(CornerFile(Path("corners.vnl")).lines)
@@ -63,15 +59,10 @@ class CornerFile:
 class Given:
     """What the caller says of corner files; what a file says itself must agree.
 
-    Parameters
-    ----------
-    shape : tuple of int, optional
-        The board's inner corners as (columns, rows).
-    square_size : float, optional
-        Side of a square in metres.
+    Args:
+        shape: The board's inner corners as (columns, rows).
+        square_size: Side of a square in metres.
 
-    Examples
-    --------
     >>> Given(shape=(9, 6)).board(square_size=0.025).square_size  # the one from the caller, the other from the file
     0.025
     """
@@ -82,22 +73,12 @@ class Given:
     def board(self, shape: tuple[int, int] | None = None, square_size: float | None = None) -> Board:
         """The board of a file that says so much of it.
 
-        Parameters
-        ----------
-        shape : tuple of int, optional
-            What the file says: inner corners as (columns, rows).
-        square_size : float, optional
-            What the file says: side of a square in metres.
+        Args:
+            shape: What the file says: inner corners as (columns, rows).
+            square_size: What the file says: side of a square in metres.
 
-        Returns
-        -------
-        Board
-            A chessboard.
-
-        Raises
-        ------
-        CalibrationError
-            Where something is missing or contradicts.
+        Returns: A chessboard.
+        Raises: CalibrationError where something is missing or contradicts.
         """
         columns, rows = self._one("inner corners", self.shape, shape, "--board COLUMNSxROWS (inner corners)")
         side = self._one("side of a square", self.square_size, square_size, "--square-mm MM")
@@ -120,24 +101,16 @@ class Given:
 class Corners:
     r"""What corner files hold: the corners of a board by picture.
 
-    Attributes
-    ----------
-    board : Board
-        What was seen.
-    pictures : mapping of str to array (columns * rows, 2)
-        Pixels by picture, the first pixel's centre at (0, 0), in the order of `Board.corners`; NaN where a corner was
-        not seen.
-    lines : mapping of str to array (columns * rows,) of int
-        By picture the number of the line in which each corner stands.
-    files : mapping of str to Path
-        By picture the file.
-    size : tuple of int, optional
-        Width and height of the pictures in pixels, where the files hold it.
-    notes : tuple of str
-        What a reader should know.
+    Attributes:
+        board: What was seen.
+        pictures: mapping of str to (columns * rows, 2), pixels by picture, the first pixel's centre at (0, 0), in the
+            order of `Board.corners`; NaN where a corner was not seen.
+        lines: mapping of str to (columns * rows,) of int, by picture the number of the line in which each corner
+            stands.
+        files: By picture the file.
+        size: Width and height of the pictures in pixels, where the files hold it.
+        notes: What a reader should know.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> from camviz_clinic.files.corners import corner_formats
     >>> _ = Path("corners.vnl").write_text("# filename x y\nleft.png 10 20\nleft.png - -\n")
@@ -161,29 +134,18 @@ class CornerFormat:
 
     `load_corners`, the help of the commands, the table in docs/formats.md and the tests read these fields.
 
-    Parameters
-    ----------
-    name : str
-        One word.
-    title : str
-        The program's file, as sentences name it: "mrcal's corners.vnl".
-    recognise : callable
-        True for a CornerFile of this format.
-    read : callable
-        From a sequence of CornerFile and what is Given to Corners; raises CalibrationError for what it cannot take.
-    several : bool
-        Whether a set of pictures may be several files.
-    holds : str
-        What of board and image size it holds, for the docs.
-    says : str
-        Its conventions.
-    source : str
-        Where its layout is written down.
-    example : mapping of str to bytes
-        Small files by their names.
+    Args:
+        name: One word.
+        title: The program's file, as sentences name it: "mrcal's corners.vnl".
+        recognise: True for a CornerFile of this format.
+        read: From a sequence of CornerFile and what is Given to Corners; raises CalibrationError for what it cannot
+            take.
+        several: Whether a set of pictures may be several files.
+        holds: What of board and image size it holds, for the docs.
+        says: Its conventions.
+        source: Where its layout is written down.
+        example: Small files by their names.
 
-    Examples
-    --------
     >>> from camviz_clinic.files.corners import corner_formats
     >>> list(corner_formats()["mrcal"].example)
     ['corners.vnl']

@@ -29,17 +29,11 @@ ENDINGS = (".orpc", ".dsc")  # of a folder's files
 class LoadedCorners:
     r"""Corners as if they had been found in pictures, the board they are of, and what a reader should know.
 
-    Attributes
-    ----------
-    detections : Detections
-        For `calibrate`.
-    board : Board
-        For `calibrate`.
-    notes : tuple of str
-        What a reader should know of the files.
+    Attributes:
+        detections: For `calibrate`.
+        board: For `calibrate`.
+        notes: What a reader should know of the files.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> rows = [f"a.png {100 + 40 * column} {90 + 40 * row}" for row in range(3) for column in range(4)]
     >>> _ = Path("corners.vnl").write_text("\n".join(["# filename x y", *rows, "b.png - -"]))
@@ -66,34 +60,18 @@ def load_corners(
     Shape, side of a square and size are each needed where the files do not hold them; what they hold must agree. A
     picture with fewer than six corners, or with corners on one line of the board, is skipped.
 
-    Parameters
-    ----------
-    paths : sequence of path
-        The files, or a folder of them.
-    shape : tuple of int, optional
-        The board's inner corners as (columns, rows).
-    square_size : float, optional
-        Side of a square in metres.
-    size : tuple of int, optional
-        Width and height of the pictures in pixels. It is also taken from `pictures`, or from a picture that the file
-        names and that is there.
-    pictures : sequence of path, optional
-        Pictures of that size.
-    otherwise : tuple of int, optional
-        The size where nothing tells it.
+    Args:
+        paths: The files, or a folder of them.
+        shape: The board's inner corners as (columns, rows).
+        square_size: Side of a square in metres.
+        size: tuple of int, width and height of the pictures in pixels. It is also taken from `pictures`, or from a
+            picture that the file names and that is there.
+        pictures: Pictures of that size.
+        otherwise: tuple of int, the size where nothing tells it.
 
-    Returns
-    -------
-    LoadedCorners
-        Pixels count from the centre of the first one, (0, 0).
+    Returns: Pixels count from the centre of the first one, (0, 0).
+    Raises: CalibrationError for everything else: one sentence with the file and, where there is one, the line.
 
-    Raises
-    ------
-    CalibrationError
-        For everything else: one sentence with the file and, where there is one, the line.
-
-    Examples
-    --------
     >>> from pathlib import Path
     >>> rows = [f"a.png {100 + 40 * column} {90 + 40 * row}" for row in range(3) for column in range(4)]
     >>> _ = Path("corners.vnl").write_text("\n".join(["# filename x y", *rows]))  # as mrcal has them

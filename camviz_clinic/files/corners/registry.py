@@ -13,13 +13,8 @@ from camviz_clinic.files.corners.format import CornerFormat
 def corner_formats() -> Mapping[str, CornerFormat]:
     """The formats by name, in alphabetical order.
 
-    Returns
-    -------
-    mapping of str to CornerFormat
-        One for each module of this package that has a FORMAT.
+    Returns: One for each module of this package that has a FORMAT.
 
-    Examples
-    --------
     >>> list(corner_formats())
     ['babelcalib', 'csv', 'mrcal']
     """
