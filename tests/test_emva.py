@@ -172,13 +172,16 @@ def test_the_equations_of_the_standard_split_a_pattern_alike():
     seen = stack(frames)
     L, M, N = frames.shape
     rows = frames.mean(axis=2)
+    columns = frames.mean(axis=1)
     noise_of_rows = np.sum((rows - rows.mean(axis=0) - rows.mean(axis=1)[:, None] + rows.mean()) ** 2) / 3 / 39
-    within = (seen.variance - noise_of_rows) * N / (N - 1)
-    cav = np.var(seen.picture.mean(axis=0)) - within / L / M
-    rav = np.var(seen.picture.mean(axis=1)) - noise_of_rows / L
+    noise_of_columns = np.sum((columns - columns.mean(axis=0) - columns.mean(axis=1)[:, None] + rows.mean()) ** 2) / 3
+    cav = np.var(seen.picture.mean(axis=0)) - noise_of_columns / 50 / L
+    rav = np.var(seen.picture.mean(axis=1)) - noise_of_rows * 39 / 40 / L
+    # Without what the frames' means vary: that is the light's, and the same for every pixel.
+    whole = np.var(seen.picture, ddof=1) - (seen.variance - np.var(frames.mean(axis=(1, 2)), ddof=1)) / L
     below = M * N - M - N
-    assert seen.split()["pixel"] == pytest.approx(M * N / below * (seen.pattern - cav - rav))
-    column = (M * N - M) / below * cav - N / below * (seen.pattern - rav)
+    assert seen.split()["pixel"] == pytest.approx(M * N / below * (whole - cav - rav))
+    column = (M * N - M) / below * cav - N / below * (whole - rav)
     assert seen.split()["column"] == pytest.approx(column)
 
 

@@ -176,7 +176,7 @@ def test_noise_that_rows_share_is_no_fixed_pattern_of_rows():
     assert found.judged["dsnu_pixel_e"].value == pytest.approx(3, rel=0.05)
     assert outside(one, how, found) == ([], [])
     parts = found.dark.split()
-    assert sum(parts.values()) == pytest.approx(found.dark.pattern, rel=1e-3)
+    assert sum(parts.values()) == pytest.approx(found.dark.whole.variance, rel=1e-3)
     assert found.read_noise_e == pytest.approx(np.hypot(6, 25), rel=0.05)  # rows are part of the temporal noise
     assert found.figures()["gain_dn_per_e"] == pytest.approx(0.4, rel=0.03)
 
@@ -216,7 +216,7 @@ def test_the_errors_that_are_said_are_those_that_are_made():
     pairs, stacks = [pair(frame(), frame()) for _ in range(400)], [stack(frame() for _ in range(6)) for _ in range(200)]
     for seen, value, said in (
         (pairs, "total", "total_error"),
-        (pairs, "within_rows", "within_error"),
+        (pairs, "within", "within_error"),
         (pairs, "mean", "mean_error"),
         (stacks, "mean", "mean_error"),
     ):
