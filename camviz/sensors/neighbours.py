@@ -137,7 +137,7 @@ UNSHADED = Shading()
 
 @lru_cache(maxsize=8)
 def _polynomials(count: int) -> Array:
-    """Polynomials of degrees 1 … `DEGREE` at `count` places (DEGREE, count), of mean 0 and mean square 1, orthogonal."""
+    """Orthogonal polynomials of degrees 1 … `DEGREE` at `count` places (DEGREE, count), of mean square 1."""
     powers = np.vander(np.linspace(-1, 1, count), DEGREE + 1, increasing=True)
     orthogonal, upper = np.linalg.qr(powers)
     return np.asarray((orthogonal * np.sign(np.diag(upper)) * np.sqrt(count)).T[1:])
