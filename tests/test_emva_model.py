@@ -38,7 +38,7 @@ def test_a_camera_that_breaks_the_model_has_what_that_spoils_withheld_with_the_r
         assert why in found.why(figure)
 
 
-@pytest.mark.parametrize("name", ["ordinary", "row noise", "8 bits", "fixed rows and columns"])
+@pytest.mark.parametrize("name", ["well exposed", "row noise", "14 bits", "fixed rows and columns"])
 def test_nothing_is_found_against_a_camera_that_obeys_the_model(name):
     camera, how, found = asked(ORDINARY[name], SIZE, 0)
     assert [one.why for one in found.estimates.checks.findings if one.names != {"dark_current_e_per_s"}] == []
@@ -61,7 +61,8 @@ def test_frames_turned_by_a_quarter_give_the_same_figures_with_rows_and_columns_
 
 
 def _exchanged(words):
-    return words.replace("row", "%").replace("column", "row").replace("%", "column")
+    """What is said of rows, of columns and the other way round."""
+    return words.replace("row", "@").replace("column", "row").replace("@", "column")
 
 
 def test_every_bound_has_its_lower_end_below_its_upper_one():

@@ -127,8 +127,8 @@ class Shading:
         sure = [np.array(one) * (variance > 0) for one, variance in zip(self._kinds, self.variances(), strict=True)]
         if not self.down:
             return 0.0, 0.0
-        curves = _polynomials(LEAST)
-        surface = (sure[0] @ curves)[:, None] + sure[1] @ curves + curves.T @ sure[2].reshape(DEGREE, DEGREE) @ curves
+        upright, level = (_polynomials(freedom + 1 + DEGREE) for freedom in self.freedoms[:2])
+        surface = (sure[0] @ upright)[:, None] + sure[1] @ level + upright.T @ sure[2].reshape(DEGREE, DEGREE) @ level
         return float(surface.min()), float(surface.max())
 
 

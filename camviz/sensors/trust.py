@@ -105,7 +105,7 @@ def _judged(e: Estimates, name: str, one: Estimate) -> Figure:
 
 def _why(e: Estimates, name: str, one: Estimate) -> str:
     widened = e.checks.widening(name) if e.checks else ""
-    if widened and kept(name, _all(e.unchecked)[name]):
+    if widened and _narrower(name, _all(e.unchecked)[name], one):
         return widened
     if not name.startswith(("prnu", "linearity", "gain")) and not kept("gain_dn_per_e", e.gain):
         return f"K is not known, since {_why(e, 'gain_dn_per_e', e.gain)}"
@@ -120,6 +120,12 @@ def _why(e: Estimates, name: str, one: Estimate) -> str:
         return f"these frames are too few to tell: ± {100 * (one.bounds[1] - one.value):.2g} % of the signal"
     off = max(one.bounds[1] - one.value, one.value - one.bounds[0])
     return f"these frames are too few to tell: ± {_share(off, one.value, name)}"
+
+
+def _narrower(name: str, plain: Estimate, one: Estimate) -> bool:
+    """Whether a figure would be told, or be known twice as well, if the model held."""
+    (low, high), (least, most) = plain.bounds, one.bounds
+    return kept(name, plain) or 2 * (high - low) < most - least
 
 
 def _share(off: float, value: float, name: str) -> str:
