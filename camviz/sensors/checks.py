@@ -7,6 +7,7 @@ a signal that rises with the light along one, an offset that stays, and even lig
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot, isfinite, sqrt
@@ -328,7 +329,7 @@ class Checks:
         return Finding(PRNU | SATURATION, why, spoils=False)
 
 
-def _correlated(each: list[tuple[float, tuple[Pair, Pair | None]]], variance: float) -> float:
+def _correlated(each: Sequence[tuple[float, tuple[Pair, Pair | None]]], variance: float) -> float:
     """Σ |correlation| over the lags, either way, that are beyond chance, of weighted pairs less dark ones."""
     if not variance > 0 or not all(one.shared for _, (one, _) in each):
         return 0.0

@@ -90,20 +90,20 @@ class Shading:
         wholes = [float(of_rows.var()), float(of_columns.var())]
         wholes.append(max(float(picture.var()) - sum(wholes), 0.0))
         parts = zip(wholes, (down, across, both), freedoms, strict=True)
-        chances = tuple(max(whole - float(np.sum(one**2)), 0.0) / freedom for whole, one, freedom in parts)
+        r, s, t = (max(whole - float(np.sum(one**2)), 0.0) / freedom for whole, one, freedom in parts)
         a, b, c = (tuple(one.ravel().tolist()) for one in (down, across, both))
-        return cls(a, b, c, chances, freedoms)  # type: ignore[arg-type]
+        return cls(a, b, c, (r, s, t), freedoms)
 
     def less(self, other: Shading) -> Shading:
         """That of the difference of two pictures."""
         if not (self.down and other.down):
             return Shading()
-        apart = [
+        down, across, both = (
             tuple(one - two for one, two in zip(ours, theirs, strict=True))
             for ours, theirs in zip(self._kinds, other._kinds, strict=True)
-        ]
+        )
         a, b, c = (one + two for one, two in zip(self.chances, other.chances, strict=True))
-        return Shading(*apart, (a, b, c), self.freedoms)
+        return Shading(down, across, both, (a, b, c), self.freedoms)
 
     @property
     def _kinds(self) -> tuple[tuple[float, ...], ...]:

@@ -152,9 +152,9 @@ def pair(first: ArrayLike, second: ArrayLike) -> Pair:
     row_means, row_pattern = _of_means(difference.mean(axis=1), total.mean(axis=1))
     column_means, column_pattern = _of_means(difference.mean(axis=0), total.mean(axis=0))
     pixels, kurtosis = shared_by_neighbours(difference)
-    lines = {"row_means": row_means, "row_pattern": row_pattern}
-    lines |= {"column_means": column_means, "column_pattern": column_pattern}
-    return replace(seen, **lines, kurtosis=kurtosis, shared=pixels, shading=Shading.of(total / 2))
+    seen = replace(seen, row_means=row_means, row_pattern=row_pattern)
+    seen = replace(seen, column_means=column_means, column_pattern=column_pattern)
+    return replace(seen, kurtosis=kurtosis, shared=pixels, shading=Shading.of(total / 2))
 
 
 def _of_means(difference: NDArray[np.float64], total: NDArray[np.float64]) -> tuple[float, float]:
@@ -294,8 +294,10 @@ class _Left:
 
     @classmethod
     def of(cls, one: Stack) -> _Left:
-        seen = (one.steady, one.within, one.row_means, one.column_means)
-        return cls(*(variance / one.count for variance in seen), one.count - 1)
+        whole, pixel, rows, columns = (
+            variance / one.count for variance in (one.steady, one.within, one.row_means, one.column_means)
+        )
+        return cls(whole, pixel, rows, columns, one.count - 1)
 
     def and_of(self, other: _Left) -> _Left:
         """What is left in the difference of two pictures."""
