@@ -38,6 +38,11 @@ class Estimates(Transfer):
         super().__init__(found)
         self.checks = checks
 
+    @property
+    def smoothed(self) -> bool:
+        """True where neighbours share their noise, which makes that of rows and of columns larger, too."""
+        return self.checks is not None and self.checks.shared_share > PROMISE
+
     @cached_property
     def unchecked(self) -> Estimates:
         """The estimates as if the model held."""
