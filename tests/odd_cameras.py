@@ -261,6 +261,12 @@ def frames(camera, how, rng, turn=lambda frame: frame):
     return levels, *(stack(shot(photons, t, how.frames)) for photons in (float(how.photons[half]), 0.0))
 
 
+def against(found):
+    """What is found against a camera; that few frames cannot confirm the dark current is nothing against it."""
+    findings = found.estimates.checks.findings
+    return [one.why for one in findings if "not known well enough" not in one.why]
+
+
 def faults(kind, camera, how, found):
     """What is told wrongly, what bounds exclude the truth or are upside down, and what is told or withheld amiss."""
     true, said = truths(camera, how, found), []

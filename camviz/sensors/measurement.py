@@ -135,8 +135,8 @@ class Measurement(Readings):
 
     @cached_property
     def full_well_e(self) -> float:
-        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks."""
-        return self.estimates.full_well.value
+        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks, under even light."""
+        return self.estimates.unchecked.full_well.value
 
     @cached_property
     def clipped(self) -> bool:
