@@ -13,6 +13,7 @@ from odd_cameras import BY_GAIN, ODD, ORDINARY, PRNU, Kind, against, asked, faul
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.neighbours import LAGS, Shading, shared_by_neighbours
 from camviz.sensors.statistics import pair, stack
+from camviz.sensors.trust import judged
 
 SIZE = (64, 96)
 REASONS = {
@@ -69,10 +70,16 @@ def _exchanged(words):
 
 
 def test_every_bound_has_its_lower_end_below_its_upper_one():
-    """An offset that falls by 2 DN from frame to frame was told as a dark current of 0 to less than 0 e⁻/s."""
+    """An offset that falls by 2 DN from frame to frame was told as a dark current of 0 to less than 0 e⁻/s.
+
+    As if the model held, the dark current is below zero whatever chance did: then there are no bounds.
+    """
     kind = Kind(lambda size, rng: ordinary(size, rng, wander_e=lambda n, _: -5.0 * n, offset_dn=500.0))
     _, _, found = asked(kind, SIZE, 0)
-    for figure in found.judged.values():
+    unchecked = judged(found.estimates.unchecked)
+    assert found.estimates.unchecked.dark_current.bounds[1] < 0
+    assert not unchecked["dark_current_e_per_s"].bounded
+    for figure in [*found.judged.values(), *unchecked.values()]:
         assert not figure.bounded or figure.low <= figure.high
     assert not isfinite(found.judged["dark_current_e_per_s"].value)
     assert "the offset drifts" in found.why("dark_current_e_per_s")
