@@ -13,10 +13,12 @@ from math import nan, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.sensors.checks import Checks
 from camviz.sensors.estimates import Estimates, threshold
 from camviz.sensors.hidden import QUANTISED, ROUNDING
 from camviz.sensors.readings import Readings
 from camviz.sensors.statistics import straight_line
+from camviz.sensors.transfer import Transfer
 from camviz.sensors.trust import Figure, judged
 
 Array = NDArray[np.float64]
@@ -80,7 +82,7 @@ class Measurement(Readings):
     @cached_property
     def estimates(self) -> Estimates:
         """Every figure with its standard error, and with what rounding and clipping may hide of it."""
-        return Estimates(self)
+        return Estimates(self, Checks(Transfer(self)))
 
     @cached_property
     def gain_dn_per_e(self) -> float:
@@ -133,8 +135,8 @@ class Measurement(Readings):
 
     @cached_property
     def full_well_e(self) -> float:
-        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks."""
-        return self.estimates.full_well.value
+        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks, under even light."""
+        return self.estimates.unchecked.full_well.value
 
     @cached_property
     def clipped(self) -> bool:

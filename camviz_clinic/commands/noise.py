@@ -20,7 +20,8 @@ Measures a sensor from its frames, by EMVA Standard 1288 (release 4.0, linear): 
 signal to noise, dynamic range, full well, fixed patterns and dark current.
 
 A figure is printed where the frames tell it within 3 % (DSNU and PRNU 5 %, decibels 0.26 dB) even if chance is at four
-standard errors. Otherwise it is withheld, with its bounds and the reason.
+standard errors. Otherwise it is withheld, with its bounds and the reason. So it is where the standard's model does not
+hold: noise that neighbours share, a bent response, an offset that drifts, uneven light.
 
 FOLDER holds, for each of several exposures, two frames of the same steady, even light and two with the lens covered,
 grey PNG or TIFF straight from the sensor, of 8 or 16 bits, or of 32 with whole numbers up to 65535:
@@ -134,10 +135,11 @@ def remarks(found: Measurement) -> list[str]:
     else:
         said = [f"How far the response is off a straight line is not known: {found.why('linearity_error')}."]
     said.append("At the threshold, ½ + √(σ² + ¼), signal and noise are equal; the standard's σ + ½ approximates it.")
-    if found.noisy_rows:
+    lines = [name for name, noisy in (("Rows", found.noisy_rows), ("Columns", found.noisy_columns)) if noisy]
+    if lines and not found.estimates.smoothed:
         said.append(
-            "Rows have noise of their own in every frame: it is part of the dark noise, and taken out of the gain and "
-            "of the patterns."
+            f"{' and '.join(lines).capitalize()} have noise of their own in every frame: it is part of the dark noise, "
+            "and taken out of the gain and of the patterns."
         )
     if not (found.bright and found.dark):
         said.append("The patterns come from pairs of frames; a stack of 16 or more of one exposure tells them better.")
