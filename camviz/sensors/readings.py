@@ -27,21 +27,13 @@ SURELY = 5.0  # standard deviations
 class Level:
     """One exposure of a photon transfer: a pair of bright and a pair of dark frames.
 
-    Parameters
-    ----------
-    exposure_s : float
-        In seconds.
-    bright, dark : Pair
-        Statistics of two frames each; `of` makes them.
-    photons : float
-        Per pixel; NaN where unknown.
+    Args:
+        exposure_s: In seconds.
+        bright, dark: Statistics of two frames each; `of` makes them.
+        photons: Per pixel; NaN where unknown.
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    Examples
-    --------
     Half the mean square of the frames' difference is the noise of one frame:
 
     >>> level = Level.of(0.01, bright=[[[10, 12]], [[12, 10]]], dark=[[[2, 2]], [[2, 2]]])
@@ -60,24 +52,13 @@ class Level:
     ) -> Level:
         """The level of two bright and two dark frames.
 
-        Parameters
-        ----------
-        exposure_s : float
-            In seconds.
-        bright, dark : sequence of array_like (height, width)
-            Two frames each, in DN.
-        photons : float
-            Per pixel; NaN where unknown.
+        Args:
+            exposure_s: In seconds.
+            bright, dark: sequence of (height, width), two frames each, in DN.
+            photons: Per pixel; NaN where unknown.
 
-        Returns
-        -------
-        Level
-            With the statistics of the frames.
-
-        Raises
-        ------
-        ValueError
-            Unless there are two frames of each kind, of one shape.
+        Returns: Level with the statistics of the frames.
+        Raises: ValueError unless there are two frames of each kind, of one shape.
         """
         for name, frames in (("bright", bright), ("dark", dark)):
             if len(frames) != 2:
