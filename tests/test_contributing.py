@@ -1,4 +1,4 @@
-"""CONTRIBUTING.md's examples, carried out word for word in a copy of the repository."""
+"""The examples of docs/recipes.md, carried out word for word in a copy of the repository."""
 
 import json
 import re
@@ -7,7 +7,7 @@ import nbformat
 import pytest
 from house import ROOT, house
 
-PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
 EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
 EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
 CELL = re.compile(r"^# %%(?P<words>.*)$", re.MULTILINE)
@@ -32,7 +32,7 @@ def cell(words, source):
 def example(where):
     """The files of one example, as they are written: a notebook from its cells."""
     found = {path: text for path, text in EXAMPLES.items() if path.startswith(where)}
-    assert found, f"CONTRIBUTING.md has no example of {where}"
+    assert found, f"docs/recipes.md has no example of {where}"
     return {path: notebook(text) if path.endswith(".ipynb") else text for path, text in found.items()}
 
 

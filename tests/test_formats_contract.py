@@ -27,10 +27,10 @@ MADE = Calibration({"camera": CAMERA}, Path("made.yml"), "made", world_from_imu=
 
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
-    """The format of CONTRIBUTING.md as the one file of a folder in which formats are looked for."""
+    """The format of docs/recipes.md as the one file of a folder in which formats are looked for."""
     folder = tmp_path / "more"
     folder.mkdir()
-    page = (PAGE.parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    page = PAGE.with_name("recipes.md").read_text(encoding="utf-8")
     code = page.split("## A calibration format")[1].split("```python\n")[1].split("```")[0]
     (folder / "toy.py").write_text(code, encoding="utf-8")
     monkeypatch.setattr(camviz_clinic.files, "__path__", [*camviz_clinic.files.__path__, str(folder)])

@@ -1,4 +1,4 @@
-"""A stranger's lens is one file: the one of CONTRIBUTING.md, put into a copy of the package, appears everywhere."""
+"""A stranger's lens is one file: the one of docs/recipes.md, put into a copy of the package, appears everywhere."""
 
 import os
 import re
@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+RECIPES = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
 
 # r = sin(kθ)/k: orthographic at k = 1, equisolid at k = 1/2. It turns back at kθ = 90°.
-SINE = re.search(r"\n## A lens\n.*?```python\n(.*?)```\n", CONTRIBUTING, flags=re.DOTALL)[1]
+SINE = re.search(r"\n## A lens\n.*?```python\n(.*?)```\n", RECIPES, flags=re.DOTALL)[1]
 
 
 @pytest.fixture(scope="module")
