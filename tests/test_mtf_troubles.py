@@ -168,7 +168,11 @@ def test_a_bent_edge_widens_the_error_or_is_refused(sagitta):
     edge = SlantedEdge.of(light)
     assert edge.error.off_the_line == pytest.approx(sagitta * 2 / np.sqrt(45), abs=0.01 + 0.1 * sagitta)
     assert is_so(edge, true_mtf50("gauss", 0.6, 5))
-    assert edge.mtf50_error > SlantedEdge.of(noisy(bent(0), 0.004)).mtf50_error or sagitta < 0.2
+    straight = SlantedEdge.of(noisy(bent(0), 0.004))
+    taken = np.log(straight.mtf(edge.mtf50) / edge.mtf(edge.mtf50))
+    assert edge.error.bend == pytest.approx(taken, rel=0.35, abs=0.004)
+    assert edge.error.total > edge.error.bend / 2
+    assert edge.mtf50_error > straight.mtf50_error or sagitta < 0.2
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -239,6 +243,12 @@ def test_noise_blurred_after_the_sensor_widens_the_error_as_far_as_it_scatters()
     found, errors = np.array([(edge.mtf50, edge.mtf50_error) for edge in shots]).T
     assert np.mean(errors) == pytest.approx(found.std(), rel=0.35)
     assert np.mean([edge.error.shared for edge in shots]) > 1.5
+    alone = [SlantedEdge.of(sharp + rng.normal(0, 0.01, SHAPE)).error.shared for _ in range(10)]
+    assert np.mean(alone) < 1.2
+    of_ln_mtf = errors / [edge.error.total for edge in shots]
+    noise = np.array([edge.error.independent * edge.error.shared for edge in shots])
+    assert np.mean(noise * of_ln_mtf) == pytest.approx(found.std(), rel=0.35)
+    assert np.all(noise <= [edge.error.total for edge in shots])
 
 
 # Whole numbers -----------------------------------------------------------------------------------------------------
