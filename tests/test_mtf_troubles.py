@@ -5,7 +5,9 @@ standard errors and 3 % of the truth; benchmarks/mtf_troubles.py holds thousands
 """
 
 import re
+import sys
 from argparse import Namespace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,6 +19,10 @@ from camviz.optics.edge_refusal import MOST_ANGLE_DEG, MOST_CLIPPED
 from camviz.optics.slanted_edge import SlantedEdge
 from camviz.scenes import to_encoded
 from camviz_clinic.commands.mtf import ends_of_scale, figures, linear_light
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+from mtf_troubles import kinds, measure
 
 SHAPE = (120, 100)
 
@@ -156,13 +162,17 @@ def test_a_bent_edge_widens_the_error_or_is_refused(sagitta):
     """A parabola lies 2/√45 of its sagitta off the line that fits it best, root mean square."""
     light = noisy(bent(sagitta), 0.004)
     if sagitta >= 0.5:
-        with pytest.raises(ValueError, match=r"off a straight line|scatter by"):
+        with pytest.raises(ValueError, match="px off a straight line"):
             SlantedEdge.of(light)
         return
     edge = SlantedEdge.of(light)
     assert edge.error.off_the_line == pytest.approx(sagitta * 2 / np.sqrt(45), abs=0.01 + 0.1 * sagitta)
     assert is_so(edge, true_mtf50("gauss", 0.6, 5))
-    assert edge.mtf50_error > SlantedEdge.of(noisy(bent(0), 0.004)).mtf50_error or sagitta < 0.2
+    straight = SlantedEdge.of(noisy(bent(0), 0.004))
+    taken = np.log(straight.mtf(edge.mtf50) / edge.mtf(edge.mtf50))
+    assert edge.error.bend == pytest.approx(taken, rel=0.35, abs=0.004)
+    assert edge.error.total > edge.error.bend / 2
+    assert edge.mtf50_error > straight.mtf50_error or sagitta < 0.2
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -174,6 +184,28 @@ def test_a_spot_of_five_pixels_on_the_edge_widens_the_error(seed):
     edge = SlantedEdge.of(light)
     assert abs(edge.mtf50 / true_mtf50("gauss", 0.6, 5) - 1) <= 2 * edge.mtf50_error / edge.mtf50 + 0.005
     assert edge.mtf50_error > 3 * clean
+
+
+REASONS = {
+    "bent by 0.1 to 3 px": "px off a straight line",
+    "a spot of 2 to 8 px on the edge": "or one without spots",
+    "JPEG of quality 50 to 95": "with less compression",
+    "white clipped, at 1.00 to 1.30 of the scale": "of the bright side's pixels are at an end of the scale",
+    "black clipped, at -0.10 to 0": "of the dark side's pixels are at an end of the scale",
+    "1° to 60°": "the edge leans by",
+}
+
+
+@pytest.mark.parametrize("trouble", REASONS)
+def test_a_trouble_is_refused_with_its_own_reason(trouble, thorough):
+    """Edges of the benchmark at random: whatever is refused is refused for what is wrong with it."""
+    rng = np.random.default_rng(8)
+    found = []
+    while len(found) < (40 if thorough else 4):
+        edge = kinds()[trouble](rng)
+        if isinstance(said := measure(edge, rng), str):
+            found.append(said)
+    assert [said for said in found if REASONS[trouble] not in said] == []
 
 
 # Noise that neighbours share ---------------------------------------------------------------------------------------
@@ -211,6 +243,52 @@ def test_noise_blurred_after_the_sensor_widens_the_error_as_far_as_it_scatters()
     found, errors = np.array([(edge.mtf50, edge.mtf50_error) for edge in shots]).T
     assert np.mean(errors) == pytest.approx(found.std(), rel=0.35)
     assert np.mean([edge.error.shared for edge in shots]) > 1.5
+    alone = [SlantedEdge.of(sharp + rng.normal(0, 0.01, SHAPE)).error.shared for _ in range(10)]
+    assert np.mean(alone) < 1.2
+    of_ln_mtf = errors / [edge.error.total for edge in shots]
+    noise = np.array([edge.error.independent * edge.error.shared for edge in shots])
+    assert np.mean(noise * of_ln_mtf) == pytest.approx(found.std(), rel=0.35)
+    assert np.all(noise <= [edge.error.total for edge in shots])
+
+
+# Whole numbers -----------------------------------------------------------------------------------------------------
+
+
+def test_the_rounding_that_a_side_s_pixels_share_is_part_of_the_error():
+    """60 pictures of 8 bits without noise, their levels at any place between two numbers: most within 2 errors.
+
+    False failure: 1e-3 each, of 95 % inside.
+    """
+    rng = np.random.default_rng(6)
+    truth = true_mtf50("gauss", 0.8, 7)
+    shots = []
+    for _ in range(60):
+        dark, bright = rng.uniform(0.03, 0.15), rng.uniform(0.5, 0.9)
+        shots.append(read(eight_bits(photograph("gauss", 0.8, 7, SHAPE, dark=dark, contrast=bright - dark))))
+    off = np.array([edge.mtf50 / truth - 1 for edge in shots])
+    errors = np.array([edge.mtf50_error / truth for edge in shots])
+    assert np.mean(np.abs(off) < 2 * errors) >= 0.88
+    assert np.mean(errors) == pytest.approx(np.sqrt(np.mean(off**2)), rel=0.4)
+    assert np.median([edge.error.rounding / edge.error.total for edge in shots]) > 0.9
+
+
+@pytest.mark.parametrize(("noise_steps", "left"), [(0.0, 1.0), (0.2, 0.6), (0.6, 0.01)])
+def test_noise_beyond_half_a_number_takes_the_shared_rounding_out(noise_steps, left):
+    """Numbers 50 and 200.4 of 255, linear: a side's rounding is uniform, 1/√12 of a step, before any noise."""
+    light = noisy(150.4 * photograph("gauss", 1.0, 7, SHAPE, 0, 1) + 50, noise_steps)
+    edge = SlantedEdge.of(np.rint(light))
+    step, shared = edge.error._rounded(edge.sides.levels[1], bright=True)
+    assert step * edge.contrast == pytest.approx(1)
+    assert shared <= 1.3 * left * step / np.sqrt(12)
+    assert (shared >= 0.99 * step / np.sqrt(12)) == (noise_steps == 0)
+
+
+def test_numbers_of_16_bits_and_light_as_it_is_have_hardly_any_rounding():
+    light = photograph("gauss", 0.8, 7, SHAPE)
+    for one in (np.rint(65535 * light), noisy(light, 0.001)):
+        edge = SlantedEdge.of(one)
+        assert edge.error.rounding < 1e-4
+        assert edge.mtf50_error < 0.002 * edge.mtf50
 
 
 # What is clean is measured -----------------------------------------------------------------------------------------

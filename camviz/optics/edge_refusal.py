@@ -13,6 +13,7 @@ LEAST_CONTRAST = 10.0  # times the noise: below, the edge cannot be found in eac
 MOST_CLIPPED = 0.05  # of the pixels of a side: with 5 % noise they move its level by 0.1 % of the contrast
 
 MOST_UNEXPLAINED = 0.04  # of the contrast: scatter at the edge beyond the sides' noise
+SHARE_OF_ROWS = 0.5  # of that scatter's variance: bends have 0.6 and more, JPEGs 0.46 at most
 MOST_BENT = 0.15  # of ln MTF at MTF50: what rows off the line may take of it
 
 
@@ -36,8 +37,6 @@ def refuse_what_spoils(edge: Any) -> None:
         )
     if not edge.sides.known or edge.flat < LEAST_RISES * edge.rise:
         raise ValueError("the edge's blur reaches the image's border: take more of both sides")
-    if edge.flat < LEAST_RISES * edge.rise:
-        raise ValueError("the edge's blur reaches the image's border: take more of both sides")
     inside = edge.rows[0]
     if len(inside) < FEWEST_ROWS:
         raise ValueError(f"the edge lies within {len(inside)} rows only: take at least {FEWEST_ROWS}")
@@ -46,16 +45,7 @@ def refuse_what_spoils(edge: Any) -> None:
             f"the edge crosses less than one pixel within {len(inside)} rows: take more of it, or lean it more"
         )
     _refuse_clipped(edge)
-    if edge.error.unexplained > MOST_UNEXPLAINED:
-        raise ValueError(
-            f"pixels at the edge scatter by {100 * edge.error.unexplained:.0f} % of its contrast, beyond the noise "
-            "beside it, as in a JPEG of low quality: save the photograph with less compression"
-        )
-    if np.isfinite(edge.mtf50) and edge.error.bend > MOST_BENT:
-        raise ValueError(
-            f"the rows' edges lie {edge.error.off_the_line:.2f} px off a straight line, which blurs them: take a "
-            "shorter piece, or one without spots"
-        )
+    _refuse_scattered(edge)
 
 
 def _refuse_clipped(edge: Any) -> None:
@@ -65,4 +55,21 @@ def _refuse_clipped(edge: Any) -> None:
         raise ValueError(
             f"{100 * max(shares):.0f} % of the {side} side's pixels are at an end of the scale, so its light is not "
             "known: expose so that neither side is cut off"
+        )
+
+
+def _refuse_scattered(edge: Any) -> None:
+    """A bend or a spot moves rows' edges, and pixels scatter for it; a JPEG lets them scatter in straight rows, too."""
+    error = edge.error
+    scatters = error.unexplained > MOST_UNEXPLAINED
+    by_the_rows = error.scatter_off_the_line**2 > SHARE_OF_ROWS * error.unexplained**2
+    if (np.isfinite(edge.mtf50) and error.bend > MOST_BENT) or (scatters and by_the_rows):
+        raise ValueError(
+            f"the rows' edges lie {error.off_the_line:.2f} px off a straight line, which blurs them: take a "
+            "shorter piece, or one without spots"
+        )
+    if scatters:
+        raise ValueError(
+            f"pixels at the edge scatter by {100 * error.unexplained:.0f} % of its contrast, beyond the noise "
+            "beside it, as in a JPEG of low quality: save the photograph with less compression"
         )

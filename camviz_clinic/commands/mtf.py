@@ -46,6 +46,7 @@ exit status:
   2  there is no edge that can be measured, or the command cannot be used; one sentence on stderr says why
 """
 MOST_MEGAPIXELS = 24  # that are measured, at 34 bytes a pixel
+LEAST_NOISE = 1e-9  # of the contrast: less noise than that is a computation's rounding
 FREQUENCIES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)  # cycles per pixel: the curve in JSON
 
 
@@ -155,7 +156,7 @@ def figures(edge: SlantedEdge) -> dict[str, float]:
         "mtf_at_half_cycle": float(edge.mtf(0.5)),
         "rise_10_90_pixels": edge.rise,
         "angle_deg": abs(edge.angle_deg),
-        "contrast_over_noise": edge.contrast / edge.noise if edge.noise > 0 else float("nan"),
+        "contrast_over_noise": edge.contrast / edge.noise if edge.noise > LEAST_NOISE * edge.contrast else float("nan"),
         "clipped_percent": 100 * max(edge.clipped_shares),
         "light_across_percent_per_pixel": 100 * abs(edge.sides.falls),
         "light_along_percent": 100 * edge.sides.along,

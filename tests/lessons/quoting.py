@@ -97,7 +97,7 @@ def _texts(number: str) -> Iterator[tuple[str, str]]:
             yield f"exercise {one.name}", _stated(text)
     planned = plans.plan(number)
     if planned:
-        for text in (planned.bring, planned.network, planned.machine, *planned.notice):
+        for text in (planned.bring, planned.network, planned.machine, *(one.text for one in planned.notice)):
             yield "the teacher's plan", _stated(text)
         for step in planned.steps:
             yield f"the teacher's plan at {step.at}", _stated(f"{step.teacher}\n\n{step.students}")
