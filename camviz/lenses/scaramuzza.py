@@ -133,5 +133,5 @@ class Scaramuzza(Fisheye):
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         area = self.c - self.d * self.e
         x, y = (self.c * x - self.e * y) / area, (y - self.d * x) / area
-        z: Array = np.polynomial.polynomial.polyval(up_to(self.rim, np.hypot(x, y)), self.forward)
-        return x, y, z
+        z = np.polynomial.polynomial.polyval(up_to(self.rim, np.hypot(x, y)), self.forward)
+        return x, y, np.asarray(z, dtype=np.float64)
