@@ -228,7 +228,18 @@ class SlantedEdge:
         return min(max(RISES * self.rise, NARROWEST), FLAT_SHARE * self.sides.strip.room)
 
     def fade(self, x: Array) -> Array:
-        """What counts as the edge: 1 near it, falling to 0 far away (a Tukey window), at places (n,) in pixels."""
+        """What counts as the edge: 1 near it, falling to 0 far away (a Tukey window).
+
+        Parameters
+        ----------
+        x : array (n,)
+            Places, in pixels from the edge.
+
+        Returns
+        -------
+        array (n,)
+            Weights, 0 to 1.
+        """
         end = min(2 * self.flat, self.sides.strip.room)
         fade = np.clip((end - np.abs(x)) / (end - self.flat), 0, 1)
         return np.asarray(0.5 * (1 - np.cos(np.pi * fade)))
@@ -295,13 +306,37 @@ class SlantedEdge:
         return self.contrast * np.sqrt(np.convolve(squares, near, "same") / np.maximum(freedom, 1))
 
     def log_mtf(self, frequency: float, means: Array) -> float:
-        """ln MTF at a frequency in cycles per pixel, of a profile's means (n,) at the places of `edge_spread`."""
+        """ln MTF of another profile across this edge.
+
+        Parameters
+        ----------
+        frequency : float
+            In cycles per pixel.
+        means : array (n,)
+            The profile's means at the places of `edge_spread`.
+
+        Returns
+        -------
+        float
+            Natural logarithm; 0 where all contrast is left.
+        """
         x, _ = self.line_spread
         light = np.diff(means) * OVERSAMPLING * self.fade(x)
         return float(np.log(np.abs(np.sum(light * np.exp(-2j * np.pi * frequency * x))) / np.abs(np.sum(light))))
 
     def spread_weights(self, wave: Array) -> Array:
-        """How much Σ wave · line spread changes with each strip's mean (n,), the wave given between strips (n - 1,)."""
+        """How much Σ wave · line spread changes with each strip's mean.
+
+        Parameters
+        ----------
+        wave : array (n - 1,)
+            At the places of `line_spread`.
+
+        Returns
+        -------
+        array (n,)
+            Per unit of each mean of `edge_spread`.
+        """
         faded = OVERSAMPLING * self.fade(self.line_spread[0]) * wave
         return -np.diff(faded, prepend=0, append=0)
 
