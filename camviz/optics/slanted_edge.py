@@ -230,15 +230,10 @@ class SlantedEdge:
     def fade(self, x: Array) -> Array:
         """What counts as the edge: 1 near it, falling to 0 far away (a Tukey window).
 
-        Parameters
-        ----------
-        x : array (n,)
-            Places, in pixels from the edge.
+        Args:
+            x: (n,), places, in pixels from the edge.
 
-        Returns
-        -------
-        array (n,)
-            Weights, 0 to 1.
+        Returns: (n,), weights, 0 to 1.
         """
         end = min(2 * self.flat, self.sides.strip.room)
         fade = np.clip((end - np.abs(x)) / (end - self.flat), 0, 1)
@@ -308,17 +303,11 @@ class SlantedEdge:
     def log_mtf(self, frequency: float, means: Array) -> float:
         """ln MTF of another profile across this edge.
 
-        Parameters
-        ----------
-        frequency : float
-            In cycles per pixel.
-        means : array (n,)
-            The profile's means at the places of `edge_spread`.
+        Args:
+            frequency: In cycles per pixel.
+            means: (n,), the profile's means at the places of `edge_spread`.
 
-        Returns
-        -------
-        float
-            Natural logarithm; 0 where all contrast is left.
+        Returns: Natural logarithm; 0 where all contrast is left.
         """
         x, _ = self.line_spread
         light = np.diff(means) * OVERSAMPLING * self.fade(x)
@@ -327,15 +316,10 @@ class SlantedEdge:
     def spread_weights(self, wave: Array) -> Array:
         """How much Σ wave · line spread changes with each strip's mean.
 
-        Parameters
-        ----------
-        wave : array (n - 1,)
-            At the places of `line_spread`.
+        Args:
+            wave: (n - 1,), at the places of `line_spread`.
 
-        Returns
-        -------
-        array (n,)
-            Per unit of each mean of `edge_spread`.
+        Returns: (n,), per unit of each mean of `edge_spread`.
         """
         faded = OVERSAMPLING * self.fade(self.line_spread[0]) * wave
         return -np.diff(faded, prepend=0, append=0)
