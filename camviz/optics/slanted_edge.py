@@ -305,7 +305,7 @@ class SlantedEdge:
 
         Args:
             frequency: In cycles per pixel.
-            means: (n,), the profile's means at the places of `edge_spread`.
+            means: (n,), shares of the contrast, 0 to 1, at the places of `edge_spread`.
 
         Returns: Natural logarithm; 0 where all contrast is left.
         """
@@ -317,7 +317,7 @@ class SlantedEdge:
         """How much Σ wave · line spread changes with each strip's mean.
 
         Args:
-            wave: (n - 1,), at the places of `line_spread`.
+            wave: (n - 1,), weights without a unit at the places of `line_spread`.
 
         Returns: (n,), per unit of each mean of `edge_spread`.
         """
