@@ -113,8 +113,8 @@ def test_a_right_function_of_the_reader_s_cuts_the_same_window(draft, yaw):
 def test_a_wrong_one_cuts_another_and_none_leaves_a_sentence():
     exercise = exercises("09")["09.equidistant"]
     for known in exercise.misconceptions:
-        if known.function.__name__ == "principal_point_swapped":
-            continue  # the picture's middle has cx = cy
+        if known.function.__name__ in ("principal_point_swapped", "arc_cosine_of_z_itself"):
+            continue  # the picture's middle has cx = cy, and a window's rays have length 1
         view = FisheyeView(panels=WITH_YOURS, yours=known.function, yaw_deg=75.0)
         apart = np.abs(shown(view, "window", True).astype(int) - shown(view, "yours", True)).max(axis=-1)
         assert np.mean(apart > 30) > 0.02, known.explanation
