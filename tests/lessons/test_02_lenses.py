@@ -498,6 +498,16 @@ def test_the_signs_of_c(says):
     assert all(one.value / C == pytest.approx(50, abs=1e-3) for one in numbers)
 
 
+def test_a_diverging_lens_has_a_negative_focal_length(says):
+    """A thin biconcave lens of n = 1.5 and radii of 100 mm: 1/f = (n − 1)(1/R₁ − 1/R₂)."""
+    (numerator,) = says("A lens that makes it diverge has a negative focal length: keep the sign of −1/C.")
+    bent = np.eye(2)
+    for radius, before, behind in ((-100.0, 1.0, 1.5), (100.0, 1.5, 1.0)):
+        bent = np.array([[1, 0], [(before - behind) / (radius * behind), before / behind]]) @ bent
+    assert numerator.value / bent[1, 0] == pytest.approx(1 / (0.5 * (-1 / 100 - 1 / 100)))
+    assert numerator.value / bent[1, 0] < 0
+
+
 def test_the_small_numbers_of_the_exercises(says):
     (half,) = says("The triangle has half the sensor's width for its side: width / 2.")
     assert view_deg(36.0, 50.0) == pytest.approx(2 * np.degrees(np.arctan(36.0 / half.value / 50)))

@@ -408,6 +408,17 @@ def test_the_photographs_know_that_the_camera_stood_still(says, samples):
     assert np.median(keyboard) < 10 < 30 < np.median(middle)
 
 
+def test_allclose_adds_its_relative_tolerance(says):
+    added, off = says(
+        "`np.allclose` adds its `rtol`, 1e-5 unless told otherwise, to your `atol`, so that MᵀM may be off by 1.1e-5 on "
+        "its diagonal: give it `rtol=0`."
+    )
+    assert off.value == pytest.approx(added.value + 1e-6)
+    for error, accepted in ((0.99 * off.value, True), (1.01 * off.value, False)):
+        assert np.allclose(1 + error, 1.0, atol=1e-6) == accepted
+        assert not np.allclose(1 + error, 1.0, rtol=0, atol=1e-6)
+
+
 # Before the lesson ---------------------------------------------------------------------------------------------------
 
 

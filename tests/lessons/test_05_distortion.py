@@ -348,6 +348,24 @@ def test_the_map_has_two_numbers_a_pixel(says):
     assert again == two.value
 
 
+def test_dividing_again_and_again_settles_in_the_barrel_alone(says):
+    says("But dividing settles only while k1 r² is below 1")
+    r_d, k1 = says("For a strong pincushion, say r_d = 6 with k1 = 0.5, it never settles.")
+
+    def last_two(r_d, k1):
+        r = r_d
+        for _ in range(10_000):
+            before, r = r, r_d / (1 + k1 * r**2)
+        return before, r
+
+    before, after = last_two(r_d.value, k1.value)
+    assert abs(after - before) > 1
+    for product in (0.99, 1.01):  # near the answer r, one division makes an error 2 k1 r² / (1 + k1 r²) times as large
+        r = np.sqrt(product / k1.value)
+        before, after = last_two(r * (1 + product), k1.value)
+        assert (abs(after - before) < 1e-6) == (product < 1)
+
+
 # Before the lesson ---------------------------------------------------------------------------------------------------
 
 
