@@ -410,8 +410,8 @@ def test_the_photographs_know_that_the_camera_stood_still(says, samples):
 
 def test_allclose_adds_its_relative_tolerance(says):
     added, off = says(
-        "`np.allclose` adds its `rtol`, 1e-5 unless told otherwise, to your `atol`, so that MᵀM may be off by 1.1e-5 on "
-        "its diagonal: give it `rtol=0`."
+        "`np.allclose` adds its `rtol`, 1e-5 unless told otherwise, to your `atol`, so that MᵀM may be off by 1.1e-5 "
+        "on its diagonal: give it `rtol=0`."
     )
     assert off.value == pytest.approx(added.value + 1e-6)
     for error, accepted in ((0.99 * off.value, True), (1.01 * off.value, False)):
