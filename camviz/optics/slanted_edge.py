@@ -339,7 +339,7 @@ class SlantedEdge:
         frequency : float
             In cycles per pixel.
         means : array (n,)
-            The profile's means at the places of `edge_spread`.
+            The profile's means at the places of `edge_spread`, in any unit.
 
         Returns
         -------
@@ -356,7 +356,7 @@ class SlantedEdge:
         Parameters
         ----------
         wave : array (n - 1,)
-            At the places of `line_spread`.
+            At the places of `line_spread`; without unit.
 
         Returns
         -------
