@@ -15,9 +15,9 @@ PAGE = re.compile(r"\]\((?!https?://|#|mailto:)([^)\s]+)\)")
 
 class Lessons(BuildHookInterface):
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Put lessons/ into the wheel as camviz/_lessons."""
+        """Put lessons/ into the wheel as camviz_school/_lessons."""
         if version != "editable":
-            build_data["force_include"]["lessons"] = "camviz/_lessons"
+            build_data["force_include"]["lessons"] = "camviz_school/_lessons"
 
 
 class Readme(MetadataHookInterface):

@@ -69,9 +69,9 @@ def originals() -> dict[str, bytes]:
     """Good files by name: the tests' samples, an example of every format, and a calibration with all its corners."""
     import numpy as np
 
-    from camviz.clinic.virtual import healthy
-    from camviz.files import formats
-    from camviz.files.writing import write
+    from camviz_clinic.checks.virtual import healthy
+    from camviz_clinic.files import formats
+    from camviz_clinic.files.writing import write
 
     found = {str(path.relative_to(DATA)): path.read_bytes() for path in sorted(DATA.rglob("*")) if path.is_file()}
     solved = healthy(np.random.default_rng(0))
@@ -114,8 +114,8 @@ class Case:
 
     def file(self, rng: Random) -> str:
         """A calibration file through `load`, `inspect_file`, and the JSON and text of what it says."""
-        from camviz.clinic import inspect_file
-        from camviz.files import CalibrationError
+        from camviz_clinic.checks import inspect_file
+        from camviz_clinic.files import CalibrationError
 
         name = rng.choice(self.names) if rng.random() < 0.99 else "corners.yml"
         while name == "corners.yml" and rng.random() < 0.9:  # whose checks take a second
@@ -133,9 +133,9 @@ class Case:
 
     def picture(self, rng: Random) -> str:
         """A picture through all that read one."""
-        from camviz.calibration.finding import look
-        from camviz.calibration.picture_files import PictureError, picture_size, read_gray, read_picture
-        from camviz.calibration.types import Board
+        from camviz.colour.picture_files import PictureError, picture_size, read_gray, read_picture
+        from camviz_clinic.calibration.finding import look
+        from camviz_clinic.calibration.types import Board
 
         name = rng.choice(self.picture_names)
         path = self.room / name
@@ -181,7 +181,7 @@ class Case:
 
     def command(self, rng: Random) -> str:
         """A command line, in this process."""
-        from camviz.commands.command import main
+        from camviz_clinic.commands.command import main
 
         room, words = self.laid_out(rng)
         out, err = StringIO(), StringIO()
@@ -222,7 +222,7 @@ def put(path: Path, content: bytes) -> None:
 
 
 def options_of(command: str) -> list[str]:
-    from camviz.commands.command import parser
+    from camviz_clinic.commands.command import parser
 
     commands = next(action for action in parser()._actions if isinstance(action.choices, dict))
     return list(commands.choices[command]._option_string_actions)  # type: ignore[index]
@@ -290,7 +290,7 @@ def work(pipe: Any, seed: int) -> None:
                 came = f"more than {MEMORY >> 20} MB"
             except BaseException as error:
                 where = traceback.extract_tb(error.__traceback__)[-1]
-                own = [frame for frame in traceback.extract_tb(error.__traceback__) if "/camviz/" in frame.filename]
+                own = [frame for frame in traceback.extract_tb(error.__traceback__) if "/camviz" in frame.filename]
                 frame = (own or [where])[-1]
                 came = f"{type(error).__name__} at {Path(frame.filename).name}:{frame.lineno} {str(error)[:100]!r}"
             pipe.send((came, used() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10))

@@ -22,14 +22,14 @@ import numpy as np
 from kernel import median_ms, table
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration import calibrate, detect
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.difference import pixel_grid
-from camviz.calibration.problem import moved
-from camviz.calibration.types import Board
-from camviz.calibration.uncertainty import projection_uncertainty
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
+from camviz_clinic.calibration import calibrate, detect
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.difference import pixel_grid
+from camviz_clinic.calibration.problem import moved
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.calibration.uncertainty import projection_uncertainty
 
 BOARD = Board(9, 6, 0.025)
 GRID = (60, 40)

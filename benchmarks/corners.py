@@ -18,9 +18,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from camviz.calibration import Board, detect
-from camviz.calibration.chessboards import everywhere, find_chessboard
-from camviz.calibration.finding import read_gray
+from camviz_clinic.calibration import Board, detect
+from camviz_clinic.calibration.chessboards import everywhere, find_chessboard
+from camviz_clinic.calibration.finding import read_gray
 
 
 def timed(find: Callable[[Any, Board], Any], pictures: list[Any], board: Board) -> tuple[list[Any], float]:

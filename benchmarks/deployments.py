@@ -7,7 +7,7 @@ sensor tilts), focused anew (the focal length and k1 change), or its pictures ar
 board are judged, or too few of them (thin). The noise of corners is 0.05 to 0.3 px, pictures have 0.3 to 2 megapixels.
 
 "By N px" is the RMS displacement of far points over the image that no turn of the whole camera makes up for. It is
-measured by `camviz.calibration.difference`, which the check does not use. Prints the table of docs/clinic.md.
+measured by `camviz_clinic.calibration.difference`, which the check does not use. Prints the table of docs/clinic.md.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from math import inf
 
 import numpy as np
 
-from camviz.calibration.detection import Detections
-from camviz.calibration.difference import difference
 from camviz.cameras import Camera
-from camviz.clinic import Check, check
-from camviz.clinic.virtual import SetUp, detections, pair, single, spread_boards
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.detection import Detections
+from camviz_clinic.calibration.difference import difference
+from camviz_clinic.checks import Check, check
+from camviz_clinic.checks.virtual import SetUp, detections, pair, single, spread_boards
 
 Rng = np.random.Generator
 VERDICTS = ("pass", "warn", "inconclusive", "fail")

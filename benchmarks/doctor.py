@@ -16,14 +16,22 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from camviz.calibration import Board, CannotCalibrate, Detections, calibrate, calibrate_pair, detect, find_corners
-from camviz.calibration.types import Calibration
 from camviz.cameras import Camera
-from camviz.clinic.checks.described import smooth
-from camviz.clinic.doctor import Shown, diagnose
-from camviz.clinic.snapshots import Pictured, pictured, snapshot
-from camviz.clinic.virtual import pair, spread_boards
 from camviz.lenses import BrownConrady
+from camviz_clinic.calibration import (
+    Board,
+    CannotCalibrate,
+    Detections,
+    calibrate,
+    calibrate_pair,
+    detect,
+    find_corners,
+)
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.checks.doctor import Shown, diagnose
+from camviz_clinic.checks.findings.described import smooth
+from camviz_clinic.checks.snapshots import Pictured, pictured, snapshot
+from camviz_clinic.checks.virtual import pair, spread_boards
 
 Rng = np.random.Generator
 DICTIONARIES = {"DICT_4X4_100": 100, "DICT_5X5_100": 100, "DICT_6X6_250": 250, "DICT_APRILTAG_36h11": 587}

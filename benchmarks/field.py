@@ -33,18 +33,18 @@ import cv2
 import numpy as np
 from kernel import table
 
-from camviz.calibration import calibrate, detect
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.cross_validation import board_halves
-from camviz.calibration.detection import CannotCalibrate, Detections, seen
-from camviz.calibration.models import poses_from_rays
-from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.inspection import Inspection
-from camviz.files import load
-from camviz.files.corners import load_corners
 from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz_clinic.calibration import calibrate, detect
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.cross_validation import board_halves
+from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
+from camviz_clinic.calibration.models import poses_from_rays
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.inspection import Inspection
+from camviz_clinic.files import load
+from camviz_clinic.files.corners import load_corners
 
 MANIFEST = Path(__file__).with_name("field.toml")
 PAGE = Path(__file__).parents[1] / "docs" / "clinic.md"

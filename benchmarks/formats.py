@@ -21,8 +21,8 @@ from kernel import table
 from references import REFERENCES
 
 from camviz.cameras import Camera, transform
-from camviz.files import format_of, load
-from camviz.files.format import File
+from camviz_clinic.files import format_of, load
+from camviz_clinic.files.format import File
 
 MANIFEST = Path(__file__).with_name("formats.toml")
 POINTS = np.random.default_rng(11).uniform([-0.4, -0.3, 1.0], [0.4, 0.3, 3.0], size=(100, 3))

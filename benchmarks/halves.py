@@ -17,12 +17,12 @@ from functools import partial
 import numpy as np
 from kernel import table
 
-from camviz.calibration.types import Calibration
 from camviz.cameras import Camera
-from camviz.clinic.between_views import Drift, Partings
-from camviz.clinic.checks import kinds
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.virtual import SetUp, single
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.checks.between_views import Drift, Partings
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.findings import kinds
+from camviz_clinic.checks.virtual import SetUp, single
 
 SEED = 30_000
 Rng = np.random.Generator

@@ -128,7 +128,7 @@ def table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def main() -> None:
-    modules = ("camviz", "camviz.cameras", "camviz.scenes", "camviz.twoview", "camviz.files", "camviz.widgets")
+    modules = ("camviz", "camviz.cameras", "camviz.scenes", "camviz.twoview", "camviz_clinic.files", "camviz.widgets")
     print(table(["import", "ms"], [[name, f"{import_ms(name):.0f}"] for name in modules]))
     head = ["lens", "project, M points/s", "OpenCV", "unproject, M points/s", "trace 640 × 480, ms"]
     print(table(head, [lens_row(name) for name in LENSES]), flush=True)

@@ -35,9 +35,9 @@ import nbformat
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from camviz.course.exercises import exercises  # noqa: E402
-from camviz.course.material import lessons_folder  # noqa: E402
-from camviz.course.notebooks import exercise_of, read, solutions, tagged  # noqa: E402
+from camviz_school.course.exercises import exercises  # noqa: E402
+from camviz_school.course.material import lessons_folder  # noqa: E402
+from camviz_school.course.notebooks import exercise_of, read, solutions, tagged  # noqa: E402
 
 Hand = Callable[[str], str]
 ENVIRONMENT = {

@@ -27,8 +27,8 @@ from every_view import STATES  # noqa: E402
 from laboratory import chromium  # noqa: E402
 from smallest import Smallest  # noqa: E402
 
-from camviz.record import Axis, Budget, BudgetError, Recording, Widget, record, write_player  # noqa: E402
 from camviz.widgets import explore  # noqa: E402
+from camviz_school.record import Axis, Budget, BudgetError, Recording, Widget, record, write_player  # noqa: E402
 
 LOOKED = 3  # times that each pane is timed; the table has the median
 

@@ -1,5 +1,19 @@
-"""camviz: one virtual camera, taken apart piece by piece.
+"""camviz: one virtual camera, taken apart piece by piece. This is the map of the house, in reading order.
 
+    cameras      intrinsics, a lens and a pose: the virtual camera, and several of them in a rig
+    lenses       from a ray to the image and back, a dozen ways
+    poses        where a camera stands
+    distortion   what a polynomial bends, and where it folds
+    twoview      what two cameras know of each other: epipolar geometry, triangulation, rectification
+    scenes       what there is to photograph, and how it is traced
+    optics       pinholes, thin lenses, sharpness
+    sensors      from light to numbers, with noise
+    colour, mosaics, lightfields, panoramas   what pictures hold beside brightness
+    draw         scalable pictures out of points and words
+    views        one visualizer each: a frozen state, and its picture
+    widgets      `explore`: sliders for a view
+
+Beside it stand two packages: the clinic, which looks at real calibrations, and the school, which runs the lessons.
 The names below are imported when they are first used, so that `import camviz` costs next to nothing.
 """
 
@@ -16,64 +30,63 @@ __version__ = "0.1.0"
 """
 
 _HOME = {
-    "Calibration": "camviz.calibration",
     "Camera": "camviz.cameras",
     "Intrinsics": "camviz.cameras",
     "Rig": "camviz.cameras",
     "explore": "camviz.widgets",
-    "inspect": "camviz.widgets.inspection",
-    "join": "camviz.room.membership",
-    "load": "camviz.files",
     "look_at": "camviz.cameras",
 }
 
 _PARTS = (
-    "calibration",
     "cameras",
-    "clinic",
     "colour",
     "distortion",
     "lenses",
     "lightfields",
-    "meshes",
     "mosaics",
     "optics",
-    "plots",
     "scenes",
     "sensors",
     "twoview",
 )
 
-__all__ = [
-    *("Calibration", "Camera", "Intrinsics", "Rig", "__version__", "explore", "inspect", "join", "load", "look_at"),
-    *_PARTS,
-]
+__all__ = ["Camera", "Intrinsics", "Rig", "__version__", "explore", "look_at", *_PARTS]
+
+
+_MOVED = {
+    "camviz_clinic": "Calibration calibration clinic commands files inspect load meshes plots report",
+    "camviz_school": "course join record room samples server teaching",
+}
+"""What stood in camviz before it became three packages."""
+
+
+def _where(name: str) -> str:
+    """Where a name that has moved stands now; empty for every other."""
+    new = {"clinic": "checks"}.get(name, name)
+    homes = [home for home, names in _MOVED.items() if name in names.split()]
+    return f"camviz.{name} is now {homes[0]}.{new}" if homes else ""
+
+
+class _Moved:
+    """Python's import asks it last: whoever imports a module that has moved learns where it is."""
+
+    @staticmethod
+    def find_spec(name: str, path: Any = None, target: Any = None) -> None:
+        house, _, rest = name.partition(".")
+        if house == "camviz" and (where := _where(rest.partition(".")[0])):
+            raise ImportError(where)
+
+
+sys.meta_path.append(_Moved)
 
 
 def __getattr__(name: str) -> Any:
     if name in _PARTS:
         return import_module(f"camviz.{name}")
-    if name not in _HOME:
-        raise AttributeError(f"module 'camviz' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(_where(name) or f"module 'camviz' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-def _show_calibrations() -> None:
-    """Have IPython, where it runs, show a bare calibration by `camviz.report.glance`, imported when it is wanted."""
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-    if shell is None:
-        return
-    formatters, calibration = shell.display_formatter.formatters, ("camviz.calibration.types", "Calibration")
-    formatters["text/html"].for_type_by_name(
-        *calibration, lambda shown: import_module("camviz.report.glance").html(shown)
-    )
-    formatters["text/plain"].for_type_by_name(
-        *calibration, lambda shown, printer, _: printer.text(import_module("camviz.report.glance").text(shown))
-    )
-
-
-_show_calibrations()

@@ -1,8 +1,8 @@
-"""`python -m camviz` is the command `camviz`."""
+"""`python -m camviz` is the command `camviz`, wherever it is installed."""
 
 import sys
-
-from camviz.commands.command import main
+from importlib.metadata import entry_points
 
 if __name__ == "__main__":
-    sys.exit(main())
+    (command,) = {each.value: each for each in entry_points(group="console_scripts", name="camviz")}.values()
+    sys.exit(command.load()())

@@ -23,28 +23,18 @@ class Intrinsics:
 
     All in pixels, centres at integers: the image spans -0.5 … width-0.5 and -0.5 … height-0.5.
 
-    Parameters
-    ----------
-    width, height : int
-        Size of the image in pixels.
-    fx, fy : float
-        Focal lengths in pixels.
-    cx, cy : float
-        Principal point in pixels.
-    skew : float, optional
-        In pixels; 0 where rows and columns are at right angles.
+    Args:
+        width, height: Size of the image in pixels.
+        fx, fy: Focal lengths in pixels.
+        cx, cy: Principal point in pixels.
+        skew: In pixels; 0 where rows and columns are at right angles.
 
-    Raises
-    ------
-    ValueError
-        For a size that is no whole number, a focal length that is not positive, or a number that is not finite.
+    Raises:
+        ValueError: For a size that is no whole number, a focal length that is not positive, or a number that is not
+            finite.
 
-    References
-    ----------
-    Hartley & Zisserman (2004), eq. 6.10.
+    Source: Hartley & Zisserman (2004), eq. 6.10.
 
-    Examples
-    --------
     >>> grid = Intrinsics(640, 480, fx=500, fy=500, cx=320, cy=240)
     >>> grid.to_pixels([0.1, -0.2])  # 0.1 focal lengths to the right, 0.2 up
     array([370., 140.])
@@ -76,25 +66,13 @@ class Intrinsics:
 
         FOV = 2 atan(width / 2f): the field of a perspective lens.
 
-        Parameters
-        ----------
-        width, height : int
-            Size of the image in pixels.
-        hfov_deg : float
-            Horizontal field of view in degrees.
+        Args:
+            width, height: Size of the image in pixels.
+            hfov_deg: Horizontal field of view in degrees.
 
-        Returns
-        -------
-        Intrinsics
-            With fx = fy.
+        Returns: Intrinsics with fx = fy.
+        Raises: ValueError for a field of view outside (0, 180) degrees.
 
-        Raises
-        ------
-        ValueError
-            For a field of view outside (0, 180) degrees.
-
-        Examples
-        --------
         >>> round(Intrinsics.from_fov(640, 480, 90).fx, 6)  # tan 45° = 1: half the width
         320.0
         """
@@ -107,27 +85,14 @@ class Intrinsics:
     def from_sensor(cls, width: int, height: int, focal_mm: float, pitch_um: float) -> Intrinsics:
         """Square pixels and a centred principal point, from what a data sheet says.
 
-        Parameters
-        ----------
-        width, height : int
-            Size of the image in pixels.
-        focal_mm : float
-            Focal length in millimetres.
-        pitch_um : float
-            Distance of neighbouring pixels in micrometres.
+        Args:
+            width, height: Size of the image in pixels.
+            focal_mm: Focal length in millimetres.
+            pitch_um: Distance of neighbouring pixels in micrometres.
 
-        Returns
-        -------
-        Intrinsics
-            With fx = fy.
+        Returns: Intrinsics with fx = fy.
+        Raises: ValueError for a pitch or a focal length that is not positive.
 
-        Raises
-        ------
-        ValueError
-            For a pitch or a focal length that is not positive.
-
-        Examples
-        --------
         >>> Intrinsics.from_sensor(1920, 1080, focal_mm=6, pitch_um=3).fx  # 6 mm / 3 µm
         2000.0
         """
@@ -140,25 +105,13 @@ class Intrinsics:
     def from_matrix(cls, K: ArrayLike, width: int, height: int) -> Intrinsics:
         """From a camera matrix [[fx, skew, cx], [0, fy, cy], [0, 0, 1]].
 
-        Parameters
-        ----------
-        K : array_like (3, 3)
-            The camera matrix in pixels.
-        width, height : int
-            Size of the image in pixels.
+        Args:
+            K: (3, 3), the camera matrix in pixels.
+            width, height: Size of the image in pixels.
 
-        Returns
-        -------
-        Intrinsics
-            With this K.
+        Returns: Intrinsics with this K.
+        Raises: ValueError for a matrix of any other form.
 
-        Raises
-        ------
-        ValueError
-            For a matrix of any other form.
-
-        Examples
-        --------
         >>> Intrinsics.from_matrix([[500, 0, 320], [0, 510, 240], [0, 0, 1]], 640, 480).fy
         510.0
         """
@@ -177,20 +130,11 @@ class Intrinsics:
     def to_pixels(self, xy: ArrayLike) -> Array:
         """Pixels of lens coordinates.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            Image points of the lens in focal lengths.
+        Args:
+            xy: (..., 2), image points of the lens in focal lengths.
 
-        Returns
-        -------
-        array (..., 2)
-            Pixels.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
+        Returns: (..., 2), pixels.
+        Raises: ValueError where the last axis has not 2 coordinates.
         """
         xy = as_points(xy, 2, "xy")
         x, y = xy[..., 0], xy[..., 1]
@@ -201,20 +145,11 @@ class Intrinsics:
     def from_pixels(self, uv: ArrayLike) -> Array:
         """Lens coordinates of pixels: the inverse of `to_pixels`.
 
-        Parameters
-        ----------
-        uv : array_like (..., 2)
-            Pixels.
+        Args:
+            uv: (..., 2), pixels.
 
-        Returns
-        -------
-        array (..., 2)
-            Image points of the lens in focal lengths.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
+        Returns: (..., 2), image points of the lens in focal lengths.
+        Raises: ValueError where the last axis has not 2 coordinates.
         """
         uv = as_points(uv, 2, "uv")
         xy = np.empty(uv.shape)
@@ -225,23 +160,12 @@ class Intrinsics:
     def contains(self, uv: ArrayLike) -> np.ndarray:
         """Whether pixels lie on the image.
 
-        Parameters
-        ----------
-        uv : array_like (..., 2)
-            Pixels.
+        Args:
+            uv: (..., 2), pixels.
 
-        Returns
-        -------
-        array (...) of bool
-            True on the image; NaN does not lie on it.
+        Returns: (...) of bool, True on the image; NaN does not lie on it.
+        Raises: ValueError where the last axis has not 2 coordinates.
 
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
-
-        Examples
-        --------
         >>> Intrinsics.from_fov(640, 480, 90).contains([[-0.5, 0], [-0.6, 0], [np.nan, 0]])
         array([ True, False, False])
         """
@@ -251,18 +175,11 @@ class Intrinsics:
     def resized(self, width: int, height: int) -> Intrinsics:
         """The same view sampled on another grid: f' = s f and, with centres at integers, c' = s c + (s - 1)/2.
 
-        Parameters
-        ----------
-        width, height : int
-            Size of the other grid in pixels.
+        Args:
+            width, height: Size of the other grid in pixels.
 
-        Returns
-        -------
-        Intrinsics
-            Of that size, with the same field of view.
+        Returns: Intrinsics of that size, with the same field of view.
 
-        Examples
-        --------
         >>> Intrinsics(640, 480, 500, 500, 320, 240).resized(320, 240).cx  # 160 - 1/4, not 160
         159.75
         """
@@ -273,15 +190,10 @@ class Intrinsics:
     def within(self, side: int) -> Intrinsics:
         """The same view on the grid of its aspect whose longer side has `side` pixels, and the shorter at least one.
 
-        Parameters
-        ----------
-        side : int
-            Pixels along the longer side.
+        Args:
+            side: Pixels along the longer side.
 
-        Returns
-        -------
-        Intrinsics
-            The view resized.
+        Returns: The view resized.
         """
         scale = side / max(self.width, self.height)
         return self.resized(max(1, round(scale * self.width)), max(1, round(scale * self.height)))
@@ -289,37 +201,22 @@ class Intrinsics:
     def cropped(self, x0: int, y0: int, width: int, height: int) -> Intrinsics:
         """The window whose first pixel was (x0, y0): only the principal point moves.
 
-        Parameters
-        ----------
-        x0, y0 : int
-            Column and row in pixels of the window's upper left pixel.
-        width, height : int
-            Size of the window in pixels.
+        Args:
+            x0, y0: Column and row in pixels of the window's upper left pixel.
+            width, height: Size of the window in pixels.
 
-        Returns
-        -------
-        Intrinsics
-            Of the window.
+        Returns: Intrinsics of the window.
         """
         return replace(self, width=width, height=height, cx=self.cx - x0, cy=self.cy - y0)
 
     def binned(self, factor: int) -> Intrinsics:
         """Blocks of factor × factor pixels read as one; left-over columns and rows are dropped.
 
-        Parameters
-        ----------
-        factor : int
-            Pixels along the side of a block.
+        Args:
+            factor: Pixels along the side of a block.
 
-        Returns
-        -------
-        Intrinsics
-            Of the smaller image.
-
-        Raises
-        ------
-        ValueError
-            For a factor that is no whole number, or below 1.
+        Returns: Intrinsics of the smaller image.
+        Raises: ValueError for a factor that is no whole number, or below 1.
         """
         if int(factor) != factor or factor < 1:
             raise ValueError(f"factor must be a whole number, at least 1, got {factor}")
@@ -329,10 +226,7 @@ class Intrinsics:
     def grid(self) -> Array:
         """Every pixel centre.
 
-        Returns
-        -------
-        array (height, width, 2)
-            Pixels (u, v).
+        Returns: (height, width, 2), pixels (u, v).
         """
         u, v = np.meshgrid(np.arange(self.width, dtype=float), np.arange(self.height, dtype=float))
         return np.stack([u, v], axis=-1)
@@ -340,15 +234,10 @@ class Intrinsics:
     def border(self, samples: int = 16) -> Array:
         """The image's outline, clockwise from the top left corner.
 
-        Parameters
-        ----------
-        samples : int, optional
-            Points along each side.
+        Args:
+            samples: Points along each side.
 
-        Returns
-        -------
-        array (4 * samples, 2)
-            Pixels.
+        Returns: (4 * samples, 2), pixels.
         """
         s = np.arange(samples) / samples
         u = np.concatenate([s, np.ones(samples), 1 - s, np.zeros(samples)]) * self.width - 0.5
@@ -360,17 +249,11 @@ class Intrinsics:
 class Camera:
     """Intrinsics, a lens and a pose.
 
-    Parameters
-    ----------
-    intrinsics : Intrinsics
-        The pixel grid.
-    lens : Lens, optional
-        Perspective unless given.
-    world_from_cam : RigidTransform, optional
-        Where the camera stands and looks, in metres; the origin, looking along z, unless given.
+    Args:
+        intrinsics: The pixel grid.
+        lens: Perspective unless given.
+        world_from_cam: Where the camera stands and looks, in metres; the origin, looking along z, unless given.
 
-    Examples
-    --------
     >>> camera = Camera(Intrinsics.from_fov(641, 481, 90), world_from_cam=look_at((0, -2, -5), (0, 0, 0)))
     >>> camera.project([0, 0, 0])  # what it looks at, in the middle
     array([320., 240.])
@@ -402,27 +285,13 @@ class Camera:
     def project(self, points_world: ArrayLike) -> Array:
         """K ∘ lens ∘ cam_from_world: where points of the world appear in the picture.
 
-        Parameters
-        ----------
-        points_world : array_like (..., 3)
-            Points in metres.
+        Args:
+            points_world: (..., 3), points in metres.
 
-        Returns
-        -------
-        array (..., 2)
-            Pixels; NaN where a point has no image.
+        Returns: (..., 2), pixels; NaN where a point has no image.
+        Raises: ValueError where the last axis has not 3 coordinates.
+        Source: Hartley & Zisserman (2004), section 6.1.
 
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 3 coordinates.
-
-        References
-        ----------
-        Hartley & Zisserman (2004), section 6.1.
-
-        Examples
-        --------
         >>> camera = Camera(Intrinsics.from_fov(641, 481, 90))  # f = 641/2, principal point (320, 240)
         >>> camera.project([[0, 0, 2], [1, 0, 2], [0, 0, -2]])
         array([[320.  , 240.  ],
@@ -436,23 +305,12 @@ class Camera:
     def unproject(self, uv: ArrayLike) -> Array:
         """The rays through pixels.
 
-        Parameters
-        ----------
-        uv : array_like (..., 2)
-            Pixels.
+        Args:
+            uv: (..., 2), pixels.
 
-        Returns
-        -------
-        array (..., 3)
-            Unit rays in the world, from the camera's centre; NaN where there is no ray.
+        Returns: (..., 3), unit rays in the world, from the camera's centre; NaN where there is no ray.
+        Raises: ValueError where the last axis has not 2 coordinates.
 
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
-
-        Examples
-        --------
         >>> Camera(Intrinsics.from_fov(641, 481, 90)).unproject([320, 240])
         array([0., 0., 1.])
         """
@@ -462,30 +320,18 @@ class Camera:
     def rays(self) -> Array:
         """The ray of every pixel.
 
-        Returns
-        -------
-        array (height, width, 3)
-            Unit rays in the world; NaN where there is no ray.
+        Returns: (height, width, 3), unit rays in the world; NaN where there is no ray.
         """
         return self.unproject(self.intrinsics.grid())
 
     def sees(self, points_world: ArrayLike) -> np.ndarray:
         """Whether points of the world have an image inside the picture.
 
-        Parameters
-        ----------
-        points_world : array_like (..., 3)
-            Points in metres.
+        Args:
+            points_world: (..., 3), points in metres.
 
-        Returns
-        -------
-        array (...) of bool
-            True where the image lies inside the picture.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 3 coordinates.
+        Returns: (...) of bool, True where the image lies inside the picture.
+        Raises: ValueError where the last axis has not 3 coordinates.
         """
         return self.intrinsics.contains(self.project(points_world))
 
@@ -494,19 +340,13 @@ class Camera:
 
         Points of the image's border at equal distance *along the ray*, so the rims bend with the lens.
 
-        Parameters
-        ----------
-        near, far : float
-            Distances in metres.
-        samples : int, optional
-            Points along each side of the image.
+        Args:
+            near, far: Distances in metres.
+            samples: Points along each side of the image.
 
-        Returns
-        -------
-        near_rim : array (4 * samples, 3)
-            Points in the world in metres, at the distance `near`.
-        far_rim : array (4 * samples, 3)
-            The same at `far`.
+        Returns:
+            near_rim: (4 * samples, 3), points in the world in metres, at the distance `near`.
+            far_rim: (4 * samples, 3), the same at `far`.
         """
         rays = self.unproject(self.intrinsics.border(samples))
         return self.centre + near * rays, self.centre + far * rays
@@ -514,15 +354,10 @@ class Camera:
     def at(self, world_from_cam: RigidTransform) -> Camera:
         """The same camera, standing elsewhere.
 
-        Parameters
-        ----------
-        world_from_cam : RigidTransform
-            Its new pose.
+        Args:
+            world_from_cam: Its new pose.
 
-        Returns
-        -------
-        Camera
-            With the same intrinsics and lens.
+        Returns: Camera with the same intrinsics and lens.
         """
         return replace(self, world_from_cam=world_from_cam)
 
@@ -531,13 +366,9 @@ class Camera:
 class Rig:
     """Named cameras that keep their places relative to each other.
 
-    Parameters
-    ----------
-    cameras : mapping of str to Camera
-        The cameras by name.
+    Args:
+        cameras: The cameras by name.
 
-    Examples
-    --------
     >>> from camviz.poses import RigidTransform
     >>> left = Camera(Intrinsics.from_fov(640, 480, 60))
     >>> rig = Rig({"left": left, "right": left.at(RigidTransform.from_translation([0.1, 0, 0]))})
@@ -558,20 +389,11 @@ class Rig:
     def a_from_b(self, a: str, b: str) -> RigidTransform:
         """The transform that takes points in camera b's frame to camera a's; for a stereo pair, right_from_left.
 
-        Parameters
-        ----------
-        a, b : str
-            Names of cameras.
+        Args:
+            a, b: Names of cameras.
 
-        Returns
-        -------
-        RigidTransform
-            In metres.
-
-        Raises
-        ------
-        KeyError
-            For a name that is none of the cameras'.
+        Returns: RigidTransform in metres.
+        Raises: KeyError for a name that is none of the cameras'.
         """
         return self[a].cam_from_world * self[b].world_from_cam
 
@@ -579,27 +401,14 @@ class Rig:
 def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> RigidTransform:
     """The pose of a camera that looks at a point.
 
-    Parameters
-    ----------
-    eye : array_like (3,)
-        Where the camera stands, in metres.
-    target : array_like (3,)
-        What it looks at, in metres.
-    down : array_like (3,), optional
-        The direction, of any unit, that its y axis leans towards; y of the world unless given.
+    Args:
+        eye: (3,), where the camera stands, in metres.
+        target: (3,), what it looks at, in metres.
+        down: (3,), the direction, of any unit, that its y axis leans towards; y of the world unless given.
 
-    Returns
-    -------
-    RigidTransform
-        world_from_cam.
+    Returns: world_from_cam.
+    Raises: ValueError where the view direction is undefined or runs along `down`, and for other than 3 coordinates.
 
-    Raises
-    ------
-    ValueError
-        Where the view direction is undefined or runs along `down`, and for other than 3 coordinates.
-
-    Examples
-    --------
     >>> look_at(eye=(0, 0, 0), target=(3, 0, 0)).apply([0, 0, 1]).round(6)  # it looks along x
     array([1., 0., 0.])
     """
@@ -616,25 +425,13 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> R
 def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
     """Points taken by a rigid transform; SciPy's `apply` takes only (n, 3).
 
-    Parameters
-    ----------
-    to_from : RigidTransform
-        One transform, in metres.
-    points : array_like (..., 3)
-        Points in metres.
+    Args:
+        to_from: One transform, in metres.
+        points: (..., 3), points in metres.
 
-    Returns
-    -------
-    array (..., 3)
-        The same points in the other frame.
+    Returns: (..., 3), the same points in the other frame.
+    Raises: ValueError where the last axis has not 3 coordinates.
 
-    Raises
-    ------
-    ValueError
-        Where the last axis has not 3 coordinates.
-
-    Examples
-    --------
     >>> from camviz.poses import RigidTransform
     >>> transform(RigidTransform.from_translation([1, 0, 0]), [[[0, 0, 2]]])
     array([[[1., 0., 2.]]])
@@ -646,25 +443,13 @@ def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
 def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:
     """Vectors turned by a rotation.
 
-    Parameters
-    ----------
-    rotation : Rotation
-        One rotation.
-    vectors : array_like (..., 3)
-        Vectors, of any unit.
+    Args:
+        rotation: One rotation.
+        vectors: (..., 3), vectors, of any unit.
 
-    Returns
-    -------
-    array (..., 3)
-        The turned vectors.
+    Returns: (..., 3), the turned vectors.
+    Raises: ValueError where the last axis has not 3 coordinates.
 
-    Raises
-    ------
-    ValueError
-        Where the last axis has not 3 coordinates.
-
-    Examples
-    --------
     >>> from camviz.poses import Rotation
     >>> rotate(Rotation.from_euler("y", 90, degrees=True), [0, 0, 1]).round(6)  # forwards turns to the right
     array([1., 0., 0.])

@@ -38,19 +38,13 @@ WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more th
 def fold_radius(lens: Lens) -> float:
     """The ideal radius where a lens's radial equation turns back, unless a pole comes before it.
 
-    Parameters
-    ----------
-    lens : Lens
-        Any lens.
+    Args:
+        lens: Any lens.
 
-    Returns
-    -------
-    float
+    Returns:
         In the equation's own variable: r in focal lengths on the plane z = 1, or for a fisheye the angle θ in radians;
         infinity where it never turns back.
 
-    Examples
-    --------
     >>> from camviz.lenses import BrownConrady
     >>> round(fold_radius(BrownConrady(-1 / 3)), 6)  # 1 - 3 r²/3 = 0
     1.0
@@ -61,18 +55,11 @@ def fold_radius(lens: Lens) -> float:
 def fold_angle(lens: Lens) -> float:
     """The angle between the axis and the ray at which a lens folds.
 
-    Parameters
-    ----------
-    lens : Lens
-        Any lens.
+    Args:
+        lens: Any lens.
 
-    Returns
-    -------
-    float
-        In radians; infinity if it never folds.
+    Returns: In radians; infinity if it never folds.
 
-    Examples
-    --------
     >>> from camviz.lenses import BrownConrady
     >>> f"{np.degrees(fold_angle(BrownConrady(-1 / 3))):.0f}°"  # atan 1
     '45°'
@@ -83,18 +70,11 @@ def fold_angle(lens: Lens) -> float:
 def pole_radius(lens: Lens) -> float:
     """The ideal radius where a rational polynomial is infinite, the first positive root of D(r²).
 
-    Parameters
-    ----------
-    lens : Lens
-        Any lens.
+    Args:
+        lens: Any lens.
 
-    Returns
-    -------
-    float
-        In focal lengths; infinity if there is none.
+    Returns: In focal lengths; infinity if there is none.
 
-    Examples
-    --------
     >>> from camviz.lenses import BrownConrady
     >>> pole_radius(BrownConrady(k4=-0.25))  # 1 - 0.25 r² = 0
     2.0
@@ -105,18 +85,11 @@ def pole_radius(lens: Lens) -> float:
 def is_rational(lens: Lens) -> bool:
     """Whether a lens's polynomial is divided by another, so that it may have a pole.
 
-    Parameters
-    ----------
-    lens : Lens
-        Any lens.
+    Args:
+        lens: Any lens.
 
-    Returns
-    -------
-    bool
-        True where it is divided.
+    Returns: True where it is divided.
 
-    Examples
-    --------
     >>> from camviz.lenses import BrownConrady
     >>> is_rational(BrownConrady(k1=0.1)), is_rational(BrownConrady(k1=0.1, k4=0.1))
     (False, True)
@@ -129,22 +102,14 @@ def weakest_denominator(lens: Lens, radius: float) -> tuple[float, float]:
 
     A D far below 1 is a near-pole: the polynomial has no root there, yet throws the picture about.
 
-    Parameters
-    ----------
-    lens : Lens
-        Any lens.
-    radius : float
-        How far to look, in focal lengths.
+    Args:
+        lens: Any lens.
+        radius: How far to look, in focal lengths.
 
-    Returns
-    -------
-    r : float
-        Where in 0 … `radius` it is smallest, in focal lengths; 0 without a denominator.
-    D : float
-        The denominator there; 1 without one.
+    Returns:
+        r: Where in 0 … `radius` it is smallest, in focal lengths; 0 without a denominator.
+        D: The denominator there; 1 without one.
 
-    Examples
-    --------
     >>> from camviz.lenses import BrownConrady
     >>> weakest_denominator(BrownConrady(k4=-1, k5=0.5), radius=2)  # 1 - s + s²/2 is smallest at s = 1
     (1.0, 0.5)
@@ -159,20 +124,12 @@ def weakest_denominator(lens: Lens, radius: float) -> tuple[float, float]:
 def edge_of_field(lens: Lens, azimuth: ArrayLike) -> Array:
     """The angle from the axis to the last ray with an image.
 
-    Parameters
-    ----------
-    lens : Lens
-        Any lens.
-    azimuth : array_like (...)
-        Directions in radians, from x towards y.
+    Args:
+        lens: Any lens.
+        azimuth: (...), directions in radians, from x towards y.
 
-    Returns
-    -------
-    array (...)
-        Angles in radians.
+    Returns: (...), angles in radians.
 
-    Examples
-    --------
     >>> from camviz.lenses import Orthographic
     >>> np.degrees(edge_of_field(Orthographic(), [0, np.pi / 2])).round(6)
     array([90., 90.])
@@ -190,18 +147,11 @@ def edge_of_field(lens: Lens, azimuth: ArrayLike) -> Array:
 def image_corner_radius(intrinsics: Intrinsics) -> float:
     """The distance from the principal point to the farthest corner pixel: a *distorted* radius.
 
-    Parameters
-    ----------
-    intrinsics : Intrinsics
-        The image.
+    Args:
+        intrinsics: The image.
 
-    Returns
-    -------
-    float
-        In focal lengths.
+    Returns: In focal lengths.
 
-    Examples
-    --------
     >>> from camviz.cameras import Intrinsics
     >>> image_corner_radius(Intrinsics(601, 801, 500, 500, cx=300, cy=400))  # √(300² + 400²) / 500
     1.0
@@ -213,18 +163,11 @@ def image_corner_radius(intrinsics: Intrinsics) -> float:
 def ideal_image_radius(camera: Camera) -> float:
     """The largest tan θ of the rays in front of the camera that arrive on the image's border.
 
-    Parameters
-    ----------
-    camera : Camera
-        With any lens.
+    Args:
+        camera: With any lens.
 
-    Returns
-    -------
-    float
-        In focal lengths on the plane z = 1; NaN if there are none.
+    Returns: In focal lengths on the plane z = 1; NaN if there are none.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> ideal_image_radius(Camera(Intrinsics(601, 801, 500, 500, cx=300, cy=400)))  # of a perspective lens: the corner
     1.0
@@ -237,18 +180,11 @@ def ideal_image_radius(camera: Camera) -> float:
 def image_reach(camera: Camera) -> float:
     """How far an undistorted picture of this camera asks the lens.
 
-    Parameters
-    ----------
-    camera : Camera
-        With any lens.
+    Args:
+        camera: With any lens.
 
-    Returns
-    -------
-    float
-        In focal lengths on the plane z = 1; NaN where nowhere.
+    Returns: In focal lengths on the plane z = 1; NaN where nowhere.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> image_reach(Camera(Intrinsics(601, 801, 500, 500, cx=300, cy=400)))
     1.0
@@ -261,25 +197,13 @@ def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
 
     By the lens's own Jacobian: of `BrownConrady` exact, beyond its fold as well; of most others good to about 1e-9.
 
-    Parameters
-    ----------
-    lens : Lens
-        Any lens.
-    xy : array_like (..., 2)
-        Ideal points in focal lengths.
+    Args:
+        lens: Any lens.
+        xy: (..., 2), ideal points in focal lengths.
 
-    Returns
-    -------
-    array (...)
-        How many times as large an area becomes.
+    Returns: (...), how many times as large an area becomes.
+    Raises: ValueError where the last axis has not 2 coordinates.
 
-    Raises
-    ------
-    ValueError
-        Where the last axis has not 2 coordinates.
-
-    Examples
-    --------
     >>> from camviz.lenses import BrownConrady
     >>> jacobian_determinant(BrownConrady(-1 / 3), [[0, 0], [1, 0], [1.2, 0]]).round(3)  # at 1 it folds
     array([ 1.   ,  0.   , -0.229])
@@ -292,25 +216,13 @@ def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
 def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
     """At which pixels a ray arrives.
 
-    Parameters
-    ----------
-    camera : Camera
-        With any lens.
-    step_px : int, optional
-        Only every so many pixels are asked.
+    Args:
+        camera: With any lens.
+        step_px: Only every so many pixels are asked.
 
-    Returns
-    -------
-    array (rows, columns) of bool
-        True where a ray arrives.
+    Returns: (rows, columns) of bool, True where a ray arrives.
+    Raises: ValueError for a step below 1.
 
-    Raises
-    ------
-    ValueError
-        For a step below 1.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.lenses import Orthographic
     >>> camera = Camera(Intrinsics(401, 401, 100, 100, 200, 200), Orthographic())  # a disc of 100 pixels' radius
@@ -330,27 +242,16 @@ def displacement(camera: Camera, step_px: float) -> tuple[Array, Array]:
 
     The grid is centred on the image; the undistorted picture has the camera's own K.
 
-    Parameters
-    ----------
-    camera : Camera
-        With any lens.
-    step_px : float
-        Distance of neighbouring points in pixels.
+    Args:
+        camera: With any lens.
+        step_px: Distance of neighbouring points in pixels.
 
-    Returns
-    -------
-    ideal : array (rows, columns, 2)
-        The grid in pixels.
-    moved : array (rows, columns, 2)
-        Vectors in pixels to where the lens puts the points; NaN where nowhere.
+    Returns:
+        ideal: (rows, columns, 2), the grid in pixels.
+        moved: (rows, columns, 2), vectors in pixels to where the lens puts the points; NaN where nowhere.
 
-    Raises
-    ------
-    ValueError
-        For a step that is not positive.
+    Raises: ValueError for a step that is not positive.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.lenses import BrownConrady
     >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2))
@@ -374,26 +275,16 @@ def undistort_maps(
 
     The forward model is evaluated at every output pixel.
 
-    Parameters
-    ----------
-    camera : Camera
-        Of the photograph.
-    target : Intrinsics
-        Of the picture by the same camera.
-    lens : Lens, optional
-        Of that picture; perspective unless given.
-    target_from_cam : Rotation, optional
-        How the picture is turned.
+    Args:
+        camera: Of the photograph.
+        target: Of the picture by the same camera.
+        lens: Of that picture; perspective unless given.
+        target_from_cam: How the picture is turned.
 
-    Returns
-    -------
-    map_x : array (height, width) of float32
-        Pixels u in the photograph, for `remap`; NaN where it shows nothing.
-    map_y : array (height, width) of float32
-        Pixels v.
+    Returns:
+        map_x: (height, width) of float32, pixels u in the photograph, for `remap`; NaN where it shows nothing.
+        map_y: (height, width) of float32, pixels v.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.lenses import BrownConrady
     >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2))
@@ -412,24 +303,15 @@ def distort_maps(camera: Camera, source: Intrinsics, lens: Lens | None = None) -
 
     Needs the inverse of the lens at every output pixel.
 
-    Parameters
-    ----------
-    camera : Camera
-        Whose lens bends.
-    source : Intrinsics
-        Of the ideal picture.
-    lens : Lens, optional
-        Of the ideal picture; perspective unless given.
+    Args:
+        camera: Whose lens bends.
+        source: Of the ideal picture.
+        lens: Of the ideal picture; perspective unless given.
 
-    Returns
-    -------
-    map_x : array (height, width) of float32
-        Pixels u in the ideal picture, for `remap`; NaN where no ray arrives.
-    map_y : array (height, width) of float32
-        Pixels v.
+    Returns:
+        map_x: (height, width) of float32, pixels u in the ideal picture, for `remap`; NaN where no ray arrives.
+        map_y: (height, width) of float32, pixels v.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.lenses import BrownConrady
     >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.2))
@@ -443,20 +325,12 @@ def distort_maps(camera: Camera, source: Intrinsics, lens: Lens | None = None) -
 def remap(image: np.ndarray, maps: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """The picture whose pixels lie at `maps` in another, bilinear.
 
-    Parameters
-    ----------
-    image : array (height, width) or (height, width, 3)
-        Of any type that OpenCV takes, in any unit.
-    maps : tuple of array (rows, columns) of float32
-        map_x and map_y in pixels.
+    Args:
+        image: (height, width) or (height, width, 3), of any type that OpenCV takes, in any unit.
+        maps: tuple of (rows, columns) of float32, map_x and map_y in pixels.
 
-    Returns
-    -------
-    array (rows, columns) or (rows, columns, 3)
-        Of the image's type; black where the maps are NaN or lead outside.
+    Returns: (rows, columns) or (rows, columns, 3), of the image's type; black where the maps are NaN or lead outside.
 
-    Examples
-    --------
     >>> row = np.array([[0, 100, 200]], np.uint8)
     >>> remap(row, (np.float32([[0.5, np.nan]]), np.float32([[0, 0]])))  # halfway between 0 and 100
     array([[50,  0]], dtype=uint8)
@@ -471,27 +345,16 @@ def undistorted_intrinsics(camera: Camera, alpha: float) -> tuple[Intrinsics, tu
     between them the focal lengths and principal points are mixed, as in cv2.getOptimalNewCameraMatrix. Rays beyond a
     fold or 80° from the axis are left out.
 
-    Parameters
-    ----------
-    camera : Camera
-        With any lens.
-    alpha : float
-        From 0 to 1.
+    Args:
+        camera: With any lens.
+        alpha: From 0 to 1.
 
-    Returns
-    -------
-    intrinsics : Intrinsics
-        Of the undistorted picture.
-    rectangle : tuple of int
-        x0, y0, width and height in pixels of what is not black.
+    Returns:
+        intrinsics: Of the undistorted picture.
+        rectangle: x0, y0, width and height in pixels of what is not black.
 
-    Raises
-    ------
-    ValueError
-        For alpha outside 0 … 1 and where no such rectangle exists.
+    Raises: ValueError for alpha outside 0 … 1 and where no such rectangle exists.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.lenses import BrownConrady
     >>> camera = Camera(Intrinsics(401, 401, 200, 200, 200, 200), BrownConrady(-0.05))

@@ -25,7 +25,7 @@ c.Spawner.start_timeout = 180
 c.Spawner.args.extend(
     [
         # Each picture goes to the browser at once: a slider answers 40 ms sooner.
-        "--ServerApp.jpserver_extensions=camviz.server=True",
+        "--ServerApp.jpserver_extensions=camviz_school.server=True",
         # A kernel whose browser has been away for an hour ends, and gives its memory to others. What was saved stays.
         "--MappingKernelManager.cull_idle_timeout=3600",
         "--MappingKernelManager.cull_interval=300",

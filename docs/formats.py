@@ -6,9 +6,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from camviz.files.corners import corner_formats
-from camviz.files.format import Format
-from camviz.files.registry import formats
+from camviz_clinic.files.corners import corner_formats
+from camviz_clinic.files.format import Format
+from camviz_clinic.files.registry import formats
 
 PAGE = Path(__file__).with_suffix(".md")
 HEAD = "| `--to` | file | camera models | conventions of its own | not written |\n|---|---|---|---|---|\n"

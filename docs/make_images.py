@@ -4,13 +4,11 @@ from pathlib import Path
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
-from camviz.views.calibration import CalibrationView
 from camviz.views.colour import ColourView
 from camviz.views.demosaicing import DemosaicingView
 from camviz.views.depth_of_field import DepthOfFieldView
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
-from camviz.views.fault_lab import FaultLabView
 from camviz.views.fisheye import FisheyeView
 from camviz.views.frustum import FrustumView
 from camviz.views.image_sensor import ImageSensorView
@@ -21,6 +19,8 @@ from camviz.views.omnidirectional import OmnidirectionalView
 from camviz.views.pinhole import PinholeView
 from camviz.views.rectification import RectificationView
 from camviz.views.sharpness import SharpnessView
+from camviz_clinic.views.calibration import CalibrationView
+from camviz_clinic.views.fault_lab import FaultLabView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(

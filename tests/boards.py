@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.problem import moved
-from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.problem import moved
+from camviz_clinic.calibration.types import Board
 
 BOARD = Board(9, 6, 0.025)
 CAMERA = Camera(Intrinsics(640, 480, 530.0, 532.0, 325.0, 236.0), BrownConrady(-0.28, 0.1, 1e-3, -5e-4))

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.types import Board, Calibration
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
+from camviz_clinic.calibration.types import Board, Calibration
 
 BOARD = Board(9, 6, 0.025)
 TRUE = Camera(Intrinsics(640, 480, 530, 532, 322, 238), BrownConrady(-0.25, 0.06))

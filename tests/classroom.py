@@ -15,8 +15,8 @@ from commandline import ROOT
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.testing import bind_unused_port
 
-from camviz.room.limits import Limits
-from camviz.room.server import House, application, listen
+from camviz_school.room.limits import Limits
+from camviz_school.room.server import House, application, listen
 
 
 @contextmanager

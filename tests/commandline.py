@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import camviz
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
 
 ROOT = Path(camviz.__file__).parents[1]
 

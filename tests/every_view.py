@@ -12,16 +12,17 @@ import numpy as np
 from calibrations import bare, pair, single
 
 import camviz.views
+import camviz_clinic.views
 from camviz.draw.picture import Picture
 from camviz.optics import SlantedEdge
 from camviz.sensors import Sensor
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import Level
 from camviz.views.base import View
-from camviz.views.board_poses import BoardPosesView
-from camviz.views.clinic.catalogue import VIEWS, Case
 from camviz.views.measured_edge import MeasuredEdgeView
 from camviz.views.measured_noise import MeasuredNoiseView
+from camviz_clinic.views.board_poses import BoardPosesView
+from camviz_clinic.views.catalogue import VIEWS, Case
 
 SHARED = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras")
 """Classes of what several views have in common; they draw nothing themselves."""
@@ -33,10 +34,12 @@ def words(svg: str) -> str:
 
 
 def classes() -> dict[str, type[View]]:
-    """Every class of view in camviz.views, by name."""
-    modules = [
-        importlib.import_module(found.name) for found in pkgutil.walk_packages(camviz.views.__path__, "camviz.views.")
+    """Every class of view in camviz.views and camviz_clinic.views, by name."""
+    found = [
+        *pkgutil.walk_packages(camviz.views.__path__, "camviz.views."),
+        *pkgutil.walk_packages(camviz_clinic.views.__path__, "camviz_clinic.views."),
     ]
+    modules = [importlib.import_module(each.name) for each in found]
     found = [one for module in modules for one in vars(module).values() if isclass(one) and issubclass(one, View)]
     return {one.__name__: one for one in found if one.__name__ not in SHARED}
 

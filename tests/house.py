@@ -8,7 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("camviz", "lessons", "docs", "tests", "README.md", "pyproject.toml", "conftest.py")
+COPIED = (
+    "camviz",
+    "camviz_clinic",
+    "camviz_school",
+    "lessons",
+    "docs",
+    "tests",
+    "README.md",
+    "pyproject.toml",
+    "conftest.py",
+)
 
 
 @dataclass(frozen=True)

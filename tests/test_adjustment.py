@@ -9,13 +9,13 @@ from boards import BOARD, CAMERA, ESTIMATED, RIGHT, board_poses, noisy, truth
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.adjustment import Adjustment, twisted
-from camviz.calibration.arrowhead import inverse
-from camviz.calibration.jacobian import pixel_jacobian, with_parameters
-from camviz.calibration.linearisation import sagittas
-from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, DoubleSphere, ExtendedUnified, FieldOfView, KannalaBrandt, UnifiedSphere
+from camviz_clinic.calibration.adjustment import Adjustment, twisted
+from camviz_clinic.calibration.arrowhead import inverse
+from camviz_clinic.calibration.jacobian import pixel_jacobian, with_parameters
+from camviz_clinic.calibration.linearisation import sagittas
+from camviz_clinic.calibration.types import Calibration
 
 SIGMA = 0.2
 LENSES = [

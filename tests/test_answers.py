@@ -5,11 +5,11 @@ import re
 
 import pytest
 
-from camviz.course import prose
-from camviz.course.answers import AnswerBook, read_answers
-from camviz.course.questions import predict_questions, question, quiz_questions
-from camviz.widgets import quiz
-from camviz.widgets.question import QuestionWidget, Sheet
+from camviz.draw import prose
+from camviz_school.course.answers import AnswerBook, read_answers
+from camviz_school.course.questions import predict_questions, question, quiz_questions
+from camviz_school.widgets import quiz
+from camviz_school.widgets.question import QuestionWidget, Sheet
 
 STATE = (
     *("title", "lead", "cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem"),

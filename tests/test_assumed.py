@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import yaml
 
-from camviz.clinic import inspect_file
-from camviz.commands.command import main
-from camviz.report.inspection import report
+from camviz_clinic.checks import inspect_file
+from camviz_clinic.commands.command import main
+from camviz_clinic.report.inspection import report
 
 
 def file(tmp_path, D, **more):

@@ -12,16 +12,16 @@ import cv2
 import numpy as np
 import pytest
 
-import camviz
-from camviz.calibration import Board, CannotCalibrate, detect
-from camviz.calibration.finding import look
-from camviz.calibration.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
-from camviz.clinic import inspect_file
-from camviz.clinic.pictures import sizes_of
-from camviz.commands.command import main
-from camviz.course.working_copy import MANIFEST, lay_out
-from camviz.files import CalibrationError
-from camviz.files.output import as_json, json_text
+import camviz_clinic
+from camviz.colour.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
+from camviz_clinic.calibration import Board, CannotCalibrate, detect
+from camviz_clinic.calibration.finding import look
+from camviz_clinic.checks import inspect_file
+from camviz_clinic.checks.pictures import sizes_of
+from camviz_clinic.commands.command import main
+from camviz_clinic.files import CalibrationError
+from camviz_clinic.files.output import as_json, json_text
+from camviz_school.course.working_copy import MANIFEST, lay_out
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import attack
@@ -227,7 +227,7 @@ def test_an_inspection_of_absurd_numbers_is_strict_json(tmp_path, number):
 def test_json_that_is_a_trap_is_refused_in_one_sentence(tmp_path, name, text, what):
     (tmp_path / name).write_text(text)
     with pytest.raises(CalibrationError, match=what) as caught:
-        camviz.load(tmp_path / name)
+        camviz_clinic.load(tmp_path / name)
     assert attack.sentence(str(caught.value)) == "refused"
 
 
@@ -237,7 +237,7 @@ def test_numbers_that_are_none_are_refused(tmp_path, number):
     focal_length = json.loads(good)["camera_matrix"]["data"][0]
     (tmp_path / "camera.json").write_text(good.replace(repr(focal_length), number, 1))
     with pytest.raises(CalibrationError) as caught:
-        camviz.load(tmp_path / "camera.json")
+        camviz_clinic.load(tmp_path / "camera.json")
     assert attack.sentence(str(caught.value)) == "refused"
 
 

@@ -5,16 +5,17 @@ import re
 import numpy as np
 import pytest
 
-from camviz import distortion, plots
-from camviz.calibration import Board, Detections, calibrate, detect, find_corners
-from camviz.calibration.zhang import board_pose, focal_lengths
+from camviz import distortion
 from camviz.cameras import Camera, Intrinsics, Rig, look_at
-from camviz.clinic import inspect
 from camviz.draw.space import Label, grid_lines, scene_items
-from camviz.files.corners import load_corners
 from camviz.scenes import textured_scene
 from camviz.views.distortion import DistortionView
 from camviz.widgets import explore
+from camviz_clinic import plots
+from camviz_clinic.calibration import Board, Detections, calibrate, detect, find_corners
+from camviz_clinic.calibration.zhang import board_pose, focal_lengths
+from camviz_clinic.checks import inspect
+from camviz_clinic.files.corners import load_corners
 
 CAMERA = Camera(Intrinsics.from_fov(64, 48, 60))
 BOARD = Board(9, 6, 0.025)
@@ -92,7 +93,7 @@ def test_a_mistake_is_answered_in_one_sentence(mistake):
 
 def test_mistakes_with_meshes_are_answered_in_one_sentence():
     pytest.importorskip("pyvista")
-    from camviz import meshes
+    from camviz_clinic import meshes
 
     with pytest.raises(ValueError, match=r"^positions must have shape \(\.\.\., 3\), got \(1, 2\)$"):
         meshes.points([[1, 2]])

@@ -7,13 +7,13 @@ import pytest
 from boards import BOARD, CAMERA, board_poses, noisy, truth
 from scipy.stats import kstest
 
-from camviz.clinic.between_views import BY_SCATTER, Drift, Partings
-from camviz.clinic.checks import kinds
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.observed import Observed
-from camviz.clinic.view_by_view import ViewByView
-from camviz.clinic.virtual import single
 from camviz.lenses.base import Array
+from camviz_clinic.checks.between_views import BY_SCATTER, Drift, Partings
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.findings import kinds
+from camviz_clinic.checks.observed import Observed
+from camviz_clinic.checks.view_by_view import ViewByView
+from camviz_clinic.checks.virtual import single
 
 SIGMA = 0.2
 VIEWS = 12

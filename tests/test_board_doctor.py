@@ -7,18 +7,18 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import Board, CannotCalibrate, detect, find_corners
-from camviz.calibration.boards.charuco import detector
-from camviz.calibration.boards.picture import whiteness
-from camviz.calibration.paper import fitted, pdf
-from camviz.clinic.checks.described import CHARUCO, smooth
-from camviz.clinic.doctor import Shown, diagnose, prescription, troubles
-from camviz.clinic.doctor.layout import likeliest, steps_of
-from camviz.clinic.doctor.symmetry import turned_views
-from camviz.clinic.snapshots import pictured
-from camviz.clinic.virtual import detections, pair
-from camviz.commands.command import main
-from camviz.files import Calibration, load, write
+from camviz_clinic.calibration import Board, CannotCalibrate, detect, find_corners
+from camviz_clinic.calibration.boards.charuco import detector
+from camviz_clinic.calibration.boards.picture import whiteness
+from camviz_clinic.calibration.paper import fitted, pdf
+from camviz_clinic.checks.doctor import Shown, diagnose, prescription, troubles
+from camviz_clinic.checks.doctor.layout import likeliest, steps_of
+from camviz_clinic.checks.doctor.symmetry import turned_views
+from camviz_clinic.checks.findings.described import CHARUCO, smooth
+from camviz_clinic.checks.snapshots import pictured
+from camviz_clinic.checks.virtual import detections, pair
+from camviz_clinic.commands.command import main
+from camviz_clinic.files import Calibration, load, write
 
 PRINTED = {
     "legacy": replace(CHARUCO, legacy=True),

@@ -6,22 +6,22 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import Board, Detections, calibrate, chessboards, find_corners
-from camviz.calibration.boards import kinds
-from camviz.calibration.boards.picture import whiteness
-from camviz.calibration.chessboards import everywhere
-from camviz.calibration.circle_grids import bias
-from camviz.calibration.paper import black_discs, black_parts, fitted, pdf
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.photographs import photographed
-from camviz.clinic.virtual import spread_boards
-from camviz.commands.command import main
-from camviz.files import Calibration, CalibrationError, load, write
-from camviz.files.target import read_target
 from camviz.lenses import BrownConrady
-from camviz.meshes import board as mesh
 from camviz.poses import RigidTransform, Rotation
-from camviz.views.chessboard import outline, printed
+from camviz_clinic.calibration import Board, Detections, calibrate, chessboards, find_corners
+from camviz_clinic.calibration.boards import kinds
+from camviz_clinic.calibration.boards.picture import whiteness
+from camviz_clinic.calibration.chessboards import everywhere
+from camviz_clinic.calibration.circle_grids import bias
+from camviz_clinic.calibration.paper import black_discs, black_parts, fitted, pdf
+from camviz_clinic.checks.photographs import photographed
+from camviz_clinic.checks.virtual import spread_boards
+from camviz_clinic.commands.command import main
+from camviz_clinic.files import Calibration, CalibrationError, load, write
+from camviz_clinic.files.target import read_target
+from camviz_clinic.meshes import board as mesh
+from camviz_clinic.views.chessboard import outline, printed
 
 CAMERA = Camera(Intrinsics.from_fov(480, 360, 60), BrownConrady(-0.2, 0.05))
 BOARDS = {

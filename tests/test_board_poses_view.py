@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import load
 from camviz.lenses import BrownConrady
-from camviz.views.board_poses import BoardPosesView
+from camviz_clinic.files import load
+from camviz_clinic.views.board_poses import BoardPosesView
 
 # The first, second and ninth row of extrinsic_parameters in OpenCV's samples/data/left_intrinsics.yml (4.6.0).
 PUBLISHED = np.array(

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import find_corners
-from camviz.calibration.paper import fitted, pdf
-from camviz.commands.command import main
-from camviz.files import Board
+from camviz_clinic.calibration import find_corners
+from camviz_clinic.calibration.paper import fitted, pdf
+from camviz_clinic.commands.command import main
+from camviz_clinic.files import Board
 
 CHESSBOARD = Board(9, 6, 0.025)
 CHARUCO = Board(7, 4, 0.03, 0.022, "DICT_4X4_50")

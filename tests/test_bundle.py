@@ -14,12 +14,12 @@ from zipfile import ZipFile
 import pytest
 from commandline import ROOT, refused
 
-from camviz.commands import packing
-from camviz.commands.command import main
-from camviz.commands.packing import BundleError, this_machine, write_bundle
-from camviz.course import material
-from camviz.samples import SampleUnavailable
-from camviz.teaching.platforms import PLATFORMS, wanted
+from camviz_clinic.commands.command import main
+from camviz_school.commands import packing
+from camviz_school.commands.packing import BundleError, this_machine, write_bundle
+from camviz_school.course import material
+from camviz_school.samples import SampleUnavailable
+from camviz_school.teaching.platforms import PLATFORMS, wanted
 
 PROJECT = """\
 [build-system]

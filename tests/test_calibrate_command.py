@@ -12,8 +12,8 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 from test_calibration import BOARD, picture
 
-import camviz
-from camviz.commands.command import main
+import camviz_clinic
+from camviz_clinic.commands.command import main
 
 ROOT = Path(__file__).parents[1]
 WORDS = ["--board", "9x6", "--square-mm", "25"]
@@ -62,7 +62,7 @@ def test_the_camera_of_a_folder_is_written_and_read_by_camviz_and_by_opencv(room
     assert "view99.jpg: skipped, it is not a picture that can be read, it begins with 'no picture'." in out
     assert out.endswith("camera.yaml: written.\n")
     assert err == ""
-    found = camviz.load("camera.yaml")
+    found = camviz_clinic.load("camera.yaml")
     assert found.cameras["camera"].intrinsics.fx == pytest.approx(600, abs=2)
     assert found.pictures["camera"] == tuple(f"view{i:02d}.png" for i in range(4))
     assert found.skipped == (("view99.jpg", "it is not a picture that can be read, it begins with 'no picture'"),)
@@ -78,7 +78,7 @@ def test_a_pair_is_written_with_its_baseline_and_pictures_without_a_partner_are_
     shots(room / "r", "right", 4, offset=-0.05)
     assert main(["calibrate", "l", "--right", "r", *WORDS, "--fix", "k3", "-o", "pair.yml", "--workers", "1"]) == 0
     assert "left04.png: skipped, it has no partner among the pictures of the right camera." in capsys.readouterr().out
-    found = camviz.load("pair.yml")
+    found = camviz_clinic.load("pair.yml")
     assert found.rig.a_from_b("right", "left").translation == pytest.approx([-0.05, 0, 0], abs=1e-3)
     assert found.detections["right"].shape == (4, 54, 2)
     assert ("left04.png", "it has no partner among the pictures of the right camera") in found.skipped
@@ -152,11 +152,11 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):
     shots(room / "shots")
     stop = "import os, signal; os.killpg(0, signal.SIGINT)"
     code = {
-        "detection": "import camviz.commands.calibrate as c\ndef new(*_):\n    STOP\nc.Bar.__call__ = new",
-        "solving": "import camviz.calibration.solving as s\ndef new(a):\n    STOP\ns._settled = new",
+        "detection": "import camviz_clinic.commands.calibrate as c\ndef new(*_):\n    STOP\nc.Bar.__call__ = new",
+        "solving": "import camviz_clinic.calibration.solving as s\ndef new(a):\n    STOP\ns._settled = new",
     }[stage].replace("STOP", stop)
     words = ["calibrate", "shots", *WORDS, "--workers", "2"]
-    start = f"import sys\nfrom camviz.commands.command import main\nsys.exit(main({words!r}))"
+    start = f"import sys\nfrom camviz_clinic.commands.command import main\nsys.exit(main({words!r}))"
     process = subprocess.run(
         [sys.executable, "-c", f"{LISTEN}{code}\n{start}"],
         capture_output=True,

@@ -19,9 +19,9 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="th
 # lock; or, where no lock is taken, while pictures are handed out.
 AT_A_LOCK = """
 import sys, threading, time
-from camviz.calibration import detect
-from camviz.calibration import detection
-from camviz.calibration.types import Board
+from camviz_clinic.calibration import detect
+from camviz_clinic.calibration import detection
+from camviz_clinic.calibration.types import Board
 
 armed = []
 
@@ -50,12 +50,12 @@ except KeyboardInterrupt:
 
 COMMAND = """
 import sys
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
 sys.argv[1:] = ["calibrate", *sys.argv[1:] * 400, "--board", "9x6", "--square-mm", "25", "--workers", "2"]
-from camviz.commands.calibrate import Bar
+from camviz_clinic.commands.calibrate import Bar
 Bar.__call__ = lambda self, done, count: print(done, file=sys.stderr, flush=True)
 import pathlib
-import camviz.commands.calibrate as calibrate
+import camviz_clinic.commands.calibrate as calibrate
 calibrate.pictures = lambda words: [pathlib.Path(word) for word in words]
 sys.exit(main())
 """

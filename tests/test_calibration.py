@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration import (
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
+from camviz_clinic.calibration import (
     MODELS,
     CannotCalibrate,
     Detections,
@@ -21,15 +23,13 @@ from camviz.calibration import (
     detect,
     find_corners,
 )
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.detection import detect_pair
-from camviz.calibration.models import pose_from_rays
-from camviz.calibration.pairing import paired
-from camviz.calibration.paper import black_parts
-from camviz.cameras import Camera, Intrinsics
-from camviz.files import Board
-from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
-from camviz.samples import SampleUnavailable, sample
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.detection import detect_pair
+from camviz_clinic.calibration.models import pose_from_rays
+from camviz_clinic.calibration.pairing import paired
+from camviz_clinic.calibration.paper import black_parts
+from camviz_clinic.files import Board
+from camviz_school.samples import SampleUnavailable, sample
 
 BOARD = Board(9, 6, 0.025)
 CHARUCO = Board(9, 6, 0.025, 0.018, "DICT_5X5_100")
@@ -149,8 +149,8 @@ def test_several_processes_find_what_one_finds_and_sixteen_bits_are_as_good_as_e
 
 SLOW = """
 import os, sys, time
-from camviz.calibration import detect, CannotCalibrate
-from camviz.files import Board
+from camviz_clinic.calibration import detect, CannotCalibrate
+from camviz_clinic.files import Board
 print("started", flush=True)
 try:
     detect(sys.argv[1:] * 400, Board(9, 6, 0.025), workers=2, progress=lambda done, count: print(done, flush=True))

@@ -9,8 +9,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import Board, Calibration, load, write
 from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
+from camviz_clinic.files import Board, Calibration, load, write
 
 GRID = Intrinsics(640, 480, 533.25, 534.125, 342.5, 233.0)
 LENSES = {

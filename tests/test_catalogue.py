@@ -7,10 +7,10 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from camviz.commands import lessons as command
-from camviz.course import catalogue, material, pages
-from camviz.course.catalogue import Lesson
-from camviz.course.tables import shaped, table_of
+from camviz_school.commands import lessons as command
+from camviz_school.course import catalogue, material, pages
+from camviz_school.course.catalogue import Lesson
+from camviz_school.course.tables import shaped, table_of
 
 ROOT = Path(__file__).parents[1]
 ONE = Lesson("05", "05_bent.ipynb", "Bent lines", "Why?", "they bend", "a wall", 40, "wall.svg")
@@ -23,7 +23,7 @@ def listed():
 
 @pytest.mark.parametrize("page", ["README.md", "docs/glossary.md", "lessons/00_start_here.ipynb"])
 def test_the_saved_pages_are_fresh(page):
-    """Mend with: python -m camviz.commands.lessons pages"""
+    """Mend with: python -m camviz_school.commands.lessons pages"""
     assert (ROOT / page).read_text(encoding="utf-8") == pages.pages()[ROOT / page]
 
 

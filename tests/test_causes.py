@@ -7,20 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic import Inspection, faults, inspect, inspect_file, kinds
-from camviz.clinic.causes import by_causes
-from camviz.clinic.checks.model import richer
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.fields import smooth_field
-from camviz.clinic.observed import explained
-from camviz.clinic.registry import SEVERITIES
-from camviz.clinic.virtual import single as set_up_of
-from camviz.clinic.virtual import spread_boards
 from camviz.lenses import BrownConrady, KannalaBrandt
-from camviz.report.findings import findings_html
-from camviz.report.inspection import report
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.checks import Inspection, faults, inspect, inspect_file, kinds
+from camviz_clinic.checks.causes import by_causes
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.fields import smooth_field
+from camviz_clinic.checks.findings.model import richer
+from camviz_clinic.checks.observed import explained
+from camviz_clinic.checks.registry import SEVERITIES
+from camviz_clinic.checks.virtual import single as set_up_of
+from camviz_clinic.checks.virtual import spread_boards
+from camviz_clinic.report.findings import findings_html
+from camviz_clinic.report.inspection import report
 
 DATA = Path(__file__).parent / "data"
 

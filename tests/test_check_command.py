@@ -10,11 +10,11 @@ import pytest
 from commandline import refused
 from test_files import sample
 
-from camviz.calibration import CannotCalibrate, calibrate, calibrate_pair, detect
-from camviz.calibration.types import Board
-from camviz.clinic.virtual import detections, healthy_pair, single
-from camviz.commands.command import main
-from camviz.files.writing import write
+from camviz_clinic.calibration import CannotCalibrate, calibrate, calibrate_pair, detect
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.checks.virtual import detections, healthy_pair, single
+from camviz_clinic.commands.command import main
+from camviz_clinic.files.writing import write
 
 BOARD = Board(9, 6, 0.025)
 
@@ -50,7 +50,9 @@ def virtual(room, monkeypatch):
 
     def see(camera):
         seen = replace(after, cameras=(camera,)).observed(np.random.default_rng(2))[0]
-        monkeypatch.setattr("camviz.calibration.detect", lambda *_, **__: detections(camera, seen), raising=False)
+        monkeypatch.setattr(
+            "camviz_clinic.calibration.detect", lambda *_, **__: detections(camera, seen), raising=False
+        )
 
     return after, see
 
@@ -179,8 +181,8 @@ def test_the_time_that_a_picture_may_take_is_handed_to_the_search(virtual, monke
         asked.append(seconds)
         raise CannotCalibrate("enough")
 
-    monkeypatch.setattr("camviz.calibration.detect", looking)
-    monkeypatch.setattr("camviz.calibration.detect_pair", looking)
+    monkeypatch.setattr("camviz_clinic.calibration.detect", looking)
+    monkeypatch.setattr("camviz_clinic.calibration.detect_pair", looking)
     assert "enough" in refused(capsys, room, "check", "camera.yaml", "new.png", "--seconds", "7")
     write(healthy_pair(np.random.default_rng(0)), room / "pair.yaml", "opencv")
     assert "enough" in refused(capsys, room, "check", "pair.yaml", "new.png", "--right", "new.png", "--seconds", "8")

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camviz.course.checks import SHAPES, Exercise, judge
-from camviz.course.exercises import Tutor, exercise, exercises
-from camviz.course.trials import Trial
+from camviz_school.course.checks import SHAPES, Exercise, judge
+from camviz_school.course.exercises import Tutor, exercise, exercises
+from camviz_school.course.trials import Trial
 
 ALL = [one for lesson in range(17) for one in exercises(f"{lesson:02d}").values()]
 
@@ -278,7 +278,7 @@ def test_a_lesson_s_exercises_are_found_by_name_and_a_wrong_name_is_answered_wit
 
 
 def test_checks_import_neither_drawing_nor_widgets():
-    code = "import sys; from camviz.course.material import module; module('05'); print(*sys.modules)"
+    code = "import sys; from camviz_school.course.material import module; module('05'); print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not {"matplotlib", "ipywidgets", "anywidget", "pyvista", "cv2", "IPython", "scipy"} & set(modules)
 

@@ -8,12 +8,14 @@ from boards import BOARD, CAMERA, RIGHT, board_poses, noisy, truth
 from scipy.spatial.transform import RigidTransform
 from scipy.stats import kstest
 
-from camviz.calibration.board_warp import warp_test
-from camviz.calibration.cross_validation import halves, held_out
-from camviz.calibration.difference import difference
-from camviz.calibration.guidance import candidate_poses, next_board_poses, outline, tilt_deg
-from camviz.calibration.jacobian import with_parameters
-from camviz.calibration.residual_statistics import (
+from camviz.cameras import transform
+from camviz.twoview import triangulate
+from camviz_clinic.calibration.board_warp import warp_test
+from camviz_clinic.calibration.cross_validation import halves, held_out
+from camviz_clinic.calibration.difference import difference
+from camviz_clinic.calibration.guidance import candidate_poses, next_board_poses, outline, tilt_deg
+from camviz_clinic.calibration.jacobian import with_parameters
+from camviz_clinic.calibration.residual_statistics import (
     board_displacements,
     correlation,
     correlation_with_depth,
@@ -25,9 +27,7 @@ from camviz.calibration.residual_statistics import (
     robust_z,
     view_rms,
 )
-from camviz.calibration.stereo_depth import depth_uncertainty
-from camviz.cameras import transform
-from camviz.twoview import triangulate
+from camviz_clinic.calibration.stereo_depth import depth_uncertainty
 
 SIGMA = 0.2
 

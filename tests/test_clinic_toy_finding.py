@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camviz.clinic import Inspection, checks, faults, inspect, kinds, statistics
-from camviz.clinic.virtual import healthy
-from camviz.commands.command import main
-from camviz.course.material import module
-from camviz.report.inspection import report
-from camviz.widgets.inspection import inspect as inspect_in_a_notebook
+from camviz_clinic.checks import Inspection, faults, findings, inspect, kinds, statistics
+from camviz_clinic.checks.virtual import healthy
+from camviz_clinic.commands.command import main
+from camviz_clinic.report.inspection import report
+from camviz_clinic.report.notebook import inspect as inspect_in_a_notebook
+from camviz_school.course.material import module
 
 DATA = Path(__file__).parent / "data"
 TOY = '''
@@ -23,9 +23,9 @@ TOY = '''
 
 from dataclasses import replace
 
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.registry import finding
-from camviz.clinic.virtual import alone, healthy
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.registry import finding
+from camviz_clinic.checks.virtual import alone, healthy
 
 
 @finding(
@@ -61,9 +61,9 @@ def on_its_side(rng, strength):
 def folder(tmp_path, monkeypatch):
     """A folder of one's own, with the one file in it."""
     (tmp_path / "turned.py").write_text(TOY, encoding="utf-8")
-    monkeypatch.setattr(checks, "__path__", [*checks.__path__, str(tmp_path)])
+    monkeypatch.setattr(findings, "__path__", [*findings.__path__, str(tmp_path)])
     yield tmp_path
-    sys.modules.pop("camviz.clinic.checks.turned", None)
+    sys.modules.pop("camviz_clinic.checks.findings.turned", None)
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_one_file_makes_a_finding_that_comes_after_all_others(folder):
     assert [path.name for path in folder.iterdir() if path.is_file()] == ["turned.py"]
     assert list(kinds())[-1] == "portrait"
     assert list(faults())[-1] == "camera on its side"
-    assert len(kinds()) == 36
+    assert len(kinds()) == 37
 
 
 def test_text_and_json_tell_of_it(sick):
@@ -104,7 +104,7 @@ def test_the_command_checks_for_it(folder, capsys):
 
 def test_the_report_and_the_notebook_show_it(sick, monkeypatch):
     shown = []
-    monkeypatch.setattr("camviz.widgets.inspection.display", lambda what, **_: shown.append(what))
+    monkeypatch.setattr("camviz_clinic.report.notebook.display", lambda what, **_: shown.append(what))
     inspect_in_a_notebook(sick)._ipython_display_()
     for html in (report(inspect(sick)), shown[0]["text/html"]):
         assert "<code>portrait</code>" in html
@@ -141,7 +141,9 @@ def test_a_declaration_that_cannot_be_is_refused_in_words():
 
 def test_every_check_and_every_fault_needs_nothing_that_draws():
     """The modules that declare are found when they are asked for, not when the clinic is imported."""
-    code = "import sys; from camviz.clinic import faults, kinds, laboratory, statistics, words; kinds(), faults(); "
+    code = (
+        "import sys; from camviz_clinic.checks import faults, kinds, laboratory, statistics, words; kinds(), faults(); "
+    )
     code += "print(*{'matplotlib', 'ipywidgets', 'pyvista', 'vtkmodules', 'IPython', 'camviz.views'} & {*sys.modules})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

@@ -12,31 +12,31 @@ from calibrations import BOARD, RIGHT_FROM_LEFT, TRUE, bare, pair, poses, seen, 
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.uncertainty import projection_uncertainty
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.lenses import BrownConrady, KannalaBrandt
-from camviz.views.clinic.board_residuals import BoardResidualsView
-from camviz.views.clinic.catalogue import VIEWS, Case
-from camviz.views.clinic.correlation import CorrelationView
-from camviz.views.clinic.coverage import CoverageView
-from camviz.views.clinic.cross_validation import CrossValidationView
-from camviz.views.clinic.depth import DepthErrorView
-from camviz.views.clinic.difference import DifferenceView
-from camviz.views.clinic.fold_map import FoldView
-from camviz.views.clinic.guidance import GuidanceView
-from camviz.views.clinic.histogram import HistogramView
-from camviz.views.clinic.missing import MissingView
-from camviz.views.clinic.numbers import NumbersView
-from camviz.views.clinic.observations import Missing, Observations, short_names
-from camviz.views.clinic.outliers import OutliersView
-from camviz.views.clinic.pairs import EpipolarPairsView, SharedViews
-from camviz.views.clinic.radius import RadiusView
-from camviz.views.clinic.rectified import RectifiedView
-from camviz.views.clinic.residuals import ResidualsView
-from camviz.views.clinic.rig import RigView
-from camviz.views.clinic.uncertainty import UncertaintyRangeView, UncertaintyView
-from camviz.views.clinic.undistorted import UndistortedView
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.uncertainty import projection_uncertainty
+from camviz_clinic.views.board_residuals import BoardResidualsView
+from camviz_clinic.views.catalogue import VIEWS, Case
+from camviz_clinic.views.correlation import CorrelationView
+from camviz_clinic.views.coverage import CoverageView
+from camviz_clinic.views.cross_validation import CrossValidationView
+from camviz_clinic.views.depth import DepthErrorView
+from camviz_clinic.views.difference import DifferenceView
+from camviz_clinic.views.fold_map import FoldView
+from camviz_clinic.views.guidance import GuidanceView
+from camviz_clinic.views.histogram import HistogramView
+from camviz_clinic.views.missing import MissingView
+from camviz_clinic.views.numbers import NumbersView
+from camviz_clinic.views.observations import Missing, Observations, short_names
+from camviz_clinic.views.outliers import OutliersView
+from camviz_clinic.views.pairs import EpipolarPairsView, SharedViews
+from camviz_clinic.views.radius import RadiusView
+from camviz_clinic.views.rectified import RectifiedView
+from camviz_clinic.views.residuals import ResidualsView
+from camviz_clinic.views.rig import RigView
+from camviz_clinic.views.uncertainty import UncertaintyRangeView, UncertaintyView
+from camviz_clinic.views.undistorted import UndistortedView
 
 PAIR = re.compile(r"M([-\d.]+),([-\d.]+)L([-\d.]+),([-\d.]+)")
 

@@ -7,9 +7,9 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from camviz.course.colab import INSTALL, badge, prepared
-from camviz.course.lesson_rules import complaints
-from camviz.course.notebooks import read
+from camviz_school.course.colab import INSTALL, badge, prepared
+from camviz_school.course.lesson_rules import complaints
+from camviz_school.course.notebooks import read
 
 LESSONS = sorted((Path(__file__).parent.parent / "lessons").glob("*.ipynb"))
 

@@ -12,10 +12,10 @@ import pytest
 
 from camviz.colour import balance, spectra
 from camviz.colour.spaces import to_srgb
-from camviz.course.material import module
 from camviz.scenes.light import to_display, to_encoded, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views.colour import LAMPS, LAYOUTS, PARTS, ColourView
+from camviz_school.course.material import module
 
 lesson13 = module("13")
 

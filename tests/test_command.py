@@ -11,8 +11,8 @@ import pytest
 from commandline import refused, run
 
 import camviz
-from camviz.commands import machine as doctor
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
+from camviz_school.commands import machine as doctor
 
 DATA = Path(__file__).parent / "data"
 MONO = "image_width: 640\nimage_height: 480\nK: [{fx}, 0, 320, 0, 500, 240, 0, 0, 1]\nD: [{d}]\n"
@@ -24,9 +24,9 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x]\n" + "".join(
 @pytest.fixture
 def page(monkeypatch):
     """A page writer that can be watched, in place of the real one."""
-    writer = types.ModuleType("camviz.report.page")
+    writer = types.ModuleType("camviz_clinic.report.page")
     writer.write_page = lambda calibration, path: Path(path).write_text(f"page of {calibration.source.name}")
-    monkeypatch.setitem(sys.modules, "camviz.report.page", writer)
+    monkeypatch.setitem(sys.modules, "camviz_clinic.report.page", writer)
     return writer
 
 

@@ -7,8 +7,8 @@ import pytest
 from commandline import run
 from packaging.requirements import Requirement
 
-from camviz.commands import machine as doctor
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
+from camviz_school.commands import machine as doctor
 
 
 def test_a_package_is_held_against_its_range():
@@ -42,8 +42,8 @@ def test_widgets_that_jupyterlab_does_not_find_are_noticed(tmp_path):
 
 def test_missing_samples_are_a_warning_not_a_fault(tmp_path, monkeypatch):
     monkeypatch.setenv("CAMVIZ_SAMPLES", str(tmp_path))
-    monkeypatch.setattr("camviz.samples._pooch", lambda: types.SimpleNamespace(path=tmp_path))
-    monkeypatch.setattr("camviz.samples.BASE_URL", "http://127.0.0.1:9/")
+    monkeypatch.setattr("camviz_school.samples._pooch", lambda: types.SimpleNamespace(path=tmp_path))
+    monkeypatch.setattr("camviz_school.samples.BASE_URL", "http://127.0.0.1:9/")
     finding = doctor.samples()
     assert (finding.status, finding.detail[:7]) == ("warn", "0 of 29")
 

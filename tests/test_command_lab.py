@@ -7,10 +7,10 @@ import types
 import pytest
 from commandline import ROOT, refused
 
-from camviz.commands import lab
-from camviz.commands.command import main
-from camviz.course import material
-from camviz.course.working_copy import MANIFEST, lay_out
+from camviz_clinic.commands.command import main
+from camviz_school.commands import lab
+from camviz_school.course import material
+from camviz_school.course.working_copy import MANIFEST, lay_out
 
 
 @pytest.fixture
@@ -138,7 +138,7 @@ def test_a_checkout_opens_its_own_lessons(jupyter, room, capsys):
     (words,) = jupyter
     assert words[:4] == [
         f"--ServerApp.root_dir={(ROOT / 'lessons').resolve()}",
-        "--ServerApp.jpserver_extensions=camviz.server=True",
+        "--ServerApp.jpserver_extensions=camviz_school.server=True",
         "--no-browser",
         "--port=9999",
     ]
@@ -180,10 +180,10 @@ def test_the_editions_do_not_overwrite_each_other(jupyter, room, lessons, monkey
 
 
 def test_the_lessons_of_a_wheel_are_inside_the_package(tmp_path, monkeypatch):
-    """Where there is no pyproject.toml beside the package, the lessons are in camviz/_lessons."""
-    inside = tmp_path / "site-packages" / "camviz" / "_lessons"
+    """Where there is no pyproject.toml beside the package, the lessons are in camviz_school/_lessons."""
+    inside = tmp_path / "site-packages" / "camviz_school" / "_lessons"
     inside.mkdir(parents=True)
-    monkeypatch.setattr(material.camviz, "__file__", str(inside.parent / "__init__.py"))
+    monkeypatch.setattr(material.camviz_school, "__file__", str(inside.parent / "__init__.py"))
     assert material.checkout_lessons() is None
     assert material.lessons_folder() == inside
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from commandline import ROOT, refused, run
 
-import camviz
-from camviz.commands import terminal
-from camviz.commands.command import main, parser
-from camviz.course.working_copy import lay_out
+import camviz_clinic
+from camviz_clinic.commands import terminal
+from camviz_clinic.commands.command import main, parser
+from camviz_school.course.working_copy import lay_out
 
 DATA = Path(__file__).parent / "data"
 STEREO = DATA / "opencv_stereo.xml"
@@ -48,7 +48,7 @@ def test_what_is_found_and_what_is_missing_have_statuses_of_their_own(room, monk
     (room / "faulty.yml").write_text(FAULTY)
     assert main(["inspect", "faulty.yml"]) == 1
     assert main(["inspect", "gone.yml"]) == 2
-    monkeypatch.setattr("camviz.commands.lab.find_spec", lambda name: None)
+    monkeypatch.setattr("camviz_school.commands.lab.find_spec", lambda name: None)
     assert main(["lab"]) == 3
 
 
@@ -57,8 +57,8 @@ def test_a_calibration_goes_through_a_pipe_and_stays_the_same(room):
     assert status == 0
     assert b"-: written from" in err
     (room / "again.yml").write_bytes(out)
-    for name, camera in camviz.load(STEREO).cameras.items():
-        again = camviz.load("again.yml").cameras[name]
+    for name, camera in camviz_clinic.load(STEREO).cameras.items():
+        again = camviz_clinic.load("again.yml").cameras[name]
         assert (again.intrinsics, again.lens) == (camera.intrinsics, camera.lens)
         np.testing.assert_allclose(again.world_from_cam.as_matrix(), camera.world_from_cam.as_matrix(), atol=1e-12)
 
@@ -175,7 +175,7 @@ def test_nothing_printed_commands_the_terminal(capsys, evil):
 
 
 def test_every_sentence_of_a_command_goes_by_way_of_what_makes_it_safe():
-    own = [path for path in (ROOT / "camviz/commands").glob("*.py") if path.stem not in ("terminal", "lessons")]
+    own = [path for path in (ROOT / "camviz_clinic/commands").glob("*.py") if path.stem not in ("terminal", "lessons")]
     calls = re.compile(r"^ +print\(", re.MULTILINE)
     printing = [path.name for path in own if calls.search(path.read_text(encoding="utf-8"))]
     assert printing == ["calibrate.py"]  # its bar, which holds numbers only
@@ -192,7 +192,7 @@ def test_what_only_its_owner_may_read_stays_so(room, capsys, words):
 
 @pytest.mark.skipif(os.name == "nt", reason="limits the size of files")
 def test_lessons_on_a_full_disk_leave_no_part_and_are_named(room):
-    program = "from pathlib import Path; from camviz.course.working_copy import lay_out\n"
+    program = "from pathlib import Path; from camviz_school.course.working_copy import lay_out\n"
     program += f"lay_out(Path({str(ROOT / 'lessons')!r}), Path('copy'), '1')"
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))  # noqa: E731
     done = subprocess.run(
@@ -212,7 +212,7 @@ def test_a_limit_of_the_machine_is_blamed_and_not_the_file(room, monkeypatch, ca
     def fail(*_, **__):
         raise OSError(24, os.strerror(24), "out.yml")
 
-    monkeypatch.setattr("camviz.commands.common.TemporaryDirectory", fail)
+    monkeypatch.setattr("camviz_clinic.commands.common.TemporaryDirectory", fail)
     assert main(["show", str(STEREO), "-o", "out.html"]) == 3
     said = capsys.readouterr().err
     assert "Too many open files" in said

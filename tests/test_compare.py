@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camviz.clinic import inspect
-from camviz.clinic.virtual import alone, healthy, single
 from camviz.lenses import BrownConrady
-from camviz.report.inspection import report
+from camviz_clinic.checks import inspect
+from camviz_clinic.checks.virtual import alone, healthy, single
+from camviz_clinic.report.inspection import report
 
 
 @pytest.fixture(scope="module")

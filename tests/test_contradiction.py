@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import yaml
 
-from camviz.calibration.redundancy import half_last_digit
-from camviz.clinic import inspect, inspect_file
-from camviz.files import load
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.redundancy import half_last_digit
+from camviz_clinic.checks import inspect, inspect_file
+from camviz_clinic.files import load
 
 TURN = Rotation.from_euler("xyz", [2.03, -1.27, 0.71], degrees=True)
 K1 = np.array([[701.2345678, 0, 331.1234567], [0, 702.3456789, 251.2345671], [0, 0, 1]])

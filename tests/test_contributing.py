@@ -1,4 +1,4 @@
-"""CONTRIBUTING.md's examples, carried out word for word in a copy of the repository."""
+"""The examples of docs/recipes.md, carried out word for word in a copy of the repository."""
 
 import json
 import re
@@ -7,7 +7,7 @@ import nbformat
 import pytest
 from house import ROOT, house
 
-PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
 EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
 EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
 CELL = re.compile(r"^# %%(?P<words>.*)$", re.MULTILINE)
@@ -32,7 +32,7 @@ def cell(words, source):
 def example(where):
     """The files of one example, as they are written: a notebook from its cells."""
     found = {path: text for path, text in EXAMPLES.items() if path.startswith(where)}
-    assert found, f"CONTRIBUTING.md has no example of {where}"
+    assert found, f"docs/recipes.md has no example of {where}"
     return {path: notebook(text) if path.endswith(".ipynb") else text for path, text in found.items()}
 
 
@@ -41,7 +41,7 @@ def lesson(tmp_path_factory):
     """The lesson of the page, written, and the pages made anew."""
     made = house(tmp_path_factory.mktemp("house") / "camviz")
     made.add(example("lessons/"))
-    made.run("-m", "camviz.commands.lessons", "pages")
+    made.run("-m", "camviz_school.commands.lessons", "pages")
     return made
 
 
@@ -67,7 +67,7 @@ def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(less
 
 
 def test_the_check_of_the_lesson_finds_nothing_wrong_and_says_what_is_still_lacking(lesson):
-    said = lesson.run("-m", "camviz.commands.lessons", "check", "18", status=1)
+    said = lesson.run("-m", "camviz_school.commands.lessons", "check", "18", status=1)
     assert {line.partition(": ")[2] for line in said.splitlines()} == {
         "no cell is tagged nbval-check-output, so no number of this lesson is held",
         "at least two predict questions are wanted, 1 are asked",
@@ -89,9 +89,9 @@ def test_the_lesson_s_question_and_exercise_are_asked_and_answered(lesson):
 import json
 from pathlib import Path
 
-from camviz.course import notebooks
-from camviz.course.exercises import Tutor, exercise
-from camviz.course.questions import question
+from camviz_school.course import notebooks
+from camviz_school.course.exercises import Tutor, exercise
+from camviz_school.course.questions import question
 
 lesson = notebooks.read(Path("lessons/18_shadows.ipynb"))
 wrong = exercise("18.height").misconceptions[0].function
@@ -155,7 +155,7 @@ print(abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
 
 
 def test_a_calibration_format_is_one_file(tmp_path):
-    made = added(tmp_path, "camviz/files/")
+    made = added(tmp_path, "camviz_clinic/files/")
     (made.root / "a.toy").write_text("toy 640 480 500 321.25 239.5\n")
     made.run("-m", "camviz", "convert", "a.toy", "b.yml", "--to", "opencv")
     made.run("-m", "camviz", "convert", "b.yml", "c.toy", "--to", "toy")
@@ -168,11 +168,11 @@ def test_a_calibration_format_is_one_file(tmp_path):
 
 
 def test_a_finding_is_one_file(tmp_path):
-    made = added(tmp_path, "camviz/clinic/checks/")
+    made = added(tmp_path, "camviz_clinic/checks/findings/")
     code = """
 import json
 import numpy as np
-from camviz.clinic import Inspection, faults, kinds
+from camviz_clinic.checks import Inspection, faults, kinds
 
 fault = faults()["skew"]
 found = Inspection.of(fault.inject(np.random.default_rng(1), fault.promised)).findings
@@ -186,6 +186,6 @@ print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]
     (made.root / "camera.yaml").write_text(json.dumps(ros))
     said = made.run("-m", "camviz", "inspect", "camera.yaml", "--json", status=1)
     assert "skewed-pixels" in [each["id"] for each in json.loads(said)["findings"]]
-    made.run("-m", "camviz.clinic.statistics", "--page")
+    made.run("-m", "camviz_clinic.checks.statistics", "--page")
     assert "### `skewed-pixels`" in made.text("docs/clinic.md")
     assert held(made, "tests/test_faults.py", "promised and skew or healthy_camera or every_finding") >= 8

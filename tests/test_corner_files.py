@@ -15,14 +15,14 @@ from test_calibrate_command import main_captured
 from test_files import sample
 from test_files_fuzzed import overwritten, reworded
 
-import camviz
-from camviz.calibration import Board, calibrate, calibrate_pair, detect
-from camviz.calibration.boards.charuco import FEWEST
-from camviz.clinic.virtual import detections, pair, single
-from camviz.commands.command import main
-from camviz.files import CalibrationError
-from camviz.files.corners import corner_formats, load_corners
-from camviz.files.writing import write
+import camviz_clinic
+from camviz_clinic.calibration import Board, calibrate, calibrate_pair, detect
+from camviz_clinic.calibration.boards.charuco import FEWEST
+from camviz_clinic.checks.virtual import detections, pair, single
+from camviz_clinic.commands.command import main
+from camviz_clinic.files import CalibrationError
+from camviz_clinic.files.corners import corner_formats, load_corners
+from camviz_clinic.files.writing import write
 
 PAGE = Path(__file__).parents[1] / "docs" / "formats.md"
 GIVEN = {"shape": (4, 3), "square_size": 0.04, "size": (640, 480)}  # what the examples show
@@ -65,7 +65,7 @@ def test_the_example_of_a_format_has_the_same_corners_in_the_order_of_the_board(
 
 @pytest.mark.parametrize("name", corner_formats())
 def test_each_format_knows_its_own_files_alone(name, tmp_path):
-    from camviz.files.corners import CornerFile
+    from camviz_clinic.files.corners import CornerFile
 
     for path in written(tmp_path, corner_formats()[name].example):
         assert [each.name for each in corner_formats().values() if each.recognise(CornerFile(path))] == [name]
@@ -195,12 +195,12 @@ def test_a_pair_is_solved_from_two_files_as_from_the_same_corners(two, room, cap
     out = capsys.readouterr().out
     assert "left04.png: skipped, it has no partner among the pictures of the right camera." in out
     assert "right9.png: skipped, it has no partner among the pictures of the left camera." in out
-    ours, kept = camviz.load("camera.yaml"), [0, 1, 2, 3, 5, 6, 7]
+    ours, kept = camviz_clinic.load("camera.yaml"), [0, 1, 2, 3, 5, 6, 7]
     both = zip(set_up.cameras, (left, right), strict=True)
     seen = [detections(camera, np.ascontiguousarray(each[kept])) for camera, each in both]
     solved = calibrate_pair(*seen, replace(set_up.board, square_size=1000 * set_up.board.square_size / 1000))
     write(solved, room / "theirs.yaml", "opencv")
-    theirs = camviz.load("theirs.yaml")
+    theirs = camviz_clinic.load("theirs.yaml")
     for name in ("left", "right"):
         np.testing.assert_array_equal(ours.cameras[name].intrinsics.K, theirs.cameras[name].intrinsics.K)
         assert ours.cameras[name].lens == theirs.cameras[name].lens
@@ -239,7 +239,7 @@ def test_the_photographs_and_their_corners_in_a_file_give_the_same_camera(room, 
     found = detect(paths, Board(9, 6, 0.025))
     written(room, {"left.vnl": vnl([str(path) for path in paths], found.corners)})
     assert main(["calibrate", "--corners", "left.vnl", "--board", "9x6", "--square-mm", "25"]) == 0
-    ours, theirs = camviz.load("camera.yaml"), calibrate(found, Board(9, 6, 0.025))
+    ours, theirs = camviz_clinic.load("camera.yaml"), calibrate(found, Board(9, 6, 0.025))
     K = theirs.cameras["camera"].intrinsics.K
     np.testing.assert_allclose(ours.cameras["camera"].intrinsics.K, K, rtol=1e-8)
     np.testing.assert_array_equal(ours.set_aside["camera"], theirs.set_aside["camera"])
@@ -397,7 +397,7 @@ def test_corners_in_a_file_take_the_place_of_those_that_a_calibration_holds(room
     set_up, corners = virtual
     spoilt = corners.copy()
     spoilt[2, :4] += 30
-    camviz.files.write(set_up.solved((spoilt,)), Path("camera.yaml"), "opencv")
+    camviz_clinic.files.write(set_up.solved((spoilt,)), Path("camera.yaml"), "opencv")
     names = detections(set_up.camera, corners).pictures[:3]
     written(room, {"corners.vnl": vnl(names, corners)})
     said = options(set_up)

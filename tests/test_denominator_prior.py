@@ -7,19 +7,20 @@ import pytest
 from boards import BOARD, CAMERA, board_poses, noisy, truth
 
 import camviz
-from camviz.calibration import calibrate, calibrate_pair, detect
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.cross_validation import held_out
-from camviz.calibration.denominator_prior import DenominatorPrior
-from camviz.calibration.difference import difference
-from camviz.calibration.regularisation import regularised, with_priors
+import camviz_clinic
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.inspection import inspect
-from camviz.clinic.virtual import SetUp, detections, spread_boards
 from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
-from camviz.files.writing import write
 from camviz.lenses import BrownConrady
-from camviz.samples import SampleUnavailable, sample
+from camviz_clinic.calibration import calibrate, calibrate_pair, detect
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.cross_validation import held_out
+from camviz_clinic.calibration.denominator_prior import DenominatorPrior
+from camviz_clinic.calibration.difference import difference
+from camviz_clinic.calibration.regularisation import regularised, with_priors
+from camviz_clinic.checks.inspection import inspect
+from camviz_clinic.checks.virtual import SetUp, detections, spread_boards
+from camviz_clinic.files.writing import write
+from camviz_school.samples import SampleUnavailable, sample
 
 RATIONAL = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 LENSES = {  # as in wide cameras: a denominator that falls to 0.37 in the image, and one that rises to 3
@@ -128,7 +129,7 @@ def test_a_prior_is_written_and_read_and_is_at_work_when_a_file_is_looked_at(tmp
     _, found = observed(CAMERA, 1)
     solved = calibrate(found, BOARD, "rational")
     write(solved, tmp_path / "camera.yml", "opencv")
-    back = camviz.load(tmp_path / "camera.yml")
+    back = camviz_clinic.load(tmp_path / "camera.yml")
     assert back.priors == solved.priors
     again = Adjustment.of(back).refined().cameras["camera"]
     assert np.nanmax(difference(again, solved.cameras["camera"]).length) < 1e-3
@@ -137,8 +138,8 @@ def test_a_prior_is_written_and_read_and_is_at_work_when_a_file_is_looked_at(tmp
     (tmp_path / "camera.yml").write_text(
         (tmp_path / "camera.yml").read_text().replace(repr(solved.priors["camera"].reach)[:6], "-1.000")
     )
-    with pytest.raises(camviz.files.CalibrationError, match="three positive numbers"):
-        camviz.load(tmp_path / "camera.yml")
+    with pytest.raises(camviz_clinic.files.CalibrationError, match="three positive numbers"):
+        camviz_clinic.load(tmp_path / "camera.yml")
 
 
 def test_a_pair_has_a_prior_for_each_camera():

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.difference import difference
-from camviz.calibration.jacobian import with_parameters
-from camviz.clinic import check
-from camviz.clinic.gaps import gaps
-from camviz.clinic.judgement import rated
-from camviz.clinic.refit import Refit, bounds, reach
-from camviz.clinic.virtual import SetUp, detections, pair, single, spread_boards
 from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz_clinic.calibration.difference import difference
+from camviz_clinic.calibration.jacobian import with_parameters
+from camviz_clinic.checks import check
+from camviz_clinic.checks.gaps import gaps
+from camviz_clinic.checks.judgement import rated
+from camviz_clinic.checks.refit import Refit, bounds, reach
+from camviz_clinic.checks.virtual import SetUp, detections, pair, single, spread_boards
 
 ROOT = Path(__file__).parents[1]
 

@@ -175,8 +175,9 @@ def test_noise_that_rows_share_is_no_fixed_pattern_of_rows():
     assert found.why("dsnu_row_e") == "the rows have no pattern above chance"
     assert found.judged["dsnu_pixel_e"].value == pytest.approx(3, rel=0.05)
     assert outside(one, how, found) == ([], [])
-    parts = found.dark.split()
-    assert sum(parts.values()) == pytest.approx(found.dark.pattern, rel=1e-3)
+    whole = found.dark.whole
+    assert sum(found.dark.split().values()) == pytest.approx(whole.variance, rel=1e-3)
+    assert abs(whole.variance - 0.4**2 * np.var(one.dsnu_e)) < 4 * whole.error
     assert found.read_noise_e == pytest.approx(np.hypot(6, 25), rel=0.05)  # rows are part of the temporal noise
     assert found.figures()["gain_dn_per_e"] == pytest.approx(0.4, rel=0.03)
 
@@ -206,17 +207,17 @@ def test_rows_with_noise_of_their_own_do_not_make_a_camera_saturated():
 
 
 def test_the_errors_that_are_said_are_those_that_are_made():
-    """400 pairs and stacks of rows with noise: each standard error within 15 % of the spread. False failure: 1e-3."""
+    """400 pairs and stacks of noisy rows and columns: each error within 15 % of the spread. False failure: 1e-3."""
     rng = np.random.default_rng(14)
     fixed = rng.normal(0, 2, (64, 80))
 
     def frame():
-        return fixed + rng.normal(0, 3, (64, 80)) + rng.normal(0, 2, (64, 1))
+        return fixed + rng.normal(0, 3, (64, 80)) + rng.normal(0, 2, (64, 1)) + rng.normal(0, 2.5, (1, 80))
 
     pairs, stacks = [pair(frame(), frame()) for _ in range(400)], [stack(frame() for _ in range(6)) for _ in range(200)]
     for seen, value, said in (
         (pairs, "total", "total_error"),
-        (pairs, "within_rows", "within_error"),
+        (pairs, "within", "within_error"),
         (pairs, "mean", "mean_error"),
         (stacks, "mean", "mean_error"),
     ):
@@ -224,8 +225,9 @@ def test_the_errors_that_are_said_are_those_that_are_made():
         assert np.mean([getattr(one, said) for one in seen]) == pytest.approx(spread, rel=0.15)
     spread = np.std([one.pattern for one in stacks])  # said larger by the skewness of few rows
     assert spread < np.mean([one.pattern_error for one in stacks]) < 1.6 * spread
-    assert np.mean([one.total for one in pairs]) == pytest.approx(13, rel=0.02)
+    assert np.mean([one.total for one in pairs]) == pytest.approx(19.25, rel=0.02)
     assert np.mean([one.row_variance for one in pairs]) == pytest.approx(4, rel=0.04)
+    assert np.mean([one.column_variance for one in pairs]) == pytest.approx(6.25, rel=0.04)
 
 
 # The threshold, and arithmetic ----------------------------------------------------------------------------------------

@@ -9,9 +9,9 @@ import pytest
 import symptoms
 from house import ROOT
 
-from camviz.clinic import kinds
-from camviz.commands.command import parser
-from camviz.course.reading import too_long
+from camviz_clinic.checks import kinds
+from camviz_clinic.commands.command import parser
+from camviz_school.course.reading import too_long
 
 PAGES = sorted((ROOT / "docs/engineers").glob("*.md"))
 

@@ -4,12 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration.difference import difference
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic import faults
-from camviz.clinic.laboratory import VIEWS, experiment, lab_faults
-from camviz.course.material import module
-from camviz.views.fault_lab import FaultLabView, grouped
+from camviz_clinic.calibration.difference import difference
+from camviz_clinic.checks import faults
+from camviz_clinic.checks.laboratory import VIEWS, experiment, lab_faults
+from camviz_clinic.views.fault_lab import FaultLabView, grouped
+from camviz_school.course.material import module
 
 lesson16 = module("16")
 Ward, HEALTHY, COMPLAINTS = (getattr(module("16", "ward"), name) for name in ("Ward", "HEALTHY", "COMPLAINTS"))

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from camviz.clinic import Inspection, faults, inspect, kinds
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.registry import SEVERITIES
-from camviz.clinic.statistics import PAGE, TABLES, alarms, page
-from camviz.clinic.virtual import MARGIN, healthy, healthy_pair, pair, single
-from camviz.course.reading import LONGEST_SENTENCE, paragraphs, sentences
+from camviz_clinic.checks import Inspection, faults, inspect, kinds
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.registry import SEVERITIES
+from camviz_clinic.checks.statistics import PAGE, TABLES, alarms, page
+from camviz_clinic.checks.virtual import MARGIN, healthy, healthy_pair, pair, single
+from camviz_school.course.reading import LONGEST_SENTENCE, paragraphs, sentences
 
 FAULTS = faults()
 SEED = 20_003
@@ -173,7 +173,7 @@ def test_every_finding_has_a_view_of_the_report_a_cause_and_a_remedy():
 
 
 def test_the_page_says_what_the_table_of_findings_says():
-    """docs/clinic.md, but for the counted tables. To renew it: python -m camviz.clinic.statistics --page"""
+    """docs/clinic.md, but for the counted tables. To renew it: python -m camviz_clinic.checks.statistics --page"""
     text = PAGE.read_text(encoding="utf-8")
     assert text == page(text.split(TABLES)[1].lstrip())
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import camviz
-from camviz.files import CalibrationError, formats
-from camviz.files.trees import parse
+import camviz_clinic
+from camviz_clinic.files import CalibrationError, formats
+from camviz_clinic.files.trees import parse
 
 DATA = Path(__file__).parent / "data"
 FILES = sorted(path for path in DATA.rglob("*") if path.is_file())
@@ -24,7 +24,7 @@ def attempt(path, content):
     """Load whatever this is; anything but a calibration or a CalibrationError is a failure."""
     path.write_bytes(content)
     try:
-        calibration = camviz.load(path, size=SIZES.get(path.name))
+        calibration = camviz_clinic.load(path, size=SIZES.get(path.name))
     except CalibrationError:
         return
     for camera in calibration.rig:

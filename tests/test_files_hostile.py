@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import camviz
-from camviz.files import Calibration, CalibrationError
-from camviz.files.text import MAX_BYTES
+import camviz_clinic
+from camviz_clinic.files import Calibration, CalibrationError
+from camviz_clinic.files.text import MAX_BYTES
 
 DATA = Path(__file__).parent / "data"
 FILES = sorted(path for path in DATA.rglob("*") if path.is_file())
@@ -46,7 +46,7 @@ ROS = (DATA / "ros_file.yaml").read_text()
 def complaint(path, **options):
     """The sentence that `load` refuses a file with, on one line and naming the file."""
     with pytest.raises(CalibrationError) as caught:
-        camviz.load(path, **options)
+        camviz_clinic.load(path, **options)
     sentence = str(caught.value)
     assert "\n" not in sentence
     assert Path(path).name in sentence or repr(path) in sentence
@@ -64,7 +64,7 @@ def test_the_healthy_originals_load(tmp_path):
     """What the tests below damage is good before they do."""
     for name, text in {"mono": MONO, "pair": PAIR, "kalibr": KALIBR, "ros": ROS}.items():
         (tmp_path / name).write_text(text)
-        assert isinstance(camviz.load(tmp_path / name), Calibration)
+        assert isinstance(camviz_clinic.load(tmp_path / name), Calibration)
 
 
 def test_a_missing_file(tmp_path):
@@ -85,7 +85,7 @@ def test_a_name_that_the_system_refuses(tmp_path, name):
     """Longer than the 255 bytes or 4096 of a path that Linux takes, or below a file."""
     (tmp_path / "file").write_text(MONO)
     with pytest.raises(CalibrationError, match=r"cannot be read \((File name too long|Not a directory)\)$"):
-        camviz.load(tmp_path / name)
+        camviz_clinic.load(tmp_path / name)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no named pipes in folders")
@@ -186,7 +186,7 @@ def test_a_damaged_opencv_file_names_the_key_and_the_number(tmp_path, old, new, 
     damaged = MONO.replace(old, new, 1)
     if what is None:
         (tmp_path / "camera.yml").write_text(damaged)
-        assert camviz.load(tmp_path / "camera.yml").cameras["camera"].lens.k1 == 0.1
+        assert camviz_clinic.load(tmp_path / "camera.yml").cameras["camera"].lens.k1 == 0.1
     else:
         assert re.search(what, refusal(tmp_path, damaged))
 
@@ -210,7 +210,7 @@ def test_a_rotation_written_with_three_digits_is_one_and_with_one_digit_is_none(
     path = tmp_path / "camera.yml"
     path.write_text(PAIR + f"R: [[{1 + off}, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.1, 0, 0]\n")
     if taken:
-        rotation = camviz.load(path).cameras["right"].world_from_cam.rotation.as_matrix()
+        rotation = camviz_clinic.load(path).cameras["right"].world_from_cam.rotation.as_matrix()
         np.testing.assert_allclose(rotation, np.eye(3), atol=1e-12)
     else:
         assert "R: expected a rotation" in complaint(path)
@@ -354,13 +354,13 @@ def test_the_largest_allowed_files_need_neither_hours_nor_gigabytes(tmp_path):
     for name, text in LARGEST.items():
         (tmp_path / f"{name}.yml").write_text(text)
     code = (
-        "import resource, sys, pathlib, camviz.files.loading\n"
-        "from camviz.files import CalibrationError\n"
+        "import resource, sys, pathlib, camviz_clinic.files.loading\n"
+        "from camviz_clinic.files import CalibrationError\n"
         "loaded = int(pathlib.Path('/proc/self/statm').read_text().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (loaded + 2 * 2**30,) * 2)\n"
         "resource.setrlimit(resource.RLIMIT_CPU, (120, 120))\n"
         "for path in sorted(pathlib.Path(sys.argv[1]).iterdir()):\n"
-        "    try: camviz.load(path)\n"
+        "    try: camviz_clinic.load(path)\n"
         "    except CalibrationError: print(path.stem)\n"
     )
     run = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
@@ -454,7 +454,7 @@ def test_a_literals_long_strings_are_passed_over(tmp_path):
     """As mrcal's optimization inputs, megabytes of text that nothing here reads."""
     text = (DATA / "mrcal_stereographic.cameramodel").read_text().rstrip().removesuffix("}")
     (tmp_path / "c.cameramodel").write_text(text + f",'optimization_inputs': b'{'A#[{' * 2**20}',  # it's long\n}}")
-    assert camviz.load(tmp_path / "c.cameramodel").cameras["camera"].intrinsics.width == 640
+    assert camviz_clinic.load(tmp_path / "c.cameramodel").cameras["camera"].intrinsics.width == 640
 
 
 def test_a_sentence_does_not_carry_the_files_control_characters(tmp_path):

@@ -10,20 +10,20 @@ import pytest
 import yaml
 from test_files import sample, write
 
-import camviz
-from camviz.calibration import Detections, calibrate, calibrate_pair, detect
-from camviz.calibration.adjustment import Adjustment
+import camviz_clinic
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic import Inspection, inspect, inspect_file, kinds
-from camviz.clinic.checks.boards import coverage, held_out_ratio
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.fields import smooth_field, warp_columns
-from camviz.clinic.observed import explained, parameter_columns
-from camviz.clinic.virtual import single
-from camviz.commands.command import main
 from camviz.distortion import valid_region
-from camviz.files import Board, CalibrationError
 from camviz.lenses import BrownConrady, Equidistant, KannalaBrandt, Orthographic, Perspective
+from camviz_clinic.calibration import Detections, calibrate, calibrate_pair, detect
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.fields import smooth_field, warp_columns
+from camviz_clinic.checks.findings.boards import coverage, held_out_ratio
+from camviz_clinic.checks.observed import explained, parameter_columns
+from camviz_clinic.checks.virtual import single
+from camviz_clinic.commands.command import main
+from camviz_clinic.files import Board, CalibrationError
 
 DATA = Path(__file__).parent / "data"
 BOARD = Board(9, 6, 0.025)
@@ -271,7 +271,7 @@ def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(h
 
 def test_a_calibration_inspects_itself(healthy):
     _, calibration = healthy
-    assert camviz.inspect(calibration).checked == inspect(calibration).checked
+    assert camviz_clinic.inspect(calibration).checked == inspect(calibration).checked
 
 
 # Files that other commands refuse ------------------------------------------------------------------------------------
@@ -311,7 +311,7 @@ def test_a_file_that_is_refused_is_inspected_and_says_why(tmp_path, name, old, n
     assert old in text
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(CalibrationError) as refused:
-        camviz.load(path, size=SIZES.get(path.name))
+        camviz_clinic.load(path, size=SIZES.get(path.name))
     assert refused.value.id == id
     inspection = inspect_file(path, size=SIZES.get(path.name))
     finding = one(inspection, id)
@@ -338,7 +338,7 @@ def test_a_negative_focal_length_in_k_leaves_nothing_to_look_at(tmp_path):
 def test_a_rotation_that_is_mended_is_the_nearest_one(tmp_path):
     """UVᵀ of the singular value decomposition (Golub & Van Loan, 12.4.1): a scaled rotation gives the rotation back."""
     tree = yaml.safe_load((DATA / "kalibr_chain.yaml").read_text())
-    R = np.array(camviz.load(DATA / "kalibr_chain.yaml").cameras["cam1"].cam_from_world.rotation.as_matrix())
+    R = np.array(camviz_clinic.load(DATA / "kalibr_chain.yaml").cameras["cam1"].cam_from_world.rotation.as_matrix())
     tree["cam1"]["T_cn_cnm1"] = np.vstack([np.column_stack([1.2 * R, [0.1, 0, 0]]), [0, 0, 0, 1]]).tolist()
     path = tmp_path / "chain.yaml"
     path.write_text(yaml.safe_dump(tree))
@@ -358,7 +358,7 @@ def test_a_positive_p03_of_ros_is_a_baseline_of_the_wrong_sign(tmp_path):
 
 
 def test_the_pictures_size_is_held_against_the_camera():
-    calibration = camviz.load(DATA / "ros_file.yaml")
+    calibration = camviz_clinic.load(DATA / "ros_file.yaml")
     assert "wrong-size" not in ids(inspect(calibration, pictures={"a.png": (640, 480)}))
     finding = one(inspect(calibration, pictures={"a.png": (1280, 960)}), "wrong-size")
     assert finding.value == 2
@@ -371,7 +371,7 @@ def test_a_focal_length_in_millimetres_is_no_focal_length(tmp_path):
 
 
 def test_the_measured_board_is_held_against_the_files():
-    calibration = camviz.load(sample("left_intrinsics.yml"))
+    calibration = camviz_clinic.load(sample("left_intrinsics.yml"))
     finding = one(inspect(calibration, board=Board(9, 6, 0.03)), "baseline-scale")
     assert finding.value == pytest.approx(25 / 30)
 

@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import Detections, calibrate, detect
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import Board
 from camviz.lenses import KannalaBrandt
 from camviz.scenes import board_corners, snapshot, textured_scene
 from camviz.scenes.standard import SQUARE
 from camviz.scenes.walk import around_board
+from camviz_clinic.calibration import Detections, calibrate, detect
+from camviz_clinic.files import Board
 
 TUM_VI = Camera(
     Intrinsics(1024, 1024, 379.045, 379.008, 505.512, 509.969).within(640),

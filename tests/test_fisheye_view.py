@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.course.exercises import exercises
 from camviz.scenes import snapshot, textured_scene
 from camviz.views.fisheye import EQUATIONS, LENSES, FisheyeView
+from camviz_school.course.exercises import exercises
 
 
 @pytest.mark.parametrize(

@@ -6,15 +6,15 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration import Detections, calibrate, find_corners
-from camviz.calibration.focal_xi_ambiguity import focal_xi_ambiguity
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import Board
 from camviz.lenses import Perspective, UnifiedSphere
 from camviz.scenes import Scene, Texture, render, to_display
 from camviz.scenes.paint import checkerboard
 from camviz.scenes.surfaces import Rectangle
-from camviz.views.focal_xi_ambiguity import focal_xi_ambiguity_picture
+from camviz_clinic.calibration import Detections, calibrate, find_corners
+from camviz_clinic.calibration.focal_xi_ambiguity import focal_xi_ambiguity
+from camviz_clinic.files import Board
+from camviz_clinic.views.focal_xi_ambiguity import focal_xi_ambiguity_picture
 
 BOARD = Board(8, 5, 0.03)
 CAMERA = Camera(Intrinsics(800, 640, 560, 563, 402, 317), UnifiedSphere(1.1))

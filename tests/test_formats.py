@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-import camviz
+import camviz_clinic
 from camviz.cameras import transform
-from camviz.files import CalibrationError, matlab_binary
-from camviz.files.colmap import MODELS
-from camviz.files.models import same_camera
 from camviz.lenses import KannalaBrandt, Stereographic
+from camviz_clinic.files import CalibrationError, matlab_binary
+from camviz_clinic.files.colmap import MODELS
+from camviz_clinic.files.models import same_camera
 
 DATA = Path(__file__).parent / "data"
 POINTS = np.random.default_rng(7).uniform([-0.3, -0.25, 0.9], [0.3, 0.25, 3.0], size=(50, 3))
@@ -54,7 +54,7 @@ def _saved(tree):
 
 
 def camera_of(name, **options):
-    (camera,) = camviz.load(DATA / name, **options).cameras.values()
+    (camera,) = camviz_clinic.load(DATA / name, **options).cameras.values()
     return camera
 
 
@@ -83,7 +83,7 @@ def test_a_colmap_model_projects_as_colmap_does(tmp_path, number, form):
     """The centre of the first pixel is (0.5, 0.5) there and (0, 0) here; poses are cam_from_world."""
     made = reconstruction(MODELS[number])
     getattr(made, f"write_{form}")(tmp_path)
-    cameras = camviz.load(tmp_path).cameras
+    cameras = camviz_clinic.load(tmp_path).cameras
     for image in made.images.values():
         points = world(cameras[image.name], POINTS)
         np.testing.assert_allclose(points, image.cam_from_world().inverse() * POINTS, rtol=0, atol=1e-12)
@@ -94,19 +94,19 @@ def test_a_colmap_model_projects_as_colmap_does(tmp_path, number, form):
 def test_a_colmap_model_is_named_by_its_folder_or_any_file_of_it(tmp_path):
     reconstruction(MODELS[1]).write_binary(tmp_path)
     for path in (tmp_path, tmp_path / "cameras.bin", tmp_path / "images.bin"):
-        assert list(camviz.load(path).cameras) == ["1.jpg", "2.jpg"]
+        assert list(camviz_clinic.load(path).cameras) == ["1.jpg", "2.jpg"]
 
 
 def test_colmap_cameras_without_images_stand_at_the_origin(tmp_path):
     (tmp_path / "a.txt").write_text("# a comment\n1 PINHOLE 640 480 500 510 320 240\n")
-    calibration = camviz.load(tmp_path / "a.txt")
+    calibration = camviz_clinic.load(tmp_path / "a.txt")
     assert calibration.cameras["camera1"].intrinsics.cx == 319.5
     assert "no images file" in calibration.notes[0]
 
 
 def test_a_colmap_image_may_see_no_points_and_have_a_name_with_spaces():
     """Every image has two lines, the second of which may be empty."""
-    calibration = camviz.load(DATA / "colmap")
+    calibration = camviz_clinic.load(DATA / "colmap")
     assert list(calibration.cameras) == ["P1180141.JPG", "fisheye/a b.jpg", "P1180142.JPG"]
     np.testing.assert_allclose(calibration.cameras["fisheye/a b.jpg"].centre, [-0.5, 0, 0], atol=1e-15)
     assert "1 of the 3 cameras" in calibration.notes[1]
@@ -143,14 +143,14 @@ def test_a_lens_of_mrcals_that_is_not_here_is_named(tmp_path, name):
     text = (DATA / "mrcal_stereographic.cameramodel").read_text().replace("LENSMODEL_STEREOGRAPHIC", name)
     (tmp_path / "camera.cameramodel").write_text(text)
     with pytest.raises(CalibrationError, match=f"lensmodel: expected one of .* got '{name}'"):
-        camviz.load(tmp_path / "camera.cameramodel")
+        camviz_clinic.load(tmp_path / "camera.cameramodel")
 
 
 def test_nerfstudio_looks_backwards_along_z_with_y_up():
     """OpenGL: a point in front of the camera has negative z, one above the axis positive y, and less v here."""
     path = DATA / "transforms.json"
     frames = json.loads(path.read_text())["frames"]
-    for camera, frame in zip(camviz.load(path).cameras.values(), frames, strict=True):
+    for camera, frame in zip(camviz_clinic.load(path).cameras.values(), frames, strict=True):
         world_from_gl = np.array(frame["transform_matrix"])
         (u, v), (above_u, above_v) = camera.project([(world_from_gl @ p)[:3] for p in ([0, 0, -2, 1], [0, 0.1, -2, 1])])
         np.testing.assert_allclose([u, v], [960.5 - 0.5, 540.0 - 0.5], rtol=0, atol=1e-9)
@@ -159,7 +159,7 @@ def test_nerfstudio_looks_backwards_along_z_with_y_up():
 
 
 def test_a_nerfstudio_frame_may_have_intrinsics_of_its_own():
-    first, second = camviz.load(DATA / "transforms.json").cameras.values()
+    first, second = camviz_clinic.load(DATA / "transforms.json").cameras.values()
     assert (first.intrinsics.fx, second.intrinsics.fx, second.intrinsics.fy) == (1400.5, 1380.0, 1401.25)
 
 
@@ -175,12 +175,12 @@ def test_nerfstudios_fourth_radial_coefficient_is_not_opencvs(tmp_path):
     """It is of the eighth power in the numerator; OpenCV's k4 is of the second in the denominator."""
     (tmp_path / "t.json").write_text((DATA / "transforms.json").read_text().replace('"k4": 0.0', '"k4": 0.5'))
     with pytest.raises(CalibrationError, match="k4: expected 0"):
-        camviz.load(tmp_path / "t.json")
+        camviz_clinic.load(tmp_path / "t.json")
 
 
 def test_eurocs_transform_takes_the_camera_to_the_body():
     """The IMU is the body: the camera's centre is at the last column of T_BS."""
-    calibration = camviz.load(DATA / "euroc_sensor.yaml")
+    calibration = camviz_clinic.load(DATA / "euroc_sensor.yaml")
     imu_from_cam = calibration.world_from_imu.inv()
     np.testing.assert_allclose(transform(imu_from_cam, [0, 0, 0]), [-0.02, -0.06, 0.01], atol=1e-15)
     np.testing.assert_allclose(transform(imu_from_cam, [1, 0, 0]), [-0.02, 0.94, 0.01], atol=1e-12)
@@ -190,7 +190,7 @@ def test_eurocs_transform_takes_the_camera_to_the_body():
 
 def test_basalts_transforms_take_the_cameras_to_the_imu():
     """A quarter turn about z: the IMU's y axis is the camera's x axis, so 0.1 along y is 0.1 to the right."""
-    calibration = camviz.load(DATA / "basalt.json")
+    calibration = camviz_clinic.load(DATA / "basalt.json")
     np.testing.assert_allclose(calibration.cameras["cam1"].centre, [0.1, 0, 0], atol=1e-12)
     imu_from_world = calibration.world_from_imu.inv()
     np.testing.assert_allclose(transform(imu_from_world, [0, 0, 0]), [0.05, 0.02, -0.01], atol=1e-15)
@@ -198,7 +198,7 @@ def test_basalts_transforms_take_the_cameras_to_the_imu():
 
 def test_basalts_lenses_project_where_they_are_published_to():
     """ucm and kb4 of (1, 2, 5): (291.022703, 329.003576) and (576.882637, 652.696340)."""
-    cameras = camviz.load(DATA / "basalt.json").cameras
+    cameras = camviz_clinic.load(DATA / "basalt.json").cameras
     for name, pixel in (("cam1", [291.022703, 329.003576]), ("cam2", [576.882637, 652.696340])):
         np.testing.assert_allclose(cameras[name].project(world(cameras[name], [1, 2, 5])), pixel, atol=1e-6)
 
@@ -206,7 +206,7 @@ def test_basalts_lenses_project_where_they_are_published_to():
 def test_a_kitti_projection_matrix_is_applied_as_it_is():
     """u ~ P x for x in the rectified frame of camera 0; the baseline is -P1[0, 3] / fx = 0.537 m."""
     path = DATA / "kitti_calib.txt"
-    cameras = camviz.load(path, size=(1242, 375)).cameras
+    cameras = camviz_clinic.load(path, size=(1242, 375)).cameras
     for line in path.read_text().splitlines()[:3]:
         name, *numbers = line.split()
         u = np.column_stack([POINTS, np.ones(50)]) @ np.array(numbers, float).reshape(3, 4).T
@@ -222,7 +222,7 @@ def test_kittis_raw_cameras_project_as_opencv_does():
     held = {key.rstrip(":"): v for key, *v in map(str.split, path.read_text().splitlines()) if key != "calib_time:"}
     K, D, R, T = (np.array(held[f"{key}_01"], float) for key in "KDRT")
     pixels = cv2.projectPoints(POINTS, cv2.Rodrigues(R.reshape(3, 3))[0], T, K.reshape(3, 3), D)[0].reshape(-1, 2)
-    camera = camviz.load(path).cameras["01"]
+    camera = camviz_clinic.load(path).cameras["01"]
     np.testing.assert_allclose(camera.project(POINTS), pixels, rtol=0, atol=1e-3)  # its R has seven digits
     assert (camera.intrinsics.width, camera.intrinsics.height) == (1392, 512)
 
@@ -259,13 +259,13 @@ def test_matlabs_pair_multiplies_rows_in_the_boards_unit(tmp_path):
     }
     path, content = tmp_path / "pair.json", json.dumps(tree)
     path.write_text(content)
-    first, second = camviz.load(path).cameras.values()
+    first, second = camviz_clinic.load(path).cameras.values()
     assert same_camera(first, camera_of("matlab_parameters.json"), 0.0)
     points = POINTS @ R + np.array([-0.12, 0.003, 0.008])
     pixels = points @ np.array(one["IntrinsicMatrix"])
     np.testing.assert_allclose(second.project(POINTS), pixels[:, :2] / pixels[:, 2:] - 1, rtol=0, atol=1e-9)
     path.write_text(content.replace('"mm"', '"in"'))
-    np.testing.assert_allclose(camviz.load(path).cameras["camera2"].centre, second.centre * 25.4, rtol=1e-12)
+    np.testing.assert_allclose(camviz_clinic.load(path).cameras["camera2"].centre, second.centre * 25.4, rtol=1e-12)
     for was, becomes, said in [
         ('"mm"', '"feet"', r"WorldUnits: expected .*mm.*, got 'feet'"),
         ("TranslationOfCamera2", "Translation", "TranslationOfCamera2"),
@@ -273,7 +273,7 @@ def test_matlabs_pair_multiplies_rows_in_the_boards_unit(tmp_path):
     ]:
         path.write_text(content.replace(was, becomes))
         with pytest.raises(CalibrationError, match=said):
-            camviz.load(path)
+            camviz_clinic.load(path)
 
 
 def test_metashape_measures_from_the_middle_and_swaps_the_tangential_pair():
@@ -290,7 +290,7 @@ def test_metashape_measures_from_the_middle_and_swaps_the_tangential_pair():
 
 
 def test_metashapes_cameras_stand_where_their_transforms_put_them():
-    calibration = camviz.load(DATA / "metashape_cameras.xml")
+    calibration = camviz_clinic.load(DATA / "metashape_cameras.xml")
     first, fish = calibration.cameras.values()
     assert list(calibration.cameras) == ["0001", "fish & eye"]
     np.testing.assert_allclose(first.centre, [10, 20, 30], atol=1e-12)
@@ -335,14 +335,14 @@ def test_a_damaged_file_names_the_key_and_what_it_got(tmp_path, name, old, new, 
     assert old in text
     (tmp_path / original.name).write_text(text.replace(old, new, 1))
     with pytest.raises(CalibrationError, match=what) as caught:
-        camviz.load(tmp_path / original.name)
+        camviz_clinic.load(tmp_path / original.name)
     assert original.name in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_a_kitti_file_asks_for_the_size_it_never_holds():
     with pytest.raises(CalibrationError, match="--size WIDTHxHEIGHT"):
-        camviz.load(DATA / "kitti_calib.txt")
+        camviz_clinic.load(DATA / "kitti_calib.txt")
 
 
 @pytest.mark.parametrize("name", ["matlab_parameters", "matlab_intrinsics"])
@@ -375,6 +375,6 @@ def test_a_mat_file_is_the_tree_that_was_saved(compressed, tree):
 def test_a_mat_file_that_holds_no_camera_is_refused_in_a_sentence(tmp_path, content, what):
     (tmp_path / "p.mat").write_bytes(content)
     with pytest.raises(CalibrationError, match=what) as caught:
-        camviz.load(tmp_path / "p.mat")
+        camviz_clinic.load(tmp_path / "p.mat")
     assert "p.mat: " in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""What holds for every format that a module of `camviz.files` declares, and what one more file adds."""
+"""What holds for every format that a module of `camviz_clinic.files` declares, and what one more file adds."""
 
 import subprocess
 import sys
@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-import camviz
-import camviz.files
+import camviz_clinic.files
 from camviz.cameras import Camera, Intrinsics
-from camviz.commands import command
-from camviz.files import Calibration, CalibrationError, File, Format, format_of, formats, write
-from camviz.files.models import same_camera
-from camviz.files.registry import written
 from camviz.lenses import Perspective
+from camviz_clinic.commands import command
+from camviz_clinic.files import Calibration, CalibrationError, File, Format, format_of, formats, write
+from camviz_clinic.files.models import same_camera
+from camviz_clinic.files.registry import written
 
 PAGE = Path(__file__).parents[1] / "docs" / "formats.md"
 renewed = run_path(str(PAGE.with_suffix(".py")))["renewed"]
@@ -28,16 +27,16 @@ MADE = Calibration({"camera": CAMERA}, Path("made.yml"), "made", world_from_imu=
 
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
-    """The format of CONTRIBUTING.md as the one file of a folder in which formats are looked for."""
+    """The format of docs/recipes.md as the one file of a folder in which formats are looked for."""
     folder = tmp_path / "more"
     folder.mkdir()
-    page = (PAGE.parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    page = PAGE.with_name("recipes.md").read_text(encoding="utf-8")
     code = page.split("## A calibration format")[1].split("```python\n")[1].split("```")[0]
     (folder / "toy.py").write_text(code, encoding="utf-8")
-    monkeypatch.setattr(camviz.files, "__path__", [*camviz.files.__path__, str(folder)])
+    monkeypatch.setattr(camviz_clinic.files, "__path__", [*camviz_clinic.files.__path__, str(folder)])
     yield folder
-    sys.modules.pop("camviz.files.toy", None)
-    vars(camviz.files).pop("toy", None)
+    sys.modules.pop("camviz_clinic.files.toy", None)
+    vars(camviz_clinic.files).pop("toy", None)
 
 
 def example(name, folder):
@@ -53,11 +52,11 @@ def example(name, folder):
 def loaded(path):
     """The calibration of a file, whose size is given where it asks for one."""
     try:
-        return camviz.load(path)
+        return camviz_clinic.load(path)
     except CalibrationError as error:
         if "--size" not in str(error):
             raise
-    return camviz.load(path, size=SIZE)
+    return camviz_clinic.load(path, size=SIZE)
 
 
 def check_example_is_read(name, folder):
@@ -146,8 +145,9 @@ def test_the_help_lists_every_format(capsys):
 
 
 def test_the_help_of_other_commands_loads_no_format(capsys):
-    code = "import sys; from camviz.commands import command\ntry: command.main(['--help'])\nexcept SystemExit: pass\n"
-    code += "print('camviz.files.kalibr' in sys.modules)"
+    code = "import sys; from camviz_clinic.commands import command\n"
+    code += "try: command.main(['--help'])\nexcept SystemExit: pass\n"
+    code += "print('camviz_clinic.files.kalibr' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "False"
 
@@ -156,7 +156,7 @@ def test_a_format_is_one_file(tmp_path, toy, capsys):
     """One file more, and it is loaded, written, converted to, listed in the help and in the documentation."""
     assert len(list(toy.iterdir())) == 1
     (tmp_path / "a.toy").write_text("toy 640 480 500 321.25 239.5\n")
-    (camera,) = camviz.load(tmp_path / "a.toy").cameras.values()
+    (camera,) = camviz_clinic.load(tmp_path / "a.toy").cameras.values()
     assert same_camera(camera, CAMERA)
     assert command.main(["convert", str(tmp_path / "a.toy"), str(tmp_path / "b.yml"), "--to", "opencv"]) == 0
     assert command.main(["convert", str(tmp_path / "b.yml"), str(tmp_path / "c.toy"), "--to", "toy"]) == 0

@@ -11,12 +11,8 @@ import pytest
 import yaml
 from scipy.spatial.transform import RigidTransform, Rotation
 
-import camviz
+import camviz_clinic
 from camviz.cameras import Camera, Intrinsics, transform
-from camviz.commands import command
-from camviz.files import Board, Calibration, CalibrationError, alone, from_first_camera, write, writing
-from camviz.files.models import same_camera
-from camviz.files.registry import written
 from camviz.lenses import (
     BrownConrady,
     Cylindrical,
@@ -31,6 +27,10 @@ from camviz.lenses import (
     Stereographic,
     UnifiedSphere,
 )
+from camviz_clinic.commands import command
+from camviz_clinic.files import Board, Calibration, CalibrationError, alone, from_first_camera, write, writing
+from camviz_clinic.files.models import same_camera
+from camviz_clinic.files.registry import written
 
 DATA = Path(__file__).parent / "data"
 POINTS = np.random.default_rng(7).uniform([-0.3, -0.25, 0.9], [0.3, 0.25, 3.0], size=(50, 3))
@@ -109,7 +109,7 @@ def test_a_lens_is_written_whole_or_refused(tmp_path, name, lens):
     path = tmp_path / "out"
     if lens in HOLDS[name]:
         write(made, path, name)
-        assert_same(made, camviz.load(path, size=(640, 480)))
+        assert_same(made, camviz_clinic.load(path, size=(640, 480)))
     else:
         with pytest.raises(CalibrationError, match=r"has no (place for|[A-Z][a-zA-Z]+ lens)") as caught:
             write(made, path, name)
@@ -123,7 +123,7 @@ def test_skew_is_kept_or_refused(tmp_path, name):
     made = calibration(Camera(SKEWED), imu=IMU)
     if name in ("kitti", "matlab", "metashape"):
         write(made, tmp_path / "out", name)
-        assert_same(made, camviz.load(tmp_path / "out", size=(640, 480)))
+        assert_same(made, camviz_clinic.load(tmp_path / "out", size=(640, 480)))
     else:
         with pytest.raises(CalibrationError, match="no place for skew of cam0"):
             write(made, tmp_path / "out", name)
@@ -133,7 +133,7 @@ def test_skew_is_kept_or_refused(tmp_path, name):
 def test_two_cameras_keep_their_places(tmp_path, name):
     made = replace(pair(), world_from_imu=IMU)
     write(made, tmp_path / "out", name)
-    assert_same(made, camviz.load(tmp_path / "out"))
+    assert_same(made, camviz_clinic.load(tmp_path / "out"))
 
 
 @pytest.mark.parametrize("name", written())
@@ -141,7 +141,7 @@ def test_a_world_of_ones_own_is_kept_or_refused(tmp_path, name):
     made = calibration(Camera(GRID, Perspective(), POSE), imu=IMU)
     if name in WORLDS:
         write(made, tmp_path / "out", name)
-        assert_same(made, camviz.load(tmp_path / "out"))
+        assert_same(made, camviz_clinic.load(tmp_path / "out"))
     else:
         with pytest.raises(CalibrationError, match=r"--first-as-world|all turned alike"):
             write(made, tmp_path / "out", name)
@@ -158,7 +158,7 @@ def test_a_format_of_one_camera_asks_which(tmp_path, name):
 @pytest.mark.parametrize("name", ["kalibr", "basalt", "euroc"])
 def test_the_imu_stays_where_it_is(tmp_path, name):
     write(calibration(Camera(GRID, LENSES["brown4"]), imu=IMU), tmp_path / "out", name)
-    back = camviz.load(tmp_path / "out").world_from_imu
+    back = camviz_clinic.load(tmp_path / "out").world_from_imu
     np.testing.assert_allclose(back.as_matrix(), IMU.as_matrix(), rtol=0, atol=1e-12)
 
 
@@ -178,9 +178,9 @@ def test_moving_the_world_into_the_first_camera_keeps_what_they_see_of_each_othe
 
 @pytest.mark.parametrize("suffix", [".yml", ".xml", ".json"])
 def test_opencv_keeps_all_that_it_knows_of_the_views(tmp_path, suffix):
-    made = camviz.load(DATA / "opencv_mono.json")
+    made = camviz_clinic.load(DATA / "opencv_mono.json")
     assert write(made, tmp_path / f"out{suffix}", "opencv") == ()
-    back = camviz.load(tmp_path / f"out{suffix}")
+    back = camviz_clinic.load(tmp_path / f"out{suffix}")
     assert back.board == made.board
     for field in ("detections", "per_view_errors"):
         np.testing.assert_array_equal(getattr(back, field)["camera"], getattr(made, field)["camera"])
@@ -355,7 +355,7 @@ def test_a_place_or_format_that_cannot_be_is_refused(tmp_path, path, name, what)
 def test_convert_writes_what_load_reads(tmp_path, capsys):
     out = tmp_path / "model"
     assert command.main(["convert", str(DATA / "kalibr_chain.yaml"), str(out), "--to", "colmap"]) == 0
-    assert_same(camviz.load(DATA / "kalibr_chain.yaml"), camviz.load(out))
+    assert_same(camviz_clinic.load(DATA / "kalibr_chain.yaml"), camviz_clinic.load(out))
     assert "the place of the IMU: left out" in capsys.readouterr().out
 
 
@@ -363,7 +363,9 @@ def test_convert_takes_one_camera_and_makes_it_the_world(tmp_path):
     words = ["convert", str(DATA / "kalibr_chain.yaml"), str(tmp_path / "o.yml"), "--to", "opencv", "--camera", "cam1"]
     assert command.main(words) == 2
     assert command.main([*words, "--first-as-world"]) == 0
-    assert camviz.load(tmp_path / "o.yml").cameras["cam1"].lens == KannalaBrandt(-0.0128, 0.0047, -0.0031, 0.0006)
+    assert camviz_clinic.load(tmp_path / "o.yml").cameras["cam1"].lens == KannalaBrandt(
+        -0.0128, 0.0047, -0.0031, 0.0006
+    )
 
 
 @pytest.mark.parametrize(

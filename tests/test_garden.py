@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz import server
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, KannalaBrandt, Perspective
 from camviz.views import garden
+from camviz_school import server
 
 VIEW = Intrinsics.from_fov(640, 480, 90).within(garden.DRAFT)
 
@@ -103,6 +103,6 @@ def test_the_server_hands_out_notebooks_with_the_python_that_runs_here():
 
 def test_an_installation_leaves_other_jupyter_servers_alone():
     """Only `camviz lab` switches the extension on, for the server that it starts."""
-    assert server._jupyter_server_extension_points()[0]["module"] == "camviz.server" == server.__name__
+    assert server._jupyter_server_extension_points()[0]["module"] == "camviz_school.server" == server.__name__
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
     assert "shared-data" not in project["tool"]["hatch"]["build"]["targets"]["wheel"]

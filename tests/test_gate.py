@@ -10,15 +10,15 @@ import pytest
 from calibrations import bare, pair
 from commandline import refused
 
-from camviz.clinic import Finding, Gate, inspect, kinds
-from camviz.clinic.gate import LIMITS, Outcome, UnknownName
-from camviz.clinic.virtual import healthy
-from camviz.commands.command import main
-from camviz.commands.gate import given_gate, project_settings
-from camviz.files import load
-from camviz.files.writing import write
-from camviz.report.findings import findings_html
-from camviz.report.junit import junit
+from camviz_clinic.checks import Finding, Gate, inspect, kinds
+from camviz_clinic.checks.gate import LIMITS, Outcome, UnknownName
+from camviz_clinic.checks.virtual import healthy
+from camviz_clinic.commands.command import main
+from camviz_clinic.commands.gate import given_gate, project_settings
+from camviz_clinic.files import load
+from camviz_clinic.files.writing import write
+from camviz_clinic.report.findings import findings_html
+from camviz_clinic.report.junit import junit
 
 
 def wrong(**pinhole):
@@ -214,7 +214,7 @@ def solution():
 def test_calibrate_writes_first_and_then_the_gate_decides(
     project, monkeypatch, capsys, solution, words, expected, said
 ):
-    monkeypatch.setattr("camviz.commands.calibrate._single", lambda *_: solution)
+    monkeypatch.setattr("camviz_clinic.commands.calibrate._single", lambda *_: solution)
     (project / "a.png").touch()
     assert main(["calibrate", "a.png", "--board", "9x6", "--square-mm", "25", "-o", "out.yaml", *words]) == expected
     assert len(load(project / "out.yaml").cameras) == 1

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from camviz.course import notebooks
-from camviz.course.glossary import anchor, glossary, markdown, page, term
-from camviz.course.material import lesson_paths
-from camviz.course.questions import questions
-from camviz.course.reading import LONGEST_SENTENCE, sentences, words
+from camviz_school.course import notebooks
+from camviz_school.course.glossary import anchor, glossary, markdown, page, term
+from camviz_school.course.material import lesson_paths
+from camviz_school.course.questions import questions
+from camviz_school.course.reading import LONGEST_SENTENCE, sentences, words
 
 ROOT = Path(__file__).parents[1]
 
@@ -97,7 +97,7 @@ def test_entries_show_as_safe_html_and_as_plain_text():
 
 
 def test_the_saved_glossary_is_fresh():
-    """Mend with: python -m camviz.commands.lessons pages"""
+    """Mend with: python -m camviz_school.commands.lessons pages"""
     assert (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8") == page()
 
 

@@ -8,11 +8,11 @@ import pytest
 from test_tiles import problems, unit_on_a_telephone
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.material import module
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors import decibel, gliding, rolling_picture
 from camviz.views.image_sensor import ImageSensorView
 from camviz.views.readout import LARGE, ROWS, ReadoutView, fan
+from camviz_school.course.material import module
 
 expected_electrons, row_time = module("14").expected_electrons, module("14").row_time
 

@@ -12,11 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.difference import NothingSharedError, difference
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic import inspect, inspect_file
-from camviz.clinic.checks.impossible import FARTHEST, FOCAL, STRETCHED, stretched
-from camviz.files import Calibration, CalibrationError, formats, write
 from camviz.lenses import (
     BrownConrady,
     DoubleSphere,
@@ -26,6 +22,10 @@ from camviz.lenses import (
     Stereographic,
     UnifiedSphere,
 )
+from camviz_clinic.calibration.difference import NothingSharedError, difference
+from camviz_clinic.checks import inspect, inspect_file
+from camviz_clinic.checks.findings.impossible import FARTHEST, FOCAL, STRETCHED, stretched
+from camviz_clinic.files import Calibration, CalibrationError, formats, write
 
 ABSURD = (b"1e6", b"-1e6", b"1e5", b"1e-9", b"0")
 NUMBER = re.compile(rb"(?<![\w.#])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?(?![\w.])")

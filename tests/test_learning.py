@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camviz.course.answers import KEPT_IN, AnswerBook
-from camviz.course.learning import class_scores, normalised_gain
-from camviz.course.questions import quiz_questions
+from camviz_school.course.answers import KEPT_IN, AnswerBook
+from camviz_school.course.learning import class_scores, normalised_gain
+from camviz_school.course.questions import quiz_questions
 
 PAGE = Path(__file__).parents[1] / "docs/learning.md"
 

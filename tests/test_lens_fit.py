@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-import camviz
-from camviz.calibration.lens_fit import fit_lens
+import camviz_clinic
 from camviz.cameras import Camera, Intrinsics
-from camviz.commands import command
-from camviz.files import Calibration, write
 from camviz.lenses import BrownConrady, DoubleSphere, FieldOfView, KannalaBrandt, UnifiedSphere
+from camviz_clinic.calibration.lens_fit import fit_lens
+from camviz_clinic.commands import command
+from camviz_clinic.files import Calibration, write
 
 GRID = Intrinsics(640, 480, 350.0, 351.0, 322.0, 238.5)
 PAIRS = {
@@ -75,7 +75,7 @@ def test_convert_fits_and_says_how_far_it_is_off(tmp_path, capsys):
     status, path = converted(tmp_path, "--fit", "fisheye", "--tolerance", "0.5")
     assert status == 0
     assert "cam0: fitted as KannalaBrandt, off by " in capsys.readouterr().out
-    (camera,) = camviz.load(path).cameras.values()
+    (camera,) = camviz_clinic.load(path).cameras.values()
     assert brute(Camera(GRID, DoubleSphere(-0.2, 0.6)), camera).max() < 0.5
 
 

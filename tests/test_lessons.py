@@ -12,12 +12,12 @@ from xml.etree import ElementTree
 import nbformat
 import pytest
 
-from camviz.commands import lessons
-from camviz.course import notebooks, saved_outputs
-from camviz.course.exercises import Tutor, exercises
-from camviz.course.lesson_rules import SETUP, complaints
-from camviz.course.material import module
-from camviz.teaching.edition import mark_solution, teacher_edition, write_teacher_edition
+from camviz_school.commands import lessons
+from camviz_school.course import notebooks, saved_outputs
+from camviz_school.course.exercises import Tutor, exercises
+from camviz_school.course.lesson_rules import SETUP, complaints
+from camviz_school.course.material import module
+from camviz_school.teaching.edition import mark_solution, teacher_edition, write_teacher_edition
 
 lesson05 = module("05")
 
@@ -267,7 +267,7 @@ def test_saved_outputs_are_fresh_until_the_code_changes(lesson):
 def test_refreshing_runs_a_lesson_with_static_outputs_twice_alike(tmp_path):
     path = tmp_path / "99_tiny.ipynb"
     cells = [
-        code("import os\nfrom camviz.widgets.question import ask"),
+        code("import os\nfrom camviz_school.widgets.question import ask"),
         code("print(os.environ['CAMVIZ_STATIC'], os.environ['CAMVIZ_RENDERER'])"),
         code('ask("05.far_rays")'),
         text("", "glossary"),
@@ -305,7 +305,7 @@ def test_the_command_line_says_what_it_did_and_answers_a_wrong_name_in_words(tmp
 
 @EACH
 def test_every_lesson_follows_the_pattern(path):
-    """Told also by: python -m camviz.commands.lessons check"""
+    """Told also by: python -m camviz_school.commands.lessons check"""
     assert complaints(notebooks.read(path), path.name) == []
 
 
@@ -347,7 +347,7 @@ def test_jupyterlab_has_nothing_to_add_to_a_notebook_that_it_opens(path):
 
 @EACH
 def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
-    """Mend with: python -m camviz.commands.lessons refresh"""
+    """Mend with: python -m camviz_school.commands.lessons refresh"""
     notebook = notebooks.read(path)
     assert saved_outputs.is_fresh(notebook)
     assert "application/vnd.jupyter.widget-view+json" not in path.read_text(encoding="utf-8")

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from camviz.calibration.types import Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.commands.command import main
 from camviz.distortion import remap, undistort_maps
-from camviz.files.lookup_tables import LookupTables, RayTable, table_error
-from camviz.files.writing import write
 from camviz.lenses import BrownConrady, DoubleSphere, KannalaBrandt
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.commands.command import main
+from camviz_clinic.files.lookup_tables import LookupTables, RayTable, table_error
+from camviz_clinic.files.writing import write
 
 CAMERA = Camera(Intrinsics(640, 480, 530.0, 532.0, 325.0, 236.0), BrownConrady(-0.28, 0.1, 1e-3, -5e-4, 0.01))
 D = np.array([-0.28, 0.1, 1e-3, -5e-4, 0.01])

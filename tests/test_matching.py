@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from camviz import samples, twoview
+from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
-from camviz.samples import motorcycle
 from camviz.scenes import snapshot, textured_scene
+from camviz_school import samples
+from camviz_school.samples import motorcycle
 
 EACH = pytest.mark.parametrize("method", twoview.METHODS)
 

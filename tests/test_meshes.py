@@ -5,15 +5,17 @@ import pytest
 from calibrations import BOARD, TRUE, bare, pair, poses, sick, single
 from test_repository import python
 
-from camviz import meshes
 from camviz.cameras import Camera, Intrinsics, look_at, transform
 from camviz.scenes import textured_scene, to_display
-from camviz.views.clinic.observations import Missing, Observations
+from camviz_clinic import meshes
+from camviz_clinic.views.observations import Missing, Observations
 
 pyvista = pytest.importorskip("pyvista")
 
 
-@pytest.mark.parametrize(("module", "library"), [("camviz.plots", "matplotlib"), ("camviz.meshes", "pyvista")])
+@pytest.mark.parametrize(
+    ("module", "library"), [("camviz_clinic.plots", "matplotlib"), ("camviz_clinic.meshes", "pyvista")]
+)
 def test_a_neighbour_is_not_imported_before_it_is_used(module, library):
     assert python(f"import sys, {module}; print('{library}' in sys.modules)").strip() == "False"
 

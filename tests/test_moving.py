@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from test_files import sample
 
-from camviz.calibration import calibrate, detect
-from camviz.clinic import Inspection, faults
-from camviz.clinic.checks import moving
-from camviz.clinic.checks.moving import motion, rolled
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.virtual import single
-from camviz.files import Board
+from camviz_clinic.calibration import calibrate, detect
+from camviz_clinic.checks import Inspection, faults
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.findings import moving
+from camviz_clinic.checks.findings.moving import motion, rolled
+from camviz_clinic.checks.virtual import single
+from camviz_clinic.files import Board
 
 SETS = 8
 

@@ -1,4 +1,4 @@
-"""A stranger's lens is one file: the one of CONTRIBUTING.md, put into a copy of the package, appears everywhere."""
+"""A stranger's lens is one file: the one of docs/recipes.md, put into a copy of the package, appears everywhere."""
 
 import os
 import re
@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+RECIPES = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
 
 # r = sin(kθ)/k: orthographic at k = 1, equisolid at k = 1/2. It turns back at kθ = 90°.
-SINE = re.search(r"\n## A lens\n.*?```python\n(.*?)```\n", CONTRIBUTING, flags=re.DOTALL)[1]
+SINE = re.search(r"\n## A lens\n.*?```python\n(.*?)```\n", RECIPES, flags=re.DOTALL)[1]
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +27,8 @@ def checkout(tmp_path_factory):
             (theirs / path.name).symlink_to(path)
     shutil.copytree(ours / "lenses", theirs / "lenses", ignore=shutil.ignore_patterns("__pycache__"))
     (theirs / "lenses" / "sine_fisheye.py").write_text(SINE, encoding="utf-8")
+    for name in ("camviz_clinic", "camviz_school"):
+        (root / name).symlink_to(ROOT / name)
     return root
 
 
@@ -64,10 +66,10 @@ def test_it_obeys_the_laws_of_all_lenses(checkout):
 def test_formats_write_it_under_the_names_it_declares_and_read_it_back(checkout):
     code = """
 from pathlib import Path
-from camviz import load
-from camviz.calibration import Calibration
+from camviz_clinic import load
+from camviz_clinic.calibration import Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import write
+from camviz_clinic.files import write
 from camviz.lenses import SineFisheye
 from camviz.poses import RigidTransform
 camera = Camera(Intrinsics(640, 480, 200.0, 200.0, 320.0, 241.0), SineFisheye(0.6))
@@ -91,10 +93,10 @@ def test_the_clinic_sees_where_it_folds(checkout):
     """At k = 0.9 it turns back at 100°, 1.11 focal lengths from the middle; the picture's corners are at 1.6."""
     code = """
 from pathlib import Path
-from camviz.calibration import Calibration
+from camviz_clinic.calibration import Calibration
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.checks.lens import fold
-from camviz.clinic.evidence import Evidence
+from camviz_clinic.checks.findings.lens import fold
+from camviz_clinic.checks.evidence import Evidence
 from camviz.lenses import SineFisheye
 camera = Camera(Intrinsics(640, 480, 250.0, 250.0, 319.5, 239.5), SineFisheye(0.9))
 for finding in fold.check(Evidence(Calibration({"camera": camera}, Path(), "here"))):
@@ -109,8 +111,8 @@ def test_it_can_be_calibrated_with_no_solver_of_opencvs(checkout):
     """From six exact views of a board, the camera that saw them."""
     code = """
 import numpy as np
-from camviz.calibration import MODELS, Board, Detections, calibrate
-from camviz.calibration.problem import moved
+from camviz_clinic.calibration import MODELS, Board, Detections, calibrate
+from camviz_clinic.calibration.problem import moved
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import SineFisheye
 from camviz.poses import RigidTransform, Rotation
@@ -128,5 +130,7 @@ print(*MODELS, f"{found.lens.k:.4f} {found.intrinsics.fx:.2f} {found.intrinsics.
 
 
 def test_the_help_of_camviz_calibrate_lists_it(checkout):
-    said = python(checkout, "import sys; from camviz.commands.command import main; main(['calibrate', '--help'])")
+    said = python(
+        checkout, "import sys; from camviz_clinic.commands.command import main; main(['calibrate', '--help'])"
+    )
     assert "  sine        k of r = sin(kθ)/k\n" in said

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.commands.command import main
-from camviz.commands.noise import NOISE
 from camviz.sensors import Sensor
+from camviz_clinic.commands.command import main
+from camviz_clinic.commands.noise import NOISE
 
 SENSOR = Sensor(
     quantum_efficiency=0.5,

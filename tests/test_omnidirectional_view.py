@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from every_view import words
 
-from camviz.course.exercises import exercises
 from camviz.lenses import UnifiedSphere
 from camviz.panoramas.reprojection import reproject
 from camviz.scenes import snapshot, textured_scene
 from camviz.views.omnidirectional import BLIND_DEG, OmnidirectionalView
+from camviz_school.course.exercises import exercises
 
 
 def test_the_window_shows_what_a_camera_in_its_place_would_have_seen():

@@ -8,12 +8,12 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.files import Calibration
 from camviz.lenses import BrownConrady, DoubleSphere, KannalaBrandt, UnifiedSphere
-from camviz.report.page import page
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
+from camviz_clinic.files import Calibration
+from camviz_clinic.report.page import page
 
 ASIDE = RigidTransform.from_translation([0.3, 0, 0])
 ODD = {

@@ -11,10 +11,10 @@ import time
 import numpy as np
 import pytest
 
-from camviz.course import patience, yours
-from camviz.course.checks import Exercise, judge
-from camviz.course.patience import Patience, TimeIsUp
-from camviz.course.yours import attempt_each, tried
+from camviz.views import patience, yours
+from camviz.views.patience import Patience, TimeIsUp
+from camviz.views.yours import attempt_each, tried
+from camviz_school.course.checks import Exercise, judge
 
 DOUBLE = Exercise("00.double", lambda x: 2 * x, lambda rng: [(rng.normal(size=3),)] * 4, ("a", "b", "c"), "Twice.")
 A_LONG_TIME = 3600

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from camviz import views
-from camviz.course import notebooks
-from camviz.course.material import material
-from camviz.teaching import markup, plans
+from camviz_school.course import notebooks
+from camviz_school.course.material import material
+from camviz_school.teaching import markup, plans
 
 LESSONS = {path.name[:2]: path for path in sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))}
 PLANNED = sorted(path.parent.name for path in material().glob("*/plan.toml"))

@@ -7,10 +7,10 @@ import pytest
 from calibrations import RIGHT_FROM_LEFT, TRUE, bare, pair, sick, single
 from mpl_toolkits.mplot3d import proj3d
 
-from camviz import plots
 from camviz.cameras import Camera, Intrinsics, Rig
 from camviz.lenses import KannalaBrandt
-from camviz.views.clinic.observations import Missing, Observations
+from camviz_clinic import plots
+from camviz_clinic.views.observations import Missing, Observations
 
 matplotlib.use("agg")
 import matplotlib.pyplot as plt

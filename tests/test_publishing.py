@@ -10,8 +10,8 @@ from hatchling.metadata.core import ProjectMetadata
 from hatchling.plugin.manager import PluginManager
 from packaging.requirements import Requirement
 
-from camviz import samples
 from camviz.scenes.photographs import PHOTOGRAPHS, photograph_credit
+from camviz_school import samples
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

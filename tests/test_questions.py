@@ -5,10 +5,10 @@ import re
 
 import pytest
 
-from camviz.course import prose
-from camviz.course.material import material
-from camviz.course.questions import Question, parse, predict_questions, question, questions, quiz_questions
-from camviz.widgets.question import QuestionWidget, Sheet, ask, quiz, score
+from camviz.draw import prose
+from camviz_school.course.material import material
+from camviz_school.course.questions import Question, parse, predict_questions, question, questions, quiz_questions
+from camviz_school.widgets.question import QuestionWidget, Sheet, ask, quiz, score
 
 LESSONS = sorted(path.parent.name for path in material().glob("*/questions.toml"))
 ALL = [one for lesson in LESSONS for one in questions(lesson).values()]
@@ -129,7 +129,7 @@ PAIR = "".join(
 def test_a_pair_is_read_and_a_quiz_without_forms_is_form_b(monkeypatch):
     assert [one.form for one in parse("99", PAIR).values()] == ["A", "B"]
     for text, forms in ((PAIR, ["05.colour"]), (GOOD.replace("predict", "quiz"), [])):
-        monkeypatch.setattr("camviz.course.questions.questions", lambda lesson, text=text: parse(lesson, text))
+        monkeypatch.setattr("camviz_school.course.questions.questions", lambda lesson, text=text: parse(lesson, text))
         assert [one.name for one in quiz_questions("05", "A")] == forms
         assert len(quiz_questions("05")) == 1
 
@@ -232,7 +232,7 @@ def test_in_a_kernel_the_widget_is_shown_and_the_page_beside_it(monkeypatch):
 
 
 def test_a_lesson_without_a_quiz_says_so(monkeypatch):
-    monkeypatch.setattr("camviz.widgets.question.quiz_questions", lambda lesson, form: ())
+    monkeypatch.setattr("camviz_school.widgets.question.quiz_questions", lambda lesson, form: ())
     with pytest.raises(ValueError, match="lesson '05' has no quiz"):
         quiz("05")
 

@@ -3,9 +3,9 @@
 import nbformat
 import pytest
 
-from camviz.course.exercises import exercises
-from camviz.course.questions import questions
-from camviz.course.reading import main_line, paragraphs, sentences, too_long, unlinked, words
+from camviz_school.course.exercises import exercises
+from camviz_school.course.questions import questions
+from camviz_school.course.reading import main_line, paragraphs, sentences, too_long, unlinked, words
 
 
 def notebook(*texts):

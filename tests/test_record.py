@@ -13,12 +13,12 @@ import pytest
 import traitlets
 
 from camviz.draw.picture import Picture, jpeg
-from camviz.record import Axis, Budget, BudgetError, Recording, Widget, record
-from camviz.record.packing import Images, Pack
-from camviz.record.panes import Explored
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.readout import ReadoutView
 from camviz.widgets import explore
+from camviz_school.record import Axis, Budget, BudgetError, Recording, Widget, record
+from camviz_school.record.packing import Images, Pack
+from camviz_school.record.panes import Explored
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 

@@ -1,4 +1,4 @@
-"""The API reference: every public name has a summary, an executed example and numpydoc's sections.
+"""The API reference: every public name has a summary, an executed example and the sections it needs, in Google's form.
 
 CONTRIBUTING.md ("Docstrings") shows the form. A public name is one in the `__all__` of `camviz` or of a part of it.
 What SciPy makes is documented by SciPy, and a module by its parts. A type that is only another name for types needs no
@@ -13,6 +13,7 @@ import inspect
 import io
 import random
 import re
+import sys
 import textwrap
 import types
 import typing
@@ -23,43 +24,46 @@ import matplotlib
 import numpy as np
 import pytest
 from docutils.core import publish_doctree
-from numpydoc.docscrape import NumpyDocString, get_doc_object
-from numpydoc.docscrape_sphinx import SphinxDocString
-from numpydoc.validate import validate
 
 import camviz
 
 matplotlib.use("agg")
 
-ROOT = Path(camviz.__file__).parent
-HELD = {  # numpydoc.validate's codes; left out are those that would say twice what the house's form says once
-    *("GL01", "GL02", "GL03", "GL05", "GL06", "GL07", "GL08", "GL10", "SS01", "SS03", "SS04", "SS06"),
-    *("PR02", "PR05", "PR07", "PR09", "PR10", "RT01", "RT02", "RT03", "RT05", "YD01"),
-}  # PR01, PR03 and PR04 are asked below, because a class may list its fields under Attributes as well
+ROOT = Path(camviz.__file__).parents[1]
+PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
+sys.path.insert(0, str(ROOT / "website"))
+
+import docstrings  # noqa: E402
+
+SECTIONS = ("Args", "Attributes", "Returns", "Yields", "Raises", "Source")  # in this order
+HEAD = re.compile(rf"({'|'.join(SECTIONS)}):(?: (.+))?")
+NAMED = re.compile(r"([\w\\*]+(?:, [\w\\*]+)*): (.*)")
+UNKNOWN = re.compile(r"[A-Z]\w*( \w+)?:|-{3,}|={3,}|Parameters|References|Examples")
 ARRAY = re.compile(r"\b(ArrayLike|Array|NDArray|ndarray|Mask|Gray|Colours)\b")
-SHAPE = re.compile(r"\([^()]*\)|\bscalar\b|\bany shape\b")
+SHAPE = re.compile(
+    r"(?:array |[a-z]+ of (?:str to )?)?(?:\([^()]*\)|scalar\b|any shape\b)"
+)  # what is said begins with it
 UNIT = re.compile(
     r"pixel|metre|\bmm\b|\bcm\b|\bm\b|µm|\bum\b|\bnm\b|micro|nano|radian|degree|°|focal length|homogeneous|second"
     r"|kelvin|\bbits?\b|electron|photon|candela|lux|hertz|per cent|%|unit|0 to 1|0 … 1|ratio|factor|share|true|index"
     r"|number|\bDN\b|linear|encoded|sRGB|grey|colour|chromaticit|XYZ|Lab\b|RGB|disparit|field|matrix",
     re.IGNORECASE,
 )
-ALONE = {"show_class_members": False}  # a class is asked about itself; its methods are asked each for itself
 SOURCE = re.compile(r"\b(18|19|20)\d\d\b|\bet al\b|\beq\. |\bISBN\b|\bdoi\b", re.IGNORECASE)
-SECTION = re.compile(r"^(References|Examples)\n-+$", re.MULTILINE)
 
 
 @functools.cache
 def sources():
-    """The text of every module of camviz that can be imported without doing anything, by the module's name."""
-    paths = [path for path in sorted(ROOT.rglob("*.py")) if path.stem not in ("__main__", "server")]
-    names = [".".join(path.relative_to(ROOT.parent).with_suffix("").parts) for path in paths]
+    """The text of every module that can be imported without doing anything, by the module's name."""
+    every = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    paths = [path for path in every if path.stem not in ("__main__", "server")]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths]
     texts = [path.read_text("utf-8") for path in paths]
     return {name.removesuffix(".__init__"): text for name, text in zip(names, texts, strict=True)}
 
 
 def imported(name):
-    if name == "camviz.meshes":
+    if name == "camviz_clinic.meshes":
         pytest.importorskip("pyvista")
     return importlib.import_module(name)
 
@@ -148,75 +152,164 @@ def is_property(member):
     return isinstance(member, (property, functools.cached_property))
 
 
-def held(value):
-    """What numpydoc finds, as far as the house's form has it."""
-    found = validate(get_doc_object(value, config=ALONE))["errors"]
-    return [f"{code} {said}" for code, said in found if code in HELD] + as_a_page(inspect.getdoc(value) or "")
+@functools.cache
+def sections(text):
+    """The lines of each section by its title, and those outside under ""; an entry's first line has no indent."""
+    found, title = {"": []}, ""
+    for line in text.split("\n"):
+        if head := HEAD.fullmatch(line):
+            title, first = head.groups()
+            found[title] = [first] if first else []
+        elif title and (line.startswith("    ") or (title == "Source" and line)):
+            found[title].append(line.removeprefix("    "))
+        else:
+            title = ""
+            found[""].append(line)
+    return found
+
+
+def entries(text, title):
+    """What a section says, by name; a result that has no name is the only one, under ""."""
+    lines = sections(text).get(title, [])
+    if title == "Raises" and lines and not NAMED.match(lines[0]):  # Raises: ValueError for another shape.
+        lines = [lines[0].replace(" ", ": ", 1), *lines[1:]]
+    one = title in ("Returns", "Yields") and (len(lines) == 1 or not all(map(NAMED.match, starts(lines))))
+    if title == "Source" or one:
+        return {"": " ".join(map(str.strip, lines))} if lines else {}
+    said = {}
+    for line in lines:
+        names, text = NAMED.match(line).groups() if NAMED.match(line) else (line, "")
+        if line.startswith(" "):
+            said[next(reversed(said))] += " " + line.strip()
+        else:
+            said[names.replace("\\", "")] = text
+    return {name: text for names, text in said.items() for name in names.split(", ")}
+
+
+def starts(lines):
+    return [line for line in lines if not line.startswith(" ")]
+
+
+def prose(text):
+    """The lines that stand outside of sections and examples."""
+    paragraphs = "\n".join(sections(text)[""]).split("\n\n")
+    introduced = {one for one, below in pairwise(paragraphs) if below.startswith(">>>") and one.endswith(":")}
+    return [line for one in paragraphs if ">>> " not in one and one not in introduced for line in one.split("\n")]
+
+
+def of_form(text):
+    """What the form of a docstring lacks; the text is what is written between the quotes, cleaned."""
+    if not text.strip():
+        return ["it has no docstring"]
+    found = sections(text)
+    titles = [title for title in found if title]
+    summary = text.split("\n\n")[0]
+    lacks = [] if "\n" not in summary else ["its summary has more than one line"]
+    lacks += [] if summary.endswith(".") else ["its summary does not end with a period"]
+    lacks += [] if text == text.strip() else ["it begins or ends with an empty line, or is indented"]
+    lacks += ["it has two empty lines in a row"] if "\n\n\n" in text else []
+    lacks += ["it has a tabulator"] if "\t" in text else []
+    lacks += [f"{line!r} is no section of ours" for line in prose(text) if UNKNOWN.fullmatch(line)]
+    lacks += [] if titles == sorted(titles, key=SECTIONS.index) else [f"its sections come as {', '.join(titles)}"]
+    lacks += [f"{title} is empty" for title in titles if not entries(text, title)]
+    for title in titles:
+        for name, said in entries(text, title).items():
+            where = f"{title} {name}".strip()
+            lacks += [] if said else [f"{where} has no description"]
+            lacks += [] if said.endswith((".", "```")) else [f"{where} does not end with a period"]
+    return lacks + as_a_page(text)
 
 
 def as_a_page(text):
     """What goes wrong when the docstring becomes a page, such as |x| in a formula, which has another meaning there."""
     said = io.StringIO()
-    page = str(SphinxDocString(text)).replace(".. only:: latex", "")  # which Sphinx has, and docutils has not
-    publish_doctree(page, settings_overrides={"warning_stream": said})
+    publish_doctree("\n".join(docstrings.as_page(text.split("\n"))), settings_overrides={"warning_stream": said})
     return said.getvalue().splitlines()
 
 
 def of_class(cls):
-    """A class says what it is made with under Parameters, or under Attributes where readers are only given one."""
-    text = NumpyDocString(inspect.getdoc(cls) or "")
+    """A class says what it is made with under Args, or under Attributes where readers are only given one."""
+    text = inspect.getdoc(cls) or ""
     has_constructor = "__init__" in vars(cls) and not getattr(cls, "_is_protocol", False)
-    found = of_parameters(cls, text["Parameters"] + text["Attributes"]) if has_constructor else []
+    given, own = entries(text, "Args"), entries(text, "Attributes")
+    found = of_parameters(cls, given, own) if has_constructor else []
+    found += [f"there is no attribute {name}" for name in own if not is_typed(cls, name)]
     checks = vars(cls).get("__post_init__")
-    if checks and does_raise(checks) and not text["Raises"]:
+    if checks and does_raise(checks) and not entries(text, "Raises"):
         found.append("it raises an error, and has no section Raises")
-    return held(cls) + found + unnamed_sources(inspect.getdoc(cls))
+    return of_form(text) + found + unnamed_sources(text)
+
+
+def is_typed(cls, name):
+    """Whether a class says the type of an attribute: as a field, or as a property."""
+    annotated = any(name in vars(base).get("__annotations__", {}) for base in cls.__mro__)
+    made = inspect.signature(cls).parameters
+    return (
+        annotated
+        or is_property(getattr(cls, name, None))
+        or (name in made and made[name].annotation is not made[name].empty)
+    )
 
 
 def of_routine(value):
+    text = inspect.getdoc(value) or ""
     if is_property(value):
-        text = inspect.getdoc(value) or ""
-        return ([] if text else ["GL08 it has no docstring"]) + unnamed_sources(text)
-    text = NumpyDocString(inspect.getdoc(value) or "")
-    found = held(inspect.unwrap(value)) + of_parameters(value, text["Parameters"] + text["Other Parameters"])
-    if does_raise(inspect.unwrap(value)) and not text["Raises"]:
+        return ([] if text else ["it has no docstring"]) + unnamed_sources(text)
+    found = of_form(text) + of_parameters(value, entries(text, "Args"))
+    if does_raise(inspect.unwrap(value)) and not entries(text, "Raises"):
         found.append("it raises an error, and has no section Raises")
+    return found + of_results(value, text) + unnamed_sources(text)
+
+
+def of_results(value, text):
+    """What comes back is said, an array with its shape and its unit."""
     returned = str(inspect.signature(value).return_annotation)
-    if ARRAY.search(returned) and text["Returns"] and not SHAPE.search(said_of(text["Returns"])):
-        found.append("Returns names no shape")
-    return found + unnamed_sources(inspect.getdoc(value))
+    title = "Yields" if inspect.isgeneratorfunction(inspect.unwrap(value)) else "Returns"
+    said = entries(text, title)
+    if not said:
+        return [] if returned in ("None", "NoReturn") else [f"it has no section {title}"]
+    each = results(returned) if len(said) > 1 else [returned]
+    if len(each) != len(said):
+        return [f"{title} says {len(said)} results of {returned}"]
+    arrays = [text for text, its in zip(said.values(), each, strict=True) if ARRAY.search(its)]
+    names_shape = SHAPE.search if "Callable" in returned else SHAPE.match
+    return [f"{title} names no shape of {text!r}" for text in arrays if not names_shape(text)]
 
 
-def said_of(section):
-    return " ".join(f"{each.name} {each.type} {' '.join(each.desc)}" for each in section)
+def results(annotation):
+    """The annotations of what a tuple holds."""
+    tuples = [node for node in ast.walk(ast.parse(annotation)) if isinstance(node, ast.Subscript)]
+    tuples = [node.slice.elts for node in tuples if ast.unparse(node.value) == "tuple"]
+    return [ast.unparse(one) for one in tuples[0]] if tuples else []
 
 
-def of_parameters(value, documented):
-    """Every parameter in its order; those that are arrays with their shapes and units."""
+def of_parameters(value, given, own=types.MappingProxyType({})):
+    """Every parameter in its order and with its type; those that are arrays with their shapes and units."""
     signature = inspect.signature(value).parameters
     stars = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
-    expected = [stars.get(each.kind, "") + name for name, each in signature.items() if name not in ("self", "cls")]
-    entries = {name.replace("\\", ""): each for each in documented for name in each.name.split(", ")}
-    listed = [name for name in entries if name in expected]
+    expected = {
+        stars.get(each.kind, "") + name: each for name, each in signature.items() if name not in ("self", "cls")
+    }
+    said = {**given, **{name: text for name, text in own.items() if name in expected}}
     found = []
-    if listed != expected:
-        found.append(f"its parameters are {', '.join(expected)}, and documented are {', '.join(listed) or 'none'}")
-    for name, each in entries.items():
-        annotation = str(signature[name].annotation) if name in signature else ""
-        said = f"{each.type} {' '.join(each.desc)}"
-        if not each.type and not name.startswith("*"):
-            found.append(f"PR04 {name} has no type")
+    if list(said) != list(expected):
+        found.append(f"its parameters are {', '.join(expected)}, and documented are {', '.join(said) or 'none'}")
+    for name in [name for name in expected if name in said]:
+        annotation = str(expected[name].annotation)
+        if expected[name].annotation is inspect.Parameter.empty:
+            found.append(f"nothing says the type of {name}")
         if ARRAY.search(annotation) and "Callable" not in annotation:
-            found += [] if SHAPE.search(said) else [f"{name} is an array, and its shape is not said"]
-            found += [] if UNIT.search(said) else [f"{name} is an array, and its unit is not said"]
+            found += [] if SHAPE.match(said[name]) else [f"{name} is an array, and its shape is not said"]
+            found += [] if UNIT.search(said[name]) else [f"{name} is an array, and its unit is not said"]
     return found
 
 
 def unnamed_sources(text):
-    """A book or a paper that stands in the text stands under References, where it is looked for."""
-    before = SECTION.split(text or "")[0]
-    cited = SOURCE.search(before)
-    return [f"{cited.group()!r} names a source outside of the section References"] if cited else []
+    """A book or a paper that stands in the text stands behind Source, where it is looked for."""
+    inside = [line for title in SECTIONS[:-1] for line in sections(text or "").get(title, [])]
+    said = prose(text or "") + inside
+    cited = SOURCE.search("\n".join(said))
+    return [f"{cited.group()!r} names a source outside of Source"] if cited else []
 
 
 def does_raise(function):
@@ -238,7 +331,7 @@ def test_every_public_name_is_documented(part):
 
 
 def test_contributing_shows_a_docstring_as_it_is():
-    shown = re.search(r'```python\ndef project.*?"""(.*?)"""', (ROOT.parent / "CONTRIBUTING.md").read_text(), re.DOTALL)
+    shown = re.search(r'```python\ndef project.*?"""(.*?)"""', (ROOT / "CONTRIBUTING.md").read_text(), re.DOTALL)
     assert shown
     assert inspect.cleandoc(shown[1]) == inspect.getdoc(camviz.Camera.project)
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from calibrations import bare, pair, sick, single
 
-import camviz
-from camviz.clinic import Inspection, inspect, inspect_file, kinds
-from camviz.report.inspection import MOST_VIEWS, report, write_report
-from camviz.views.clinic.catalogue import ALIASES, VIEWS
-from camviz.widgets.inspection import LiveInspection
+import camviz_clinic
+from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
+from camviz_clinic.report.inspection import MOST_VIEWS, report, write_report
+from camviz_clinic.report.notebook import LiveInspection
+from camviz_clinic.views.catalogue import ALIASES, VIEWS
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -195,14 +195,14 @@ def test_the_notebook_chooses_between_cameras():
 @pytest.fixture
 def displayed(monkeypatch):
     shown = []
-    for module in ("inspection", "still"):
-        monkeypatch.setattr(f"camviz.widgets.{module}.display", lambda what, **_: shown.append(what))
+    for module in ("camviz_clinic.report.notebook", "camviz.widgets.still"):
+        monkeypatch.setattr(f"{module}.display", lambda what, **_: shown.append(what))
     return shown
 
 
 def test_a_saved_notebook_keeps_the_findings_and_a_still(displayed, monkeypatch):
     monkeypatch.delenv("CAMVIZ_STATIC", raising=False)
-    inspection = camviz.inspect(sick())
+    inspection = camviz_clinic.inspect(sick())
     live = LiveInspection(inspection)
     live._ipython_display_()
     words, still, widget = displayed

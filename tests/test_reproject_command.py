@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camviz.commands.command import main
 from camviz.panoramas.projections import PROJECTIONS, across_deg, projection
+from camviz_clinic.commands.command import main
 
 DATA = Path(__file__).parent / "data"
 EARTH = Path(find_spec("pyvista").submodule_search_locations[0]) / "examples" / "2k_earth_daymap.jpg"

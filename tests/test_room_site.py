@@ -10,11 +10,11 @@ import pytest
 from classroom import served
 from commandline import refused
 
-from camviz.course.questions import questions
-from camviz.room import hub, site
-from camviz.room.limits import Allowance, Limits
-from camviz.room.site import Site
-from camviz.room.store import Room
+from camviz_school.course.questions import questions
+from camviz_school.room import hub, site
+from camviz_school.room.limits import Allowance, Limits
+from camviz_school.room.site import Site
+from camviz_school.room.store import Room
 
 SCRIPT = "\n  document.documentElement.dataset.mode = 'auto';\n"
 LESSON = f"""<!DOCTYPE html><html><head><title>05</title><script>{SCRIPT}</script></head><body>

@@ -14,8 +14,8 @@ import numpy as np
 import pooch
 import pytest
 
-from camviz import samples
-from camviz.samples import REGISTRY, SampleUnavailable, chessboard_pictures, sample
+from camviz_school import samples
+from camviz_school.samples import REGISTRY, SampleUnavailable, chessboard_pictures, sample
 
 FOLDER = os.environ.get("CAMVIZ_SAMPLES")
 NOWHERE = "http://127.0.0.1:9/"
@@ -139,9 +139,8 @@ def detected(picture):
 
 
 def test_importing_touches_neither_pooch_nor_the_network():
-    code = (
-        "import sys, camviz.samples; print([m for m in ('pooch', 'requests', 'cv2', 'matplotlib') if m in sys.modules])"
-    )
+    code = "import sys, camviz_school.samples\n"
+    code += "print([m for m in ('pooch', 'requests', 'cv2', 'matplotlib') if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
 

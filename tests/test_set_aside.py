@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from camviz.clinic import faults, inspect, kinds
-from camviz.clinic.causes import by_causes
-from camviz.clinic.checks.corners import NEIGHBOUR
-from camviz.clinic.checks.set_aside import pattern, points_one_way
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.virtual import single
+from camviz_clinic.checks import faults, inspect, kinds
+from camviz_clinic.checks.causes import by_causes
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.findings.corners import NEIGHBOUR
+from camviz_clinic.checks.findings.set_aside import pattern, points_one_way
+from camviz_clinic.checks.virtual import single
 
 SEED = 20_003
 

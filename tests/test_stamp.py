@@ -11,14 +11,15 @@ from PIL import Image
 from PIL.TiffImagePlugin import IFDRational
 
 import camviz
-from camviz.calibration.stamp import Stamp, now
-from camviz.calibration.types import Calibration
-from camviz.clinic import check, inspect
-from camviz.clinic.stamps import contradictions, holds_for, settings_differ, size_change
-from camviz.clinic.summary import Summary
-from camviz.clinic.virtual import detections, healthy, single
-from camviz.commands.command import main
-from camviz.files import CalibrationError, write
+import camviz_clinic
+from camviz_clinic.calibration.stamp import Stamp, now
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.checks import check, inspect
+from camviz_clinic.checks.stamps import contradictions, holds_for, settings_differ, size_change
+from camviz_clinic.checks.summary import Summary
+from camviz_clinic.checks.virtual import detections, healthy, single
+from camviz_clinic.commands.command import main
+from camviz_clinic.files import CalibrationError, write
 
 CANON = {0x010F: "Canon", 0x0110: "Canon EOS 80D"}
 LENS = {0x9003: "2026:01:31 12:34:56", 0x920A: IFDRational(35, 1), 0x9206: IFDRational(21, 10), 0xA434: "EF-S18-55mm"}
@@ -98,7 +99,7 @@ def test_opencvs_file_keeps_the_stamp(tmp_path, ending):
     calibration = replace(healthy(np.random.default_rng(2)), stamps={"camera": STAMP})
     path = tmp_path / f"camera{ending}"
     assert write(calibration, path, "opencv") == ()
-    assert camviz.load(path).stamps == {"camera": STAMP}
+    assert camviz_clinic.load(path).stamps == {"camera": STAMP}
     assert cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ).getNode("stamp").getNode("views").real() == 20
 
 
@@ -114,7 +115,7 @@ def test_a_stamp_that_makes_no_sense_is_refused_by_its_key(tmp_path):
     ):
         path.write_text(text.replace(old, new))
         with pytest.raises(CalibrationError, match=said):
-            camviz.load(path)
+            camviz_clinic.load(path)
 
 
 def test_another_format_says_that_the_stamp_is_left_out(tmp_path):
@@ -129,7 +130,7 @@ def test_the_time_that_opencvs_sample_writes_is_when_it_was_made(tmp_path):
         '%YAML:1.0\n---\ncalibration_time: "Thu Jul 24 10:11:12 2008"\nimage_width: 640\nimage_height: 480\n'
         "K: [[500, 0, 320], [0, 500, 240], [0, 0, 1]]\nD: [0.1, 0, 0, 0, 0]\n"
     )
-    calibration = camviz.load(path)
+    calibration = camviz_clinic.load(path)
     assert calibration.stamps["camera"].made == "Thu Jul 24 10:11:12 2008"
     assert "calibrated Thu Jul 24 10:11:12 2008" in Summary.of(calibration).origin
     assert Summary.of(calibration).holds == ()
@@ -253,7 +254,7 @@ def test_calibrate_stamps_and_check_contradicts(tmp_path, monkeypatch, capsys):
     out = tmp_path / "camera.yaml"
     words = [*map(str, boards), "--board", "7x5", "--square-mm", "30", "--workers", "1"]
     assert main(["calibrate", *words, "-o", str(out), "--conditions", "21 °C"]) == 0
-    stamp = camviz.load(out).stamps["camera"]
+    stamp = camviz_clinic.load(out).stamps["camera"]
     assert (stamp.made, stamp.program, stamp.model) == (now(), f"camviz {camviz.__version__}", "standard")
     assert (stamp.views, stamp.focal_lengths, stamp.conditions) == (4, (35.0,), "21 °C")
     other = [str(_photographed(tmp_path / f"new{view}.jpg", view, 24)) for view in range(4)]

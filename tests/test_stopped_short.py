@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.solving import SHORT, STOPPED_SHORT
-from camviz.clinic import kinds
-from camviz.clinic.checks.assumed import assumed_reading
-from camviz.clinic.checks.model import STUCK
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.virtual import single, spread_boards
 from camviz.lenses import KannalaBrandt
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.solving import SHORT, STOPPED_SHORT
+from camviz_clinic.checks import kinds
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.findings.assumed import assumed_reading
+from camviz_clinic.checks.findings.model import STUCK
+from camviz_clinic.checks.virtual import single, spread_boards
 
 
 def fisheye(seed):

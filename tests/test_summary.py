@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 from calibrations import bare, pair, sick, single
 
-import camviz
-from camviz.calibration.detection import Detections
-from camviz.calibration.solving import calibrate
-from camviz.clinic import inspect
-from camviz.clinic.summary import CORNER, GOOD, MIDDLE, RMS, Summary, measured
-from camviz.files.writing import write
+import camviz_clinic
 from camviz.lenses import BrownConrady
-from camviz.report.findings import findings_html, glance_html, verdict_html
-from camviz.report.inspection import report
-from camviz.views.clinic.catalogue import VIEWS, Case
-from camviz.views.clinic.guidance import GuidanceView
-from camviz.views.clinic.uncertainty import UncertaintyView
-from camviz.widgets.inspection import CAMERA, LOOK, LiveInspection
+from camviz_clinic.calibration.detection import Detections
+from camviz_clinic.calibration.solving import calibrate
+from camviz_clinic.checks import inspect
+from camviz_clinic.checks.summary import CORNER, GOOD, MIDDLE, RMS, Summary, measured
+from camviz_clinic.files.writing import write
+from camviz_clinic.report.findings import findings_html, glance_html, verdict_html
+from camviz_clinic.report.inspection import report
+from camviz_clinic.report.notebook import CAMERA, LOOK, LiveInspection
+from camviz_clinic.views.catalogue import VIEWS, Case
+from camviz_clinic.views.guidance import GuidanceView
+from camviz_clinic.views.uncertainty import UncertaintyView
 
 SKIPPED = (
     "10 could not because the file holds one camera, not a pair, and because no pictures of the board were given "
@@ -160,7 +160,7 @@ def test_the_header_names_file_date_camera_and_pictures(solved, tmp_path):
     path = tmp_path / "mine.yaml"
     write(solved, path, "opencv")
     os.utime(path, (1_700_000_000, 1_700_000_000))
-    page = report(inspect(camviz.load(path)))
+    page = report(inspect(camviz_clinic.load(path)))
     header = page[: page.index('id="findings"')]
     assert re.search(r"mine\.yaml · written 2023-11-1[45] \d\d:\d\d · OpenCV FileStorage · one camera, 640 × 480 px · "
                      r"10 of 12 pictures used", header)  # fmt: skip
@@ -211,8 +211,8 @@ BARE = """
 import sys
 from IPython.core.interactiveshell import InteractiveShell
 shell = InteractiveShell.instance()
-shell.run_cell("import camviz; c = camviz.load({path!r})")
-print("camviz.report" in sys.modules)
+shell.run_cell("import camviz_clinic; c = camviz_clinic.load({path!r})")
+print("camviz_clinic.report" in sys.modules)
 data, _ = shell.display_formatter.format(shell.user_ns["c"])
 print(sorted(data), data["text/html"].count("<table"), data["text/html"].count("<img"))
 print(data["text/plain"])

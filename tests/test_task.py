@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from calibrations import bare, pair, single
 
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.uncertainty import (
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.uncertainty import (
     expected_length,
     largest_expected_error,
     projection_covariance,
     projection_uncertainty,
 )
-from camviz.clinic import inspect
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.summary import Summary
-from camviz.clinic.task import DEPTHS, MATCHING_PX, direction_deviation, task_errors
-from camviz.commands.command import main
-from camviz.files.writing import write
+from camviz_clinic.checks import inspect
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.summary import Summary
+from camviz_clinic.checks.task import DEPTHS, MATCHING_PX, direction_deviation, task_errors
+from camviz_clinic.commands.command import main
+from camviz_clinic.files.writing import write
 
 PIXELS = np.array([(319.5, 239.5), (0.0, 0.0), (600.0, 60.0)])
 

@@ -9,13 +9,14 @@ import nbformat
 import numpy as np
 import pytest
 
-from camviz.commands import teacher
-from camviz.commands.command import main
-from camviz.course import notebooks, prose, questions
-from camviz.course.checks import Exercise
-from camviz.course.exercises import exercises
-from camviz.course.material import module
-from camviz.teaching import deck, edition, marking, markup, numbering, one_page, panels, parts, plans, sheets
+from camviz.draw import prose
+from camviz_clinic.commands.command import main
+from camviz_school.commands import teacher
+from camviz_school.course import notebooks, questions
+from camviz_school.course.checks import Exercise
+from camviz_school.course.exercises import exercises
+from camviz_school.course.material import module
+from camviz_school.teaching import deck, edition, marking, markup, numbering, one_page, panels, parts, plans, sheets
 
 lesson05 = module("05")
 

@@ -11,8 +11,8 @@ import nbformat
 import numpy as np
 import pytest
 
-from camviz.course import notebooks
-from camviz.teaching import deck, panels, parts, plans, slides
+from camviz_school.course import notebooks
+from camviz_school.teaching import deck, panels, parts, plans, slides
 
 LESSONS = sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))
 EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)

@@ -7,8 +7,9 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from camviz.course import notebooks, prose
-from camviz.teaching import deck, parts, slides
+from camviz.draw import prose
+from camviz_school.course import notebooks
+from camviz_school.teaching import deck, parts, slides
 
 LESSONS = sorted((Path(__file__).parents[1] / "lessons").glob("*.ipynb"))
 EACH = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)

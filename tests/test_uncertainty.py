@@ -15,19 +15,19 @@ from boards import BOARD, CAMERA, RIGHT, board_poses, noisy, truth
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.adjustment import Adjustment
-from camviz.calibration.difference import aligned, difference, pixel_grid
-from camviz.calibration.jacobian import pixel_jacobian
-from camviz.calibration.uncertainty import (
+from camviz.cameras import Camera, Intrinsics, transform
+from camviz.lenses import BrownConrady, KannalaBrandt
+from camviz.lenses.base import unit
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.difference import aligned, difference, pixel_grid
+from camviz_clinic.calibration.jacobian import pixel_jacobian
+from camviz_clinic.calibration.uncertainty import (
     mean_deviation,
     projection_covariance,
     projection_jacobian,
     projection_uncertainty,
     worst_deviation,
 )
-from camviz.cameras import Camera, Intrinsics, transform
-from camviz.lenses import BrownConrady, KannalaBrandt
-from camviz.lenses.base import unit
 
 SIGMA = 0.2
 OPENCV5 = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")

@@ -18,19 +18,19 @@ import pytest
 from classroom import ask, camviz_class, served
 from commandline import ROOT, refused
 
-from camviz.commands.command import main
-from camviz.course import prose
-from camviz.course.learning import class_scores, normalised_gain
-from camviz.course.questions import question, questions
-from camviz.room import gain as gain_module
-from camviz.room import hub, membership, shown
-from camviz.room.address import is_named_safely
-from camviz.room.gain import gain, gains
-from camviz.room.limits import Allowance, Limits
-from camviz.room.server import answers_csv
-from camviz.room.site import Site
-from camviz.room.store import Room, RoomError
-from camviz.widgets.question import QuestionWidget, Sheet
+from camviz.draw import prose
+from camviz_clinic.commands.command import main
+from camviz_school.course.learning import class_scores, normalised_gain
+from camviz_school.course.questions import question, questions
+from camviz_school.room import gain as gain_module
+from camviz_school.room import hub, membership, shown
+from camviz_school.room.address import is_named_safely
+from camviz_school.room.gain import gain, gains
+from camviz_school.room.limits import Allowance, Limits
+from camviz_school.room.server import answers_csv
+from camviz_school.room.site import Site
+from camviz_school.room.store import Room, RoomError
+from camviz_school.widgets.question import QuestionWidget, Sheet
 
 ASKED = questions("05")
 FIRST, SECOND = "05.grid", "05.far_rays"
@@ -571,10 +571,10 @@ def test_every_answer_has_a_policy_that_runs_no_script_of_a_student(room, tmp_pa
 
 
 def test_the_pages_have_no_script_and_no_style_of_their_own_and_ask_no_other_host():
-    for page in (ROOT / "camviz/room/pages").iterdir():
+    for page in (ROOT / "camviz_school/room/pages").iterdir():
         text = page.read_text(encoding="utf-8")
         assert not re.search(r"https?://|\bon\w+=|style=|eval\(|document\.cookie|localStorage", text), page.name
-    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "camviz/room/pages").glob("*.html")]
+    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "camviz_school/room/pages").glob("*.html")]
     assert not [page for page in pages if re.search(r"<script(?![^>]* src=)", page) or "<style" in page]
 
 
@@ -654,7 +654,7 @@ def test_the_command_refuses_what_it_cannot_serve(tmp_path, monkeypatch, capsys)
 def test_a_qr_code_leads_to_the_room():
     import cv2
 
-    from camviz.room.address import qr_terminal
+    from camviz_school.room.address import qr_terminal
 
     link = "http://192.168.4.1:8787/#prism-4817"
     rows = qr_terminal(link).splitlines()
@@ -673,7 +673,7 @@ def test_questions_are_shown_as_prose_and_never_as_what_a_student_sent(room):
 
 def test_the_files_are_in_the_package():
     assert {"phone.html", "teacher.html", "projector.html"} <= {
-        p.name for p in Path(ROOT, "camviz/room/pages").iterdir()
+        p.name for p in Path(ROOT, "camviz_school/room/pages").iterdir()
     }
 
 

@@ -1,5 +1,6 @@
 """The site is the lessons: each page has every word, picture, question and reply of its notebook."""
 
+import inspect
 import json
 import re
 import sys
@@ -8,7 +9,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
+from docutils import nodes
+from docutils.core import publish_doctree
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -22,11 +26,12 @@ from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
 from scripts import question_script  # noqa: E402
 
-from camviz.course.exercises import exercises  # noqa: E402
-from camviz.course.glossary import glossary  # noqa: E402
-from camviz.course.material import lesson_paths  # noqa: E402
+from camviz.twoview import ransac_fundamental  # noqa: E402
 from camviz.views.frustum import FrustumView  # noqa: E402
 from camviz.widgets import explore  # noqa: E402
+from camviz_school.course.exercises import exercises  # noqa: E402
+from camviz_school.course.glossary import glossary  # noqa: E402
+from camviz_school.course.material import lesson_paths  # noqa: E402
 
 LESSONS = lesson_paths()
 PAGES = frozenset(path.relative_to(ROOT).as_posix() for path in [*LESSONS, *(ROOT / "docs").glob("*.md")])
@@ -92,7 +97,7 @@ def test_a_page_has_every_question_with_all_choices_and_replies(pair) -> None:
 
 
 def words_of_prose(text: str) -> list[str]:
-    from camviz.course import prose
+    from camviz.draw import prose
 
     return words(prose.to_html(text))
 
@@ -133,7 +138,7 @@ def test_pictures_with_one_content_are_one_file(tmp_path: Path) -> None:
 
 
 def test_the_pages_script_is_the_notebooks_own() -> None:
-    source = (ROOT / "camviz/widgets/question.js").read_text(encoding="utf-8")
+    source = (ROOT / "camviz_school/widgets/question.js").read_text(encoding="utf-8")
     assert source.removesuffix("export default { render };\n") in question_script()
 
 
@@ -143,12 +148,16 @@ def test_the_icon_font_is_left_out_and_another_font_is_not():
 
 
 def test_a_constant_is_explained_by_its_own_words_and_not_by_its_types():
+    import camviz.colour
     import camviz.mosaics
 
     said = docstrings.of_constant("camviz.mosaics.PATTERNS", camviz.mosaics.PATTERNS)
     assert said
     assert said[0] not in (dict.__doc__ or "")
     assert docstrings.of_constant("camviz.mosaics.NOTHING", object()) == []
+    lines = (np.ndarray.__doc__ or "").split("\n")
+    docstrings._process(None, "data", "camviz.colour.WAVELENGTHS_NM", camviz.colour.WAVELENGTHS_NM, None, lines)
+    assert lines[0].startswith("The wavelengths (81,) of all spectra here, in nanometres")
 
 
 def test_a_preview_tells_its_size(tmp_path: Path):
@@ -162,3 +171,58 @@ def test_a_clip_begins_at_the_present_state_and_goes_to_both_ends(monkeypatch):
     way = clips.moved(explorer)
     assert (way[0], max(way), min(way)) == (60, 120, 20)
     assert {abs(after - before) for before, after in pairwise([*way, way[0]])} == {5}
+
+
+def fields(lines: list[str]) -> dict[str, str]:
+    """What a page shows of a docstring: the text of each field by its title."""
+    page = publish_doctree("\n".join(lines))
+    assert not list(page.findall(nodes.system_message))
+    return {field[0].astext(): field[1].astext() for field in page.findall(nodes.field)}
+
+
+def test_a_page_of_the_reference_shows_every_section_of_a_docstring():
+    said = fields(docstrings.as_page((inspect.getdoc(ransac_fundamental) or "").split("\n")))
+    assert list(said) == ["Parameters", "Returns", "Raises", "Source"]
+    assert said["Parameters"].startswith("uv_left, uv_right – (n, 2), pairs in pixels")
+    assert said["Parameters"].endswith("max_samples – The most samples.")
+    assert [line.split(" – ")[0] for line in said["Returns"].split("\n\n")] == ["F", "agrees"]
+    assert said["Raises"] == "ValueError – Where no 8 pairs agree, and for a confidence outside (0, 1)."
+    assert said["Source"] == "Hartley & Zisserman (2004), algorithm 11.4 and eq. 4.18."
+
+
+def test_a_colon_in_what_a_function_returns_and_markup_that_is_mathematics_stay_text():
+    said = fields(
+        docstrings.as_page(
+            ["The sum.", "", "Args:", "    *a: |a| in mm.", "Returns: Depth: exact.", "Source: S. F. Ray."]
+        )
+    )
+    assert said == {"Parameters": "*a – |a| in mm.", "Returns": "Depth: exact.", "Source": "S. F. Ray."}
+
+
+def test_a_signature_shows_types_as_the_source_writes_them():
+    shown = docstrings._signature(None, "function", "", ransac_fundamental)
+    assert shown
+    assert shown[0].startswith("(uv_left: ArrayLike, uv_right: ArrayLike, threshold_px: float")
+    assert shown[0].endswith("max_samples: int = 5000)")
+    assert shown[1] == "tuple[Array, np.ndarray]"
+    assert docstrings._signature(None, "method", "", FrustumView.figure)[0].startswith("(")
+    assert "self" not in docstrings._signature(None, "method", "", FrustumView.figure)[0]
+
+
+def test_the_references_of_two_docstrings_of_scipy_can_stand_on_one_page():
+    lines = [
+        "Turns.",
+        "",
+        "Notes",
+        "-----",
+        "After [1]_.",
+        "",
+        "References",
+        "----------",
+        ".. [1] A book,",
+        "   2001.",
+    ]
+    one, other = (docstrings.of_numpydoc(name, lines) for name in ("a.apply", "b.apply"))
+    page = publish_doctree("\n".join([*one, "", *other]))
+    assert not list(page.findall(nodes.system_message))
+    assert [note.astext() for note in page.findall(nodes.footnote)] == ["1\n\nA book,\n2001.", "2\n\nA book,\n2001."]

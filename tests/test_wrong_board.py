@@ -4,11 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.calibration import Board, CannotCalibrate, detect, find_corners
-from camviz.calibration.wrong_board import part_of_a_larger
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.photographs import photographed
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration import Board, CannotCalibrate, detect, find_corners
+from camviz_clinic.calibration.wrong_board import part_of_a_larger
+from camviz_clinic.checks.photographs import photographed
 
 CAMERA = Camera(Intrinsics.from_fov(480, 360, 60))
 POSES = [

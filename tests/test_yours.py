@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camviz.course.yours import MID_GREY, attempt, attempt_each, tried
+from camviz.views.yours import MID_GREY, attempt, attempt_each, tried
 
 WANTED = np.zeros((2, 3))
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from camviz.calibration.types import Board
-from camviz.calibration.zhang import board_pose, camera_matrix, constraints, focal_lengths
 from camviz.twoview import homography
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.calibration.zhang import board_pose, camera_matrix, constraints, focal_lengths
 
 BOARD = Board(9, 6, 0.025)
 XY = BOARD.corners[:, :2]

@@ -10,13 +10,15 @@ from types import GenericAlias, ModuleType
 
 import camviz
 
-PACKAGE = Path(camviz.__file__).parent
+ROOT = Path(camviz.__file__).parents[1]
+PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
 
 
 def parts() -> list[str]:
-    """Every module of the package that says what it offers, by `__all__`."""
-    saying = [path for path in PACKAGE.rglob("*.py") if re.search(r"^__all__\b", path.read_text("utf-8"), re.MULTILINE)]
-    ways = (path.relative_to(PACKAGE.parent).with_suffix("").parts for path in saying)
+    """Every module of the three packages that says what it offers, by `__all__`."""
+    every = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
+    saying = [path for path in every if re.search(r"^__all__\b", path.read_text("utf-8"), re.MULTILINE)]
+    ways = (path.relative_to(ROOT).with_suffix("").parts for path in saying)
     return sorted(".".join(way).removesuffix(".__init__") for way in ways)
 
 
@@ -29,7 +31,7 @@ def api_pages() -> dict[str, str]:
     rows = "\n".join(f"| [{name}]({name}.md) | {_first_line(name)} |" for name in PARTS)
     toctree = "\n".join(PARTS)
     pages["api/index.md"] = (
-        "# API reference\n\nWhat each part of the package offers. Arrays have shapes such as (..., 2): any number of "
+        "# API reference\n\nWhat each part of the packages offers. Arrays have shapes such as (..., 2): any number of "
         "leading axes. Symbols mean the same [everywhere](../lessons/conventions.md).\n\n"
         f"| Part | What it is for |\n|---|---|\n{rows}\n\n```{{toctree}}\n:hidden:\n\n{toctree}\n```\n"
     )

@@ -24,10 +24,10 @@ from lesson_page import LessonPage
 from links import on_site
 from scripts import question_script, style_sheet
 
-from camviz.course.material import lesson_paths
-from camviz.course.notebooks import Notebook, read, text_of
-from camviz.record import write_player
-from camviz.samples import chessboard_pictures
+from camviz_school.course.material import lesson_paths
+from camviz_school.course.notebooks import Notebook, read, text_of
+from camviz_school.record import write_player
+from camviz_school.samples import chessboard_pictures
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent

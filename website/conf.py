@@ -21,7 +21,6 @@ extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "numpydoc",
     "docstrings",
     "mathml",
 ]
@@ -40,10 +39,9 @@ suppress_warnings = ["config.cache", "mystnb.unknown_mime_type", "autosummary.im
 autosummary_generate = True
 autosummary_imported_members = True
 autosummary_ignore_module_all = False
-autodoc_typehints = "none"  # the sections say the types; ArrayLike alone would take three lines
+autodoc_typehints = "none"  # docstrings.py writes them
+python_maximum_signature_line_length = 90
 autodoc_member_order = "bysource"
-numpydoc_show_class_members = False
-numpydoc_class_members_toctree = False
 default_role = "literal"
 
 html_theme = "pydata_sphinx_theme"

@@ -6,10 +6,10 @@ import json
 from html import escape
 from pathlib import Path
 
-from camviz.course import prose
-from camviz.course.catalogue import Lesson, catalogue
-from camviz.course.glossary import Term, glossary
-from camviz.course.questions import predict_questions, quiz_questions
+from camviz.draw import prose
+from camviz_school.course.catalogue import Lesson, catalogue
+from camviz_school.course.glossary import Term, glossary
+from camviz_school.course.questions import predict_questions, quiz_questions
 
 
 def course_pages() -> dict[str, str]:

@@ -15,11 +15,12 @@ from pathlib import Path
 import pictures
 from links import REPOSITORY, on_site
 
-from camviz.course import colab, prose
-from camviz.course.exercises import exercise
-from camviz.course.notebooks import Cell, Notebook, exercise_of, read
-from camviz.course.questions import Question, question, quiz_questions
-from camviz.widgets.question import LEAD
+from camviz.draw import prose
+from camviz_school.course import colab
+from camviz_school.course.exercises import exercise
+from camviz_school.course.notebooks import Cell, Notebook, exercise_of, read
+from camviz_school.course.questions import Question, question, quiz_questions
+from camviz_school.widgets.question import LEAD
 
 PICTURES = "_pictures"
 _ASK = re.compile(r'^ask\("([\w.]+)"\)$')

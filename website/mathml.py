@@ -6,7 +6,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.writers.html5 import HTML5Translator
 
-from camviz.teaching.markup import formula
+from camviz_school.teaching.markup import formula
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

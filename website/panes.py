@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import clips
 
-from camviz.samples import local_sample
+from camviz_school.samples import local_sample
 
 RECORDINGS = "_recordings"
 SIZE = 950_000
@@ -36,6 +36,7 @@ from camviz.views.frustum import FrustumView
 from camviz.widgets import explore
 explore(FrustumView(), "hfov_deg", "yaw_deg", "pitch_deg")
 """
+PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
 
 
 class CodeCell(NamedTuple):
@@ -118,7 +119,7 @@ class Recorder:
 
 def code_cells(path: Path) -> dict[int, CodeCell]:
     """The code of a notebook by the numbers of its cells."""
-    from camviz.course.notebooks import read
+    from camviz_school.course.notebooks import read
 
     return {
         number: CodeCell(cell.source, tuple(cell.metadata.get("camviz", {}).get("together", ())))
@@ -149,8 +150,8 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> s
 
 
 def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder) -> Any:
-    from camviz.record import Budget, record
-    from camviz.record.panes import Explored
+    from camviz_school.record import Budget, record
+    from camviz_school.record.panes import Explored
 
     return record(Explored(explorer, together), recorder.folder, budget=Budget(SIZE, recorder.positions))
 
@@ -180,6 +181,8 @@ def _shown(root: Path, cells: dict[int, CodeCell]) -> list[tuple[int, Any]]:
 def _loaded(root: Path, name: str) -> set[Path]:
     """The files on which what this process has drawn depends: modules, the package's data, the lesson's material."""
     modules = {Path(module.__file__) for module in list(sys.modules.values()) if getattr(module, "__file__", None)}
-    data = {path for path in (root / "camviz").rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
+    packages = [root / name for name in PACKAGES]
+    files = [path for package in packages for path in package.rglob("*") if path.is_file()]
+    data = {path for path in files if path.suffix not in (".py", ".pyc")}
     material = {path for path in (root / "lessons/material" / name).glob("*") if path.is_file()}
-    return {path for path in modules if path.is_relative_to(root / "camviz")} | data | material
+    return {path for path in modules if any(map(path.is_relative_to, packages))} | data | material

@@ -24,31 +24,15 @@ def response(light: ArrayLike, reflectance: ArrayLike, sensitivity: ArrayLike) -
 
     The sum stands for the integral over wavelength. Divide by the response to a perfect white to have shares of it.
 
-    Parameters
-    ----------
-    light : array_like (81,)
-        Its power at WAVELENGTHS_NM, in any unit.
-    reflectance : array_like (..., 81)
-        Shares 0 … 1; a single number is a grey.
-    sensitivity : array_like (81, c)
-        What each of c channels makes of a unit of power.
+    Args:
+        light: (81,), its power at WAVELENGTHS_NM, in any unit.
+        reflectance: (..., 81), shares 0 … 1; a single number is a grey.
+        sensitivity: (81, c), what each of c channels makes of a unit of power.
 
-    Returns
-    -------
-    array (..., c)
-        Linear, in the light's units times nanometres.
+    Returns: (..., c), linear, in the light's units times nanometres.
+    Raises: ValueError for other shapes.
+    Source: Szeliski (2022), section 2.3.2.
 
-    Raises
-    ------
-    ValueError
-        For other shapes.
-
-    References
-    ----------
-    Szeliski (2022), section 2.3.2.
-
-    Examples
-    --------
     A grey card of 18 % gives 18 % of white's response in every channel:
 
     >>> light, camera = illuminant("D65"), sensitivities("Nikon D5100")
@@ -74,25 +58,13 @@ def seen(light: ArrayLike, reflectance: ArrayLike) -> Array:
 
     This is the truth that a camera's colours are held against. Adaptation is Bradford's, as `adaptation` has it.
 
-    Parameters
-    ----------
-    light : array_like (81,)
-        Its power at WAVELENGTHS_NM, in any unit.
-    reflectance : array_like (..., 81)
-        Shares 0 … 1.
+    Args:
+        light: (81,), its power at WAVELENGTHS_NM, in any unit.
+        reflectance: (..., 81), shares 0 … 1.
 
-    Returns
-    -------
-    array (..., 3)
-        XYZ; Y = 1 is a perfect white.
+    Returns: (..., 3), XYZ; Y = 1 is a perfect white.
+    Raises: ValueError for other shapes.
 
-    Raises
-    ------
-    ValueError
-        For other shapes.
-
-    Examples
-    --------
     White paper looks white in a light bulb's light too:
 
     >>> seen(illuminant("A"), np.ones(81)).round(3)
@@ -107,23 +79,12 @@ def seen(light: ArrayLike, reflectance: ArrayLike) -> Array:
 def neutral(rgb: ArrayLike) -> Array:
     """The gains that make one colour grey and leave its green.
 
-    Parameters
-    ----------
-    rgb : array_like (3,)
-        Linear.
+    Args:
+        rgb: (3,), linear.
 
-    Returns
-    -------
-    array (3,)
-        What to multiply red, green and blue by.
+    Returns: (3,), what to multiply red, green and blue by.
+    Raises: ValueError where a channel is not above 0.
 
-    Raises
-    ------
-    ValueError
-        Where a channel is not above 0.
-
-    Examples
-    --------
     >>> neutral((0.5, 1.0, 0.8))
     array([2.  , 1.  , 1.25])
     """
@@ -136,27 +97,13 @@ def neutral(rgb: ArrayLike) -> Array:
 def grey_world(rgb: ArrayLike) -> Array:
     """The gains that make the mean of all colours grey.
 
-    Parameters
-    ----------
-    rgb : array_like (..., 3)
-        Linear.
+    Args:
+        rgb: (..., 3), linear.
 
-    Returns
-    -------
-    array (3,)
-        What to multiply red, green and blue by.
+    Returns: (3,), what to multiply red, green and blue by.
+    Raises: ValueError where the mean of a channel is not above 0.
+    Source: G. Buchsbaum, A spatial processor model for object colour perception, J. Franklin Inst. 310 (1980).
 
-    Raises
-    ------
-    ValueError
-        Where the mean of a channel is not above 0.
-
-    References
-    ----------
-    G. Buchsbaum, A spatial processor model for object colour perception, J. Franklin Inst. 310 (1980).
-
-    Examples
-    --------
     The mean of these two colours is (0.4, 0.6, 0.25):
 
     >>> grey_world([(0.2, 0.4, 0.1), (0.6, 0.8, 0.4)])
@@ -168,29 +115,14 @@ def grey_world(rgb: ArrayLike) -> Array:
 def white_patch(rgb: ArrayLike, percentile: float = 100) -> Array:
     """The gains that make the brightest values of the three channels equal.
 
-    Parameters
-    ----------
-    rgb : array_like (..., 3)
-        Linear.
-    percentile : float
-        Below 100 it leaves out the few brightest, which may be highlights that are cut off.
+    Args:
+        rgb: (..., 3), linear.
+        percentile: Below 100 it leaves out the few brightest, which may be highlights that are cut off.
 
-    Returns
-    -------
-    array (3,)
-        What to multiply red, green and blue by.
+    Returns: (3,), what to multiply red, green and blue by.
+    Raises: ValueError where the brightest of a channel is not above 0.
+    Source: E. H. Land and J. J. McCann, Lightness and retinex theory, J. Opt. Soc. Am. 61 (1971).
 
-    Raises
-    ------
-    ValueError
-        Where the brightest of a channel is not above 0.
-
-    References
-    ----------
-    E. H. Land and J. J. McCann, Lightness and retinex theory, J. Opt. Soc. Am. 61 (1971).
-
-    Examples
-    --------
     >>> white_patch([(0.2, 0.4, 0.1), (0.5, 0.8, 0.4)])
     array([1.6, 1. , 2. ])
     """
@@ -212,26 +144,14 @@ def from_white_xy(xy: ArrayLike, xyz_from_raw: ArrayLike) -> Array:
 def fit_matrix(rgb: ArrayLike, target: ArrayLike, keep: tuple[ArrayLike, ArrayLike] | None = None) -> Array:
     """The matrix M that takes colours to their targets with the least Σ ‖M rgb − target‖².
 
-    Parameters
-    ----------
-    rgb, target : array_like (n, 3)
-        Linear colours and what they should become.
-    keep : pair of array_like (3,), optional
-        A colour and its target that M must take to each other exactly, such as white. The rest is then fitted in the
-        directions that leave it alone.
+    Args:
+        rgb, target: (n, 3), linear colours and what they should become.
+        keep: pair of (3,), a colour and its target that M must take to each other exactly, such as white. The rest is
+            then fitted in the directions that leave it alone.
 
-    Returns
-    -------
-    array (3, 3)
-        M acts on columns: for arrays (..., 3) use `rgb @ M.T`.
+    Returns: (3, 3). M acts on columns: for arrays (..., 3) use `rgb @ M.T`.
+    Raises: ValueError unless `rgb` holds three independent colours, and `target` has its shape; for a black to keep.
 
-    Raises
-    ------
-    ValueError
-        Unless `rgb` holds three independent colours, and `target` has its shape; for a black to keep.
-
-    Examples
-    --------
     Colours that a matrix made give it back:
 
     >>> M = np.array([[1.5, -0.3, -0.2], [-0.2, 1.4, -0.2], [0.0, -0.4, 1.4]])
@@ -264,31 +184,16 @@ def metamer(reflectance: ArrayLike, alike: ArrayLike, apart: ArrayLike, smoothne
     Among smooth changes, those that `alike` cannot notice form a null space, the metameric blacks. Taken is the
     direction in it, and then the longest step within 0 … 1, that `apart` notices most.
 
-    Parameters
-    ----------
-    reflectance : array_like (81,)
-        Shares 0 … 1.
-    alike, apart : array_like (81, c), (81, d)
-        Sensitivities times the light, in any unit: `alike` answers as before, `apart` does not.
-    smoothness : int
-        How many cosines the changes are sums of.
+    Args:
+        reflectance: (81,), shares 0 … 1.
+        alike, apart: (81, c), (81, d), sensitivities times the light, in any unit: `alike` answers as before, `apart`
+            does not.
+        smoothness: How many cosines the changes are sums of.
 
-    Returns
-    -------
-    array (81,)
-        Shares 0 … 1; the reflectance unchanged where `apart` notices nothing.
+    Returns: (81,), shares 0 … 1; the reflectance unchanged where `apart` notices nothing.
+    Raises: ValueError for other shapes.
+    Source: G. Wyszecki and W. S. Stiles, Color Science (2nd ed. 1982), chapter 3.
 
-    Raises
-    ------
-    ValueError
-        For other shapes.
-
-    References
-    ----------
-    G. Wyszecki and W. S. Stiles, Color Science (2nd ed. 1982), chapter 3.
-
-    Examples
-    --------
     It looks like grey in daylight, and under a light bulb it is redder and bluer:
 
     >>> daylight, bulb = (illuminant(name)[:, None] * observer() for name in ("D65", "A"))

@@ -26,17 +26,11 @@ _FULL = 250  # a channel whose median is at least this was cut off
 class FoundChart:
     """A chart of 24 patches in a photograph, as `find_chart` found it.
 
-    Attributes
-    ----------
-    patches : array (24, 4, 2)
-        The corners of each patch's inner part, in pixels.
-    rgb : array (24, 3)
-        Each patch's median colour, linear light 0 … 1, in the chart's order.
-    clipped : tuple of int
-        The numbers of the patches that are overexposed.
+    Attributes:
+        patches: (24, 4, 2), the corners of each patch's inner part, in pixels.
+        rgb: (24, 3), each patch's median colour, linear light 0 … 1, in the chart's order.
+        clipped: The numbers of the patches that are overexposed.
 
-    Examples
-    --------
     >>> found = FoundChart(np.zeros((24, 4, 2)), np.full((24, 3), 0.2), clipped=(18,))
     >>> found.rgb[18], found.clipped
     (array([0.2, 0.2, 0.2]), (18,))
@@ -53,23 +47,12 @@ def find_chart(picture: NDArray[np.uint8]) -> FoundChart:
     The detector takes other things for charts, and misses charts beside such things. So the whole picture is searched
     and then parts of it, and what is found must have the chart's colours but for a 3×3 matrix.
 
-    Parameters
-    ----------
-    picture : array (height, width, 3)
-        sRGB bytes, uint8.
+    Args:
+        picture: (height, width, 3), sRGB bytes, uint8.
 
-    Returns
-    -------
-    FoundChart
-        Where its patches are, and their colours.
+    Returns: Where its patches are, and their colours.
+    Raises: ValueError where no chart is found, saying what to do; and for an array of another kind.
 
-    Raises
-    ------
-    ValueError
-        Where no chart is found, saying what to do; and for an array of another kind.
-
-    Examples
-    --------
     >>> from camviz.colour.charts import painted, published_srgb
     >>> from camviz.scenes import to_display
     >>> chart = to_display(np.pad(painted(published_srgb()), ((60, 60), (60, 60), (0, 0))))

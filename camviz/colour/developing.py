@@ -79,33 +79,16 @@ def xyz_from_raw(camera: str) -> Array:
 def developed(raw: ArrayLike, gains: ArrayLike, matrix: ArrayLike, *, encoded: bool = False) -> Array:
     """Linear sRGB of raw colours: the gains, then the matrix.
 
-    Parameters
-    ----------
-    raw : array_like (..., 3)
-        What the sensor counted, linear.
-    gains : array_like (3,)
-        Factors of white balance.
-    matrix : array_like (3, 3)
-        From the balanced raw colour to sRGB; it acts on columns.
-    encoded : bool
-        Whether both act on values that the screen's curve has bent already, which is the common mistake.
+    Args:
+        raw: (..., 3), what the sensor counted, linear.
+        gains: (3,), factors of white balance.
+        matrix: (3, 3), from the balanced raw colour to sRGB; it acts on columns.
+        encoded: Whether both act on values that the screen's curve has bent already, which is the common mistake.
 
-    Returns
-    -------
-    array (..., 3)
-        Linear; values outside 0 … 1 are kept, unless `encoded`.
+    Returns: (..., 3), linear; values outside 0 … 1 are kept, unless `encoded`.
+    Raises: ValueError for raw colours of another shape.
+    Source: Szeliski (2022), section 2.3.2.
 
-    Raises
-    ------
-    ValueError
-        For raw colours of another shape.
-
-    References
-    ----------
-    Szeliski (2022), section 2.3.2.
-
-    Examples
-    --------
     Gains turn a grey card's raw colour grey, but not once the curve has bent it:
 
     >>> raw, gains = (0.1, 0.2, 0.16), (2, 1, 1.25)

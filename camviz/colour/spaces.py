@@ -27,29 +27,14 @@ _KNEE, _SLOPE = 216 / 24389, 24389 / 27  # where L* leaves its cube root for a s
 def tristimulus(light: ArrayLike, reflectance: ArrayLike = 1.0) -> Array:
     """XYZ of surfaces in a light: X = k Σ light · reflectance · x̄, and so on, with k = 1 / Σ light · ȳ.
 
-    Parameters
-    ----------
-    light : array_like (..., 81)
-        Its power at WAVELENGTHS_NM, in any unit.
-    reflectance : array_like (..., 81)
-        Shares 0 … 1; by default a perfect white.
+    Args:
+        light: (..., 81), its power at WAVELENGTHS_NM, in any unit.
+        reflectance: (..., 81), shares 0 … 1; by default a perfect white.
 
-    Returns
-    -------
-    array (..., 3)
-        Y = 1 is a perfect white.
+    Returns: (..., 3), Y = 1 is a perfect white.
+    Raises: ValueError for another shape.
+    Source: CIE 15:2004, Colorimetry, section 7.1.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    CIE 15:2004, Colorimetry, section 7.1.
-
-    Examples
-    --------
     The white of D65 has X = 0.9504 and Z = 1.0888 (CIE):
 
     >>> tristimulus(illuminant("D65")).round(4)
@@ -65,27 +50,13 @@ def tristimulus(light: ArrayLike, reflectance: ArrayLike = 1.0) -> Array:
 def chromaticity(xyz: ArrayLike) -> Array:
     """CIE (x, y) of XYZ.
 
-    Parameters
-    ----------
-    xyz : array_like (..., 3)
-        XYZ on any scale.
+    Args:
+        xyz: (..., 3), XYZ on any scale.
 
-    Returns
-    -------
-    array (..., 2)
-        x = X / (X + Y + Z), y = Y / (X + Y + Z); NaN for black, which has none.
+    Returns: (..., 2), x = X / (X + Y + Z), y = Y / (X + Y + Z); NaN for black, which has none.
+    Raises: ValueError for another shape.
+    Source: CIE 15:2004, Colorimetry, section 7.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    CIE 15:2004, Colorimetry, section 7.
-
-    Examples
-    --------
     >>> chromaticity(tristimulus(illuminant("D65"))).round(4)
     array([0.3127, 0.329 ])
     """
@@ -121,27 +92,15 @@ for _matrix in (XYZ_FROM_SRGB, SRGB_FROM_XYZ):
 def to_srgb(xyz: ArrayLike) -> Array:
     """Linear sRGB of XYZ under D65.
 
-    Parameters
-    ----------
-    xyz : array_like (..., 3)
-        XYZ; Y = 1 is white.
+    Args:
+        xyz: (..., 3), XYZ; Y = 1 is white.
 
-    Returns
-    -------
-    array (..., 3)
-        Linear; outside 0 … 1 lies what no sRGB screen can show. `camviz.scenes.to_encoded` has the curve.
+    Returns:
+        (..., 3), linear; outside 0 … 1 lies what no sRGB screen can show. `camviz.scenes.to_encoded` has the curve.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
+    Raises: ValueError for another shape.
+    Source: IEC 61966-2-1:1999.
 
-    References
-    ----------
-    IEC 61966-2-1:1999.
-
-    Examples
-    --------
     No screen can show this green, for its blue would be below 0:
 
     >>> to_srgb((0.3, 0.6, 0.05)).round(2)
@@ -153,27 +112,13 @@ def to_srgb(xyz: ArrayLike) -> Array:
 def from_srgb(rgb: ArrayLike) -> Array:
     """XYZ under D65 of linear sRGB: the inverse of `to_srgb`.
 
-    Parameters
-    ----------
-    rgb : array_like (..., 3)
-        Linear, 1 is full.
+    Args:
+        rgb: (..., 3), linear, 1 is full.
 
-    Returns
-    -------
-    array (..., 3)
-        Y = 1 is white.
+    Returns: (..., 3), Y = 1 is white.
+    Raises: ValueError for another shape.
+    Source: IEC 61966-2-1:1999.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    IEC 61966-2-1:1999.
-
-    Examples
-    --------
     Red's share of white's brightness is 21 %:
 
     >>> from_srgb((1, 0, 0)).round(4)
@@ -188,29 +133,14 @@ def from_srgb(rgb: ArrayLike) -> Array:
 def to_lab(xyz: ArrayLike, white: ArrayLike) -> Array:
     """CIELAB of XYZ beside a white.
 
-    Parameters
-    ----------
-    xyz : array_like (..., 3)
-        XYZ on the white's scale.
-    white : array_like (3,)
-        XYZ of what looks white.
+    Args:
+        xyz: (..., 3), XYZ on the white's scale.
+        white: (3,), XYZ of what looks white.
 
-    Returns
-    -------
-    array (..., 3)
-        L* (0 black … 100 white), a*, b*.
+    Returns: (..., 3), L* (0 black … 100 white), a*, b*.
+    Raises: ValueError for another shape.
+    Source: CIE 15:2004, Colorimetry, section 8.2.1.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    CIE 15:2004, Colorimetry, section 8.2.1.
-
-    Examples
-    --------
     Middle grey, L* = 50, reflects 18.4 % of the light:
 
     >>> white = np.array([0.9505, 1, 1.089])
@@ -225,29 +155,14 @@ def to_lab(xyz: ArrayLike, white: ArrayLike) -> Array:
 def from_lab(lab: ArrayLike, white: ArrayLike) -> Array:
     """XYZ of CIELAB beside a white: the inverse of `to_lab`.
 
-    Parameters
-    ----------
-    lab : array_like (..., 3)
-        CIELAB's L*, a*, b*.
-    white : array_like (3,)
-        XYZ of what looks white.
+    Args:
+        lab: (..., 3), CIELAB's L*, a*, b*.
+        white: (3,), XYZ of what looks white.
 
-    Returns
-    -------
-    array (..., 3)
-        On the white's scale.
+    Returns: (..., 3), on the white's scale.
+    Raises: ValueError for another shape.
+    Source: CIE 15:2004, Colorimetry, section 8.2.1.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    CIE 15:2004, Colorimetry, section 8.2.1.
-
-    Examples
-    --------
     >>> from_lab((50, 0, 0), (1, 1, 1)).round(4)  # ((50 + 16) / 116)³
     array([0.1842, 0.1842, 0.1842])
     """
@@ -260,28 +175,14 @@ def from_lab(lab: ArrayLike, white: ArrayLike) -> Array:
 def delta_e_2000(lab1: ArrayLike, lab2: ArrayLike) -> Array:
     """ΔE2000 between two CIELAB colours: about 1 is the least that an eye sees side by side.
 
-    Parameters
-    ----------
-    lab1, lab2 : array_like (..., 3)
-        CIELAB's L*, a*, b*.
+    Args:
+        lab1, lab2: (..., 3), CIELAB's L*, a*, b*.
 
-    Returns
-    -------
-    array (...)
-        0 for equal colours.
+    Returns: (...), 0 for equal colours.
+    Raises: ValueError for another shape.
+    Source: G. Sharma, W. Wu and E. N. Dalal, The CIEDE2000 color-difference formula: implementation notes,
+    supplementary test data, and mathematical observations, Color Res. Appl. 30 (2005).
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    G. Sharma, W. Wu and E. N. Dalal, The CIEDE2000 color-difference formula: implementation notes, supplementary test
-    data, and mathematical observations, Color Res. Appl. 30 (2005).
-
-    Examples
-    --------
     The first pair of the paper's table:
 
     >>> delta_e_2000((50, 2.6772, -79.7751), (50, 0, -82.7485)).round(4)
@@ -345,29 +246,14 @@ def adaptation(white_from: ArrayLike, white_to: ArrayLike, method: str = "Bradfo
 
     M⁻¹ diag(M white_to / M white_from) M: each channel of M is scaled by itself, as von Kries proposed.
 
-    Parameters
-    ----------
-    white_from, white_to : array_like (3,)
-        Their XYZ.
-    method : {"Bradford", "von Kries", "XYZ"}
-        Which channels M makes: see ADAPTATIONS.
+    Args:
+        white_from, white_to: (3,), their XYZ.
+        method: {"Bradford", "von Kries", "XYZ"}, which channels M makes: see ADAPTATIONS.
 
-    Returns
-    -------
-    array (3, 3)
-        It acts on columns.
+    Returns: (3, 3). It acts on columns.
+    Raises: ValueError for a method that is not one of ADAPTATIONS, and for other shapes.
+    Source: K. M. Lam, Metamerism and colour constancy, PhD thesis, University of Bradford (1985).
 
-    Raises
-    ------
-    ValueError
-        For a method that is not one of ADAPTATIONS, and for other shapes.
-
-    References
-    ----------
-    K. M. Lam, Metamerism and colour constancy, PhD thesis, University of Bradford (1985).
-
-    Examples
-    --------
     From D65 to the D50 of ICC profiles:
 
     >>> adaptation((0.95047, 1, 1.08883), (0.96422, 1, 0.82521)).round(3)

@@ -39,17 +39,9 @@ _HOTTEST_DAYLIGHT = 25000.0
 def observer() -> Array:
     """The colour-matching functions x̄, ȳ, z̄ of the CIE's standard observer of 2°.
 
-    Returns
-    -------
-    array (81, 3)
-        At WAVELENGTHS_NM; read-only.
+    Returns: (81, 3), at WAVELENGTHS_NM; read-only.
+    Source: CIE 1931 standard colorimetric observer, as tabulated in CIE 015:2018.
 
-    References
-    ----------
-    CIE 1931 standard colorimetric observer, as tabulated in CIE 015:2018.
-
-    Examples
-    --------
     The eye is most sensitive at 555 nm:
 
     >>> WAVELENGTHS_NM[observer()[:, 1].argmax()]
@@ -69,27 +61,14 @@ def whole_observer() -> tuple[Array, Array]:
 def illuminant(name: str) -> Array:
     """The spectrum of a CIE illuminant.
 
-    Parameters
-    ----------
-    name : {"A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3"}
-        A light bulb, daylights, fluorescent lamps, a white LED.
+    Args:
+        name: {"A", "D50", "D65", "FL2", "FL7", "FL11", "LED-B3"}, a light bulb, daylights, fluorescent lamps, a white
+            LED.
 
-    Returns
-    -------
-    array (81,)
-        Relative power at WAVELENGTHS_NM; read-only.
+    Returns: (81,), relative power at WAVELENGTHS_NM; read-only.
+    Raises: ValueError for any other name.
+    Source: CIE 015:2018, Colorimetry.
 
-    Raises
-    ------
-    ValueError
-        For any other name.
-
-    References
-    ----------
-    CIE 015:2018, Colorimetry.
-
-    Examples
-    --------
     A light bulb has far more red than blue, daylight does not:
 
     >>> red, blue = WAVELENGTHS_NM == 650, WAVELENGTHS_NM == 450
@@ -107,27 +86,15 @@ def sensitivities(camera: str) -> Array:
     They are responses to power, not to photons: quantum efficiency times wavelength. A camera's channels are published
     with a peak of 1 each, so their levels against each other are not known.
 
-    Parameters
-    ----------
-    camera : {"Nikon D5100", "Sigma SD1 Merrill", "CIE observer"}
-        The last is no camera: one that sees exactly as the eye.
+    Args:
+        camera: {"Nikon D5100", "Sigma SD1 Merrill", "CIE observer"}. The last is no camera: one that sees exactly as
+            the eye.
 
-    Returns
-    -------
-    array (81, 3)
-        At WAVELENGTHS_NM; read-only.
+    Returns: (81, 3), at WAVELENGTHS_NM; read-only.
+    Raises: ValueError for any other name.
+    Source: M. M. Darrodi et al., Reference data set for camera spectral sensitivity estimation, J. Opt. Soc. Am. A 32
+    (2015).
 
-    Raises
-    ------
-    ValueError
-        For any other name.
-
-    References
-    ----------
-    M. M. Darrodi et al., Reference data set for camera spectral sensitivity estimation, J. Opt. Soc. Am. A 32 (2015).
-
-    Examples
-    --------
     Where red, green and blue peak, in nm:
 
     >>> WAVELENGTHS_NM[sensitivities("Nikon D5100").argmax(axis=0)]
@@ -145,17 +112,9 @@ def patch_names() -> tuple[str, ...]:
 def reflectances() -> Array:
     """The share of light that each patch of the 24-patch chart reflects at each wavelength.
 
-    Returns
-    -------
-    array (24, 81)
-        Row by row of the chart, at WAVELENGTHS_NM; the last six patches are grey, from white to black.
+    Returns: (24, 81), row by row of the chart, at WAVELENGTHS_NM; the last six patches are grey, from white to black.
+    Source: N. Ohta, The basis of color reproduction engineering (1997), the same numbers as in ISO 17321-1:2012.
 
-    References
-    ----------
-    N. Ohta, The basis of color reproduction engineering (1997), the same numbers as in ISO 17321-1:2012.
-
-    Examples
-    --------
     How bright the six grey patches are beside a perfect white:
 
     >>> tristimulus(illuminant("D65"), reflectances())[18:, 1].round(2)
@@ -185,29 +144,14 @@ def gel(strength: float) -> Array:
 def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
     """The spectra of glowing black bodies, by Planck's law.
 
-    Parameters
-    ----------
-    kelvin : array_like (...)
-        Temperatures above 0, in kelvin.
-    wavelengths_nm : array_like (n,)
-        In nanometres; by default WAVELENGTHS_NM.
+    Args:
+        kelvin: (...), temperatures above 0, in kelvin.
+        wavelengths_nm: (n,), in nanometres; by default WAVELENGTHS_NM.
 
-    Returns
-    -------
-    array (..., n)
-        Relative power, 100 at 560 nm.
+    Returns: (..., n), relative power, 100 at 560 nm.
+    Raises: ValueError unless every temperature is above 0.
+    Source: CIE 015:2018, Colorimetry, with c2 = 0.014388 m K.
 
-    Raises
-    ------
-    ValueError
-        Unless every temperature is above 0.
-
-    References
-    ----------
-    CIE 015:2018, Colorimetry, with c2 = 0.014388 m K.
-
-    Examples
-    --------
     Wien's law puts the peak of 5000 K at 2.898e6 nm K / 5000 K = 580 nm:
 
     >>> WAVELENGTHS_NM[planckian(5000).argmax()]
@@ -225,27 +169,13 @@ def daylight(kelvin: float) -> Array:
 
     The CIE rounds the weights of its two components to three decimals; these are not rounded.
 
-    Parameters
-    ----------
-    kelvin : float
-        4000 … 25000 K.
+    Args:
+        kelvin: 4000 … 25000 K.
 
-    Returns
-    -------
-    array (81,)
-        Relative power at WAVELENGTHS_NM, 100 at 560 nm.
+    Returns: (81,), relative power at WAVELENGTHS_NM, 100 at 560 nm.
+    Raises: ValueError for a temperature outside 4000 … 25000 K.
+    Source: CIE 015:2018, Colorimetry, after D. B. Judd, D. L. MacAdam and G. Wyszecki, J. Opt. Soc. Am. 54 (1964).
 
-    Raises
-    ------
-    ValueError
-        For a temperature outside 4000 … 25000 K.
-
-    References
-    ----------
-    CIE 015:2018, Colorimetry, after D. B. Judd, D. L. MacAdam and G. Wyszecki, J. Opt. Soc. Am. 54 (1964).
-
-    Examples
-    --------
     D65 is daylight of 6504 K:
 
     >>> chromaticity(tristimulus(daylight(6504))).round(4)

@@ -22,27 +22,13 @@ FARTHEST = 0.05  # from the locus, in Duv: beyond, a colour temperature says not
 def locus_xy(kelvin: ArrayLike) -> Array:
     """The chromaticity of black bodies: the Planckian locus.
 
-    Parameters
-    ----------
-    kelvin : array_like (...)
-        Temperatures above 0, in kelvin.
+    Args:
+        kelvin: (...), temperatures above 0, in kelvin.
 
-    Returns
-    -------
-    array (..., 2)
-        CIE (x, y).
+    Returns: (..., 2), CIE (x, y).
+    Raises: ValueError unless every temperature is above 0.
+    Source: CIE 015:2018, Colorimetry.
 
-    Raises
-    ------
-    ValueError
-        Unless every temperature is above 0.
-
-    References
-    ----------
-    CIE 015:2018, Colorimetry.
-
-    Examples
-    --------
     Colder light bulbs are redder, and the limit of heat is a bluish white:
 
     >>> locus_xy([2856, 1e9]).round(3)
@@ -76,29 +62,14 @@ def temperature(xy: ArrayLike) -> tuple[float, float]:
 def xy_of_temperature(kelvin: float, duv: float = 0.0) -> Array:
     """The chromaticity of a light of a colour temperature, beside the Planckian locus.
 
-    Parameters
-    ----------
-    kelvin : float
-        The correlated colour temperature.
-    duv : float
-        How far beside the locus in the (u, v) diagram: above 0 towards green, below towards magenta.
+    Args:
+        kelvin: The correlated colour temperature.
+        duv: How far beside the locus in the (u, v) diagram: above 0 towards green, below towards magenta.
 
-    Returns
-    -------
-    array (2,)
-        CIE (x, y).
+    Returns: (2,), CIE (x, y).
+    Raises: ValueError for a temperature that is not above 0.
+    Source: CIE 1960 UCS diagram, and ANSI C78.377 for the sign of Duv.
 
-    Raises
-    ------
-    ValueError
-        For a temperature that is not above 0.
-
-    References
-    ----------
-    CIE 1960 UCS diagram, and ANSI C78.377 for the sign of Duv.
-
-    Examples
-    --------
     D65 lies 0.0032 to the green side of a black body of 6504 K:
 
     >>> xy_of_temperature(6504, 0.0032).round(3)

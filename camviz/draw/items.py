@@ -20,24 +20,14 @@ from camviz.poses import RigidTransform
 class Line:
     """A line through points in space; NaN interrupts it.
 
-    Parameters
-    ----------
-    points : array_like (n, 3)
-        Points in metres.
-    class_ : str, optional
-        Its colour, a name from the style sheet.
-    width : float, optional
-        In picture units.
-    head : bool, optional
-        Makes it an arrow.
+    Args:
+        points: (n, 3), points in metres.
+        class_: Its colour, a name from the style sheet.
+        width: In picture units.
+        head: Makes it an arrow.
 
-    Raises
-    ------
-    ValueError
-        Where the last axis has not 3 coordinates.
+    Raises: ValueError where the last axis has not 3 coordinates.
 
-    Examples
-    --------
     >>> Line([(0, 0, 0), (1, 0, 0)]).points.shape
     (2, 3)
     """
@@ -55,22 +45,13 @@ class Line:
 class Face:
     """A convex outline, filled: a fan of triangles around its first vertex. Not drawn when a vertex is NaN.
 
-    Parameters
-    ----------
-    vertices : array_like (n, 3)
-        Points in metres.
-    colour : str, optional
-        A name from the style sheet, or "#rrggbb".
-    opacity : float, optional
-        From 0 to 1.
+    Args:
+        vertices: (n, 3), points in metres.
+        colour: A name from the style sheet, or "#rrggbb".
+        opacity: From 0 to 1.
 
-    Raises
-    ------
-    ValueError
-        For another opacity, and where the last axis has not 3 coordinates.
+    Raises: ValueError for another opacity, and where the last axis has not 3 coordinates.
 
-    Examples
-    --------
     >>> Face(np.eye(3), opacity=2)
     Traceback (most recent call last):
     ValueError: opacity must lie between 0 and 1, got 2
@@ -92,26 +73,15 @@ class TexturedMesh:
 
     A quad with a NaN vertex is left out. A flat quad shows the picture in exact perspective.
 
-    Parameters
-    ----------
-    vertices : array_like (n, 3)
-        Points in metres.
-    quads : array (m, 4) of int
-        Indices of vertices.
-    uv : array_like (n, 2)
-        Where the vertices lie on the picture, 0 … 1, u to the right and v upwards.
-    picture : array (height, width, 3) of uint8
-        RGB.
-    opacity : float, optional
-        From 0 to 1.
+    Args:
+        vertices: (n, 3), points in metres.
+        quads: (m, 4) of int, indices of vertices.
+        uv: (n, 2), where the vertices lie on the picture, 0 … 1, u to the right and v upwards.
+        picture: (height, width, 3) of uint8, RGB.
+        opacity: From 0 to 1.
 
-    Raises
-    ------
-    ValueError
-        Where `uv` is not one for each vertex, and for a picture of another form.
+    Raises: ValueError where `uv` is not one for each vertex, and for a picture of another form.
 
-    Examples
-    --------
     >>> grid = np.stack([*np.meshgrid([0, 1, 2], [0, 1]), np.ones((2, 3))], axis=-1)  # 2 × 3 points of a wall
     >>> TexturedMesh.over(grid, np.zeros((4, 4, 3), np.uint8)).quads
     array([[0, 1, 4, 3],
@@ -136,24 +106,13 @@ class TexturedMesh:
     def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: float = 1.0) -> TexturedMesh:
         """The picture over a grid of points, whose rows follow the picture's.
 
-        Parameters
-        ----------
-        points : array_like (m, n, 3)
-            At least 2 × 2, in metres.
-        picture : array (height, width, 3) of uint8
-            RGB.
-        opacity : float, optional
-            From 0 to 1.
+        Args:
+            points: (m, n, 3), at least 2 × 2, in metres.
+            picture: (height, width, 3) of uint8, RGB.
+            opacity: From 0 to 1.
 
-        Returns
-        -------
-        TexturedMesh
-            Of (m - 1) × (n - 1) quads.
-
-        Raises
-        ------
-        ValueError
-            For points that are no grid.
+        Returns: TexturedMesh of (m - 1) × (n - 1) quads.
+        Raises: ValueError for points that are no grid.
         """
         points = as_points(points, 3, "points")
         if points.ndim != 3 or min(points.shape[:2]) < 2:
@@ -169,22 +128,13 @@ class TexturedMesh:
 class Dots:
     """Round marks at points.
 
-    Parameters
-    ----------
-    points : array_like (n, 3)
-        Points in metres.
-    class_ : str, optional
-        Their colour, a name from the style sheet.
-    diameter : float, optional
-        In picture units.
+    Args:
+        points: (n, 3), points in metres.
+        class_: Their colour, a name from the style sheet.
+        diameter: In picture units.
 
-    Raises
-    ------
-    ValueError
-        Where the last axis has not 3 coordinates.
+    Raises: ValueError where the last axis has not 3 coordinates.
 
-    Examples
-    --------
     >>> Dots((0, 0, 1)).points  # one point is a list of one
     array([[0., 0., 1.]])
     """
@@ -201,22 +151,13 @@ class Dots:
 class Label:
     """Words beside a point.
 
-    Parameters
-    ----------
-    point : array_like (3,)
-        In metres.
-    words : str
-        What stands there.
-    class_ : str, optional
-        A name from the style sheet.
+    Args:
+        point: (3,), in metres.
+        words: What stands there.
+        class_: A name from the style sheet.
 
-    Raises
-    ------
-    ValueError
-        Where the point has not 3 coordinates.
+    Raises: ValueError where the point has not 3 coordinates.
 
-    Examples
-    --------
     >>> Label((0, 0, 1), "C").words
     'C'
     """
@@ -238,22 +179,13 @@ Item = Line | Face | TexturedMesh | Dots | Label
 def axes_triad(world_from_frame: RigidTransform, length: float, name: str = "") -> list[Item]:
     """The axes of a frame as arrows: x orange, y green, z blue, each with its letter.
 
-    Parameters
-    ----------
-    world_from_frame : RigidTransform
-        Where the frame is, in metres.
-    length : float
-        Of the arrows, in metres.
-    name : str, optional
-        Of the frame. With one, as the world beside a camera, it has capital letters.
+    Args:
+        world_from_frame: Where the frame is, in metres.
+        length: Of the arrows, in metres.
+        name: Of the frame. With one, as the world beside a camera, it has capital letters.
 
-    Returns
-    -------
-    list of Item
-        Lines and labels.
+    Returns: Lines and labels.
 
-    Examples
-    --------
     >>> from camviz.poses import RigidTransform
     >>> [item.words for item in axes_triad(RigidTransform.identity(), 1) if isinstance(item, Label)]
     ['x', 'y', 'z']
@@ -280,28 +212,16 @@ def camera_body(
     The rim is where the rays of the image's border reach `depth`, so it bends with the lens; rays of one lens that all
     point well forward end on a plane, as a pinhole's image does, those of a wider lens on a sphere.
 
-    Parameters
-    ----------
-    camera : Camera
-        What is drawn.
-    depth : float
-        How far the volume reaches, in metres.
-    image : array (height, width, 3) of uint8, optional
-        RGB, shown at the rim.
-    colour : str, optional
-        A name from the style sheet.
-    name : str, optional
-        A label at the centre.
-    near : float, optional
-        Adds a second rim at this distance in metres.
+    Args:
+        camera: What is drawn.
+        depth: How far the volume reaches, in metres.
+        image: (height, width, 3) of uint8, RGB, shown at the rim.
+        colour: A name from the style sheet.
+        name: A label at the centre.
+        near: Adds a second rim at this distance in metres.
 
-    Returns
-    -------
-    list of Item
-        The rim first.
+    Returns: The rim first.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> rim, *_ = camera_body(Camera(Intrinsics.from_fov(640, 480, 90)), depth=2)
     >>> rim.points[0]  # the image's upper left: tan 45° to the left, 3/4 of that up
@@ -325,29 +245,15 @@ def camera_body(
 def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid") -> list[Item]:
     """A ground: lines in the plane y = const.
 
-    Parameters
-    ----------
-    centre : array_like (3,)
-        In metres.
-    size : float
-        How far it reaches to each side, in metres.
-    step : float
-        Distance of the lines in metres.
-    class_ : str, optional
-        Their colour, a name from the style sheet.
+    Args:
+        centre: (3,), in metres.
+        size: How far it reaches to each side, in metres.
+        step: Distance of the lines in metres.
+        class_: Their colour, a name from the style sheet.
 
-    Returns
-    -------
-    list of Item
-        One Line, with NaN between its parts.
+    Returns: One Line, with NaN between its parts.
+    Raises: ValueError for a step that is not positive, and where the centre has not 3 coordinates.
 
-    Raises
-    ------
-    ValueError
-        For a step that is not positive, and where the centre has not 3 coordinates.
-
-    Examples
-    --------
     >>> (lines,) = grid_lines((0, 1, 0), size=2, step=1)
     >>> int(np.isnan(lines.points).any(axis=1).sum())  # five lines each way
     10

@@ -16,24 +16,14 @@ class OrbitCamera:
 
     At yaw 0 and pitch 0 it looks along z, as a camera in the identity pose does; pitch raises it above the target.
 
-    Parameters
-    ----------
-    target : tuple of float, optional
-        What it looks at, in metres.
-    distance : float, optional
-        From the target, in metres.
-    yaw_deg, pitch_deg : float, optional
-        Where it stands, in degrees; the pitch from -89 to 89.
-    vfov_deg : float, optional
-        Vertical field of view in degrees.
+    Args:
+        target: What it looks at, in metres.
+        distance: From the target, in metres.
+        yaw_deg, pitch_deg: Where it stands, in degrees; the pitch from -89 to 89.
+        vfov_deg: Vertical field of view in degrees.
 
-    Raises
-    ------
-    ValueError
-        For a distance that is not positive, and angles out of range.
+    Raises: ValueError for a distance that is not positive, and angles out of range.
 
-    Examples
-    --------
     >>> OrbitCamera(distance=4, yaw_deg=0, pitch_deg=0).camera(200, 100).centre  # 4 m before the origin
     array([ 0.,  0., -4.])
     """
@@ -55,15 +45,10 @@ class OrbitCamera:
     def camera(self, width: int, height: int) -> Camera:
         """The pinhole camera through which it sees.
 
-        Parameters
-        ----------
-        width, height : int
-            Size of the picture in pixels.
+        Args:
+            width, height: Size of the picture in pixels.
 
-        Returns
-        -------
-        Camera
-            In place.
+        Returns: Camera in place.
         """
         yaw, pitch = radians(self.yaw_deg), radians(self.pitch_deg)
         outward = np.array([-sin(yaw) * cos(pitch), -sin(pitch), -cos(yaw) * cos(pitch)])
@@ -74,15 +59,10 @@ class OrbitCamera:
     def orbited(self, dx: float, dy: float) -> OrbitCamera:
         """After a drag: what is near follows the pointer.
 
-        Parameters
-        ----------
-        dx, dy : float
-            The drag in picture units.
+        Args:
+            dx, dy: The drag in picture units.
 
-        Returns
-        -------
-        OrbitCamera
-            0.4° further for each unit.
+        Returns: 0.4° further for each unit.
         """
         yaw = (self.yaw_deg + 0.4 * dx + 180) % 360 - 180
         return replace(self, yaw_deg=yaw, pitch_deg=min(85.0, max(-85.0, self.pitch_deg + 0.4 * dy)))
@@ -90,30 +70,20 @@ class OrbitCamera:
     def zoomed(self, steps: float) -> OrbitCamera:
         """Nearer by a tenth for every positive step.
 
-        Parameters
-        ----------
-        steps : float
-            How many; negative ones lead away.
+        Args:
+            steps: How many; negative ones lead away.
 
-        Returns
-        -------
-        OrbitCamera
-            At another distance.
+        Returns: OrbitCamera at another distance.
         """
         return replace(self, distance=min(1e4, max(0.05, self.distance * exp(-0.1 * steps))))
 
     def key(self, key: str) -> OrbitCamera:
         """After a key: arrows walk around by 5°, + and - (or page up and down) walk nearer and back.
 
-        Parameters
-        ----------
-        key : str
-            As browsers name it.
+        Args:
+            key: As browsers name it.
 
-        Returns
-        -------
-        OrbitCamera
-            The same for another key.
+        Returns: The same for another key.
         """
         turns = {"ArrowLeft": (-12.5, 0), "ArrowRight": (12.5, 0), "ArrowUp": (0, -12.5), "ArrowDown": (0, 12.5)}
         steps = {"+": 1, "=": 1, "PageUp": 1, "-": -1, "_": -1, "PageDown": -1}

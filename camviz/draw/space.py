@@ -26,22 +26,13 @@ __all__ = [
 def space_panel(name: str, x: float, y: float, width: float, height: float) -> Panel:
     """A panel whose coordinates are its own picture units, to be filled by `draw_space`.
 
-    Parameters
-    ----------
-    name : str
-        Of the panel, within its picture.
-    x, y : float
-        Its upper left in picture units.
-    width, height : float
-        Its size in picture units.
+    Args:
+        name: Of the panel, within its picture.
+        x, y: Its upper left in picture units.
+        width, height: Its size in picture units.
 
-    Returns
-    -------
-    Panel
-        Empty.
+    Returns: Empty.
 
-    Examples
-    --------
     >>> space_panel("world", 10, 20, 300, 200).right
     300
     """
@@ -63,37 +54,21 @@ def draw_space(
     Solid and wireframe pictures show the same points at the same places. Unless `renderer` says which, it is solid
     wherever OpenGL works and the environment variable CAMVIZ_RENDERER does not say "wire".
 
-    Parameters
-    ----------
-    panel : Panel
-        Of `space_panel`.
-    items : sequence of Item
-        What is drawn.
-    eye : OrbitCamera
-        From where.
-    draft : bool, optional
-        Quickly, while something is dragged.
-    renderer : {"solid", "wire"}, optional
-        How.
-    frame : RigidTransform, optional
-        world_from_frame, where the eye stands in another frame than the world's.
-    scenery : tuple of Item, optional
-        Of `scene_items`.
+    Args:
+        panel: Of `space_panel`.
+        items: What is drawn.
+        eye: From where.
+        draft: Quickly, while something is dragged.
+        renderer: {"solid", "wire"}, how.
+        frame: world_from_frame, where the eye stands in another frame than the world's.
+        scenery: Of `scene_items`.
 
-    Returns
-    -------
-    content : str
-        SVG.
-    photographs : dict of str to bytes
-        Pictures that it shows, by name.
+    Returns:
+        content: SVG.
+        photographs: Pictures that it shows, by name.
 
-    Raises
-    ------
-    ValueError
-        For another renderer.
+    Raises: ValueError for another renderer.
 
-    Examples
-    --------
     >>> eye = OrbitCamera(distance=4, yaw_deg=0, pitch_deg=0)
     >>> svg, _ = draw_space(space_panel("", 0, 0, 200, 100), [Line([(0, 0, 0), (1, 0, 0)])], eye, renderer="wire")
     >>> svg.split('"')[1]  # 1 m, 4 m away: 50 / tan(35°/2) / 4
@@ -121,25 +96,13 @@ def scene_items(make: Callable[[], Scene], renderer: str) -> tuple[Item, ...]:
     The lawn and what stands far off on it are left out: seen from outside, a scene is a model on a table. The items are
     kept and the scene, which is far larger, is not.
 
-    Parameters
-    ----------
-    make : callable
-        Makes the Scene.
-    renderer : {"solid", "wire"}
-        What shows it.
+    Args:
+        make: Makes the Scene.
+        renderer: {"solid", "wire"}, what shows it.
 
-    Returns
-    -------
-    tuple of Item
-        For `draw_space`.
+    Returns: For `draw_space`.
+    Raises: ValueError for another renderer.
 
-    Raises
-    ------
-    ValueError
-        For another renderer.
-
-    Examples
-    --------
     >>> from camviz.scenes import textured_scene
     >>> {type(item).__name__ for item in scene_items(textured_scene, "solid")}
     {'TexturedMesh'}
@@ -181,25 +144,14 @@ def chosen_renderer(renderer: str | None = None, draft: bool = False) -> str:
 
     Where nobody asked, a draft is a wireframe once solid pictures have proved too slow to be dragged.
 
-    Parameters
-    ----------
-    renderer : {"solid", "wire"}, optional
-        What is asked for; unless given, what the environment variable CAMVIZ_RENDERER says.
-    draft : bool, optional
-        Quickly, while something is dragged.
+    Args:
+        renderer: {"solid", "wire"}, what is asked for; unless given, what the environment variable CAMVIZ_RENDERER
+            says.
+        draft: Quickly, while something is dragged.
 
-    Returns
-    -------
-    str
-        "solid" or "wire".
+    Returns: "solid" or "wire".
+    Raises: ValueError for another renderer.
 
-    Raises
-    ------
-    ValueError
-        For another renderer.
-
-    Examples
-    --------
     >>> chosen_renderer("wire")
     'wire'
     """

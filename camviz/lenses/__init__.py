@@ -50,18 +50,11 @@ __all__ += [lens.__name__ for lens in LENSES.values()]
 def spelled(program: str) -> list[tuple[type[Lens], Spelling]]:
     """The lenses that a program has, and how it writes them.
 
-    Parameters
-    ----------
-    program : str
-        The name of a format, such as "kalibr".
+    Args:
+        program: The name of a format, such as "kalibr".
 
-    Returns
-    -------
-    list of (type of Lens, Spelling)
-        A lens may have several spellings; none for a program that is not known.
+    Returns: list of (type of Lens, Spelling). A lens may have several spellings; none for a program that is not known.
 
-    Examples
-    --------
     >>> [(lens.__name__, spelling.model) for lens, spelling in spelled("ros")][:2]
     [('BrownConrady', 'plumb_bob'), ('BrownConrady', 'rational_polynomial')]
     """
@@ -71,13 +64,8 @@ def spelled(program: str) -> list[tuple[type[Lens], Spelling]]:
 def calibration_models() -> dict[str, tuple[type[Lens], CalibrationModel]]:
     """The models that can be calibrated, by name, each with its lens.
 
-    Returns
-    -------
-    dict of str to (type of Lens, CalibrationModel)
-        By the names that `camviz calibrate --model` takes.
+    Returns: dict of str to (type of Lens, CalibrationModel), by the names that `camviz calibrate --model` takes.
 
-    Examples
-    --------
     >>> lens, model = calibration_models()["fisheye"]
     >>> lens.__name__, model.parameters
     ('KannalaBrandt', 'k1 k2 k3 k4')
@@ -88,20 +76,13 @@ def calibration_models() -> dict[str, tuple[type[Lens], CalibrationModel]]:
 def same_lenses(lens: Lens) -> Iterator[tuple[Lens, float]]:
     """The same lens under other names.
 
-    Parameters
-    ----------
-    lens : Lens
-        The lens to be written otherwise.
+    Args:
+        lens: The lens to be written otherwise.
 
-    Yields
-    ------
-    other : Lens
-        A lens of another class with the same image, up to its scale.
-    factor : float
-        From this lens's focal lengths to the other's.
+    Yields:
+        other: A lens of another class with the same image, up to its scale.
+        factor: From this lens's focal lengths to the other's.
 
-    Examples
-    --------
     >>> list(same_lenses(BrownConrady()))  # nothing but 0: a perspective lens
     [(Perspective(), 1.0)]
     """

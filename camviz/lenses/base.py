@@ -37,8 +37,6 @@ class Lens(ABC):
     A subclass is a frozen dataclass whose fields are its parameters. It writes its two equations, `image` and `ray`,
     on coordinates (n,), and declares the rest where the default does not hold.
 
-    Examples
-    --------
     >>> from camviz.lenses import Equidistant
     >>> fisheye = Equidistant()  # r = θ: a ray to the side, at 90°, lands at π/2
     >>> fisheye.project([1, 0, 0]).round(4)
@@ -59,40 +57,22 @@ class Lens(ABC):
     def project(self, points_cam: ArrayLike) -> Array:
         """The images of camera-frame points.
 
-        Parameters
-        ----------
-        points_cam : array_like (..., 3)
-            Points or rays, of any unit: only their directions count.
+        Args:
+            points_cam: (..., 3), points or rays, of any unit: only their directions count.
 
-        Returns
-        -------
-        array (..., 2)
-            Image points in focal lengths; NaN where there is none.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 3 coordinates.
+        Returns: (..., 2), image points in focal lengths; NaN where there is none.
+        Raises: ValueError where the last axis has not 3 coordinates.
         """
         return blockwise(self.image, as_points(points_cam, 3, "points_cam"), 2)
 
     def unproject(self, xy: ArrayLike) -> Array:
         """The rays of image points.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            Image points in focal lengths.
+        Args:
+            xy: (..., 2), image points in focal lengths.
 
-        Returns
-        -------
-        array (..., 3)
-            Unit rays; NaN where no ray arrives.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
+        Returns: (..., 3), unit rays; NaN where no ray arrives.
+        Raises: ValueError where the last axis has not 2 coordinates.
         """
         return blockwise(self._unit_ray, as_points(xy, 2, "xy"), 3)
 
@@ -100,36 +80,25 @@ class Lens(ABC):
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         """The equation from directions to the image, on coordinates; readers ask `project`.
 
-        Parameters
-        ----------
-        x, y, z : array (n,)
-            Coordinates of camera-frame points, of any unit.
+        Args:
+            x, y, z: (n,), coordinates of camera-frame points, of any unit.
 
-        Returns
-        -------
-        x : array (n,)
-            Image coordinates in focal lengths, to the right.
-        y : array (n,)
-            The same downwards.
+        Returns:
+            x: (n,), image coordinates in focal lengths, to the right.
+            y: (n,), the same downwards.
         """
 
     @abstractmethod
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """The equation from the image to directions, on coordinates; readers ask `unproject`.
 
-        Parameters
-        ----------
-        x, y : array (n,)
-            Image coordinates in focal lengths.
+        Args:
+            x, y: (n,), image coordinates in focal lengths.
 
-        Returns
-        -------
-        x : array (n,)
-            To the right, of a ray of any length.
-        y : array (n,)
-            Downwards.
-        z : array (n,)
-            Forwards.
+        Returns:
+            x: (n,), to the right, of a ray of any length.
+            y: (n,), downwards.
+            z: (n,), forwards.
         """
 
     def _unit_ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -143,22 +112,16 @@ class Lens(ABC):
     def parameters(cls) -> tuple[str, ...]:
         """The names of the lens's own parameters.
 
-        Returns
-        -------
-        tuple of str
-            In the order of the constructor.
+        Returns: In the order of the constructor.
         """
         return tuple(each.name for each in fields(cls))  # type: ignore[arg-type]
 
     def same_as(self) -> Iterator[tuple[Lens, float]]:
         """The same lens under names that this class itself knows; `same_lenses` knows all.
 
-        Yields
-        ------
-        other : Lens
-            A lens of another class with the same image, up to its scale.
-        factor : float
-            From this lens's focal lengths to the other's.
+        Yields:
+            other: A lens of another class with the same image, up to its scale.
+            factor: From this lens's focal lengths to the other's.
         """
         if self.plain is not None and self == type(self)():
             yield self.plain(), 1.0
@@ -190,35 +153,21 @@ class Lens(ABC):
     def project_unchecked(self, rays: Array) -> Array:
         """As `project`, also beyond a fold if the equation goes on there: quicker to ask.
 
-        Parameters
-        ----------
-        rays : array (..., 3)
-            Rays, of any unit.
+        Args:
+            rays: (..., 3), rays, of any unit.
 
-        Returns
-        -------
-        array (..., 2)
-            Image points in focal lengths.
+        Returns: (..., 2), image points in focal lengths.
         """
         return self.project(rays)
 
     def jacobian(self, xy: ArrayLike) -> Array:
         """The derivative of the map from the plane z = 1 to the image, good to 1e-9.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            Points of the plane z = 1 in focal lengths.
+        Args:
+            xy: (..., 2), points of the plane z = 1 in focal lengths.
 
-        Returns
-        -------
-        array (..., 2, 2)
-            ∂image/∂xy, without unit.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
+        Returns: (..., 2, 2), ∂image/∂xy, without unit.
+        Raises: ValueError where the last axis has not 2 coordinates.
         """
         xy = as_points(xy, 2, "xy")
         step = 6e-6 * (1 + np.linalg.norm(xy, axis=-1))[..., None, None] * np.eye(2)
@@ -228,15 +177,10 @@ class Lens(ABC):
     def ray_jacobian(self, rays: Array) -> Array:
         """The derivative ∂xy/∂ray.
 
-        Parameters
-        ----------
-        rays : array (..., 3)
-            Unit rays.
+        Args:
+            rays: (..., 3), unit rays.
 
-        Returns
-        -------
-        array (..., 2, 3)
-            In focal lengths.
+        Returns: (..., 2, 3), in focal lengths.
         """
         moved = STEP * np.eye(3)
         columns = [(self.project_unchecked(rays + to) - self.project_unchecked(rays - to)) / (2 * STEP) for to in moved]
@@ -245,17 +189,11 @@ class Lens(ABC):
     def parameter_jacobian(self, name: str, rays: Array) -> Array:
         """The derivative ∂xy/∂name; from one side at the end of what the parameter may be.
 
-        Parameters
-        ----------
-        name : str
-            One of `parameters()`.
-        rays : array (..., 3)
-            Unit rays.
+        Args:
+            name: One of `parameters()`.
+            rays: (..., 3), unit rays.
 
-        Returns
-        -------
-        array (..., 2)
-            In focal lengths per unit of the parameter.
+        Returns: (..., 2), in focal lengths per unit of the parameter.
         """
         value = getattr(self, name)
         step = STEP * max(1.0, abs(value))

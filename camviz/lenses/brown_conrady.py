@@ -40,25 +40,14 @@ class BrownConrady(Lens):
     image, and only if the way to them from the axis meets neither the fold of the radial part, nor its pole, nor a
     Jacobian determinant of 0 (`valid`).
 
-    Parameters
-    ----------
-    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 : float, optional
-        Coefficients of lengths in focal lengths, in OpenCV's order.
-    tau_x, tau_y : float, optional
-        Tilt of the sensor in radians.
+    Args:
+        k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4: Coefficients of lengths in focal lengths, in OpenCV's order.
+        tau_x, tau_y: Tilt of the sensor in radians.
 
-    Raises
-    ------
-    ValueError
-        For a coefficient that is not a finite number, and for a tilt outside -π/2 … π/2.
+    Raises: ValueError for a coefficient that is not a finite number, and for a tilt outside -π/2 … π/2.
+    Source: D. C. Brown, *Close-range camera calibration*, Photogrammetric Engineering 37 (1971). OpenCV's documentation
+    of calib3d.
 
-    References
-    ----------
-    D. C. Brown, *Close-range camera calibration*, Photogrammetric Engineering 37 (1971). OpenCV's documentation of
-    calib3d.
-
-    Examples
-    --------
     >>> barrel = BrownConrady(k1=-0.2)
     >>> barrel.project([0.5, 0, 1])  # 0.5 (1 - 0.2 · 0.25)
     array([0.475, 0.   ])
@@ -162,23 +151,12 @@ class BrownConrady(Lens):
     def from_coefficients(cls, coefficients: Iterable[float]) -> "BrownConrady":
         """From a list of coefficients, as OpenCV and ROS write them.
 
-        Parameters
-        ----------
-        coefficients : iterable of float
-            4, 5, 8, 12 or 14 numbers: k1, k2, p1, p2, k3 and so on, in OpenCV's order.
+        Args:
+            coefficients: 4, 5, 8, 12 or 14 numbers: k1, k2, p1, p2, k3 and so on, in OpenCV's order.
 
-        Returns
-        -------
-        BrownConrady
-            With 0 for what is left out.
+        Returns: BrownConrady with 0 for what is left out.
+        Raises: ValueError for any other number of coefficients.
 
-        Raises
-        ------
-        ValueError
-            For any other number of coefficients.
-
-        Examples
-        --------
         >>> BrownConrady.from_coefficients([-0.3, 0.1, 0, 0, 0.02]).k3
         0.02
         """
@@ -196,15 +174,10 @@ class BrownConrady(Lens):
     def radial(self, r: ArrayLike) -> Array:
         """g(r) = r N(r²)/D(r²), the distorted radius of an ideal one.
 
-        Parameters
-        ----------
-        r : array_like (...)
-            Ideal radii in focal lengths.
+        Args:
+            r: (...), ideal radii in focal lengths.
 
-        Returns
-        -------
-        array (...)
-            Distorted radii in focal lengths, beyond the fold as well.
+        Returns: (...), distorted radii in focal lengths, beyond the fold as well.
         """
         r = np.asarray(r, dtype=float)
         with np.errstate(all="ignore"):
@@ -213,40 +186,22 @@ class BrownConrady(Lens):
     def distort(self, xy: ArrayLike) -> Array:
         """Distorted points of ideal ones, beyond the fold as well.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            Ideal points in focal lengths.
+        Args:
+            xy: (..., 2), ideal points in focal lengths.
 
-        Returns
-        -------
-        array (..., 2)
-            Distorted points in focal lengths.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
+        Returns: (..., 2), distorted points in focal lengths.
+        Raises: ValueError where the last axis has not 2 coordinates.
         """
         return blockwise(self._distort, as_points(xy, 2, "xy"), 2)
 
     def jacobian(self, xy: ArrayLike) -> Array:
         """The derivative of `distort`, exact.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            Ideal points in focal lengths.
+        Args:
+            xy: (..., 2), ideal points in focal lengths.
 
-        Returns
-        -------
-        array (..., 2, 2)
-            ∂x'y'/∂xy, without unit.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
+        Returns: (..., 2, 2), ∂x'y'/∂xy, without unit.
+        Raises: ValueError where the last axis has not 2 coordinates.
         """
         xy = as_points(xy, 2, "xy")
         bent = blockwise(lambda x, y: self._bend_and_derivatives(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
@@ -298,20 +253,11 @@ class BrownConrady(Lens):
     def valid(self, xy: ArrayLike) -> np.ndarray:
         """Whether ideal points have an image that they share with no other point of the domain.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            Ideal points in focal lengths.
+        Args:
+            xy: (..., 2), ideal points in focal lengths.
 
-        Returns
-        -------
-        array (...) of bool
-            True inside the domain.
-
-        Raises
-        ------
-        ValueError
-            Where the last axis has not 2 coordinates.
+        Returns: (...) of bool, True inside the domain.
+        Raises: ValueError where the last axis has not 2 coordinates.
         """
         xy = as_points(xy, 2, "xy")
         return blockwise(lambda x, y: (self._valid(x, y),), xy, 1)[..., 0] > 0
@@ -329,17 +275,12 @@ class BrownConrady(Lens):
     def bend(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Distorted coordinates of ideal ones.
 
-        Parameters
-        ----------
-        x, y : array (n,)
-            Ideal coordinates in focal lengths.
+        Args:
+            x, y: (n,), ideal coordinates in focal lengths.
 
-        Returns
-        -------
-        x : array (n,)
-            Distorted coordinates in focal lengths; NaN outside the domain.
-        y : array (n,)
-            The same downwards.
+        Returns:
+            x: (n,), distorted coordinates in focal lengths; NaN outside the domain.
+            y: (n,), the same downwards.
         """
         valid = self._valid(x, y)
         x, y = self._distort(x, y)
@@ -350,17 +291,12 @@ class BrownConrady(Lens):
     def straighten(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Ideal coordinates of distorted ones, by Newton's method.
 
-        Parameters
-        ----------
-        x, y : array (n,)
-            Distorted coordinates in focal lengths.
+        Args:
+            x, y: (n,), distorted coordinates in focal lengths.
 
-        Returns
-        -------
-        x : array (n,)
-            Ideal coordinates in focal lengths; NaN where there are none.
-        y : array (n,)
-            The same downwards.
+        Returns:
+            x: (n,), ideal coordinates in focal lengths; NaN where there are none.
+            y: (n,), the same downwards.
         """
         u, v = self._untilt(x, y)
         within = u * u + v * v <= self._rim[1].max() ** 2

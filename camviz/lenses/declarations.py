@@ -29,7 +29,7 @@ class CalibrationModel:
 
     `solver` is the function of OpenCV that solves first, with `flags` of its own. Without one the calibration begins
     with the lens of parameters `start`, at the focal length that fits the boards best. `regularised` are models whose
-    denominator a prior keeps from 0 (`camviz.calibration.regularisation`).
+    denominator a prior keeps from 0 (`camviz_clinic.calibration.regularisation`).
     """
 
     name: str

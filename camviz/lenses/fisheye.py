@@ -50,12 +50,8 @@ class Fisheye(Lens):
 class Equidistant(Fisheye):
     """r = θ: equal angles, equal distances.
 
-    References
-    ----------
-    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+    Source: J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
 
-    Examples
-    --------
     >>> Equidistant().radial(np.radians([30, 90, 180])).round(4)  # as many radians
     array([0.5236, 1.5708, 3.1416])
     """
@@ -77,12 +73,8 @@ class Equidistant(Fisheye):
 class Equisolid(Fisheye):
     """r = 2 sin(θ/2): equal solid angles, equal areas.
 
-    References
-    ----------
-    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+    Source: J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
 
-    Examples
-    --------
     >>> round(float(Equisolid().radial(np.pi / 2)), 4)  # half a sphere of 2π sr: a disc of area 2π
     1.4142
     """
@@ -100,12 +92,8 @@ class Equisolid(Fisheye):
 class Orthographic(Fisheye):
     """r = sin θ: the hemisphere seen from far above; nothing beyond 90°.
 
-    References
-    ----------
-    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+    Source: J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
 
-    Examples
-    --------
     >>> Orthographic().project([[1, 0, 1], [1, 0, -1]]).round(4)  # sin 45°, and a ray backwards
     array([[0.7071, 0.    ],
            [   nan,    nan]])
@@ -128,12 +116,8 @@ class Orthographic(Fisheye):
 class Stereographic(Fisheye):
     """r = 2 tan(θ/2): circles on the sphere stay circles.
 
-    References
-    ----------
-    J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
+    Source: J. Kannala & S. S. Brandt, IEEE PAMI 28 (2006), section 2.
 
-    Examples
-    --------
     >>> round(float(Stereographic().radial(np.pi / 2)), 4)  # 2 tan 45°
     2.0
     """
@@ -163,22 +147,13 @@ class Stereographic(Fisheye):
 class FieldOfView(Fisheye):
     """r = atan(2 tan θ tan(ω/2)) / ω, continued behind 90° by atan2.
 
-    Parameters
-    ----------
-    omega : float
-        ω, the field of view of an ideal fisheye in radians, between 0 and π.
+    Args:
+        omega: ω, the field of view of an ideal fisheye in radians, between 0 and π.
 
-    Raises
-    ------
-    ValueError
-        For an angle outside (0, π).
+    Raises: ValueError for an angle outside (0, π).
+    Source: F. Devernay & O. Faugeras, *Straight lines have to be straight*, Machine Vision and Applications 13 (2001),
+    eq. 13.
 
-    References
-    ----------
-    F. Devernay & O. Faugeras, *Straight lines have to be straight*, Machine Vision and Applications 13 (2001), eq. 13.
-
-    Examples
-    --------
     >>> lens = FieldOfView(omega=1.0)
     >>> round(float(lens.radial(np.arctan(1 / (2 * np.tan(0.5))))), 4)  # atan 1 / ω
     0.7854

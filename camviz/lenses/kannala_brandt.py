@@ -17,23 +17,13 @@ from camviz.lenses.roots import first_positive_root, solve_rising
 class KannalaBrandt(Fisheye):
     """r = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸), as far as it rises.
 
-    Parameters
-    ----------
-    k1, k2, k3, k4 : float
-        Coefficients of the angle θ in radians; the image is in focal lengths.
+    Args:
+        k1, k2, k3, k4: Coefficients of the angle θ in radians; the image is in focal lengths.
 
-    Raises
-    ------
-    ValueError
-        For a coefficient that is not a finite number.
+    Raises: ValueError for a coefficient that is not a finite number.
+    Source: J. Kannala & S. S. Brandt, *A generic camera model and calibration method for conventional, wide-angle, and
+    fish-eye lenses*, IEEE PAMI 28 (2006), eq. 6.
 
-    References
-    ----------
-    J. Kannala & S. S. Brandt, *A generic camera model and calibration method for conventional, wide-angle, and fish-eye
-    lenses*, IEEE PAMI 28 (2006), eq. 6.
-
-    Examples
-    --------
     >>> lens = KannalaBrandt(k1=-0.1)  # it folds where its slope 1 - 0.3 θ² is 0
     >>> f"{np.degrees(lens.fold.angle):.1f}°"
     '104.6°'
@@ -85,15 +75,10 @@ class KannalaBrandt(Fisheye):
     def radial(self, theta: ArrayLike) -> Array:
         """θ_d(θ), also beyond the fold.
 
-        Parameters
-        ----------
-        theta : array_like (...)
-            Angles from the axis in radians.
+        Args:
+            theta: (...), angles from the axis in radians.
 
-        Returns
-        -------
-        array (...)
-            Distances from the image's centre in focal lengths.
+        Returns: (...), distances from the image's centre in focal lengths.
         """
         theta = np.asarray(theta, dtype=float)
         s = theta * theta
@@ -102,15 +87,10 @@ class KannalaBrandt(Fisheye):
     def slope(self, theta: ArrayLike) -> Array:
         """The derivative θ_d'(θ); the lens folds where it reaches 0.
 
-        Parameters
-        ----------
-        theta : array_like (...)
-            Angles from the axis in radians.
+        Args:
+            theta: (...), angles from the axis in radians.
 
-        Returns
-        -------
-        array (...)
-            Focal lengths per radian.
+        Returns: (...), focal lengths per radian.
         """
         s = np.square(np.asarray(theta, dtype=float))
         return 1 + s * (3 * self.k1 + s * (5 * self.k2 + s * (7 * self.k3 + s * 9 * self.k4)))

@@ -23,22 +23,12 @@ class ModifiedBrownConrady(Lens):
     as far as this does not fold on the way from the axis. Brown and Conrady have x and y in place of the last a and b:
     with radial terms alone, or tangential ones alone, the two are one lens.
 
-    Parameters
-    ----------
-    k1, k2, p1, p2, k3 : float, optional
-        Coefficients of lengths in focal lengths, in librealsense's order.
+    Args:
+        k1, k2, p1, p2, k3: Coefficients of lengths in focal lengths, in librealsense's order.
 
-    Raises
-    ------
-    ValueError
-        For a coefficient that is not a finite number.
+    Raises: ValueError for a coefficient that is not a finite number.
+    Source: librealsense 2.56, src/rs.cpp, rs2_project_point_to_pixel: so for the inverse model too since August 2019.
 
-    References
-    ----------
-    librealsense 2.56, src/rs.cpp, rs2_project_point_to_pixel: so for the inverse model too since August 2019.
-
-    Examples
-    --------
     >>> ModifiedBrownConrady(k1=0.2, p2=0.1).project([0.5, 0, 1])  # a = 0.525: a + 0.1 (0.25 + 2 a²)
     array([0.605125, 0.      ])
     """

@@ -15,12 +15,8 @@ class Equirectangular(Lens):
 
     It sees everything. The two poles, images of a whole line each, are given the longitude 0.
 
-    References
-    ----------
-    J. P. Snyder, *Map Projections: A Working Manual*, USGS Professional Paper 1395 (1987), p. 90.
+    Source: J. P. Snyder, *Map Projections: A Working Manual*, USGS Professional Paper 1395 (1987), p. 90.
 
-    Examples
-    --------
     >>> Equirectangular().project([[1, 0, 0], [0, 1, 0]]).round(4)  # to the right 90°; down 90°
     array([[1.5708, 0.    ],
            [0.    , 1.5708]])
@@ -50,12 +46,8 @@ class Cylindrical(Lens):
 
     It sees all but straight up and straight down.
 
-    References
-    ----------
-    Szeliski (2022), eq. 8.42.
+    Source: Szeliski (2022), eq. 8.42.
 
-    Examples
-    --------
     >>> Cylindrical().project([[3, 2, 4], [3, -2, 4]]).round(4)  # one upright line: x = atan(3/4), y = ±2/5
     array([[ 0.6435,  0.4   ],
            [ 0.6435, -0.4   ]])

@@ -12,12 +12,8 @@ from camviz.lenses.declarations import Example, Spelling
 class Perspective(Lens):
     """x = X/Z, y = Y/Z for everything in front of the camera.
 
-    References
-    ----------
-    Hartley & Zisserman (2004), eq. 6.1.
+    Source: Hartley & Zisserman (2004), eq. 6.1.
 
-    Examples
-    --------
     >>> Perspective().project([[1, 2, 4], [1, 2, -4]])  # what is behind has no image
     array([[0.25, 0.5 ],
            [ nan,  nan]])

@@ -22,24 +22,14 @@ class Scaramuzza(Fisheye):
     The image is then stretched: (x + e y, d x + c y). OCamCalib's polynomial f(ρ) = s0 + s2 ρ² + … of pixels, whose z
     points backward, is that of focal length -s0 and a_k = -s_k (-s0)^(k-1); its x goes down and its y to the right.
 
-    Parameters
-    ----------
-    a2, a3, a4, a5, a6 : float, optional
-        Coefficients of the radius in focal lengths.
-    c, d, e : float, optional
-        The stretch; 1, 0 and 0 for none.
+    Args:
+        a2, a3, a4, a5, a6: Coefficients of the radius in focal lengths.
+        c, d, e: The stretch; 1, 0 and 0 for none.
 
-    Raises
-    ------
-    ValueError
-        For a coefficient that is not a finite number, and for a stretch whose c - d e is not positive.
+    Raises: ValueError for a coefficient that is not a finite number, and for a stretch whose c - d e is not positive.
+    Source: D. Scaramuzza, A. Martinelli & R. Siegwart, *A toolbox for easily calibrating omnidirectional cameras*, IROS
+    (2006).
 
-    References
-    ----------
-    D. Scaramuzza, A. Martinelli & R. Siegwart, *A toolbox for easily calibrating omnidirectional cameras*, IROS (2006).
-
-    Examples
-    --------
     >>> Scaramuzza(a2=-0.25).unproject([2, 0]).round(6)  # 1 - 0.25 · 2² = 0: to the side
     array([1., 0., 0.])
     """
@@ -102,15 +92,10 @@ class Scaramuzza(Fisheye):
     def slope(self, radius: Array) -> Array:
         """The derivative of `angle`, (g - r g') / (r² + g²).
 
-        Parameters
-        ----------
-        radius : array (...)
-            Radii in focal lengths.
+        Args:
+            radius: (...), radii in focal lengths.
 
-        Returns
-        -------
-        array (...)
-            Radians per focal length.
+        Returns: (...), radians per focal length.
         """
         ahead = np.polynomial.polynomial.polyval(radius, self.forward)
         rising = np.polynomial.polynomial.polyval(radius, self.forward * (1 - np.arange(7)))
@@ -148,5 +133,5 @@ class Scaramuzza(Fisheye):
     def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         area = self.c - self.d * self.e
         x, y = (self.c * x - self.e * y) / area, (y - self.d * x) / area
-        z: Array = np.polynomial.polynomial.polyval(up_to(self.rim, np.hypot(x, y)), self.forward)
-        return x, y, z
+        z = np.polynomial.polynomial.polyval(up_to(self.rim, np.hypot(x, y)), self.forward)
+        return x, y, np.asarray(z, dtype=np.float64)

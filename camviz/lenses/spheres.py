@@ -21,25 +21,14 @@ class UnifiedSphere(Lens):
     projection at half its focal length and the parabolic mirror. The same lens written with α has ξ = α/(1 - α) and the
     focal length f = γ (1 - α): see `from_alpha`.
 
-    Parameters
-    ----------
-    xi : float
-        ξ, at least 0.
-    k1, k2, p1, p2 : float, optional
-        Coefficients of `BrownConrady`.
+    Args:
+        xi: ξ, at least 0.
+        k1, k2, p1, p2: Coefficients of `BrownConrady`.
 
-    Raises
-    ------
-    ValueError
-        For a ξ below 0, and for a parameter that is not a finite number.
+    Raises: ValueError for a ξ below 0, and for a parameter that is not a finite number.
+    Source: C. Mei & P. Rives, *Single view point omnidirectional camera calibration from planar grids*, ICRA (2007),
+    sec. II.B. With α: V. Usenko, N. Demmel & D. Cremers, *The double sphere camera model*, 3DV (2018), sec. 3.1.
 
-    References
-    ----------
-    C. Mei & P. Rives, *Single view point omnidirectional camera calibration from planar grids*, ICRA (2007), sec. II.B.
-    With α: V. Usenko, N. Demmel & D. Cremers, *The double sphere camera model*, 3DV (2018), sec. 3.1.
-
-    Examples
-    --------
     >>> UnifiedSphere(xi=1).project([3, 0, 4])  # 3 / (4 + 5)
     array([0.33333333, 0.        ])
     """
@@ -84,23 +73,12 @@ class UnifiedSphere(Lens):
 
         Its focal lengths are γ = f/(1 - α): the intrinsics must be divided as well.
 
-        Parameters
-        ----------
-        alpha : float
-            At least 0 and below 1.
+        Args:
+            alpha: At least 0 and below 1.
 
-        Returns
-        -------
-        UnifiedSphere
-            Without distortion.
+        Returns: UnifiedSphere without distortion.
+        Raises: ValueError for another α.
 
-        Raises
-        ------
-        ValueError
-            For another α.
-
-        Examples
-        --------
         >>> UnifiedSphere.from_alpha(0.5).xi
         1.0
         """
@@ -156,24 +134,13 @@ class UnifiedSphere(Lens):
 class ExtendedUnified(Lens):
     """(x, y) = (X, Y) / (α D + (1 - α) Z) with D² = β (X² + Y²) + Z²: an ellipsoid in place of the sphere.
 
-    Parameters
-    ----------
-    alpha : float
-        α, between 0 and 1.
-    beta : float
-        β, above 0.
+    Args:
+        alpha: α, between 0 and 1.
+        beta: β, above 0.
 
-    Raises
-    ------
-    ValueError
-        For an α or a β outside its range.
+    Raises: ValueError for an α or a β outside its range.
+    Source: B. Khomutenko, G. Garcia & P. Martinet, *An enhanced unified camera model*, IEEE RA-L 1 (2016), eq. 11.
 
-    References
-    ----------
-    B. Khomutenko, G. Garcia & P. Martinet, *An enhanced unified camera model*, IEEE RA-L 1 (2016), eq. 11.
-
-    Examples
-    --------
     >>> ExtendedUnified(alpha=0.5, beta=1).project([3, 0, 4])  # 3 / (0.5 · 5 + 0.5 · 4)
     array([0.66666667, 0.        ])
     """
@@ -221,24 +188,13 @@ class DoubleSphere(Lens):
 
     D₁ = ‖(X, Y, Z)‖ and D₂ = ‖(X, Y, ξ D₁ + Z)‖: onto one sphere, then onto another, ξ further on.
 
-    Parameters
-    ----------
-    xi : float
-        ξ, above -1 and at most 1.
-    alpha : float
-        α, between 0 and 1.
+    Args:
+        xi: ξ, above -1 and at most 1.
+        alpha: α, between 0 and 1.
 
-    Raises
-    ------
-    ValueError
-        For a ξ or an α outside its range.
+    Raises: ValueError for a ξ or an α outside its range.
+    Source: V. Usenko, N. Demmel & D. Cremers, *The double sphere camera model*, 3DV (2018), eq. 40-45.
 
-    References
-    ----------
-    V. Usenko, N. Demmel & D. Cremers, *The double sphere camera model*, 3DV (2018), eq. 40-45.
-
-    Examples
-    --------
     >>> DoubleSphere(xi=0, alpha=0.5).project([3, 0, 4])  # with ξ = 0 one sphere: 3 / (0.5 · 5 + 0.5 · 4)
     array([0.66666667, 0.        ])
     """

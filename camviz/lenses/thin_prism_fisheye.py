@@ -26,22 +26,13 @@ class ThinPrismFisheye(Lens):
 
     as far as the polynomial does not fold on the way from the axis.
 
-    Parameters
-    ----------
-    k1, k2, p1, p2, k3, k4, sx1, sy1 : float, optional
-        Coefficients of the angle θ in radians.
+    Args:
+        k1, k2, p1, p2, k3, k4, sx1, sy1: Coefficients of the angle θ in radians.
 
-    Raises
-    ------
-    ValueError
-        For a coefficient that is not a finite number.
+    Raises: ValueError for a coefficient that is not a finite number.
+    Source: T. Schöps et al., *A multi-view stereo benchmark with high-resolution images and multi-camera videos*, CVPR
+    (2017).
 
-    References
-    ----------
-    T. Schöps et al., *A multi-view stereo benchmark with high-resolution images and multi-camera videos*, CVPR (2017).
-
-    Examples
-    --------
     >>> ThinPrismFisheye(k1=0.1).project([1, 0, 0]).round(4)  # θ = π/2: θ (1 + 0.1 θ²)
     array([1.9584, 0.    ])
     """

@@ -17,28 +17,16 @@ APERTURES = ("full", "round", "half", "ring", "pinhole")
 def aperture(shape: str, rows: int, columns: int, v: int | None = None, u: int | None = None) -> Array:
     """A mask of ones and zeros: which views of a grid take part in a picture.
 
-    Parameters
-    ----------
-    shape : {"full", "round", "half", "ring", "pinhole"}
-        "full" is every view; "round" those within the grid's inscribed ellipse, and "ring" the outer part of these;
-        "half" the left half, the middle column included; "pinhole" a single view.
-    rows, columns : int
-        Of the grid.
-    v, u : int, optional
-        The row and column of the single view; by default those of the middle.
+    Args:
+        shape: {"full", "round", "half", "ring", "pinhole"}. "full" is every view; "round" those within the grid's
+            inscribed ellipse, and "ring" the outer part of these; "half" the left half, the middle column included;
+            "pinhole" a single view.
+        rows, columns: Of the grid.
+        v, u: The row and column of the single view; by default those of the middle.
 
-    Returns
-    -------
-    array (rows, columns)
-        1.0 for a view that takes part, 0.0 for the others.
+    Returns: (rows, columns), 1.0 for a view that takes part, 0.0 for the others.
+    Raises: ValueError for another name, or a view that is not there.
 
-    Raises
-    ------
-    ValueError
-        For another name, or a view that is not there.
-
-    Examples
-    --------
     >>> aperture("ring", 5, 5).astype(int)
     array([[0, 1, 1, 1, 0],
            [1, 0, 0, 0, 1],

@@ -21,30 +21,21 @@ class LightField:
     left for each step of u to the right, and up for each step of v down. It is positive for what is nearer than the
     focus: u_left − u_right, as in stereo. The middle of the grid is the middle of the aperture.
 
-    Parameters
-    ----------
-    views : array (v, u, height, width, 3)
-        v counts the places downwards and u to the right, as one looks at the scene; then the rows and columns of each
-        view. Floating point views are linear light 0 … 1, uint8 views are sRGB bytes.
-    baseline : float
-        From place to place in both directions, in metres; NaN where unknown.
-    focal_length : float
-        From lens to image in pixels; NaN where unknown.
-    focus_distance : float
-        All views show a point at this depth, in metres, in the same pixel; inf where they are not sheared.
+    Args:
+        views: (v, u, height, width, 3). v counts the places downwards and u to the right, as one looks at the scene;
+            then the rows and columns of each view. Floating point views are linear light 0 … 1, uint8 views are sRGB
+            bytes.
+        baseline: From place to place in both directions, in metres; NaN where unknown.
+        focal_length: From lens to image in pixels; NaN where unknown.
+        focus_distance: All views show a point at this depth, in metres, in the same pixel; inf where they are not
+            sheared.
 
-    Raises
-    ------
-    ValueError
-        For views of another shape or kind, and a baseline, focal length or focus distance that is not positive.
+    Raises:
+        ValueError: For views of another shape or kind, and a baseline, focal length or focus distance that is not
+            positive.
 
-    References
-    ----------
-    M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; Szeliski (2022), section
-    14.3.
+    Source: M. Levoy and P. Hanrahan, Light field rendering, SIGGRAPH 1996; Szeliski (2022), section 14.3.
 
-    Examples
-    --------
     Here baseline · focal_length is 6 m px, so a point at 1 m moves by 6 (1/1 − 1/2) pixels a view:
 
     >>> views = np.zeros((9, 9, 48, 64, 3), np.uint8)
@@ -93,27 +84,19 @@ class LightField:
     def steps(self) -> tuple[Array, Array]:
         """How many baselines each place is below and to the right of the grid's middle.
 
-        Returns
-        -------
-        down : array (rows,)
-            Negative above the middle.
-        right : array (columns,)
-            Negative to the left of the middle.
+        Returns:
+            down: (rows,), negative above the middle.
+            right: (columns,), negative to the left of the middle.
         """
         return _centred(self.rows), _centred(self.columns)
 
     def light(self, v: int, u: int) -> NDArray[np.floating]:
         """One view as linear light.
 
-        Parameters
-        ----------
-        v, u : int
-            Its row and column in the grid, from 0.
+        Args:
+            v, u: Its row and column in the grid, from 0.
 
-        Returns
-        -------
-        array (height, width, 3)
-            Linear, 0 … 1.
+        Returns: (height, width, 3), linear, 0 … 1.
         """
         view = self.views[v, u]
         return to_linear(view) if view.dtype == np.uint8 else np.asarray(view)
@@ -121,15 +104,10 @@ class LightField:
     def disparity(self, depth: ArrayLike) -> Array:
         """By how much points at a depth move from one view to the next: their slope.
 
-        Parameters
-        ----------
-        depth : array_like (...)
-            In metres, along the optical axis.
+        Args:
+            depth: (...), in metres, along the optical axis.
 
-        Returns
-        -------
-        array (...)
-            In pixels a view; positive for what is nearer than the focus.
+        Returns: (...), in pixels a view; positive for what is nearer than the focus.
         """
         with np.errstate(divide="ignore"):
             return self.baseline * self.focal_length * (1 / np.asarray(depth, dtype=float) - 1 / self.focus_distance)
@@ -137,15 +115,10 @@ class LightField:
     def depth(self, disparity: ArrayLike) -> Array:
         """Where points are that move by a disparity: the inverse of `disparity`.
 
-        Parameters
-        ----------
-        disparity : array_like (...)
-            In pixels a view.
+        Args:
+            disparity: (...), in pixels a view.
 
-        Returns
-        -------
-        array (...)
-            In metres; NaN where it would be beyond infinity.
+        Returns: (...), in metres; NaN where it would be beyond infinity.
         """
         d = np.asarray(disparity, dtype=float)
         inverse = d / (self.baseline * self.focal_length) + 1 / self.focus_distance
@@ -158,21 +131,12 @@ class LightField:
         With image distances F and αF, 1 − 1/α = F (1/z − 1/z_focus), and F = focal_length · pixel_pitch; so
         1 − 1/α = disparity · pixel_pitch / baseline: the slope is straight in 1/α, not in α.
 
-        Parameters
-        ----------
-        disparity : array_like (...)
-            In pixels a view.
-        pixel_pitch : float
-            In metres.
+        Args:
+            disparity: (...), in pixels a view.
+            pixel_pitch: In metres.
 
-        Returns
-        -------
-        array (...)
-            A ratio, 1 at the focus; NaN where no film would do.
-
-        References
-        ----------
-        R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
+        Returns: (...), a ratio, 1 at the focus; NaN where no film would do.
+        Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
         """
         over = 1 - np.asarray(disparity, dtype=float) * pixel_pitch / self.baseline
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.calibration.picture_files import read_picture
+from camviz.colour.picture_files import read_picture
 from camviz.lightfields.field import LightField
 
 _HCI = re.compile(r"input_Cam(\d+)\.png")
@@ -38,35 +38,22 @@ def read_folder(
     places in the names have no unit that holds for all, and in some sets x falls from left to right, which turns the
     sign of every disparity. Any other pictures are taken in the order of their names, row by row.
 
-    Parameters
-    ----------
-    path : str or Path
-        The folder.
-    rows : int, optional
-        How many rows of views the other pictures make, 1 for a camera moved along a ruler; by default they make a
-        square.
-    width : int, optional
-        Makes the views smaller: so many pixels wide.
-    baseline, focal_length, focus_distance : float
-        As of `LightField`, the focal length in pixels of the views as returned: what the folder does not tell itself.
+    Args:
+        path: The folder.
+        rows: How many rows of views the other pictures make, 1 for a camera moved along a ruler; by default they make a
+            square.
+        width: Makes the views smaller: so many pixels wide.
+        baseline, focal_length, focus_distance: As of `LightField`, the focal length in pixels of the views as returned:
+            what the folder does not tell itself.
 
-    Returns
-    -------
-    LightField
-        With uint8 views.
+    Returns: LightField with uint8 views.
 
-    Raises
-    ------
-    ValueError
-        For a folder that is not there or empty, a view that is missing or cannot be read, views of different sizes, or
-        a number of views that makes no grid.
+    Raises:
+        ValueError: For a folder that is not there or empty, a view that is missing or cannot be read, views of
+            different sizes, or a number of views that makes no grid.
 
-    References
-    ----------
-    K. Honauer et al., A dataset and evaluation methodology for depth estimation on 4D light fields, ACCV 2016.
+    Source: K. Honauer et al., A dataset and evaluation methodology for depth estimation on 4D light fields, ACCV 2016.
 
-    Examples
-    --------
     Three pictures from along a ruler, made up:
 
     >>> import cv2

@@ -19,27 +19,13 @@ def to_microlens_image(views: Pixels) -> Pixels:
     Under the microlens (x, y) lie the pixels that look through it at every place of the main lens. As with any camera
     the picture is shown turned by 180°: that puts both the scene and each small image of the main lens upright.
 
-    Parameters
-    ----------
-    views : array (v, u, height, width, ...)
-        Of any kind of number.
+    Args:
+        views: (v, u, height, width, ...), of any kind of number.
 
-    Returns
-    -------
-    array (height · v, width · u, ...)
-        The same numbers in another order.
+    Returns: (height · v, width · u, ...), the same numbers in another order.
+    Raises: ValueError for views of another shape.
+    Source: R. Ng et al., Light field photography with a hand-held plenoptic camera, Stanford CTSR 2005-02.
 
-    Raises
-    ------
-    ValueError
-        For views of another shape.
-
-    References
-    ----------
-    R. Ng et al., Light field photography with a hand-held plenoptic camera, Stanford CTSR 2005-02.
-
-    Examples
-    --------
     Two views, 1 and 2, of two pixels each lie next to each other under two microlenses:
 
     >>> to_microlens_image(np.array([[[[1, 1]], [[2, 2]]]]))
@@ -52,29 +38,14 @@ def to_microlens_image(views: Pixels) -> Pixels:
 def from_microlens_image(sensor: Pixels, rows: int, columns: int) -> Pixels:
     """The views from the sensor behind microlenses: pixel (v, u) from under every one of them.
 
-    Parameters
-    ----------
-    sensor : array (height · rows, width · columns, ...)
-        Of any kind of number.
-    rows, columns : int
-        Pixels under a microlens.
+    Args:
+        sensor: (height · rows, width · columns, ...), of any kind of number.
+        rows, columns: Pixels under a microlens.
 
-    Returns
-    -------
-    array (rows, columns, height, width, ...)
-        The same numbers in another order.
+    Returns: (rows, columns, height, width, ...), the same numbers in another order.
+    Raises: ValueError when the sensor does not hold a whole number of microlenses.
+    Source: R. Ng et al., Light field photography with a hand-held plenoptic camera, Stanford CTSR 2005-02.
 
-    Raises
-    ------
-    ValueError
-        When the sensor does not hold a whole number of microlenses.
-
-    References
-    ----------
-    R. Ng et al., Light field photography with a hand-held plenoptic camera, Stanford CTSR 2005-02.
-
-    Examples
-    --------
     >>> from_microlens_image(np.array([[1, 2, 1, 2]]), rows=1, columns=2)
     array([[[[1, 1]],
             [[2, 2]]]])
@@ -87,23 +58,12 @@ def from_microlens_image(sensor: Pixels, rows: int, columns: int) -> Pixels:
 def to_mosaic(views: Pixels) -> Pixels:
     """The views side by side, as one picture.
 
-    Parameters
-    ----------
-    views : array (v, u, height, width, ...)
-        Of any kind of number.
+    Args:
+        views: (v, u, height, width, ...), of any kind of number.
 
-    Returns
-    -------
-    array (v · height, u · width, ...)
-        The same numbers in another order.
+    Returns: (v · height, u · width, ...), the same numbers in another order.
+    Raises: ValueError for views of another shape.
 
-    Raises
-    ------
-    ValueError
-        For views of another shape.
-
-    Examples
-    --------
     >>> to_mosaic(np.array([[[[1, 1]], [[2, 2]]]]))
     array([[1, 1, 2, 2]])
     """
@@ -114,25 +74,13 @@ def to_mosaic(views: Pixels) -> Pixels:
 def from_mosaic(picture: Pixels, rows: int, columns: int) -> Pixels:
     """The views of a picture that holds them side by side.
 
-    Parameters
-    ----------
-    picture : array (rows · height, columns · width, ...)
-        Of any kind of number.
-    rows, columns : int
-        Of the grid of views.
+    Args:
+        picture: (rows · height, columns · width, ...), of any kind of number.
+        rows, columns: Of the grid of views.
 
-    Returns
-    -------
-    array (rows, columns, height, width, ...)
-        The same numbers in another order.
+    Returns: (rows, columns, height, width, ...), the same numbers in another order.
+    Raises: ValueError when the picture cannot be divided so.
 
-    Raises
-    ------
-    ValueError
-        When the picture cannot be divided so.
-
-    Examples
-    --------
     >>> from_mosaic(np.array([[1, 1, 2, 2]]), rows=1, columns=2)
     array([[[[1, 1]],
             [[2, 2]]]])
@@ -147,26 +95,14 @@ def epipolar_plane_image(views: Pixels, row: int, v: int | None = None) -> Pixel
     For every step of u the point moves by its disparity to the left. Transpose the views' axes, (1, 0, 3, 2), for the
     upright slices.
 
-    Parameters
-    ----------
-    views : array (v, u, height, width, ...)
-        Of any kind of number.
-    row : int
-        Of pixels.
-    v : int, optional
-        The row of views; by default that in the middle.
+    Args:
+        views: (v, u, height, width, ...), of any kind of number.
+        row: Of pixels.
+        v: The row of views; by default that in the middle.
 
-    Returns
-    -------
-    array (u, width, ...)
-        One row for each view.
+    Returns: (u, width, ...), one row for each view.
+    Source: R. C. Bolles, H. H. Baker and D. H. Marimont, Epipolar-plane image analysis, Int. J. Comput. Vis. 1 (1987).
 
-    References
-    ----------
-    R. C. Bolles, H. H. Baker and D. H. Marimont, Epipolar-plane image analysis, Int. J. Comput. Vis. 1 (1987).
-
-    Examples
-    --------
     A point that moves by two pixels a view:
 
     >>> views = np.zeros((1, 3, 1, 7), int)

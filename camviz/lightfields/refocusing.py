@@ -23,31 +23,15 @@ def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) 
     R(x, y) = Σ w_vu L_vu(x − d u, y − d v) / Σ w_vu, with u and v counted from the aperture's middle. Between pixels
     views are interpolated linearly, first along y and then along x; beyond its border a view goes on as it ends.
 
-    Parameters
-    ----------
-    field : LightField
-        The views.
-    disparity : float
-        In pixels a view; 0 is the focus of the field.
-    mask : array_like (rows, columns), optional
-        The weights w ≥ 0 of the views, such as `aperture` gives; by default all share alike.
+    Args:
+        field: The views.
+        disparity: In pixels a view; 0 is the focus of the field.
+        mask: (rows, columns), the weights w ≥ 0 of the views, such as `aperture` gives; by default all share alike.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light, float32.
+    Returns: (height, width, 3), linear light, float32.
+    Raises: ValueError for a mask of another shape or with no view in it, and a disparity that is not finite.
+    Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
 
-    Raises
-    ------
-    ValueError
-        For a mask of another shape or with no view in it, and a disparity that is not finite.
-
-    References
-    ----------
-    R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
-
-    Examples
-    --------
     A point that moves by one pixel a view is bright in focus, and spread over nine pixels out of focus:
 
     >>> views = np.zeros((3, 3, 5, 5, 3))
@@ -115,29 +99,14 @@ def periodic_shift_and_sum(views: ArrayLike, disparity: float) -> Array:
     Each view is shifted by d (u, v), whole pixels or not, by the phase of its own two-dimensional spectrum: exact for
     what `refocus` interpolates.
 
-    Parameters
-    ----------
-    views : array_like (v, u, height, width, ...)
-        Linear light.
-    disparity : float
-        In pixels a view.
+    Args:
+        views: (v, u, height, width, ...), linear light.
+        disparity: In pixels a view.
 
-    Returns
-    -------
-    array (height, width, ...)
-        Linear light.
+    Returns: (height, width, ...), linear light.
+    Raises: ValueError for views of another shape.
+    Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
 
-    Raises
-    ------
-    ValueError
-        For views of another shape.
-
-    References
-    ----------
-    R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
-
-    Examples
-    --------
     >>> views = np.random.default_rng(0).random((3, 3, 8, 8))
     >>> np.allclose(periodic_shift_and_sum(views, 0), views.mean(axis=(0, 1)))  # no shift: a plain mean
     True
@@ -162,29 +131,14 @@ def fourier_slice(views: ArrayLike, disparity: float) -> Array:
     angular frequencies d k, in cycles per view. Between the samples of the spectrum along u and v the interpolation is
     exact, by the kernel of a grid of so many views.
 
-    Parameters
-    ----------
-    views : array_like (v, u, height, width, ...)
-        Linear light.
-    disparity : float
-        In pixels a view.
+    Args:
+        views: (v, u, height, width, ...), linear light.
+        disparity: In pixels a view.
 
-    Returns
-    -------
-    array (height, width, ...)
-        Linear light.
+    Returns: (height, width, ...), linear light.
+    Raises: ValueError for views of another shape.
+    Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
 
-    Raises
-    ------
-    ValueError
-        For views of another shape.
-
-    References
-    ----------
-    R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
-
-    Examples
-    --------
     The theorem, tried:
 
     >>> views = np.random.default_rng(0).random((3, 3, 8, 8))

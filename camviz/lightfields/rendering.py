@@ -27,33 +27,17 @@ def photograph_field(
 ) -> LightField:
     """The light field of a scene around a camera, whose centre is the middle of the aperture.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is photographed.
-    camera : Camera
-        With a perspective lens.
-    rows, columns : int
-        Of the grid of views, at least 1 each.
-    baseline, focus_distance : float
-        In metres, as of `LightField`.
-    encoded : bool
-        Whether the views are sRGB bytes, a quarter of the memory, instead of linear light as float32.
-    supersample : int
-        Rays along each side of a pixel, as of `render`; for linear light only.
+    Args:
+        scene: What is photographed.
+        camera: With a perspective lens.
+        rows, columns: Of the grid of views, at least 1 each.
+        baseline, focus_distance: In metres, as of `LightField`.
+        encoded: Whether the views are sRGB bytes, a quarter of the memory, instead of linear light as float32.
+        supersample: Rays along each side of a pixel, as of `render`; for linear light only.
 
-    Returns
-    -------
-    LightField
-        Its views are read-only.
+    Returns: Its views are read-only.
+    Raises: ValueError when there is no view at all, and for a lens that bends.
 
-    Raises
-    ------
-    ValueError
-        When there is no view at all, and for a lens that bends.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera
     >>> from camviz import Intrinsics
     >>> from camviz.scenes import textured_scene
@@ -78,22 +62,13 @@ def photograph_field(
 def true_disparity(scene: Scene, camera: Camera, field: LightField) -> NDArray[np.float32]:
     """The disparity of what the middle of the aperture sees, traced.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is photographed.
-    camera : Camera
-        That of the field.
-    field : LightField
-        Its baseline, focal length and focus distance count.
+    Args:
+        scene: What is photographed.
+        camera: That of the field.
+        field: Its baseline, focal length and focus distance count.
 
-    Returns
-    -------
-    array (height, width)
-        In pixels a view, float32; the sky's is that of infinity.
+    Returns: (height, width), in pixels a view, float32; the sky's is that of infinity.
 
-    Examples
-    --------
     A wall 1 m away moves by 0.05 m · 100 px (1/1 − 1/2) / m = 2.5 pixels:
 
     >>> from camviz.cameras import Camera
@@ -114,22 +89,13 @@ def true_disparity(scene: Scene, camera: Camera, field: LightField) -> NDArray[n
 def disparity_of_views(scene: Scene, camera: Camera, field: LightField) -> NDArray[np.float32]:
     """The disparity of what each view of a field sees, traced.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is photographed.
-    camera : Camera
-        That of the field.
-    field : LightField
-        Its places, focal length and focus distance count.
+    Args:
+        scene: What is photographed.
+        camera: That of the field.
+        field: Its places, focal length and focus distance count.
 
-    Returns
-    -------
-    array (v, u, height, width)
-        In pixels a view, float32.
+    Returns: (v, u, height, width), in pixels a view, float32.
 
-    Examples
-    --------
     From all places a wall that faces the camera has the same disparity, 2.5 pixels as in `true_disparity`:
 
     >>> from camviz.cameras import Camera

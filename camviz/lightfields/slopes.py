@@ -18,31 +18,15 @@ def disparity_by_sweep(field: LightField, disparities: ArrayLike, window: int = 
     cost and its neighbours goes between the steps. Light is compared in the fourth root, nearer to how it is seen and
     to its noise.
 
-    Parameters
-    ----------
-    field : LightField
-        The views.
-    disparities : array_like (n,)
-        What is tried, in pixels a view: evenly spaced, n ≥ 3.
-    window : int
-        Pixels along each side, odd.
+    Args:
+        field: The views.
+        disparities: (n,), what is tried, in pixels a view: evenly spaced, n ≥ 3.
+        window: Pixels along each side, odd.
 
-    Returns
-    -------
-    array (height, width)
-        In pixels a view, float32.
+    Returns: (height, width), in pixels a view, float32.
+    Raises: ValueError for fewer than three disparities, unevenly spaced ones, and an even window.
+    Source: Szeliski (2022), section 12.1.2, plane sweep.
 
-    Raises
-    ------
-    ValueError
-        For fewer than three disparities, unevenly spaced ones, and an even window.
-
-    References
-    ----------
-    Szeliski (2022), section 12.1.2, plane sweep.
-
-    Examples
-    --------
     A pattern that moves by one pixel a view:
 
     >>> import cv2
@@ -72,34 +56,19 @@ def disparity_by_structure(field: LightField, start: ArrayLike = 0.0, window: in
     J_uu)), where J_xx = Σ L_x², J_xu = Σ L_x L_u, J_uu = Σ L_u² over a window and both directions; its coherence is the
     trust. It takes the three views around the middle in each direction.
 
-    Parameters
-    ----------
-    field : LightField
-        The views, at least 3 × 3.
-    start : array_like (), scalar
-        In pixels a view: shear the field there first, for the answer is good within half a pixel of it.
-    window : int
-        Pixels along each side, odd.
+    Args:
+        field: The views, at least 3 × 3.
+        start: scalar, in pixels a view: shear the field there first, for the answer is good within half a pixel of it.
+        window: Pixels along each side, odd.
 
-    Returns
-    -------
-    disparity : array (height, width)
-        In pixels a view, float32.
-    trust : array (height, width)
-        0 … 1.
+    Returns:
+        disparity: (height, width), in pixels a view, float32.
+        trust: (height, width), 0 … 1.
 
-    Raises
-    ------
-    ValueError
-        For a field of fewer than 3 × 3 views, and an even window.
+    Raises: ValueError for a field of fewer than 3 × 3 views, and an even window.
+    Source: S. Wanner and B. Goldlücke, Variational light field analysis for disparity estimation and super-resolution,
+    IEEE Trans. Pattern Anal. Mach. Intell. 36 (2014).
 
-    References
-    ----------
-    S. Wanner and B. Goldlücke, Variational light field analysis for disparity estimation and super-resolution, IEEE
-    Trans. Pattern Anal. Mach. Intell. 36 (2014).
-
-    Examples
-    --------
     A pattern that moves by one pixel a view:
 
     >>> import cv2

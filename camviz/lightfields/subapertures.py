@@ -30,31 +30,17 @@ def exact_range(field: LightField, width: float) -> tuple[float, float]:
 
     Within this range a refocused picture is as sharp as the pixels allow, whatever the number of views.
 
-    Parameters
-    ----------
-    field : LightField
-        Its baseline, focal length and focus distance count.
-    width : float
-        Of an opening over the distance between places, 0 … 1.
+    Args:
+        field: Its baseline, focal length and focus distance count.
+        width: Of an opening over the distance between places, 0 … 1.
 
-    Returns
-    -------
-    nearest : float
-        In metres.
-    farthest : float
-        In metres; inf where nothing far is blurred by more.
+    Returns:
+        nearest: In metres.
+        farthest: In metres; inf where nothing far is blurred by more.
 
-    Raises
-    ------
-    ValueError
-        For a width outside 0 … 1.
+    Raises: ValueError for a width outside 0 … 1.
+    Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
 
-    References
-    ----------
-    R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
-
-    Examples
-    --------
     With baseline · focal_length = 6 m px and the focus at 2 m, 1/z is 1/2 ± 1/6:
 
     >>> field = LightField(np.zeros((9, 9, 2, 2, 3)), baseline=0.005, focal_length=1200, focus_distance=2)
@@ -78,22 +64,13 @@ class Openings:
     L(x, u + ε) = L(x + ε d, u) with the slope d that the tracer met there; only along the rims of things, where it sees
     a little of what is behind, this is not exact.
 
-    Parameters
-    ----------
-    pinholes : LightField
-        With views as sRGB bytes, such as `photograph_field` makes with `encoded`.
-    scene : Scene
-        What they show.
-    camera : Camera
-        That of the field.
+    Args:
+        pinholes: With views as sRGB bytes, such as `photograph_field` makes with `encoded`.
+        scene: What they show.
+        camera: That of the field.
 
-    Raises
-    ------
-    ValueError
-        For views that are not sRGB bytes.
+    Raises: ValueError for views that are not sRGB bytes.
 
-    Examples
-    --------
     Beyond the focus, an opening blurs the garden:
 
     >>> from camviz.cameras import Camera
@@ -119,20 +96,11 @@ class Openings:
     def opened(self, width: float) -> LightField:
         """The field whose views come through openings of a width.
 
-        Parameters
-        ----------
-        width : float
-            Over the distance between places, 0 … 1.
+        Args:
+            width: Over the distance between places, 0 … 1.
 
-        Returns
-        -------
-        LightField
-            Linear light; at width 0 the pinholes themselves.
-
-        Raises
-        ------
-        ValueError
-            For a width outside 0 … 1.
+        Returns: Linear light; at width 0 the pinholes themselves.
+        Raises: ValueError for a width outside 0 … 1.
         """
         if not 0 <= width <= 1:
             raise ValueError(f"width must lie between 0 and 1, got {width}")

@@ -21,25 +21,13 @@ BY_DIFFERENCES = ("edge-aware", "Menon")
 def green_windows(values: ArrayLike, pattern: Pattern) -> Array:
     """The windows of a Bayer mosaic around its red and blue pixels, mirrored at the border.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light, at least 4 × 4.
-    pattern : Pattern
-        One of BAYER.
+    Args:
+        values: (height, width), a mosaic of linear light, at least 4 × 4.
+        pattern: One of BAYER.
 
-    Returns
-    -------
-    array (n, 5, 5)
-        Linear light, row by row of the n red and blue pixels.
+    Returns: (n, 5, 5), linear light, row by row of the n red and blue pixels.
+    Raises: ValueError for a mosaic of another shape, and for other patterns.
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape, and for other patterns.
-
-    Examples
-    --------
     Half of the pixels miss green:
 
     >>> green_windows(np.zeros((6, 8)), BAYER["RGGB"]).shape
@@ -54,30 +42,17 @@ def green_windows(values: ArrayLike, pattern: Pattern) -> Array:
 def with_green(values: ArrayLike, pattern: Pattern, green: ArrayLike, algorithm: str = "edge-aware") -> Array:
     """The picture of a Bayer mosaic whose green was guessed elsewhere.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light, at least 4 × 4.
-    pattern : Pattern
-        One of BAYER.
-    green : array_like (n,)
-        Linear light at the pixels that `green_windows` names, in its order.
-    algorithm : {"edge-aware", "Menon", "nearest", "bilinear", "Malvar"}
-        Red and blue are made as it makes them: green plus the interpolated differences red − green and blue − green for
-        those of BY_DIFFERENCES, from the mosaic alone for the others.
+    Args:
+        values: (height, width), a mosaic of linear light, at least 4 × 4.
+        pattern: One of BAYER.
+        green: (n,), linear light at the pixels that `green_windows` names, in its order.
+        algorithm: {"edge-aware", "Menon", "nearest", "bilinear", "Malvar"}. Red and blue are made as it makes them:
+            green plus the interpolated differences red − green and blue − green for those of BY_DIFFERENCES, from the
+            mosaic alone for the others.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light.
+    Returns: (height, width, 3), linear light.
+    Raises: ValueError for a mosaic of another shape, another number of `green`, and other patterns.
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape, another number of `green`, and other patterns.
-
-    Examples
-    --------
     Of a grey picture, true green makes all three colours true:
 
     >>> plate, pattern = zone_plate(32), BAYER["RGGB"]

@@ -38,29 +38,14 @@ _THREE = np.full((1, 3), 1 / 3)
 def nearest(values: ArrayLike, pattern: Pattern) -> Array:
     """Every missing colour copied from the nearest pixel that measured it.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light.
-    pattern : Pattern
-        Any one.
+    Args:
+        values: (height, width), a mosaic of linear light.
+        pattern: Any one.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light.
+    Returns: (height, width, 3), linear light.
+    Raises: ValueError for a mosaic of another shape.
+    Source: Szeliski (2022), section 10.3.1.
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape.
-
-    References
-    ----------
-    Szeliski (2022), section 10.3.1.
-
-    Examples
-    --------
     >>> nearest([[0.1, 0.2], [0.3, 0.4]], BAYER["RGGB"])[..., RED]
     array([[0.1, 0.1],
            [0.1, 0.1]])
@@ -72,29 +57,14 @@ def nearest(values: ArrayLike, pattern: Pattern) -> Array:
 def bilinear(values: ArrayLike, pattern: Pattern) -> Array:
     """Every missing colour as the mean of the pixels around that measured it, weighted by their nearness.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light.
-    pattern : Pattern
-        Any one.
+    Args:
+        values: (height, width), a mosaic of linear light.
+        pattern: Any one.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light.
+    Returns: (height, width, 3), linear light.
+    Raises: ValueError for a mosaic of another shape.
+    Source: Szeliski (2022), section 10.3.1.
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape.
-
-    References
-    ----------
-    Szeliski (2022), section 10.3.1.
-
-    Examples
-    --------
     A black-and-white edge gets a coloured fringe:
 
     >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
@@ -110,30 +80,15 @@ def bilinear(values: ArrayLike, pattern: Pattern) -> Array:
 def malvar(values: ArrayLike, pattern: Pattern) -> Array:
     """Bilinear interpolation corrected by the second derivative of the measured colour.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light, at least 4 × 4.
-    pattern : Pattern
-        One of BAYER.
+    Args:
+        values: (height, width), a mosaic of linear light, at least 4 × 4.
+        pattern: One of BAYER.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light.
+    Returns: (height, width, 3), linear light.
+    Raises: ValueError for a mosaic of another shape, and for other patterns.
+    Source: H. S. Malvar, L. He and R. Cutler, High-quality linear interpolation for demosaicing of Bayer-patterned
+    color images, ICASSP 2004.
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape, and for other patterns.
-
-    References
-    ----------
-    H. S. Malvar, L. He and R. Cutler, High-quality linear interpolation for demosaicing of Bayer-patterned color
-    images, ICASSP 2004.
-
-    Examples
-    --------
     The fringe that `bilinear` makes at an edge is weaker:
 
     >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
@@ -155,29 +110,14 @@ def malvar(values: ArrayLike, pattern: Pattern) -> Array:
 def edge_aware(values: ArrayLike, pattern: Pattern) -> Array:
     """Green along the edge, not across it; then bilinear interpolation of red − green and blue − green.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light, at least 4 × 4.
-    pattern : Pattern
-        One of BAYER.
+    Args:
+        values: (height, width), a mosaic of linear light, at least 4 × 4.
+        pattern: One of BAYER.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light.
+    Returns: (height, width, 3), linear light.
+    Raises: ValueError for a mosaic of another shape, and for other patterns.
+    Source: J. F. Hamilton and J. E. Adams, US patent 5,629,734 (1997), for the choice of green.
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape, and for other patterns.
-
-    References
-    ----------
-    J. F. Hamilton and J. E. Adams, US patent 5,629,734 (1997), for the choice of green.
-
-    Examples
-    --------
     An upright edge comes back without a fringe:
 
     >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
@@ -202,30 +142,15 @@ def by_differences(values: ArrayLike, pattern: Pattern, green: Array) -> Array:
 def menon(values: ArrayLike, pattern: Pattern) -> Array:
     """Green both ways, and afterwards the way that left the smoother colours; then refined.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light, at least 4 × 4.
-    pattern : Pattern
-        One of BAYER.
+    Args:
+        values: (height, width), a mosaic of linear light, at least 4 × 4.
+        pattern: One of BAYER.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light.
+    Returns: (height, width, 3), linear light.
+    Raises: ValueError for a mosaic of another shape, and for other patterns.
+    Source: D. Menon, S. Andriani and G. Calvagno, Demosaicing with directional filtering and a posteriori decision,
+    IEEE Trans. Image Process. 16 (2007).
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape, and for other patterns.
-
-    References
-    ----------
-    D. Menon, S. Andriani and G. Calvagno, Demosaicing with directional filtering and a posteriori decision, IEEE Trans.
-    Image Process. 16 (2007).
-
-    Examples
-    --------
     An upright edge comes back without a fringe:
 
     >>> edge = np.tile(np.array([0, 0, 0, 0, 1, 1, 1, 1.0])[:, None], (8, 1, 3))
@@ -250,27 +175,14 @@ def opencv(values: NDArray[np.uint8] | NDArray[np.uint16], pattern: Pattern, met
     OpenCV's older names are shifted by one pixel: its `COLOR_BayerBG2RGB` is for RGGB. The names used here spell the
     tile.
 
-    Parameters
-    ----------
-    values : array (height, width)
-        A mosaic of linear light as uint8 or uint16.
-    pattern : Pattern
-        One of BAYER.
-    method : {"bilinear", "EA", "VNG"}
-        "EA" is edge-aware in green only; "VNG" takes uint8 only.
+    Args:
+        values: (height, width), a mosaic of linear light as uint8 or uint16.
+        pattern: One of BAYER.
+        method: {"bilinear", "EA", "VNG"}. "EA" is edge-aware in green only; "VNG" takes uint8 only.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light, of the same integer type.
+    Returns: (height, width, 3), linear light, of the same integer type.
+    Raises: ValueError for another method or pattern, and for values of another kind.
 
-    Raises
-    ------
-    ValueError
-        For another method or pattern, and for values of another kind.
-
-    Examples
-    --------
     Where only the red pixels measured light, the picture is red:
 
     >>> values = np.zeros((6, 6), np.uint8)
@@ -312,27 +224,14 @@ ANY_PATTERN = ("nearest", "bilinear")
 def demosaic(values: ArrayLike, pattern: Pattern, algorithm: str = "Menon") -> Array:
     """A picture from a mosaic, by interpolating what was not measured.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        A mosaic of linear light.
-    pattern : Pattern
-        The filters.
-    algorithm : {"nearest", "bilinear", "Malvar", "edge-aware", "Menon"}
-        One of ALGORITHMS.
+    Args:
+        values: (height, width), a mosaic of linear light.
+        pattern: The filters.
+        algorithm: {"nearest", "bilinear", "Malvar", "edge-aware", "Menon"}, one of ALGORITHMS.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light; values below 0 and above 1 are not cut off.
+    Returns: (height, width, 3), linear light; values below 0 and above 1 are not cut off.
+    Raises: ValueError for another algorithm, a mosaic of another shape, and a pattern that the algorithm cannot do.
 
-    Raises
-    ------
-    ValueError
-        For another algorithm, a mosaic of another shape, and a pattern that the algorithm cannot do.
-
-    Examples
-    --------
     How near to the truth they come on the finest detail, in dB:
 
     >>> plate, pattern = zone_plate(128), BAYER["RGGB"]

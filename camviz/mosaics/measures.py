@@ -24,17 +24,11 @@ _NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 class Measures(NamedTuple):
     """What `compare` finds.
 
-    Attributes
-    ----------
-    psnr_db : float
-        As of `psnr`.
-    colour_error : array (height, width)
-        As of `colour_error`.
-    zipper : float
-        As of `zipper`.
+    Attributes:
+        psnr_db: As of `psnr`.
+        colour_error: (height, width), as of `colour_error`.
+        zipper: As of `zipper`.
 
-    Examples
-    --------
     >>> Measures(psnr_db=30.0, colour_error=np.array([[0.0, 4.0]]), zipper=0.1).false_colour
     2.0
     """
@@ -52,23 +46,12 @@ class Measures(NamedTuple):
 def compare(picture: ArrayLike, truth: ArrayLike) -> Measures:
     """All measures of a demosaiced picture against the truth.
 
-    Parameters
-    ----------
-    picture, truth : array_like (height, width, 3)
-        As shown on a screen: sRGB 0 … 1, or bytes.
+    Args:
+        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
-    Returns
-    -------
-    Measures
-        PSNR, colour error of each pixel, and zippers.
+    Returns: PSNR, colour error of each pixel, and zippers.
+    Raises: ValueError for pictures of different sizes.
 
-    Raises
-    ------
-    ValueError
-        For pictures of different sizes.
-
-    Examples
-    --------
     Stripes where the truth is flat are right in colour, and zippers everywhere:
 
     >>> flat = np.full((4, 4, 3), 0.5)
@@ -84,23 +67,12 @@ def compare(picture: ArrayLike, truth: ArrayLike) -> Measures:
 def psnr(picture: ArrayLike, truth: ArrayLike) -> float:
     """Peak signal-to-noise ratio, 10 log10(1 / mean squared error).
 
-    Parameters
-    ----------
-    picture, truth : array_like (height, width, 3)
-        As shown on a screen: sRGB 0 … 1, or bytes.
+    Args:
+        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
-    Returns
-    -------
-    float
-        In dB; infinite for equal pictures.
+    Returns: In dB; infinite for equal pictures.
+    Raises: ValueError for pictures of different sizes.
 
-    Raises
-    ------
-    ValueError
-        For pictures of different sizes.
-
-    Examples
-    --------
     An error of 0.1 everywhere is 20 dB:
 
     >>> round(psnr(np.full((4, 4, 3), 0.5), np.full((4, 4, 3), 0.4)), 2)
@@ -112,23 +84,12 @@ def psnr(picture: ArrayLike, truth: ArrayLike) -> float:
 def false_colour(picture: ArrayLike, truth: ArrayLike) -> float:
     """Mean distance of the colours in CIELAB's a*b* plane, brightness left aside.
 
-    Parameters
-    ----------
-    picture, truth : array_like (height, width, 3)
-        As shown on a screen: sRGB 0 … 1, or bytes.
+    Args:
+        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
-    Returns
-    -------
-    float
-        0 where no colour is false.
+    Returns: 0 where no colour is false.
+    Raises: ValueError for pictures of different sizes.
 
-    Raises
-    ------
-    ValueError
-        For pictures of different sizes.
-
-    Examples
-    --------
     A grey that is too bright has no false colour:
 
     >>> false_colour(np.full((4, 4, 3), 0.5), np.full((4, 4, 3), 0.6))
@@ -140,27 +101,13 @@ def false_colour(picture: ArrayLike, truth: ArrayLike) -> float:
 def colour_error(picture: ArrayLike, truth: ArrayLike) -> Values:
     """The distance of each pixel's colours in CIELAB's a*b* plane: sqrt(Δa*² + Δb*²).
 
-    Parameters
-    ----------
-    picture, truth : array_like (height, width, 3)
-        As shown on a screen: sRGB 0 … 1, or bytes.
+    Args:
+        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
-    Returns
-    -------
-    array (height, width)
-        0 where the colour is true, float32.
+    Returns: (height, width), 0 where the colour is true, float32.
+    Raises: ValueError for pictures of different sizes.
+    Source: CIE 15:2004, Colorimetry, section 8.2.1.
 
-    Raises
-    ------
-    ValueError
-        For pictures of different sizes.
-
-    References
-    ----------
-    CIE 15:2004, Colorimetry, section 8.2.1.
-
-    Examples
-    --------
     A grey with a tenth too much blue:
 
     >>> colour_error([[(0.5, 0.5, 0.6)]], [[(0.5, 0.5, 0.5)]]).round(1)
@@ -175,28 +122,14 @@ def zipper(picture: ArrayLike, truth: ArrayLike) -> float:
     For each pixel, that of its eight neighbours is sought which is nearest to it in the *true* picture.
     It counts where the ΔE*ab of the two differs by more than 2.3 between picture and truth.
 
-    Parameters
-    ----------
-    picture, truth : array_like (height, width, 3)
-        As shown on a screen: sRGB 0 … 1, or bytes.
+    Args:
+        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
-    Returns
-    -------
-    float
-        0 … 1.
-
-    Raises
-    ------
-    ValueError
-        For pictures of different sizes.
-
-    References
-    ----------
-    W. Lu and Y.-P. Tan, Color filter array demosaicking: new method and performance measures, IEEE Trans. Image
+    Returns: 0 … 1.
+    Raises: ValueError for pictures of different sizes.
+    Source: W. Lu and Y.-P. Tan, Color filter array demosaicking: new method and performance measures, IEEE Trans. Image
     Process. 12 (2003).
 
-    Examples
-    --------
     >>> flat = np.full((4, 4, 3), 0.5)
     >>> zipper(flat + np.array([0.1, -0.1, 0.1, -0.1])[:, None], flat)
     1.0

@@ -42,20 +42,13 @@ Rows = tuple[tuple[int, ...], ...]
 class Pattern:
     """A colour filter array: a tile of channels that repeats across the sensor, from its upper left pixel.
 
-    Parameters
-    ----------
-    name : str
-        For readers.
-    tile : tuple of tuple of int
-        Rows of RED, GREEN, BLUE and WHITE; a WHITE pixel has no filter (it is also called panchromatic).
+    Args:
+        name: For readers.
+        tile: tuple of tuple of int, rows of RED, GREEN, BLUE and WHITE; a WHITE pixel has no filter (it is also called
+            panchromatic).
 
-    Raises
-    ------
-    ValueError
-        For rows of different lengths, and for other channels.
+    Raises: ValueError for rows of different lengths, and for other channels.
 
-    Examples
-    --------
     >>> Pattern("stripes", ((RED, GREEN, BLUE),)).channels(2, 5)
     array([[0, 1, 2, 0, 1],
            [0, 1, 2, 0, 1]], dtype=uint8)
@@ -75,22 +68,12 @@ class Pattern:
     def spelled(cls, name: str, rows: str) -> Pattern:
         """The pattern whose tile is written as letters.
 
-        Parameters
-        ----------
-        name : str
-            For readers.
-        rows : str
-            The tile's rows with blanks between them: "RG GB".
+        Args:
+            name: For readers.
+            rows: The tile's rows with blanks between them: "RG GB".
 
-        Returns
-        -------
-        Pattern
-            With that tile.
-
-        Raises
-        ------
-        ValueError
-            For letters other than R, G, B and W, and rows of different lengths.
+        Returns: Pattern with that tile.
+        Raises: ValueError for letters other than R, G, B and W, and rows of different lengths.
         """
         if not rows.split() or set(rows) - set(LETTERS + " "):
             raise ValueError(f"rows must be written with the letters {', '.join(LETTERS)} and blanks, got {rows!r}")
@@ -124,30 +107,20 @@ class Pattern:
     def share(self, channel: int) -> float:
         """The share of pixels that measure a channel.
 
-        Parameters
-        ----------
-        channel : int
-            RED, GREEN, BLUE or WHITE.
+        Args:
+            channel: RED, GREEN, BLUE or WHITE.
 
-        Returns
-        -------
-        float
-            0 … 1.
+        Returns: 0 … 1.
         """
         return sum(row.count(channel) for row in self.tile) / (self.height * self.width)
 
     def channels(self, height: int, width: int) -> NDArray[np.uint8]:
         """The channel that each pixel of a sensor measures.
 
-        Parameters
-        ----------
-        height, width : int
-            Of the sensor, in pixels.
+        Args:
+            height, width: Of the sensor, in pixels.
 
-        Returns
-        -------
-        array (height, width)
-            RED, GREEN, BLUE or WHITE, uint8.
+        Returns: (height, width), RED, GREEN, BLUE or WHITE, uint8.
         """
         tile = np.array(self.tile, dtype=np.uint8)
         repeats = (-(-height // self.height), -(-width // self.width))
@@ -156,17 +129,11 @@ class Pattern:
     def mask(self, channel: int, height: int, width: int) -> NDArray[np.bool_]:
         """Whether each pixel of a sensor measures a channel.
 
-        Parameters
-        ----------
-        channel : int
-            RED, GREEN, BLUE or WHITE.
-        height, width : int
-            Of the sensor, in pixels.
+        Args:
+            channel: RED, GREEN, BLUE or WHITE.
+            height, width: Of the sensor, in pixels.
 
-        Returns
-        -------
-        array (height, width)
-            True where it does.
+        Returns: (height, width), True where it does.
         """
         return self.channels(height, width) == channel
 
@@ -175,15 +142,10 @@ class Pattern:
 
         An odd number changes the phase of a Bayer array: RGGB without its first column is GRBG.
 
-        Parameters
-        ----------
-        x0, y0 : int
-            How many columns, and how many rows.
+        Args:
+            x0, y0: How many columns, and how many rows.
 
-        Returns
-        -------
-        Pattern
-            One of PATTERNS where the tile is known.
+        Returns: One of PATTERNS where the tile is known.
         """
         rolled = np.roll(np.array(self.tile), (-y0, -x0), axis=(0, 1))
         tile = tuple(tuple(int(channel) for channel in row) for row in rolled)
@@ -197,29 +159,14 @@ def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
     A white pixel answers (R + G + B)/3: all channels are scaled so that white light reads the same in each. (On a real
     sensor it gathers about three times as many photons, which is why it is there.)
 
-    Parameters
-    ----------
-    picture : array_like (height, width, 3)
-        Linear light.
-    pattern : Pattern
-        The filters.
+    Args:
+        picture: (height, width, 3), linear light.
+        pattern: The filters.
 
-    Returns
-    -------
-    array (height, width)
-        Linear light; float32 if the picture is, otherwise float64.
+    Returns: (height, width), linear light; float32 if the picture is, otherwise float64.
+    Raises: ValueError for a picture of another shape.
+    Source: Szeliski (2022), section 2.3.2, color filter arrays.
 
-    Raises
-    ------
-    ValueError
-        For a picture of another shape.
-
-    References
-    ----------
-    Szeliski (2022), section 2.3.2, color filter arrays.
-
-    Examples
-    --------
     >>> mosaic([[(1, 2, 3), (4, 5, 6)], [(7, 8, 9), (10, 11, 12)]], BAYER["RGGB"])
     array([[ 1.,  5.],
            [ 8., 12.]])
@@ -236,25 +183,13 @@ def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
 def in_colour(values: ArrayLike, pattern: Pattern) -> Array:
     """A mosaic as a picture: each pixel in its filter's colour, white ones grey.
 
-    Parameters
-    ----------
-    values : array_like (height, width)
-        Linear light, as `mosaic` gives it.
-    pattern : Pattern
-        The filters.
+    Args:
+        values: (height, width), linear light, as `mosaic` gives it.
+        pattern: The filters.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light.
+    Returns: (height, width, 3), linear light.
+    Raises: ValueError for a mosaic of another shape.
 
-    Raises
-    ------
-    ValueError
-        For a mosaic of another shape.
-
-    Examples
-    --------
     >>> in_colour([[0.1, 0.2], [0.3, 0.4]], BAYER["RGGB"])[0]  # red, and green
     array([[0.1, 0. , 0. ],
            [0. , 0.2, 0. ]])

@@ -20,16 +20,11 @@ from camviz.mosaics.patterns import BLUE, GREEN, RED, Pattern, as_picture
 class Carrier:
     """A frequency at which a grey grating moves the means of the channels' pixels as a colour would.
 
-    Parameters
-    ----------
-    fu, fv : float
-        In cycles per pixel, along u (right) and v (down).
-    colour : tuple of complex
-        What the grating's crest, of height 1 on the first pixel, adds to the means of the red, green and blue pixels;
-        its imaginary part belongs to a grating moved by a quarter of its period.
+    Args:
+        fu, fv: In cycles per pixel, along u (right) and v (down).
+        colour: What the grating's crest, of height 1 on the first pixel, adds to the means of the red, green and blue
+            pixels; its imaginary part belongs to a grating moved by a quarter of its period.
 
-    Examples
-    --------
     Stripes one pixel wide fall on all red pixels of a Bayer array, and miss all blue ones:
 
     >>> round(Carrier(0.5, 0.0, (1, 0, -1)).strength, 3)  # √2
@@ -54,23 +49,13 @@ def carriers(pattern: Pattern) -> tuple[Carrier, ...]:
     colours; so fine detail that lies there is taken for colour. A grating at f shows as false colour of the frequency
     f − carrier. For any tile they follow from its discrete Fourier transform.
 
-    Parameters
-    ----------
-    pattern : Pattern
-        The filters.
+    Args:
+        pattern: The filters.
 
-    Returns
-    -------
-    tuple of Carrier
-        The strongest first, one of f and −f; none for a pattern without colours.
+    Returns: The strongest first, one of f and −f; none for a pattern without colours.
+    Source: D. Alleysson, S. Süsstrunk and J. Hérault, Linear demosaicing inspired by the human visual system, IEEE
+    Trans. Image Process. 14 (2005).
 
-    References
-    ----------
-    D. Alleysson, S. Süsstrunk and J. Hérault, Linear demosaicing inspired by the human visual system, IEEE Trans. Image
-    Process. 14 (2005).
-
-    Examples
-    --------
     >>> [(one.fu, one.fv) for one in carriers(BAYER["RGGB"])]
     [(0.5, 0.5), (0.5, 0.0), (0.0, 0.5)]
     """
@@ -99,25 +84,13 @@ def zone_plate(size: int = 256, highest: float = 0.5) -> Array:
     The frequency (fu, fv), in cycles per pixel, lies (fu, fv) · size / (2 highest) pixels from the middle. Each pixel
     takes the mean over its area, as a sensor's pixel does.
 
-    Parameters
-    ----------
-    size : int
-        Width and height in pixels, at least 8.
-    highest : float
-        The frequency at the middles of the sides, in cycles per pixel.
+    Args:
+        size: Width and height in pixels, at least 8.
+        highest: The frequency at the middles of the sides, in cycles per pixel.
 
-    Returns
-    -------
-    array (size, size, 3)
-        Linear light 0 … 1; read-only.
+    Returns: (size, size, 3), linear light 0 … 1; read-only.
+    Raises: ValueError for a smaller size, or a highest frequency that is not above 0.
 
-    Raises
-    ------
-    ValueError
-        For a smaller size, or a highest frequency that is not above 0.
-
-    Examples
-    --------
     White in the middle, and black √128 pixels beside it, where 128 · 0.5 / 128 makes half a turn:
 
     >>> zone_plate(128)[64, [64, 75], 0].round(1)
@@ -143,30 +116,15 @@ def low_pass(picture: ArrayLike, spots_px: float) -> NDArray[np.float32]:
     cos(π d fu) cos(π d fv), nothing at 1/(2d): with d = 1 nothing at the carriers of Bayer's pattern. The picture is
     taken as mirrored at its borders, and as having no detail finer than its pixels.
 
-    Parameters
-    ----------
-    picture : array_like (height, width, 3)
-        Linear light.
-    spots_px : float
-        How far apart the spots are, d, in pixels; 0 for no filter.
+    Args:
+        picture: (height, width, 3), linear light.
+        spots_px: How far apart the spots are, d, in pixels; 0 for no filter.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light, float32.
+    Returns: (height, width, 3), linear light, float32.
+    Raises: ValueError for a picture of another shape, or a distance below 0.
+    Source: J. E. Greivenkamp, Color dependent optical prefilter for the suppression of aliasing artifacts, Appl. Opt.
+    29 (1990).
 
-    Raises
-    ------
-    ValueError
-        For a picture of another shape, or a distance below 0.
-
-    References
-    ----------
-    J. E. Greivenkamp, Color dependent optical prefilter for the suppression of aliasing artifacts, Appl. Opt. 29
-    (1990).
-
-    Examples
-    --------
     Of a grating of 1/4 cycle per pixel, cos(π/4) = 71 % is left:
 
     >>> grating = np.cos(np.pi * (np.arange(8) + 0.5) / 2)[None, :, None] * np.ones(3)

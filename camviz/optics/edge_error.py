@@ -22,11 +22,9 @@ NEAREST_NUMBERS = 5  # of a side's level: the widest gap between these is the st
 class EdgeError:
     """The parts of the standard error of ln MTF at one frequency, and what they are from.
 
-    Parameters
-    ----------
-    edge : SlantedEdge
-    frequency : float
-        Cycles per pixel.
+    Args:
+        edge: SlantedEdge.
+        frequency: Cycles per pixel.
     """
 
     edge: Any  # a SlantedEdge, whose module imports this one
@@ -94,9 +92,7 @@ class EdgeError:
     def pieces(self) -> tuple[Array, float]:
         """ln MTF without each piece of the edge in turn (n,), and the standard deviation that follows: the jackknife.
 
-        References
-        ----------
-        B. Efron, The jackknife, the bootstrap and other resampling plans, SIAM (1982), chapter 3.
+        Source: B. Efron, The jackknife, the bootstrap and other resampling plans, SIAM (1982), chapter 3.
         """
         profile = self.edge.profile
         without = np.array([self.edge.log_mtf(self.frequency, profile.without(b)) for b in np.unique(profile.block)])
@@ -191,9 +187,7 @@ class EdgeError:
         Uniform over a step; noise of deviation σ leaves exp(-2 π² σ²) of it, σ in steps: the first term of Fourier's
         series for the mean of rounded numbers. The pixels' own deviation has the rounding's 1/12 in it.
 
-        References
-        ----------
-        B. Widrow and I. Kollár, Quantization Noise, Cambridge University Press (2008), chapters 4 and 9.
+        Source: B. Widrow and I. Kollár, Quantization Noise, Cambridge University Press (2008), chapters 4 and 9.
         """
         strip, edge = self.edge.sides.strip, self.edge
         near = (np.abs(strip.distance) > edge.rise) & (np.abs(strip.distance) < 2 * edge.flat)

@@ -19,22 +19,12 @@ def normal_angle(image: ArrayLike) -> float:
 
     The main axis of the gradients' second moments.
 
-    Parameters
-    ----------
-    image : array_like (height, width)
-        Light.
+    Args:
+        image: (height, width), light.
 
-    Returns
-    -------
-    float
-        0 where it changes along the rows: an upright edge.
+    Returns: 0 where it changes along the rows: an upright edge.
+    Source: J. Bigün and G. H. Granlund, Optimal orientation detection of linear symmetry, ICCV 1987.
 
-    References
-    ----------
-    J. Bigün and G. H. Granlund, Optimal orientation detection of linear symmetry, ICCV 1987.
-
-    Examples
-    --------
     >>> v, u = np.mgrid[:40, :40]
     >>> round(np.degrees(normal_angle(u > 20 + 0.5 * (v - 20))))
     -26
@@ -48,20 +38,13 @@ def normal_angle(image: ArrayLike) -> float:
 def rough_edge(image: ArrayLike) -> tuple[float, float, float]:
     """The nearly upright edge in an image, as the blurred step that fits all its pixels best.
 
-    Parameters
-    ----------
-    image : array_like (height, width)
-        Light, dark on the left.
+    Args:
+        image: (height, width), light, dark on the left.
 
-    Returns
-    -------
-    slope, intercept : float
-        Of the edge, u = slope · v + intercept.
-    spread : float
-        The standard deviation of its blur across, in pixels.
+    Returns:
+        slope, intercept: Of the edge, u = slope · v + intercept.
+        spread: The standard deviation of its blur across, in pixels.
 
-    Examples
-    --------
     >>> v, u = np.mgrid[:40, :40]
     >>> slope, intercept, _ = rough_edge(np.clip(u - 20.2 - 0.1 * v, 0, 1))
     >>> round(slope, 2), round(intercept, 1)

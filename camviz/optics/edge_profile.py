@@ -22,20 +22,14 @@ class Profile:
     Third differences of its coefficients are kept small, and so it bridges places at which no pixel lies, as a smooth
     curve would.
 
-    Parameters
-    ----------
-    distance, light : array (n,)
-        Of pixels; those beyond the reach are left out by the caller.
-    reach : float
-        The spline goes from -reach to reach, pixels.
-    step : float
-        Between its knots, pixels.
-    block : array (n,) of int
-        A number from 0 for each pixel; `without` fits all blocks but one.
+    Args:
+        distance, light: (n,), of pixels; those beyond the reach are left out by the caller.
+        reach: The spline goes from -reach to reach, pixels.
+        step: Between its knots, pixels.
+        block: (n,) of int, a number from 0 for each pixel; `without` fits all blocks but one.
 
-    References
-    ----------
-    P. H. C. Eilers and B. D. Marx, Flexible smoothing with B-splines and penalties, Statistical Science 11 (1996).
+    Source: P. H. C. Eilers and B. D. Marx, Flexible smoothing with B-splines and penalties, Statistical Science 11
+    (1996).
     """
 
     distance: Array

@@ -20,10 +20,7 @@ MOST_BENT = 0.15  # of ln MTF at MTF50: what rows off the line may take of it
 def refuse_what_spoils(edge: Any) -> None:
     """Say what is wrong with an edge that cannot be measured.
 
-    Raises
-    ------
-    ValueError
-        In one sentence.
+    Raises: ValueError in one sentence.
     """
     rows, columns = edge.image.shape
     if rows < FEWEST_ROWS or columns < FEWEST_ROWS:

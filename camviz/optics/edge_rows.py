@@ -18,19 +18,13 @@ def row_shifts(sides: Sides, rise: float) -> tuple[Array, Array, Array]:
 
     Least squares to first order: Σ E' (E - light) / Σ E'² over a row's pixels, E the profile.
 
-    Parameters
-    ----------
-    sides : Sides
-        Of the line that the shifts are counted from.
-    rise : float
-        From 10 to 90 %, pixels.
+    Args:
+        sides: Of the line that the shifts are counted from.
+        rise: From 10 to 90 %, pixels.
 
-    Returns
-    -------
-    rows : array (n,) of whole numbers
-        Those whose edge lies within the image.
-    shifts, errors : array (n,)
-        To the right, in pixels, and their standard errors.
+    Returns:
+        rows: (n,) of whole numbers, those whose edge lies within the image.
+        shifts, errors: (n,), to the right, in pixels, and their standard errors.
     """
     strip = sides.strip
     near = np.abs(strip.distance) <= 1.5 * rise + 1.5
@@ -50,10 +44,8 @@ def row_shifts(sides: Sides, rise: float) -> tuple[Array, Array, Array]:
 def straight(rows: Array, shifts: Array, errors: Array) -> tuple[float, float] | None:
     """The line shift = a · row + b that fits most rows; None for fewer than three.
 
-    Parameters
-    ----------
-    rows, shifts, errors : array (n,)
-        As `row_shifts` gives them.
+    Args:
+        rows, shifts, errors: (n,), as `row_shifts` gives them.
     """
     if len(rows) < 3:
         return None

@@ -64,11 +64,9 @@ class Sides:
     that falls off slopes in proportion to the level. The wide feet of a blur slope alike on both sides: so the two
     are told apart.
 
-    Parameters
-    ----------
-    strip : Strip
-    start : float
-        How far from the edge its sides begin, pixels.
+    Args:
+        strip:
+        start: How far from the edge its sides begin, pixels.
     """
 
     strip: Strip

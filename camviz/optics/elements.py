@@ -18,22 +18,12 @@ from camviz.lenses.base import Array
 def free_space(distance_mm: float) -> Array:
     """The matrix of a way through one medium, [[1, d], [0, 1]]: a ray gains height by its slope.
 
-    Parameters
-    ----------
-    distance_mm : float
-        Along the axis.
+    Args:
+        distance_mm: Along the axis.
 
-    Returns
-    -------
-    array (2, 2)
-        It acts on rays (height in mm, slope).
+    Returns: (2, 2). It acts on rays (height in mm, slope).
+    Source: E. Hecht, Optics (5th ed. 2017), section 6.2.1.
 
-    References
-    ----------
-    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
-
-    Examples
-    --------
     >>> free_space(10) @ [1, 0.1]  # 1 mm high, rising by 1 in 10
     array([2. , 0.1])
     """
@@ -43,27 +33,13 @@ def free_space(distance_mm: float) -> Array:
 def ideal_lens(focal_mm: float) -> Array:
     """The matrix of a thin lens, [[1, 0], [-1/f, 1]]: a ray loses slope in proportion to its height.
 
-    Parameters
-    ----------
-    focal_mm : float
-        The focal length, negative for a lens that spreads light.
+    Args:
+        focal_mm: The focal length, negative for a lens that spreads light.
 
-    Returns
-    -------
-    array (2, 2)
-        It acts on rays (height in mm, slope).
+    Returns: (2, 2). It acts on rays (height in mm, slope).
+    Raises: ValueError for a focal length of 0.
+    Source: E. Hecht, Optics (5th ed. 2017), section 6.2.1.
 
-    Raises
-    ------
-    ValueError
-        For a focal length of 0.
-
-    References
-    ----------
-    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
-
-    Examples
-    --------
     Parallel light meets the axis one focal length behind the lens:
 
     >>> (free_space(50) @ ideal_lens(50) @ [10, 0]).round(9) + 0
@@ -77,29 +53,14 @@ def ideal_lens(focal_mm: float) -> Array:
 def refraction(radius_mm: float, before: float, after: float) -> Array:
     """The matrix of a spherical surface: Snell's law for small angles.
 
-    Parameters
-    ----------
-    radius_mm : float
-        Of the sphere, positive where its centre lies behind the surface, infinite for a flat one.
-    before, after : float
-        The refractive indices on its two sides.
+    Args:
+        radius_mm: Of the sphere, positive where its centre lies behind the surface, infinite for a flat one.
+        before, after: The refractive indices on its two sides.
 
-    Returns
-    -------
-    array (2, 2)
-        It acts on rays (height in mm, slope).
+    Returns: (2, 2). It acts on rays (height in mm, slope).
+    Raises: ValueError for a radius of 0.
+    Source: E. Hecht, Optics (5th ed. 2017), section 6.2.1.
 
-    Raises
-    ------
-    ValueError
-        For a radius of 0.
-
-    References
-    ----------
-    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
-
-    Examples
-    --------
     Behind a surface of 50 mm, in glass, parallel light meets after n R / (n - 1) = 150 mm:
 
     >>> (free_space(150) @ refraction(50, before=1.0, after=1.5) @ [3, 0]).round(9) + 0
@@ -114,25 +75,15 @@ def refraction(radius_mm: float, before: float, after: float) -> Array:
 class Prescription:
     """A lens as its designer writes it, surface by surface, traced with 2 × 2 matrices near the axis.
 
-    Parameters
-    ----------
-    name : str
-        For readers.
-    surfaces : tuple of tuple of float
-        A row for each surface, in the light's order: radius of curvature in mm, distance to the next surface in mm, and
-        refractive index behind it. An infinite radius is flat, index 1 is air; the last distance is not used.
+    Args:
+        name: For readers.
+        surfaces: A row for each surface, in the light's order: radius of curvature in mm, distance to the next surface
+            in mm, and refractive index behind it. An infinite radius is flat, index 1 is air; the last distance is not
+            used.
 
-    Raises
-    ------
-    ValueError
-        For other rows, a radius of 0, and an index below 1.
+    Raises: ValueError for other rows, a radius of 0, and an index below 1.
+    Source: E. Hecht, Optics (5th ed. 2017), section 6.2.1.
 
-    References
-    ----------
-    E. Hecht, Optics (5th ed. 2017), section 6.2.1.
-
-    Examples
-    --------
     A flat side and one of 50 mm radius, in glass of index 1.5, have f = R / (n - 1) = 100 mm:
 
     >>> lens = Prescription("plano-convex", ((50, 5, 1.5), (np.inf, 0, 1.0)))
@@ -189,19 +140,13 @@ class Prescription:
     def trace(self, height_mm: ArrayLike, slope: ArrayLike, reach_mm: float = 0.0) -> tuple[Array, Array]:
         """Rays through the lens, to the back focal point.
 
-        Parameters
-        ----------
-        height_mm, slope : array_like (...)
-            Heights in mm and slopes, as ratios, of the rays where they start.
-        reach_mm : float
-            Where they start: so far before the first surface.
+        Args:
+            height_mm, slope: (...), heights in mm and slopes, as ratios, of the rays where they start.
+            reach_mm: Where they start: so far before the first surface.
 
-        Returns
-        -------
-        z : array (n,)
-            Places along the axis in mm, 0 at the first surface.
-        heights : array (n, ...)
-            The rays' heights there in mm.
+        Returns:
+            z: (n,), places along the axis in mm, 0 at the first surface.
+            heights: (n, ...), the rays' heights there in mm.
         """
         rays = np.stack(np.broadcast_arrays(np.asarray(height_mm, float), np.asarray(slope, float)))
         flat, z, before = rays.reshape(2, -1), [-reach_mm, 0.0], 1.0

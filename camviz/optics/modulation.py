@@ -20,24 +20,13 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 def cutoff_per_mm(f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM) -> Array:
     """The finest grating whose light passes through a round opening at all: 1 / (λ N).
 
-    Parameters
-    ----------
-    f_number : array_like (...)
-        The working f-number N, a ratio.
-    wavelength_nm : array_like (...)
-        λ in nanometres.
+    Args:
+        f_number: (...), the working f-number N, a ratio.
+        wavelength_nm: (...), λ in nanometres.
 
-    Returns
-    -------
-    array (...)
-        In cycles per mm.
+    Returns: (...), in cycles per mm.
+    Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.3.
 
-    References
-    ----------
-    J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.3.
-
-    Examples
-    --------
     >>> cutoff_per_mm(8, wavelength_nm=500).round(6)  # 1 / (0.0005 mm · 8)
     np.float64(250.0)
     """
@@ -49,26 +38,14 @@ def diffraction_transfer(per_mm: ArrayLike, f_number: ArrayLike, wavelength_nm: 
 
     It is the share of a round opening that it has in common with its moved copy.
 
-    Parameters
-    ----------
-    per_mm : array_like (...)
-        The grating's frequency f in cycles per mm.
-    f_number : array_like (...)
-        The working f-number N, a ratio.
-    wavelength_nm : array_like (...)
-        λ in nanometres.
+    Args:
+        per_mm: (...), the grating's frequency f in cycles per mm.
+        f_number: (...), the working f-number N, a ratio.
+        wavelength_nm: (...), λ in nanometres.
 
-    Returns
-    -------
-    array (...)
-        1 … 0.
+    Returns: (...), 1 … 0.
+    Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
 
-    References
-    ----------
-    J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
-
-    Examples
-    --------
     At half of the cutoff frequency 2/3 - √3/(2π) = 39 % of the contrast is left:
 
     >>> diffraction_transfer(cutoff_per_mm(8) / 2, 8).round(3)
@@ -83,24 +60,13 @@ def disc_transfer(per_mm: ArrayLike, diameter_mm: ArrayLike) -> Array:
 
     2 J1(x) / x with x = π f c. Negative where bright and dark lines of a grating change places.
 
-    Parameters
-    ----------
-    per_mm : array_like (...)
-        The grating's frequency f in cycles per mm.
-    diameter_mm : array_like (...)
-        Of the disc in mm, c.
+    Args:
+        per_mm: (...), the grating's frequency f in cycles per mm.
+        diameter_mm: (...), of the disc in mm, c.
 
-    Returns
-    -------
-    array (...)
-        1 … -0.13.
+    Returns: (...), 1 … -0.13.
+    Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
 
-    References
-    ----------
-    J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
-
-    Examples
-    --------
     A disc of 0.02 mm blots out the grating of f = 1.22 / c first, and turns finer ones around:
 
     >>> disc_transfer([0, 1.22 / 0.02, 80], 0.02).round(2) + 0
@@ -116,24 +82,13 @@ def pixel_transfer(per_mm: ArrayLike, pitch_mm: ArrayLike) -> Array:
 
     It is the mean over a pixel that is all sensitive.
 
-    Parameters
-    ----------
-    per_mm : array_like (...)
-        The grating's frequency f in cycles per mm.
-    pitch_mm : array_like (...)
-        The pixels' width p in mm.
+    Args:
+        per_mm: (...), the grating's frequency f in cycles per mm.
+        pitch_mm: (...), the pixels' width p in mm.
 
-    Returns
-    -------
-    array (...)
-        1 … -0.22.
+    Returns: (...), 1 … -0.22.
+    Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
 
-    References
-    ----------
-    J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
-
-    Examples
-    --------
     At half a cycle per pixel 2/π = 64 % is left, at one cycle nothing:
 
     >>> pixel_transfer([100, 200], 0.005).round(3)
@@ -151,28 +106,15 @@ def lens_transfer(
     copy, where the waves differ by defocus: c / (8 N) at the rim. At c = 0 it is `diffraction_transfer`, and for λ → 0
     `disc_transfer`. Good to 1e-6 up to f c = 30.
 
-    Parameters
-    ----------
-    per_mm : array_like (...)
-        The grating's frequency f in cycles per mm.
-    f_number : array_like (...)
-        The working f-number N, a ratio.
-    wavelength_nm : array_like (...)
-        λ in nanometres.
-    diameter_mm : array_like (...)
-        Of the disc that the rays make at the sensor in mm, c.
+    Args:
+        per_mm: (...), the grating's frequency f in cycles per mm.
+        f_number: (...), the working f-number N, a ratio.
+        wavelength_nm: (...), λ in nanometres.
+        diameter_mm: (...), of the disc that the rays make at the sensor in mm, c.
 
-    Returns
-    -------
-    array (...)
-        1 or less, negative where bright and dark lines change places.
+    Returns: (...), 1 or less, negative where bright and dark lines change places.
+    Source: H. H. Hopkins, The frequency response of a defocused optical system, Proc. R. Soc. A 231 (1955).
 
-    References
-    ----------
-    H. H. Hopkins, The frequency response of a defocused optical system, Proc. R. Soc. A 231 (1955).
-
-    Examples
-    --------
     In focus it is diffraction's; a disc of 0.02 mm halves that at 50 cycles per mm:
 
     >>> lens_transfer(50, 8, diameter_mm=[0, 0.02]).round(2), diffraction_transfer(50, 8).round(2)
@@ -195,26 +137,14 @@ def unvignetted_share(angle_rad: ArrayLike, aperture_mm: ArrayLike, rim_mm: Arra
 
     Seen aslant, the rim's disc moves aside by distance · tan θ. What is left is the overlap of two discs.
 
-    Parameters
-    ----------
-    angle_rad : array_like (...)
-        θ, from the axis, in radians.
-    aperture_mm, rim_mm : array_like (...)
-        Diameters in mm.
-    distance_mm : array_like (...)
-        From the rim to the aperture in mm.
+    Args:
+        angle_rad: (...), θ, from the axis, in radians.
+        aperture_mm, rim_mm: (...), diameters in mm.
+        distance_mm: (...), from the rim to the aperture in mm.
 
-    Returns
-    -------
-    array (...)
-        0 … 1.
+    Returns: (...), 0 … 1.
+    Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
-    References
-    ----------
-    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
-
-    Examples
-    --------
     A rim as wide as the aperture, moved by half its width, leaves 2/3 - √3/(2π) = 39 %:
 
     >>> unvignetted_share(np.arctan(0.25), aperture_mm=10, rim_mm=10, distance_mm=20).round(3)
@@ -234,24 +164,13 @@ def unvignetted_share(angle_rad: ArrayLike, aperture_mm: ArrayLike, rim_mm: Arra
 def exposure_value(f_number: ArrayLike, shutter_s: ArrayLike) -> Array:
     """EV = log2(N² / t): settings of the same EV let the same light fall on the sensor; one more is half of it.
 
-    Parameters
-    ----------
-    f_number : array_like (...)
-        N, a ratio.
-    shutter_s : array_like (...)
-        t in seconds.
+    Args:
+        f_number: (...), N, a ratio.
+        shutter_s: (...), t in seconds.
 
-    Returns
-    -------
-    array (...)
-        In stops.
+    Returns: (...), in stops.
+    Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
-    References
-    ----------
-    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
-
-    Examples
-    --------
     f/8 and 1/100 s, and one stop less light:
 
     >>> exposure_value([8, 8], [1 / 100, 1 / 200]).round(1)

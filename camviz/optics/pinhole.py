@@ -51,22 +51,13 @@ np.float64(1.0)
 def geometric_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, object_mm: ArrayLike = np.inf) -> Array:
     """The diameter of the hole's shadow of a point: d (Z + f) / Z, by similar triangles.
 
-    Parameters
-    ----------
-    diameter_mm : array_like (...)
-        Of the hole in mm, d.
-    focal_mm : array_like (...)
-        From the hole to the wall in mm, f.
-    object_mm : array_like (...)
-        From the hole to the point in mm, Z.
+    Args:
+        diameter_mm: (...), of the hole in mm, d.
+        focal_mm: (...), from the hole to the wall in mm, f.
+        object_mm: (...), from the hole to the point in mm, Z.
 
-    Returns
-    -------
-    array (...)
-        In mm.
+    Returns: (...), in mm.
 
-    Examples
-    --------
     >>> geometric_blur_mm(0.5, focal_mm=100, object_mm=[1000, np.inf])
     array([0.55, 0.5 ])
     """
@@ -76,26 +67,14 @@ def geometric_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, object_mm: Ar
 def diffraction_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, wavelength_nm: float = GREEN_NM) -> Array:
     """The diameter of the Airy disc: 2.44 λ f / d.
 
-    Parameters
-    ----------
-    diameter_mm : array_like (...)
-        Of the hole in mm, d.
-    focal_mm : array_like (...)
-        From the hole to the wall in mm, f.
-    wavelength_nm : float
-        λ.
+    Args:
+        diameter_mm: (...), of the hole in mm, d.
+        focal_mm: (...), from the hole to the wall in mm, f.
+        wavelength_nm: λ.
 
-    Returns
-    -------
-    array (...)
-        In mm.
+    Returns: (...), in mm.
+    Source: M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
 
-    References
-    ----------
-    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
-
-    Examples
-    --------
     A hole half as wide blurs twice as much:
 
     >>> diffraction_blur_mm([0.4, 0.2], focal_mm=100, wavelength_nm=500).round(3)  # 2.44 · 0.0005 · 100 / 0.4
@@ -111,24 +90,14 @@ def pinhole_blur_mm(
 
     A rule of thumb for the circle that holds the share of light an Airy disc does, 84 %; `pinhole_spread` is exact.
 
-    Parameters
-    ----------
-    diameter_mm : array_like (...)
-        Of the hole in mm.
-    focal_mm : array_like (...)
-        From the hole to the wall in mm.
-    object_mm : array_like (...)
-        From the hole to the point in mm.
-    wavelength_nm : float
-        Of the light.
+    Args:
+        diameter_mm: (...), of the hole in mm.
+        focal_mm: (...), from the hole to the wall in mm.
+        object_mm: (...), from the hole to the point in mm.
+        wavelength_nm: Of the light.
 
-    Returns
-    -------
-    array (...)
-        In mm.
+    Returns: (...), in mm.
 
-    Examples
-    --------
     Neither the narrow nor the wide hole is the sharpest:
 
     >>> pinhole_blur_mm([0.1, best_hole_mm(100), 1.0], focal_mm=100).round(2)
@@ -141,26 +110,14 @@ def pinhole_blur_mm(
 def best_hole_mm(focal_mm: ArrayLike, wavelength_nm: float = GREEN_NM, constant: float = BALANCE) -> Array:
     """The diameter of the sharpest hole for distant objects: c sqrt(f λ).
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        From the hole to the wall in mm, f.
-    wavelength_nm : float
-        λ.
-    constant : float
-        c: with BALANCE, `pinhole_blur_mm` is least; RAYLEIGH and YOUNG are other ideas of what is sharp.
+    Args:
+        focal_mm: (...), from the hole to the wall in mm, f.
+        wavelength_nm: λ.
+        constant: c: with BALANCE, `pinhole_blur_mm` is least; RAYLEIGH and YOUNG are other ideas of what is sharp.
 
-    Returns
-    -------
-    array (...)
-        In mm.
+    Returns: (...), in mm.
+    Source: M. Young, Pinhole optics, Applied Optics 10 (1971).
 
-    References
-    ----------
-    M. Young, Pinhole optics, Applied Optics 10 (1971).
-
-    Examples
-    --------
     >>> best_hole_mm(100).round(2), best_hole_mm(400).round(2)  # four times as far, twice as wide
     (np.float64(0.37), np.float64(0.73))
     """
@@ -172,28 +129,15 @@ def fresnel_number(
 ) -> float:
     """How many half wavelengths longer the way past the hole's rim is: a² (1/f + 1/Z) / λ.
 
-    Parameters
-    ----------
-    diameter_mm : float
-        Of the hole, 2a.
-    focal_mm : float
-        From the hole to the wall, f.
-    object_mm : float
-        From the hole to the point, Z.
-    wavelength_nm : float
-        λ.
+    Args:
+        diameter_mm: Of the hole, 2a.
+        focal_mm: From the hole to the wall, f.
+        object_mm: From the hole to the point, Z.
+        wavelength_nm: λ.
 
-    Returns
-    -------
-    float
-        Far above 1 the image is the hole's shadow, far below an Airy disc.
+    Returns: Far above 1 the image is the hole's shadow, far below an Airy disc.
+    Source: M. Young, Pinhole optics, Applied Optics 10 (1971).
 
-    References
-    ----------
-    M. Young, Pinhole optics, Applied Optics 10 (1971).
-
-    Examples
-    --------
     >>> round(fresnel_number(1.0, focal_mm=100, wavelength_nm=500), 6)  # 0.25 / (100 · 0.0005)
     5.0
     """
@@ -211,30 +155,16 @@ def pinhole_spread(
 
     A shadow for a wide hole, an Airy disc for a narrow one, and between them fringes. One wavelength, small angles.
 
-    Parameters
-    ----------
-    radius_mm : array_like (...)
-        From the middle in mm.
-    diameter_mm : float
-        Of the hole.
-    focal_mm : float
-        From the hole to the wall.
-    object_mm : float
-        From the hole to the point.
-    wavelength_nm : float
-        Of the light.
+    Args:
+        radius_mm: (...), from the middle in mm.
+        diameter_mm: Of the hole.
+        focal_mm: From the hole to the wall.
+        object_mm: From the hole to the point.
+        wavelength_nm: Of the light.
 
-    Returns
-    -------
-    array (...)
-        Shares of the light per mm²: over the whole wall they sum to 1.
+    Returns: (...), shares of the light per mm²: over the whole wall they sum to 1.
+    Source: M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.8.1.
 
-    References
-    ----------
-    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.8.1.
-
-    Examples
-    --------
     At a Fresnel number of 1 the middle is four times as bright as the plain shadow, at 2 it is dark:
 
     >>> holes = best_hole_mm(100) * np.array([2, 8**0.5]) / BALANCE
@@ -265,37 +195,18 @@ def pinhole_kernel(
 
     Beyond a Fresnel number of `many`, where the fringes are too fine to see, it is the plain shadow.
 
-    Parameters
-    ----------
-    pitch_mm : float
-        From pixel to pixel.
-    diameter_mm : float
-        Of the hole.
-    focal_mm : float
-        From the hole to the wall.
-    object_mm : float
-        From the hole to the point.
-    wavelength_nm : float
-        Of the light.
-    many : float
-        A Fresnel number.
+    Args:
+        pitch_mm: From pixel to pixel.
+        diameter_mm: Of the hole.
+        focal_mm: From the hole to the wall.
+        object_mm: From the hole to the point.
+        wavelength_nm: Of the light.
+        many: A Fresnel number.
 
-    Returns
-    -------
-    array (n, n)
-        Shares of the light that sum to 1; n is odd.
+    Returns: (n, n), shares of the light that sum to 1; n is odd.
+    Raises: ValueError for a pitch, diameter or focal length that is not above 0.
+    Source: M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.8.1.
 
-    Raises
-    ------
-    ValueError
-        For a pitch, diameter or focal length that is not above 0.
-
-    References
-    ----------
-    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.8.1.
-
-    Examples
-    --------
     A shadow of 8 mm on pixels of 0.5 mm; each holds 0.25 / (16 π) of the light:
 
     >>> kernel = pinhole_kernel(0.5, diameter_mm=8, focal_mm=100)
@@ -327,20 +238,12 @@ def pinhole_kernel(
 def f_number(diameter_mm: ArrayLike, focal_mm: ArrayLike) -> Array:
     """The f-number N = f / d.
 
-    Parameters
-    ----------
-    diameter_mm : array_like (...)
-        Of the hole or the aperture in mm.
-    focal_mm : array_like (...)
-        From the hole to the wall, or the focal length.
+    Args:
+        diameter_mm: (...), of the hole or the aperture in mm.
+        focal_mm: (...), from the hole to the wall, or the focal length.
 
-    Returns
-    -------
-    array (...)
-        A ratio.
+    Returns: (...), a ratio.
 
-    Examples
-    --------
     >>> f_number(0.5, 100)
     np.float64(200.0)
     """
@@ -352,22 +255,13 @@ def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: Arra
 
     By photographers' "sunny 16" rule, f/16 and 1/100 s are correct.
 
-    Parameters
-    ----------
-    diameter_mm : array_like (...)
-        Of the hole or the aperture in mm, d.
-    focal_mm : array_like (...)
-        From the hole to the wall, or the focal length, f.
-    exposure_s : array_like (...)
-        In seconds, t.
+    Args:
+        diameter_mm: (...), of the hole or the aperture in mm, d.
+        focal_mm: (...), from the hole to the wall, or the focal length, f.
+        exposure_s: (...), in seconds, t.
 
-    Returns
-    -------
-    array (...)
-        A ratio, 1 where the exposure is correct.
+    Returns: (...), a ratio, 1 where the exposure is correct.
 
-    Examples
-    --------
     A pinhole of f/200 takes (200/16)² as long:
 
     >>> sunny_exposure(0.5, 100, exposure_s=(200 / 16) ** 2 / 100)
@@ -379,24 +273,13 @@ def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: Arra
 def field_of_view_deg(width_mm: ArrayLike, distance_mm: ArrayLike) -> Any:
     """The angle that a wall or a sensor sees through a hole or thin lens: 2 atan(width / 2v).
 
-    Parameters
-    ----------
-    width_mm : array_like (...)
-        Of the wall or sensor in mm.
-    distance_mm : array_like (...)
-        From the hole or lens to it in mm, v.
+    Args:
+        width_mm: (...), of the wall or sensor in mm.
+        distance_mm: (...), from the hole or lens to it in mm, v.
 
-    Returns
-    -------
-    array (...)
-        In degrees.
+    Returns: array (...), in degrees.
+    Source: Szeliski (2022), section 2.1.4.
 
-    References
-    ----------
-    Szeliski (2022), section 2.1.4.
-
-    Examples
-    --------
     A lens of 50 mm on a sensor 36 mm wide:
 
     >>> field_of_view_deg(36, 50).round(1)

@@ -39,19 +39,13 @@ class SlantedEdge:
     The edge leans by 1 to 30 degrees against the columns, dark on its left; `of` turns other edges so, and refuses
     images without one. Every row crosses it at another fraction of a pixel, so that all rows together sample it finely.
 
-    Parameters
-    ----------
-    image : array (height, width)
-        *Linear* light.
-    clipped : array (height, width) of bool, optional
-        Which pixels are at an end of the camera's scale, where the number no longer tells the light.
+    Args:
+        image: (height, width), *Linear* light.
+        clipped: (height, width) of bool, which pixels are at an end of the camera's scale, where the number no longer
+            tells the light.
 
-    References
-    ----------
-    ISO 12233:2017, annex D.
+    Source: ISO 12233:2017, annex D.
 
-    Examples
-    --------
     An edge of which square pixels take the mean has the MTF of a pixel, sin(π/4) / (π/4) = 0.90 at 1/4 cycle per pixel:
 
     >>> v, u = np.mgrid[:64, :64]
@@ -67,22 +61,12 @@ class SlantedEdge:
     def of(cls, image: ArrayLike, clipped: ArrayLike | None = None) -> SlantedEdge:
         """The edge in an image, nearly vertical or nearly horizontal, dark first or bright first.
 
-        Parameters
-        ----------
-        image : array_like (height, width)
-            *Linear* light in any unit.
-        clipped : array_like (height, width) of bool, optional
-            Which pixels are at an end of the camera's scale.
+        Args:
+            image: (height, width), *Linear* light in any unit.
+            clipped: (height, width) of bool, which pixels are at an end of the camera's scale.
 
-        Returns
-        -------
-        SlantedEdge
-            Its image is turned so that the edge leans against the columns, dark on its left.
-
-        Raises
-        ------
-        ValueError
-            In one sentence, where the image holds no edge that can be measured.
+        Returns: Its image is turned so that the edge leans against the columns, dark on its left.
+        Raises: ValueError in one sentence, where the image holds no edge that can be measured.
         """
         light = np.asarray(image, dtype=float)
         ends = None if clipped is None else np.asarray(clipped, dtype=bool)
@@ -246,15 +230,10 @@ class SlantedEdge:
     def fade(self, x: Array) -> Array:
         """What counts as the edge: 1 near it, falling to 0 far away (a Tukey window).
 
-        Parameters
-        ----------
-        x : array (n,)
-            Places, in pixels from the edge.
+        Args:
+            x: (n,), places, in pixels from the edge.
 
-        Returns
-        -------
-        array (n,)
-            Weights, 0 to 1.
+        Returns: (n,), weights, 0 to 1.
         """
         end = min(2 * self.flat, self.sides.strip.room)
         fade = np.clip((end - np.abs(x)) / (end - self.flat), 0, 1)
@@ -279,30 +258,20 @@ class SlantedEdge:
     def mtf(self, frequency: ArrayLike) -> Array:
         """What is left of gratings: the MTF.
 
-        Parameters
-        ----------
-        frequency : array_like (...)
-            In cycles per pixel, 0 to 1.
+        Args:
+            frequency: (...), in cycles per pixel, 0 to 1.
 
-        Returns
-        -------
-        array (...)
-            Shares of contrast, 1 at frequency 0.
+        Returns: (...), shares of contrast, 1 at frequency 0.
         """
         return np.interp(np.asarray(frequency, dtype=float), *self.curve)
 
     def frequency_at(self, modulation: float) -> float:
         """The lowest frequency at which the MTF falls to a value.
 
-        Parameters
-        ----------
-        modulation : float
-            The share of contrast that is left.
+        Args:
+            modulation: The share of contrast that is left.
 
-        Returns
-        -------
-        float
-            In cycles per pixel; NaN where it never does.
+        Returns: In cycles per pixel; NaN where it never does.
         """
         frequency, values = self.curve
         below = np.flatnonzero(values < modulation)
@@ -334,17 +303,11 @@ class SlantedEdge:
     def log_mtf(self, frequency: float, means: Array) -> float:
         """ln MTF of another profile across this edge.
 
-        Parameters
-        ----------
-        frequency : float
-            In cycles per pixel.
-        means : array (n,)
-            The profile's means at the places of `edge_spread`, in any unit.
+        Args:
+            frequency: In cycles per pixel.
+            means: (n,), shares of the contrast, 0 to 1, at the places of `edge_spread`.
 
-        Returns
-        -------
-        float
-            Natural logarithm; 0 where all contrast is left.
+        Returns: Natural logarithm; 0 where all contrast is left.
         """
         x, _ = self.line_spread
         light = np.diff(means) * OVERSAMPLING * self.fade(x)
@@ -353,15 +316,10 @@ class SlantedEdge:
     def spread_weights(self, wave: Array) -> Array:
         """How much Σ wave · line spread changes with each strip's mean.
 
-        Parameters
-        ----------
-        wave : array (n - 1,)
-            At the places of `line_spread`; without unit.
+        Args:
+            wave: (n - 1,), weights without a unit at the places of `line_spread`.
 
-        Returns
-        -------
-        array (n,)
-            Per unit of each mean of `edge_spread`.
+        Returns: (n,), per unit of each mean of `edge_spread`.
         """
         faded = OVERSAMPLING * self.fade(self.line_spread[0]) * wave
         return -np.diff(faded, prepend=0, append=0)

@@ -17,25 +17,16 @@ from camviz.optics.pinhole import GREEN_NM
 def image_distance_mm(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
     """Where the image of an object lies: v = 1 / (1/f - 1/u), Gauss's lens equation.
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        The focal length f.
-    object_mm : array_like (...)
-        From the object to the lens in mm, u.
+    Args:
+        focal_mm: (...), the focal length f.
+        object_mm: (...), from the object to the lens in mm, u.
 
-    Returns
-    -------
-    array (...)
-        In mm behind the lens. Inside the focal length it is negative, the place from which the light seems to come; at
-        u = f it is infinite.
+    Returns:
+        (...), in mm behind the lens. Inside the focal length it is negative, the place from which the light seems to
+        come; at u = f it is infinite.
 
-    References
-    ----------
-    E. Hecht, Optics (5th ed. 2017), chapter 5; Szeliski (2022), section 2.2.3.
+    Source: E. Hecht, Optics (5th ed. 2017), chapter 5; Szeliski (2022), section 2.2.3.
 
-    Examples
-    --------
     >>> image_distance_mm(50, [100, 50, 25])
     array([100.,  inf, -50.])
     """
@@ -46,24 +37,13 @@ def image_distance_mm(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
 def object_distance_mm(focal_mm: ArrayLike, image_mm: ArrayLike) -> Array:
     """What a sensor at a distance sees sharp: u = 1 / (1/f - 1/v). The lens equation is its own inverse.
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        The focal length f.
-    image_mm : array_like (...)
-        From the lens to the sensor in mm, v.
+    Args:
+        focal_mm: (...), the focal length f.
+        image_mm: (...), from the lens to the sensor in mm, v.
 
-    Returns
-    -------
-    array (...)
-        In mm before the lens.
+    Returns: (...), in mm before the lens.
+    Source: E. Hecht, Optics (5th ed. 2017), chapter 5.
 
-    References
-    ----------
-    E. Hecht, Optics (5th ed. 2017), chapter 5.
-
-    Examples
-    --------
     A lens of 50 mm moved forward by 5 mm:
 
     >>> object_distance_mm(50, 55).round(6)
@@ -75,24 +55,13 @@ def object_distance_mm(focal_mm: ArrayLike, image_mm: ArrayLike) -> Array:
 def magnification(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
     """How many times as large as the object its image is: m = v / u = f / (u - f); it is upside down.
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        The focal length f.
-    object_mm : array_like (...)
-        From the object to the lens in mm, u.
+    Args:
+        focal_mm: (...), the focal length f.
+        object_mm: (...), from the object to the lens in mm, u.
 
-    Returns
-    -------
-    array (...)
-        A ratio; 1 is life size.
+    Returns: (...), a ratio; 1 is life size.
+    Source: E. Hecht, Optics (5th ed. 2017), chapter 5.
 
-    References
-    ----------
-    E. Hecht, Optics (5th ed. 2017), chapter 5.
-
-    Examples
-    --------
     >>> magnification(50, [100, 5050])
     array([1.  , 0.01])
     """
@@ -108,33 +77,16 @@ def circle_of_confusion_mm(
 
     By similar triangles: the cone behind the lens is f/N wide there, and a point where the sensor cuts it at v(u).
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        The focal length f.
-    f_number : array_like (...)
-        N, a ratio.
-    focus_mm : array_like (...)
-        What the lens is focused at in mm, s; infinity, too.
-    object_mm : array_like (...)
-        From the point to the lens in mm, u.
+    Args:
+        focal_mm: (...), the focal length f.
+        f_number: (...), N, a ratio.
+        focus_mm: (...), what the lens is focused at in mm, s; infinity, too.
+        object_mm: (...), from the point to the lens in mm, u.
 
-    Returns
-    -------
-    array (...)
-        In mm.
+    Returns: (...), in mm.
+    Raises: ValueError for a focus inside the focal length.
+    Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002); Szeliski (2022), section 2.2.3.
 
-    Raises
-    ------
-    ValueError
-        For a focus inside the focal length.
-
-    References
-    ----------
-    S. F. Ray, Applied Photographic Optics (3rd ed. 2002); Szeliski (2022), section 2.2.3.
-
-    Examples
-    --------
     A lens of 50 mm at f/2, focused at 2 m; the middle one is 2500 / (2 · 1950) · 1/2 mm:
 
     >>> circle_of_confusion_mm(50, 2, focus_mm=2000, object_mm=[2000, 4000, np.inf]).round(3)
@@ -149,26 +101,14 @@ def hyperfocal_mm(focal_mm: ArrayLike, f_number: ArrayLike, circle_mm: ArrayLike
 
     Focused there, everything from H/2 to infinity is blurred by no more than c.
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        The focal length f.
-    f_number : array_like (...)
-        N, a ratio.
-    circle_mm : array_like (...)
-        The widest disc that passes for sharp in mm, c.
+    Args:
+        focal_mm: (...), the focal length f.
+        f_number: (...), N, a ratio.
+        circle_mm: (...), the widest disc that passes for sharp in mm, c.
 
-    Returns
-    -------
-    array (...)
-        In mm.
+    Returns: (...), in mm.
+    Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
-    References
-    ----------
-    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
-
-    Examples
-    --------
     >>> hyperfocal_mm(50, 10, circle_mm=0.025).round(6)  # 2500 / 0.25 + 50
     np.float64(10050.0)
     """
@@ -180,33 +120,16 @@ def hyperfocal_mm(focal_mm: ArrayLike, f_number: ArrayLike, circle_mm: ArrayLike
 def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
     """Where sharpness begins: s (H - f) / (H + s - 2f); nearer than this, a point is blurred by more than c.
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        The focal length f.
-    f_number : array_like (...)
-        N, a ratio.
-    focus_mm : array_like (...)
-        What the lens is focused at in mm, s; infinity, too.
-    circle_mm : array_like (...)
-        The widest disc that passes for sharp in mm, c.
+    Args:
+        focal_mm: (...), the focal length f.
+        f_number: (...), N, a ratio.
+        focus_mm: (...), what the lens is focused at in mm, s; infinity, too.
+        circle_mm: (...), the widest disc that passes for sharp in mm, c.
 
-    Returns
-    -------
-    array (...)
-        In mm.
+    Returns: (...), in mm.
+    Raises: ValueError for a focus inside the focal length.
+    Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
-    Raises
-    ------
-    ValueError
-        For a focus inside the focal length.
-
-    References
-    ----------
-    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
-
-    Examples
-    --------
     Focused at H = 10.05 m, from H/2 on; focused at infinity, from H - f on:
 
     >>> near_limit_mm(50, 10, focus_mm=[10050, np.inf], circle_mm=0.025).round(6)
@@ -221,33 +144,16 @@ def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike,
 def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
     """Where sharpness ends: s (H - f) / (H - s); farther than this, a point is blurred by more than c.
 
-    Parameters
-    ----------
-    focal_mm : array_like (...)
-        The focal length f.
-    f_number : array_like (...)
-        N, a ratio.
-    focus_mm : array_like (...)
-        What the lens is focused at in mm, s.
-    circle_mm : array_like (...)
-        The widest disc that passes for sharp in mm, c.
+    Args:
+        focal_mm: (...), the focal length f.
+        f_number: (...), N, a ratio.
+        focus_mm: (...), what the lens is focused at in mm, s.
+        circle_mm: (...), the widest disc that passes for sharp in mm, c.
 
-    Returns
-    -------
-    array (...)
-        In mm; infinite from s = H on.
+    Returns: (...), in mm; infinite from s = H on.
+    Raises: ValueError for a focus inside the focal length.
+    Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
-    Raises
-    ------
-    ValueError
-        For a focus inside the focal length.
-
-    References
-    ----------
-    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
-
-    Examples
-    --------
     With H = 10.05 m, 5025 · 10000 / 5025 mm, and no end:
 
     >>> far_limit_mm(50, 10, focus_mm=[5025, 10051], circle_mm=0.025).round(6)
@@ -263,24 +169,13 @@ def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, 
 def working_f_number(f_number: ArrayLike, magnification: ArrayLike) -> Array:
     """The image's distance over the aperture's width, which is what the sensor sees: N (1 + m).
 
-    Parameters
-    ----------
-    f_number : array_like (...)
-        N, a ratio.
-    magnification : array_like (...)
-        m, a ratio.
+    Args:
+        f_number: (...), N, a ratio.
+        magnification: (...), m, a ratio.
 
-    Returns
-    -------
-    array (...)
-        A ratio.
+    Returns: (...), a ratio.
+    Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
-    References
-    ----------
-    S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
-
-    Examples
-    --------
     At life size it is twice as large:
 
     >>> working_f_number(2.8, 1)
@@ -292,24 +187,14 @@ def working_f_number(f_number: ArrayLike, magnification: ArrayLike) -> Array:
 def airy_radius_um(working_f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM) -> Array:
     """The first dark ring around a point's image: 1.22 λ N_w.
 
-    Parameters
-    ----------
-    working_f_number : array_like (...)
-        N_w = N (1 + m), a ratio, which the function `working_f_number` gives; far away it is the f-number N itself.
-    wavelength_nm : array_like (...)
-        λ in nanometres.
+    Args:
+        working_f_number: (...), N_w = N (1 + m), a ratio, which the function `working_f_number` gives; far away it is
+            the f-number N itself.
+        wavelength_nm: (...), λ in nanometres.
 
-    Returns
-    -------
-    array (...)
-        Its radius in micrometres.
+    Returns: (...), its radius in micrometres.
+    Source: M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
 
-    References
-    ----------
-    M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
-
-    Examples
-    --------
     >>> airy_radius_um(8, wavelength_nm=500).round(2)  # 1.22 · 0.5 · 8
     np.float64(4.88)
     """
@@ -321,22 +206,12 @@ def relative_illumination(angle_rad: ArrayLike) -> Array:
 
     The thin lens seen aslant is smaller (cos θ), farther away (cos² θ), and lights the sensor aslant (cos θ).
 
-    Parameters
-    ----------
-    angle_rad : array_like (...)
-        θ, from the axis, in radians.
+    Args:
+        angle_rad: (...), θ, from the axis, in radians.
 
-    Returns
-    -------
-    array (...)
-        A share, 0 … 1; none from 90° on, where light would come from beside or behind the lens.
+    Returns: (...), a share, 0 … 1; none from 90° on, where light would come from beside or behind the lens.
+    Source: Szeliski (2022), section 2.2.3.
 
-    References
-    ----------
-    Szeliski (2022), section 2.2.3.
-
-    Examples
-    --------
     >>> relative_illumination(np.radians([0, 30, 45])).round(4)
     array([1.    , 0.5625, 0.25  ])
     """

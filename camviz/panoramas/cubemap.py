@@ -39,8 +39,6 @@ class Layout(Enum):
     CROSS is the cube unfolded around its front, four faces wide and three high, every joint of up and down with the
     front whole; STRIP is all six in a row: front, right, back, left, up, down.
 
-    Examples
-    --------
     Faces are counted in that order, -1 is a gap:
 
     >>> Layout.CROSS.faces
@@ -83,17 +81,12 @@ class Cubemap(Lens):
     of the layout has no ray; every direction has an image. On an edge of the cube the first face of the layout's order
     is taken.
 
-    Parameters
-    ----------
-    layout : Layout
-        Where the faces lie.
+    Args:
+        layout: Where the faces lie.
 
-    References
-    ----------
-    N. Greene, Environment mapping and other applications of world projections, IEEE Comput. Graph. Appl. 6 (1986).
+    Source: N. Greene, Environment mapping and other applications of world projections, IEEE Comput. Graph. Appl. 6
+    (1986).
 
-    Examples
-    --------
     The middles of the front, the right and the lower face:
 
     >>> Cubemap().project([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
@@ -136,29 +129,15 @@ class Cubemap(Lens):
 def cubemap_camera(side: int, layout: Layout = Layout.CROSS) -> Camera:
     """The camera whose picture is a whole cube map.
 
-    Parameters
-    ----------
-    side : int
-        Of a face, in pixels.
-    layout : Layout
-        Where the faces lie.
+    Args:
+        side: Of a face, in pixels.
+        layout: Where the faces lie.
 
-    Returns
-    -------
-    Camera
-        At the origin, its front looking along z.
+    Returns: Camera at the origin, its front looking along z.
+    Raises: ValueError for a side that is no whole number, or below 1.
+    Source: N. Greene, Environment mapping and other applications of world projections, IEEE Comput. Graph. Appl. 6
+    (1986).
 
-    Raises
-    ------
-    ValueError
-        For a side that is no whole number, or below 1.
-
-    References
-    ----------
-    N. Greene, Environment mapping and other applications of world projections, IEEE Comput. Graph. Appl. 6 (1986).
-
-    Examples
-    --------
     Straight ahead is the middle of the second face in the second row, to the right of it what is at right angles:
 
     >>> cubemap_camera(100).project([[0, 0, 1], [1, 0, 0]])
@@ -173,25 +152,13 @@ def cubemap_camera(side: int, layout: Layout = Layout.CROSS) -> Camera:
 def face_camera(face: str, side: int) -> Camera:
     """The perspective camera of 90° that takes one face of a cube map.
 
-    Parameters
-    ----------
-    face : {"front", "right", "back", "left", "up", "down"}
-        Where it looks.
-    side : int
-        In pixels.
+    Args:
+        face: {"front", "right", "back", "left", "up", "down"}, where it looks.
+        side: In pixels.
 
-    Returns
-    -------
-    Camera
-        At the origin.
+    Returns: Camera at the origin.
+    Raises: ValueError for any other word, naming these.
 
-    Raises
-    ------
-    ValueError
-        For any other word, naming these.
-
-    Examples
-    --------
     >>> face_camera("up", 101).project([0, -1, 0])  # y points down
     array([50., 50.])
     """

@@ -36,26 +36,15 @@ class Mirror:
 
     The origin is its focus; z runs from there towards the camera, with the top p/(1 + e) above.
 
-    Parameters
-    ----------
-    eccentricity : float
-        e: 0 for a sphere, 1 for a paraboloid, more for a hyperboloid.
-    curvature_radius : float
-        p, of its top, in metres.
-    rim : float
-        The distance of its edge from the axis, in metres.
+    Args:
+        eccentricity: e: 0 for a sphere, 1 for a paraboloid, more for a hyperboloid.
+        curvature_radius: p, of its top, in metres.
+        rim: The distance of its edge from the axis, in metres.
 
-    Raises
-    ------
-    ValueError
-        For an eccentricity below 0, and a radius or rim that is not positive.
+    Raises: ValueError for an eccentricity below 0, and a radius or rim that is not positive.
+    Source: S. Baker and S. K. Nayar, A theory of single-viewpoint catadioptric image formation, Int. J. Comput. Vis. 35
+    (1999).
 
-    References
-    ----------
-    S. Baker and S. K. Nayar, A theory of single-viewpoint catadioptric image formation, Int. J. Comput. Vis. 35 (1999).
-
-    Examples
-    --------
     A paraboloid of p = 4 cm is x² / 2p = 1.125 cm deep at a rim of 3 cm:
 
     >>> mirror = Mirror(eccentricity=1, curvature_radius=0.04, rim=0.03)
@@ -93,15 +82,10 @@ class Mirror:
     def depth(self, radius: ArrayLike) -> Array:
         """How far below the top the surface is.
 
-        Parameters
-        ----------
-        radius : array_like (...)
-            Distances from the axis in metres.
+        Args:
+            radius: (...), distances from the axis in metres.
 
-        Returns
-        -------
-        array (...)
-            In metres; NaN where there is no mirror.
+        Returns: (...), in metres; NaN where there is no mirror.
         """
         radius, p = np.asarray(radius, dtype=float), self.curvature_radius
         with np.errstate(invalid="ignore"):
@@ -111,15 +95,10 @@ class Mirror:
     def normal(self, points: ArrayLike) -> Array:
         """The surface's normals, outwards: half the gradient of the quadric.
 
-        Parameters
-        ----------
-        points : array_like (..., 3)
-            Of the surface, in metres.
+        Args:
+            points: (..., 3), of the surface, in metres.
 
-        Returns
-        -------
-        array (..., 3)
-            Unit vectors.
+        Returns: (..., 3), unit vectors.
         """
         x, y, z = np.moveaxis(as_points(points, 3, "points"), -1, 0)
         return unit(np.stack([x, y, self.curvature_radius - (1 - self.eccentricity**2) * (self.top - z)], axis=-1))
@@ -127,15 +106,10 @@ class Mirror:
     def intersect(self, origins: Array, directions: Array) -> Array:
         """Where rays meet the mirror first.
 
-        Parameters
-        ----------
-        origins, directions : array (..., 3)
-            In metres; the directions of any length.
+        Args:
+            origins, directions: (..., 3), in metres; the directions of any length.
 
-        Returns
-        -------
-        array (..., 3)
-            Points in metres; NaN where a ray misses.
+        Returns: (..., 3), points in metres; NaN where a ray misses.
         """
         shape = 1 - self.eccentricity**2
         start, step = self.top - origins[..., 2], -directions[..., 2]
@@ -160,25 +134,15 @@ class Catadioptric:
     Image points are (x, y)/z of the camera; of an orthographic one x and y in metres. They are not mirrored: left and
     right are swapped back.
 
-    Parameters
-    ----------
-    mirror : Mirror
-        Its focus is the origin.
-    distance : float
-        The camera is at z = `distance` metres; at infinity it is orthographic.
+    Args:
+        mirror: Its focus is the origin.
+        distance: The camera is at z = `distance` metres; at infinity it is orthographic.
 
-    Raises
-    ------
-    ValueError
-        For a camera that is not above the mirror's top.
+    Raises: ValueError for a camera that is not above the mirror's top.
+    Source: S. Baker and S. K. Nayar, A theory of single-viewpoint catadioptric image formation, Int. J. Comput. Vis. 35
+    (1999); C. Geyer and K. Daniilidis, A unifying theory for central panoramic systems and practical implications, ECCV
+    2000.
 
-    References
-    ----------
-    S. Baker and S. K. Nayar, A theory of single-viewpoint catadioptric image formation, Int. J. Comput. Vis. 35 (1999);
-    C. Geyer and K. Daniilidis, A unifying theory for central panoramic systems and practical implications, ECCV 2000.
-
-    Examples
-    --------
     A paraboloid shows the horizon at the radius p, and what it shows comes straight from its focus:
 
     >>> camera = Catadioptric.central(Mirror(eccentricity=1, curvature_radius=0.04))
@@ -198,35 +162,21 @@ class Catadioptric:
     def central(cls, mirror: Mirror) -> Catadioptric:
         """With the camera in the mirror's second focus, so that there is a single viewpoint.
 
-        Parameters
-        ----------
-        mirror : Mirror
-            A paraboloid or a hyperboloid.
+        Args:
+            mirror: A paraboloid or a hyperboloid.
 
-        Returns
-        -------
-        Catadioptric
-            With a perspective camera, or with an orthographic one for a paraboloid.
-
-        Raises
-        ------
-        ValueError
-            For an eccentricity below 1.
+        Returns: Catadioptric with a perspective camera, or with an orthographic one for a paraboloid.
+        Raises: ValueError for an eccentricity below 1.
         """
         return cls(mirror, mirror.second_focus)
 
     def moved(self, metres: float) -> Catadioptric:
         """With the camera farther from the mirror.
 
-        Parameters
-        ----------
-        metres : float
-            By how much.
+        Args:
+            metres: By how much.
 
-        Returns
-        -------
-        Catadioptric
-            Of the same mirror.
+        Returns: Catadioptric of the same mirror.
         """
         return replace(self, distance=self.distance + metres)
 
@@ -245,17 +195,12 @@ class Catadioptric:
     def before(self, xy: ArrayLike) -> tuple[Array, Array]:
         """The camera's own rays to image points, before the mirror.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            In focal lengths; of an orthographic camera in metres.
+        Args:
+            xy: (..., 2), in focal lengths; of an orthographic camera in metres.
 
-        Returns
-        -------
-        starts : array (..., 3)
-            In metres.
-        directions : array (..., 3)
-            Unit vectors.
+        Returns:
+            starts: (..., 3), in metres.
+            directions: (..., 3), unit vectors.
         """
         xy = as_points(xy, 2, "xy")
         back = -np.ones_like(xy[..., :1])
@@ -268,17 +213,12 @@ class Catadioptric:
     def trace(self, xy: ArrayLike) -> tuple[Array, Array]:
         """The rays seen at image points: where they leave the mirror, by the law of reflection d - 2 (d·n) n.
 
-        Parameters
-        ----------
-        xy : array_like (..., 2)
-            In focal lengths; of an orthographic camera in metres.
+        Args:
+            xy: (..., 2), in focal lengths; of an orthographic camera in metres.
 
-        Returns
-        -------
-        points : array (..., 3)
-            Where the rays leave the mirror, in metres; NaN where there is none.
-        directions : array (..., 3)
-            Unit vectors; NaN where there is none.
+        Returns:
+            points: (..., 3), where the rays leave the mirror, in metres; NaN where there is none.
+            directions: (..., 3), unit vectors; NaN where there is none.
         """
         starts, directions = self.before(xy)
         points = self.mirror.intersect(starts, directions)
@@ -288,10 +228,7 @@ class Catadioptric:
     def rim(self) -> float:
         """The radius of the image of the mirror's rim.
 
-        Returns
-        -------
-        float
-            In focal lengths; of an orthographic camera in metres.
+        Returns: In focal lengths; of an orthographic camera in metres.
         """
         below = float(self.mirror.depth(self.mirror.rim))
         away = self.distance - self.mirror.top + below
@@ -300,19 +237,11 @@ class Catadioptric:
     def caustic(self, xs: ArrayLike) -> Array:
         """Where neighbouring rays of one plane through the axis cross: the envelope of the reflected rays, prolonged.
 
-        Parameters
-        ----------
-        xs : array_like (n,)
-            Image radii, in focal lengths or metres.
+        Args:
+            xs: (n,), image radii, in focal lengths or metres.
 
-        Returns
-        -------
-        array (n, 2)
-            Radius and z in metres; one point for a central camera.
-
-        References
-        ----------
-        R. Swaminathan, M. D. Grossberg and S. K. Nayar, Non-single viewpoint catadioptric cameras: geometry and
+        Returns: (n, 2), radius and z in metres; one point for a central camera.
+        Source: R. Swaminathan, M. D. Grossberg and S. K. Nayar, Non-single viewpoint catadioptric cameras: geometry and
         analysis, Int. J. Comput. Vis. 66 (2006).
         """
         xs = np.asarray(xs, dtype=float)
@@ -329,15 +258,10 @@ class Catadioptric:
     def best_viewpoint(self, xs: ArrayLike) -> float:
         """The point on the axis that is nearest, by least squares, to the rays that are seen.
 
-        Parameters
-        ----------
-        xs : array_like (n,)
-            Image radii, in focal lengths or metres.
+        Args:
+            xs: (n,), image radii, in focal lengths or metres.
 
-        Returns
-        -------
-        float
-            Its z in metres.
+        Returns: Its z in metres.
         """
         points, directions = self._meridian(np.asarray(xs, dtype=float))
         sine, off = directions[:, 0], _cross(points, directions)  # the distance from (0, z) is |off + z sine|

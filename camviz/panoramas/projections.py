@@ -19,21 +19,13 @@ from camviz.panoramas.cubemap import FACES, Layout, cubemap_camera, face_camera
 class Projection:
     """A kind of picture: how it is made for a size and a field of view, and what is usual.
 
-    Attributes
-    ----------
-    make : callable
-        Makes the camera of a width and height in pixels and a field in degrees.
-    hfov_deg : float
-        The usual horizontal field.
-    widest_deg : float
-        The widest field; 0 where the field cannot be chosen.
-    closed : bool
-        Whether the widest itself is allowed.
-    aspect : float
-        The usual width : height.
+    Attributes:
+        make: Makes the camera of a width and height in pixels and a field in degrees.
+        hfov_deg: The usual horizontal field.
+        widest_deg: The widest field; 0 where the field cannot be chosen.
+        closed: Whether the widest itself is allowed.
+        aspect: The usual width : height.
 
-    Examples
-    --------
     >>> fisheye = projection("fisheye:equidistant")
     >>> fisheye.hfov_deg, fisheye.widest_deg
     (180, 360)
@@ -48,22 +40,12 @@ class Projection:
     def camera(self, width: int, height: int, hfov_deg: float | None = None) -> Camera:
         """The camera of a size, looking ahead.
 
-        Parameters
-        ----------
-        width, height : int
-            In pixels.
-        hfov_deg : float, optional
-            The horizontal field; by default the usual one.
+        Args:
+            width, height: In pixels.
+            hfov_deg: The horizontal field; by default the usual one.
 
-        Returns
-        -------
-        Camera
-            At the origin.
-
-        Raises
-        ------
-        ValueError
-            For a size or field that it does not take, saying which it does.
+        Returns: Camera at the origin.
+        Raises: ValueError for a size or field that it does not take, saying which it does.
         """
         if hfov_deg is None:
             return self.make(width, height, self.hfov_deg)
@@ -78,24 +60,14 @@ class Projection:
 def projection(name: str) -> Projection:
     """The projection of a name.
 
-    Parameters
-    ----------
-    name : str
-        "perspective", "equirectangular", "cylindrical", "fisheye:equidistant", "fisheye:equisolid",
-        "fisheye:stereographic", "fisheye:orthographic", "cube", "cube:strip", or a face of the cube such as "cube:up".
+    Args:
+        name: "perspective", "equirectangular", "cylindrical", "fisheye:equidistant", "fisheye:equisolid",
+            "fisheye:stereographic", "fisheye:orthographic", "cube", "cube:strip", or a face of the cube such as
+            "cube:up".
 
-    Returns
-    -------
-    Projection
-        What makes its cameras.
+    Returns: What makes its cameras.
+    Raises: ValueError with the names there are, and the nearest, for any other.
 
-    Raises
-    ------
-    ValueError
-        With the names there are, and the nearest, for any other.
-
-    Examples
-    --------
     A fisheye's half field of 90° reaches the edge of its picture, at 180 - 0.5:
 
     >>> projection("fisheye:equidistant").camera(180, 180).project([0, 1, 0]).round(6)

@@ -42,34 +42,18 @@ def reproject(
     Where a pixel of the target covers several of the source, n × n samples spread evenly over it are averaged, n being
     how many it covers along a side, rounded, at most 16. That is the box filter of the new pixel.
 
-    Parameters
-    ----------
-    picture : array_like (height, width) or (height, width, channels)
-        What `source` took, 1 to 4 channels of any unit, as integers of up to 16 bits or floats.
-    source, target : Camera
-        Whose picture it is, and whose is wanted.
-    nothing : array_like () or (channels,), optional
-        What a pixel shows that has no ray, or whose ray `source` does not see: a share of full scale (1 for floats).
-        With None the result has one channel more, alpha: 0 there, full elsewhere.
-    antialias : bool
-        Without it one sample is taken at the centre of each pixel.
+    Args:
+        picture: (height, width) or (height, width, channels), what `source` took, 1 to 4 channels of any unit, as
+            integers of up to 16 bits or floats.
+        source, target: Whose picture it is, and whose is wanted.
+        nothing: scalar or (channels,), what a pixel shows that has no ray, or whose ray `source` does not see: a share
+            of full scale (1 for floats). With None the result has one channel more, alpha: 0 there, full elsewhere.
+        antialias: Without it one sample is taken at the centre of each pixel.
 
-    Returns
-    -------
-    array (height, width) or (height, width, channels)
-        Of the target's size and the picture's kind.
+    Returns: array (height, width) or (height, width, channels), of the target's size and the picture's kind.
+    Raises: ValueError for a picture that is not of the source's size, or of a kind that cannot be interpolated.
+    Source: Szeliski (2022), sections 3.6.1 and 8.2.6.
 
-    Raises
-    ------
-    ValueError
-        For a picture that is not of the source's size, or of a kind that cannot be interpolated.
-
-    References
-    ----------
-    Szeliski (2022), sections 3.6.1 and 8.2.6.
-
-    Examples
-    --------
     A panorama whose right half is white, seen straight ahead:
 
     >>> panorama = np.zeros((180, 360))
@@ -107,27 +91,14 @@ def window(
 
     The axes are those of the frustum view: Y X Z, each in the frame turned so far.
 
-    Parameters
-    ----------
-    width, height : int
-        In pixels.
-    hfov_deg : float
-        Its horizontal field, between 0 and 180 degrees.
-    yaw_deg, pitch_deg, roll_deg : float
-        To the right, up and clockwise, in degrees.
+    Args:
+        width, height: In pixels.
+        hfov_deg: Its horizontal field, between 0 and 180 degrees.
+        yaw_deg, pitch_deg, roll_deg: To the right, up and clockwise, in degrees.
 
-    Returns
-    -------
-    Camera
-        At the origin.
+    Returns: Camera at the origin.
+    Raises: ValueError for a field outside (0, 180) degrees.
 
-    Raises
-    ------
-    ValueError
-        For a field outside (0, 180) degrees.
-
-    Examples
-    --------
     Turned by 90° its middle sees what lies to the right:
 
     >>> window(640, 480, hfov_deg=60, yaw_deg=90).project([1, 0, 0])
@@ -147,27 +118,13 @@ def equirectangular_camera(width: int, height: int) -> Camera:
 
     Longitudes -180° … 180° lie over the width, and the poles at both edges.
 
-    Parameters
-    ----------
-    width, height : int
-        In pixels; twice as wide as high for square pixels.
+    Args:
+        width, height: In pixels; twice as wide as high for square pixels.
 
-    Returns
-    -------
-    Camera
-        At the origin.
+    Returns: Camera at the origin.
+    Raises: ValueError for a width or height that is no whole number, or below 1.
+    Source: Szeliski (2022), section 8.2.6.
 
-    Raises
-    ------
-    ValueError
-        For a width or height that is no whole number, or below 1.
-
-    References
-    ----------
-    Szeliski (2022), section 8.2.6.
-
-    Examples
-    --------
     One pixel a degree: what lies at right angles is 90 pixels beside the middle:
 
     >>> equirectangular_camera(360, 180).project([[0, 0, 1], [1, 0, 0]])

@@ -21,28 +21,17 @@ class Ring:
 
     Each shows what lies nearest its own direction, and, with an overlap, a part of what its neighbours show.
 
-    Parameters
-    ----------
-    cameras : int
-        How many, at least 2.
-    radius : float
-        Of the circle, in metres.
-    overlap : float
-        How far a camera's picture reaches into its neighbours' parts, 0 … 1 of the way.
-    turn : float
-        The first camera looks so many radians to the right of z.
+    Args:
+        cameras: How many, at least 2.
+        radius: Of the circle, in metres.
+        overlap: How far a camera's picture reaches into its neighbours' parts, 0 … 1 of the way.
+        turn: The first camera looks so many radians to the right of z.
 
-    Raises
-    ------
-    ValueError
-        For fewer than 2 cameras, a radius below 0, an overlap outside 0 … 1 and a turn that is not finite.
+    Raises:
+        ValueError: For fewer than 2 cameras, a radius below 0, an overlap outside 0 … 1 and a turn that is not finite.
 
-    References
-    ----------
-    Szeliski (2022), section 8.3.2, for parallax in stitched pictures.
+    Source: Szeliski (2022), section 8.3.2, for parallax in stitched pictures.
 
-    Examples
-    --------
     Six cameras on a circle of 10 cm are 10 cm from each other. Stitched for infinity, they show a point at 10 m twice,
     0.01 rad apart:
 
@@ -90,15 +79,10 @@ class Ring:
     def nearest(self, longitudes: ArrayLike) -> NDArray[np.intp]:
         """Which camera looks most nearly at a longitude.
 
-        Parameters
-        ----------
-        longitudes : array_like (...)
-            In radians, to the right of z.
+        Args:
+            longitudes: (...), in radians, to the right of z.
 
-        Returns
-        -------
-        array (...)
-            Numbers of cameras, from 0.
+        Returns: (...), numbers of cameras, from 0.
         """
         turns = self._turns(longitudes)
         return np.rint(turns).astype(np.intp) % self.cameras
@@ -106,17 +90,12 @@ class Ring:
     def second(self, longitudes: ArrayLike) -> tuple[NDArray[np.intp], Array]:
         """The next nearest camera, and its share of the picture.
 
-        Parameters
-        ----------
-        longitudes : array_like (...)
-            In radians, to the right of z.
+        Args:
+            longitudes: (...), in radians, to the right of z.
 
-        Returns
-        -------
-        camera : array (...)
-            Numbers of cameras, from 0.
-        share : array (...)
-            Half at a seam, 0 beyond the overlap.
+        Returns:
+            camera: (...), numbers of cameras, from 0.
+            share: (...), half at a seam, 0 beyond the overlap.
         """
         turns = self._turns(longitudes)
         off = turns - np.rint(turns)  # ±½ at the seams
@@ -135,22 +114,12 @@ class Ring:
         A camera α = π/n to the side sees the point ψ off the seam, tan ψ = r sin α / (Z - r cos α); its ray crosses the
         circle of radius S at φ = ψ - asin(Z sin ψ / S). Of two cameras: 2φ, about b (1/Z - 1/S) far away.
 
-        Parameters
-        ----------
-        distance : array_like (...)
-            Z, from the ring's centre in metres.
-        stitched : float
-            S, the distance in metres that the panorama is stitched for, which may be infinite.
+        Args:
+            distance: (...), Z, from the ring's centre in metres.
+            stitched: S, the distance in metres that the panorama is stitched for, which may be infinite.
 
-        Returns
-        -------
-        array (...)
-            In radians; positive where the images are crossed, nearer than S; NaN inside the ring.
-
-        Raises
-        ------
-        ValueError
-            Where S is not beyond the ring.
+        Returns: (...), in radians; positive where the images are crossed, nearer than S; NaN inside the ring.
+        Raises: ValueError where S is not beyond the ring.
         """
         if not stitched > self.radius:
             raise ValueError(f"stitched must be beyond the ring, {self.radius:g} m, got {stitched}")
@@ -163,21 +132,14 @@ class Ring:
     def rays(self, directions: ArrayLike, stitched: float, camera: ArrayLike | None = None) -> tuple[Array, Array]:
         """The rays of cameras that stand in for rays from the middle.
 
-        Parameters
-        ----------
-        directions : array_like (..., 3)
-            Unit vectors from the middle.
-        stitched : float
-            The rays go to the points that lie so many metres out.
-        camera : array_like (...), optional
-            Numbers of cameras; by default the nearest.
+        Args:
+            directions: (..., 3), unit vectors from the middle.
+            stitched: The rays go to the points that lie so many metres out.
+            camera: (...), numbers of cameras; by default the nearest.
 
-        Returns
-        -------
-        origins : array (..., 3)
-            In metres.
-        directions : array (..., 3)
-            Unit vectors.
+        Returns:
+            origins: (..., 3), in metres.
+            directions: (..., 3), unit vectors.
         """
         directions = np.asarray(directions, dtype=float)
         nearest = self.nearest(np.arctan2(directions[..., 0], directions[..., 2]))
@@ -187,19 +149,12 @@ class Ring:
     def panorama(self, scene: Scene, pixels: Intrinsics, stitched: float = inf) -> Floats:
         """The panorama of a scene; where cameras overlap, their pictures are faded into each other.
 
-        Parameters
-        ----------
-        scene : Scene
-            What is photographed.
-        pixels : Intrinsics
-            Equirectangular pixels; fx is their number per radian.
-        stitched : float
-            The distance in metres that it is stitched for.
+        Args:
+            scene: What is photographed.
+            pixels: Equirectangular pixels; fx is their number per radian.
+            stitched: The distance in metres that it is stitched for.
 
-        Returns
-        -------
-        array (height, width, 3)
-            Linear light, float32.
+        Returns: (height, width, 3), linear light, float32.
         """
         angles = pixels.from_pixels(pixels.grid()).reshape(-1, 2)
         directions = Equirectangular().unproject(angles)

@@ -12,22 +12,12 @@ SKYLIGHT = 0.42  # the share of light that comes from everywhere, and reaches th
 def to_linear(encoded: ArrayLike) -> NDArray[np.floating]:
     """Linear light of sRGB values: what the screen's curve makes of them.
 
-    Parameters
-    ----------
-    encoded : array_like, any shape
-        sRGB values 0 … 1, or uint8 bytes 0 … 255.
+    Args:
+        encoded: any shape, sRGB values 0 … 1, or uint8 bytes 0 … 255.
 
-    Returns
-    -------
-    array, any shape
-        Linear, 0 … 1; float32 for bytes.
+    Returns: any shape, linear, 0 … 1; float32 for bytes.
+    Source: IEC 61966-2-1:1999, section 5.2.
 
-    References
-    ----------
-    IEC 61966-2-1:1999, section 5.2.
-
-    Examples
-    --------
     Half of the values is a fifth of the light:
 
     >>> to_linear([0.0, 0.5, 1.0]).round(3)
@@ -42,22 +32,12 @@ def to_linear(encoded: ArrayLike) -> NDArray[np.floating]:
 def to_encoded(linear: ArrayLike) -> Array:
     """sRGB values of linear light: the inverse of `to_linear`.
 
-    Parameters
-    ----------
-    linear : array_like, any shape
-        Linear light 0 … 1.
+    Args:
+        linear: any shape, linear light 0 … 1.
 
-    Returns
-    -------
-    array, any shape
-        0 … 1.
+    Returns: any shape, 0 … 1.
+    Source: IEC 61966-2-1:1999, section 5.2.
 
-    References
-    ----------
-    IEC 61966-2-1:1999, section 5.2.
-
-    Examples
-    --------
     A grey card of 18 % is not far from the middle of the values:
 
     >>> to_encoded(0.18).round(3)  # 1.055 · 0.18^(1/2.4) - 0.055
@@ -70,22 +50,12 @@ def to_encoded(linear: ArrayLike) -> Array:
 def to_display(radiance: ArrayLike) -> NDArray[np.uint8]:
     """sRGB bytes of linear radiance.
 
-    Parameters
-    ----------
-    radiance : array_like, any shape
-        Linear; 1 is white, what is brighter is cut off, and NaN is black.
+    Args:
+        radiance: any shape, linear; 1 is white, what is brighter is cut off, and NaN is black.
 
-    Returns
-    -------
-    array, any shape
-        0 … 255, uint8.
+    Returns: any shape, 0 … 255, uint8.
+    Source: IEC 61966-2-1:1999, section 5.2.
 
-    References
-    ----------
-    IEC 61966-2-1:1999, section 5.2.
-
-    Examples
-    --------
     >>> to_display([0, 0.18, 1, 2, np.nan])
     array([  0, 118, 255, 255,   0], dtype=uint8)
     """

@@ -32,16 +32,11 @@ NEUTRAL = 0.06  # linear light where no ray arrives: a dark grey that cannot be 
 class Scene:
     """Surfaces under a sky, for a tracer that photographs them through any lens.
 
-    Parameters
-    ----------
-    surfaces : sequence of Surface
-        Best listed near to far: then hidden ones cost no time.
-    sky : Texture
-        Infinitely far away and equirectangular, its texels square, its middle towards +z and its first row straight up.
-        Where it ends before the nadir, its last row goes on.
+    Args:
+        surfaces: Best listed near to far: then hidden ones cost no time.
+        sky: Infinitely far away and equirectangular, its texels square, its middle towards +z and its first row
+            straight up. Where it ends before the nadir, its last row goes on.
 
-    Examples
-    --------
     A wall 2 m ahead, and nothing above it but the sky:
 
     >>> scene = Scene([Rectangle((-1, -1, 2), (2, 0, 0), (0, 2, 0), Texture.plain((1, 1, 1)))])
@@ -58,30 +53,18 @@ class Scene:
 
         A ray that meets nothing shows the sky. A direction that is NaN is no ray, and shows a neutral grey.
 
-        Parameters
-        ----------
-        origins : array_like (..., 3)
-            In metres.
-        directions : array_like (..., 3)
-            Unit vectors.
-        spread : float
-            The angle in radians between neighbouring rays, over which textures are averaged; 0 averages nothing.
+        Args:
+            origins: (..., 3), in metres.
+            directions: (..., 3), unit vectors.
+            spread: The angle in radians between neighbouring rays, over which textures are averaged; 0 averages
+                nothing.
 
-        Returns
-        -------
-        light : array (..., 3)
-            Linear, float32.
-        distance : array (...)
-            Along the ray in metres, float32; NaN where it meets nothing.
+        Returns:
+            light: (..., 3), linear, float32.
+            distance: (...), along the ray in metres, float32; NaN where it meets nothing.
 
-        Raises
-        ------
-        ValueError
-            For directions that are not of unit length, and for origins that are not finite.
-
-        References
-        ----------
-        J. Amanatides, Ray tracing with cones, SIGGRAPH 1984.
+        Raises: ValueError for directions that are not of unit length, and for origins that are not finite.
+        Source: J. Amanatides, Ray tracing with cones, SIGGRAPH 1984.
         """
         origins, directions = as_points(origins, 3, "origins"), as_points(directions, 3, "directions")
         shape = np.broadcast_shapes(origins.shape, directions.shape)
@@ -110,19 +93,13 @@ class Scene:
     def follow(self, rays: Rays, spread: float) -> tuple[Floats, Floats]:
         """As `trace` does, for rays in tiles.
 
-        Parameters
-        ----------
-        rays : Rays
-            Gathered in tiles of neighbours.
-        spread : float
-            The angle in radians between neighbouring rays.
+        Args:
+            rays: Gathered in tiles of neighbours.
+            spread: The angle in radians between neighbouring rays.
 
-        Returns
-        -------
-        light : array (height, width, 3)
-            Linear, float32.
-        distance : array (height, width)
-            In metres, float32.
+        Returns:
+            light: (height, width, 3), linear, float32.
+            distance: (height, width), in metres, float32.
         """
         depth = np.full(rays.directions[0].size, np.inf, dtype=np.float32)
         light = np.empty((depth.size, LIGHT), dtype=np.float32)
@@ -173,10 +150,7 @@ class Scene:
     def outlines(self) -> Wireframe:
         """The same scene as lines.
 
-        Returns
-        -------
-        Wireframe
-            Each line named after its surface.
+        Returns: Each line named after its surface.
         """
         lines = [(line, surface.name) for surface in self.surfaces for line in surface.outline()]
         return Wireframe(tuple(line for line, _ in lines), tuple(name for _, name in lines))
@@ -184,10 +158,7 @@ class Scene:
     def faces(self) -> tuple[Mesh, ...]:
         """The same scene for a solid renderer.
 
-        Returns
-        -------
-        tuple of Mesh
-            One for each surface; the sky is not among them.
+        Returns: One for each surface; the sky is not among them.
         """
         return tuple(surface.mesh() for surface in self.surfaces)
 
@@ -195,27 +166,14 @@ class Scene:
 def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
     """The picture that a camera takes of a scene, as light.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is photographed.
-    camera : Camera
-        With any lens.
-    supersample : int
-        n: each pixel is the mean of n × n rays.
+    Args:
+        scene: What is photographed.
+        camera: With any lens.
+        supersample: n: each pixel is the mean of n × n rays.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light, float32.
+    Returns: (height, width, 3), linear light, float32.
+    Raises: ValueError unless n is a whole number of at least 1.
 
-    Raises
-    ------
-    ValueError
-        Unless n is a whole number of at least 1.
-
-    Examples
-    --------
     A white wall that fills the middle two of four columns:
 
     >>> from camviz.cameras import Camera, Intrinsics
@@ -239,20 +197,12 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
 def snapshot(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
     """The picture that a camera takes of a scene, for the screen: to_display(render(scene, camera)).
 
-    Parameters
-    ----------
-    scene : Scene
-        What is photographed.
-    camera : Camera
-        With any lens.
+    Args:
+        scene: What is photographed.
+        camera: With any lens.
 
-    Returns
-    -------
-    array (height, width, 3)
-        sRGB bytes, uint8.
+    Returns: (height, width, 3), sRGB bytes, uint8.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> sky = Scene([], sky=Texture.plain((0, 0.2, 1)))
     >>> snapshot(sky, Camera(Intrinsics.from_fov(4, 2, 90)))[0, 0]

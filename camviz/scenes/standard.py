@@ -33,13 +33,8 @@ _BOARD_DOWN /= np.linalg.norm(_BOARD_DOWN)
 def board_corners() -> Array:
     """The 9 × 6 inner corners of the garden's checkerboard, whose squares are 0.1 m wide.
 
-    Returns
-    -------
-    array (54, 3)
-        In the world, in metres, row by row.
+    Returns: (54, 3), in the world, in metres, row by row.
 
-    Examples
-    --------
     Nine corners on, one row down, is one square away:
 
     >>> corners = board_corners()
@@ -54,13 +49,8 @@ def board_corners() -> Array:
 def textured_scene() -> Scene:
     """The garden: a calibration board, a crate with a globe, a ball, a brick wall, and lamps into the distance.
 
-    Returns
-    -------
-    Scene
-        Always the same one; y points down, in metres.
+    Returns: Always the same one; y points down, in metres.
 
-    Examples
-    --------
     Straight ahead of the origin hangs a picture, on a wall 6.5 m away:
 
     >>> textured_scene().trace((0, 0, 0), (0, 0, 1))[1].round(1)
@@ -140,14 +130,10 @@ def _wall() -> list[Surface]:
 def wireframe_scene() -> Wireframe:
     """A house on a ground grid of one metre, the garden's board, and the world's axes, one metre each, as lines.
 
-    Returns
-    -------
-    Wireframe
+    Returns:
         Its names are "ground", "house", "board", "axis x", "axis y" and "axis z". Every line is straight between its
         points.
 
-    Examples
-    --------
     >>> wireframe_scene().only("axis x").lines
     (array([[0., 0., 0.],
             [1., 0., 0.]]),)

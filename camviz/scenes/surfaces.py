@@ -21,23 +21,14 @@ from camviz.scenes.texture import Texture
 class Mesh:
     """A surface as quadrilaterals, for a solid renderer.
 
-    Attributes
-    ----------
-    name : str
-        What it belongs to.
-    vertices : array (n, 3)
-        In metres.
-    quads : array (m, 4)
-        Indices of vertices.
-    uv : array (n, 2)
-        Places of the vertices on the texture's picture, as shares of it: u to the right and v upwards.
-    texture : Texture
-        What lies on it.
-    shade : float
-        The light that it receives, 1 for full light.
+    Attributes:
+        name: What it belongs to.
+        vertices: (n, 3), in metres.
+        quads: (m, 4), indices of vertices.
+        uv: (n, 2), places of the vertices on the texture's picture, as shares of it: u to the right and v upwards.
+        texture: What lies on it.
+        shade: The light that it receives, 1 for full light.
 
-    Examples
-    --------
     >>> wall = Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), Texture.plain((1, 0, 0))).mesh()
     >>> wall.vertices.shape, wall.quads.tolist(), wall.rgb
     ((4, 3), [[0, 1, 2, 3]], (255, 0, 0))
@@ -95,26 +86,15 @@ class Surface(Protocol):
 class Rectangle(Surface):
     """The parallelogram corner + s across + r down, 0 ≤ s, r ≤ 1, seen from both sides.
 
-    Parameters
-    ----------
-    corner, across, down : array (3,)
-        In metres; the first row of the texture lies along `across`.
-    texture : Texture
-        What lies on it.
-    shade : float
-        The light that it receives, 1 for full light.
-    repeats : tuple of float
-        How many times the texture fits along either edge.
-    name : str
-        What it belongs to, in drawings.
+    Args:
+        corner, across, down: (3,), in metres; the first row of the texture lies along `across`.
+        texture: What lies on it.
+        shade: The light that it receives, 1 for full light.
+        repeats: How many times the texture fits along either edge.
+        name: What it belongs to, in drawings.
 
-    Raises
-    ------
-    ValueError
-        When the two edges span no area, or are not three finite numbers each.
+    Raises: ValueError when the two edges span no area, or are not three finite numbers each.
 
-    Examples
-    --------
     A wall in front of a camera at the origin shows its picture the right way round; its normal points at the viewer:
 
     >>> Rectangle((-1, -1, 2), (2, 0, 0), (0, 2, 0), Texture.plain((1, 1, 1))).normal + 0
@@ -183,28 +163,17 @@ class Rectangle(Surface):
 class Ground(Surface):
     """The endless horizontal plane y = `height`, which fades into the air's colour with the distance.
 
-    Parameters
-    ----------
-    height : float
-        In metres; y points down.
-    texture : Texture
-        What lies on it.
-    tile : float
-        The texture is repeated every so many metres.
-    haze : array_like (3,)
-        The colour of the air, linear RGB. At a distance d the ground has a share 1 - exp(-d / `sight`) of it.
-    sight : float
-        In metres.
-    name : str
-        What it belongs to, in drawings.
+    Args:
+        height: In metres; y points down.
+        texture: What lies on it.
+        tile: The texture is repeated every so many metres.
+        haze: (3,), the colour of the air, linear RGB. At a distance d the ground has a share 1 - exp(-d / `sight`) of
+            it.
+        sight: In metres.
+        name: What it belongs to, in drawings.
 
-    Raises
-    ------
-    ValueError
-        For a tile or a sight that is not positive.
+    Raises: ValueError for a tile or a sight that is not positive.
 
-    Examples
-    --------
     White ground at a distance of its sight in black air: 1/e = 0.37 of it is seen.
 
     >>> ground = Ground(1.0, Texture.plain((1, 1, 1)), haze=(0, 0, 0), sight=2.0)
@@ -266,24 +235,14 @@ class Ground(Surface):
 class Sphere(Surface):
     """A ball under an equirectangular texture.
 
-    Parameters
-    ----------
-    centre : array (3,)
-        In metres.
-    radius : float
-        In metres.
-    texture : Texture
-        Its middle faces -z, towards a camera at the origin; its first row is the pole -y, the top.
-    name : str
-        What it belongs to, in drawings.
+    Args:
+        centre: (3,), in metres.
+        radius: In metres.
+        texture: Its middle faces -z, towards a camera at the origin; its first row is the pole -y, the top.
+        name: What it belongs to, in drawings.
 
-    Raises
-    ------
-    ValueError
-        For a radius that is not positive, and a centre that is not three finite numbers.
+    Raises: ValueError for a radius that is not positive, and a centre that is not three finite numbers.
 
-    Examples
-    --------
     >>> ball = Sphere((0, 0, 3), 1.0, Texture.plain((1, 1, 1)))
     >>> Scene([ball]).trace((0, 0, 0), (0, 0, 1))[1]
     array(2., dtype=float32)
@@ -330,24 +289,14 @@ class Sphere(Surface):
 class Column(Surface):
     """An upright tube, open at both ends.
 
-    Parameters
-    ----------
-    foot : array (3,)
-        The middle of its lower end, in metres.
-    height, radius : float
-        In metres.
-    texture : Texture
-        Its middle faces -z, its first row is at the top.
-    name : str
-        What it belongs to, in drawings.
+    Args:
+        foot: (3,), the middle of its lower end, in metres.
+        height, radius: In metres.
+        texture: Its middle faces -z, its first row is at the top.
+        name: What it belongs to, in drawings.
 
-    Raises
-    ------
-    ValueError
-        For a height or radius that is not positive, and a foot that is not three finite numbers.
+    Raises: ValueError for a height or radius that is not positive, and a foot that is not three finite numbers.
 
-    Examples
-    --------
     >>> post = Column((0, 1, 3), height=2.0, radius=0.5, texture=Texture.plain((1, 1, 1)))
     >>> Scene([post]).trace((0, 0, 0), (0, 0, 1))[1]
     array(2.5, dtype=float32)
@@ -372,10 +321,7 @@ class Column(Surface):
     def bounding_spheres(self) -> tuple[Ball, ...]:
         """Balls one above the other, at most four: a single one would be far wider than a thin column.
 
-        Returns
-        -------
-        tuple
-            For each its centre (3,) in metres, its radius, and no normal.
+        Returns: For each its centre (3,) in metres, its radius, and no normal.
         """
         count = int(np.clip(self.height / (2 * self.radius), 1, 4))
         radius = float(np.hypot(self.height / (2 * count), self.radius))
@@ -420,33 +366,17 @@ def box(
 ) -> tuple[Rectangle, ...]:
     """The four walls and the lid of a box, lit by the sun.
 
-    Parameters
-    ----------
-    foot : array_like (3,)
-        The middle of its floor, in metres.
-    size : array_like (3,)
-        Width, height and depth in metres, before it is turned.
-    texture : Texture
-        It covers each side once, or repeats.
-    yaw : float
-        The turn about the vertical in radians, clockwise as seen from above.
-    tile : float, optional
-        The texture repeats every so many metres.
-    name : str
-        What it belongs to, in drawings.
+    Args:
+        foot: (3,), the middle of its floor, in metres.
+        size: (3,), width, height and depth in metres, before it is turned.
+        texture: It covers each side once, or repeats.
+        yaw: The turn about the vertical in radians, clockwise as seen from above.
+        tile: The texture repeats every so many metres.
+        name: What it belongs to, in drawings.
 
-    Returns
-    -------
-    tuple of Rectangle
-        Front, right, back and left side, and the lid.
+    Returns: Front, right, back and left side, and the lid.
+    Raises: ValueError for a foot or size that is not three finite numbers.
 
-    Raises
-    ------
-    ValueError
-        For a foot or size that is not three finite numbers.
-
-    Examples
-    --------
     The sun is high and to the left, so that the lid is brighter than the front, and the right side is in the shade:
 
     >>> sides = box((0, 1, 4), (1, 1, 1), Texture.plain((1, 1, 1)))

@@ -25,24 +25,13 @@ class Texture:
     It is looked up by s (to the right) and r (down), 0 … 1. It keeps halved copies of itself down to a single texel,
     and mixes the two whose texels come nearest to the distance between rays.
 
-    Parameters
-    ----------
-    light : array_like (height, width, 3)
-        Linear light 0 … 1, or sRGB bytes.
-    repeat : bool
-        Whether it tiles the plane; otherwise its border goes on for ever.
+    Args:
+        light: (height, width, 3), linear light 0 … 1, or sRGB bytes.
+        repeat: Whether it tiles the plane; otherwise its border goes on for ever.
 
-    Raises
-    ------
-    ValueError
-        For any other shape.
+    Raises: ValueError for any other shape.
+    Source: L. Williams, Pyramidal parametrics, SIGGRAPH 1983.
 
-    References
-    ----------
-    L. Williams, Pyramidal parametrics, SIGGRAPH 1983.
-
-    Examples
-    --------
     Black and white texels, from near and from far:
 
     >>> texture, where = Texture([[(0, 0, 0), (1, 1, 1)]]), np.array([0.25, 0.75], np.float32)
@@ -62,20 +51,11 @@ class Texture:
     def plain(cls, rgb: ArrayLike) -> Texture:
         """One colour everywhere.
 
-        Parameters
-        ----------
-        rgb : array_like (3,)
-            sRGB 0 … 1.
+        Args:
+            rgb: (3,), sRGB 0 … 1.
 
-        Returns
-        -------
-        Texture
-            Of a single texel.
-
-        Raises
-        ------
-        ValueError
-            For another shape.
+        Returns: Texture of a single texel.
+        Raises: ValueError for another shape.
         """
         return cls(to_linear(as_points(rgb, 3, "rgb")).reshape(1, 1, 3))
 
@@ -97,17 +77,11 @@ class Texture:
     def sample(self, s: Floats, r: Floats, texels: Floats | float = 0.0) -> Floats:
         """Light at places on the texture.
 
-        Parameters
-        ----------
-        s, r : array (n,)
-            To the right and down, shares of the picture.
-        texels : array (n,) or float
-            How many texels of the finest copy the rays lie apart.
+        Args:
+            s, r: (n,), to the right and down, shares of the picture.
+            texels: (n,) or float, how many texels of the finest copy the rays lie apart.
 
-        Returns
-        -------
-        array (n, 4)
-            Linear light, and a fourth number that means nothing.
+        Returns: (n, 4), linear light, and a fourth number that means nothing.
         """
         top = self._places.shape[1] - 1
         texels = np.maximum(np.multiply(texels, _SOFTNESS, dtype=np.float32), 1)

@@ -14,20 +14,12 @@ from camviz.lenses.base import Array, as_points
 class Wireframe:
     """Lines in space, for drawings of the world that the tracer photographs.
 
-    Parameters
-    ----------
-    lines : tuple of array (n, 3)
-        Polylines in metres.
-    names : tuple of str
-        What each line belongs to: "ground", "house", ...
+    Args:
+        lines: tuple of (n, 3), polylines in metres.
+        names: What each line belongs to: "ground", "house", ...
 
-    Raises
-    ------
-    ValueError
-        When there are not as many names as lines, or a line is not (n, 3).
+    Raises: ValueError when there are not as many names as lines, or a line is not (n, 3).
 
-    Examples
-    --------
     Two drawings added:
 
     >>> beam = Wireframe((np.array([[0, 0, 1], [1, 0, 1]]),), ("beam",))
@@ -57,15 +49,10 @@ class Wireframe:
     def only(self, *names: str) -> Wireframe:
         """The lines with some names.
 
-        Parameters
-        ----------
-        *names : str
-            Those that are kept.
+        Args:
+            *names: Those that are kept.
 
-        Returns
-        -------
-        Wireframe
-            The others are left out.
+        Returns: The others are left out.
         """
         kept = [(name, line) for name, line in self if name in names]
         return Wireframe(tuple(line for _, line in kept), tuple(name for name, _ in kept))
@@ -73,20 +60,11 @@ class Wireframe:
     def subdivided(self, max_length: float) -> Wireframe:
         """The same lines with more points, so that a lens can bend them; all corners are kept.
 
-        Parameters
-        ----------
-        max_length : float
-            Points are no more than so many metres apart.
+        Args:
+            max_length: Points are no more than so many metres apart.
 
-        Returns
-        -------
-        Wireframe
-            With the same names.
-
-        Raises
-        ------
-        ValueError
-            Unless `max_length` is positive.
+        Returns: Wireframe with the same names.
+        Raises: ValueError unless `max_length` is positive.
         """
         if not max_length > 0:
             raise ValueError(f"max_length must be a positive length in metres, got {max_length}")

@@ -24,32 +24,17 @@ Array = NDArray[np.float64]
 class NoiseModel:
     """The noise of one pixel after EMVA 1288, and what each remedy leaves of it.
 
-    Parameters
-    ----------
-    gain_dn_per_e : float
-        What a DN is.
-    dark_noise_e : float
-        Temporal noise in the dark, in electrons, with what rounding adds.
-    black_dn : float
-        The mean of dark frames.
-    saturation_dn : float
-        From this number on a pixel no longer counts.
-    prnu : float
-        The pattern that light brings, a fraction of the signal.
-    dsnu_e : float
-        The pattern in the dark, in electrons.
+    Args:
+        gain_dn_per_e: What a DN is.
+        dark_noise_e: Temporal noise in the dark, in electrons, with what rounding adds.
+        black_dn: The mean of dark frames.
+        saturation_dn: From this number on a pixel no longer counts.
+        prnu: The pattern that light brings, a fraction of the signal.
+        dsnu_e: The pattern in the dark, in electrons.
 
-    Raises
-    ------
-    ValueError
-        For a gain that is not positive, and noise below zero or infinite.
+    Raises: ValueError for a gain that is not positive, and noise below zero or infinite.
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
-
-    Examples
-    --------
     In one frame 875 electrons have noise √(5² + 875) = 30, in the mean of 100 frames a tenth of it:
 
     >>> model = NoiseModel(gain_dn_per_e=0.5, dark_noise_e=5)
@@ -75,19 +60,12 @@ class NoiseModel:
     def of(cls, sensor: Sensor, exposure_s: float = 0.0, temperature_c: float | None = None) -> NoiseModel:
         """The model of a sensor whose parameters are known.
 
-        Parameters
-        ----------
-        sensor : Sensor
-            Its parameters.
-        exposure_s : float
-            In seconds: dark current adds noise and brightens the black.
-        temperature_c : float, optional
-            In °C; by default the sensor's reference temperature.
+        Args:
+            sensor: Its parameters.
+            exposure_s: In seconds: dark current adds noise and brightens the black.
+            temperature_c: In °C; by default the sensor's reference temperature.
 
-        Returns
-        -------
-        NoiseModel
-            Of one pixel.
+        Returns: NoiseModel of one pixel.
         """
         noise = np.hypot(sensor.dark_noise_e(exposure_s, temperature_c), np.sqrt(1 / 12) / sensor.gain_dn_per_e)
         current = sensor.dark_current(sensor.reference_temperature_c if temperature_c is None else temperature_c)
@@ -101,15 +79,10 @@ class NoiseModel:
     def measured(cls, found: Measurement) -> NoiseModel:
         """The model that a measurement found; noise that it could not measure is taken as 0.
 
-        Parameters
-        ----------
-        found : Measurement
-            Of dark and bright frames.
+        Args:
+            found: Of dark and bright frames.
 
-        Returns
-        -------
-        NoiseModel
-            Of one pixel.
+        Returns: NoiseModel of one pixel.
         """
         saturation = found.levels[found.peak].bright.mean if found.saturated else np.inf
         patterns = np.nan_to_num([found.prnu, found.dsnu_e]).tolist()
@@ -119,45 +92,30 @@ class NoiseModel:
     def electrons(self, dn: ArrayLike) -> Array:
         """The electrons that digital numbers stand for.
 
-        Parameters
-        ----------
-        dn : array_like (...)
-            In DN.
+        Args:
+            dn: (...), in DN.
 
-        Returns
-        -------
-        array (...)
-            In electrons; below zero where noise outweighs them.
+        Returns: (...), in electrons; below zero where noise outweighs them.
         """
         return (np.asarray(dn, dtype=float) - self.black_dn) / self.gain_dn_per_e
 
     def temporal_variance(self, electrons: ArrayLike) -> Array:
         """The noise that changes from frame to frame: σ² = σ_d² + μ_e.
 
-        Parameters
-        ----------
-        electrons : array_like (...)
-            The mean signal μ_e in electrons.
+        Args:
+            electrons: (...), the mean signal μ_e in electrons.
 
-        Returns
-        -------
-        array (...)
-            In electrons².
+        Returns: (...), in electrons².
         """
         return self.dark_noise_e**2 + np.maximum(np.asarray(electrons, dtype=float), 0)
 
     def pattern_variance(self, electrons: ArrayLike) -> Array:
         """What is the same in every frame: DSNU² + (PRNU μ_e)².
 
-        Parameters
-        ----------
-        electrons : array_like (...)
-            The mean signal μ_e in electrons.
+        Args:
+            electrons: (...), the mean signal μ_e in electrons.
 
-        Returns
-        -------
-        array (...)
-            In electrons².
+        Returns: (...), in electrons².
         """
         return self.dsnu_e**2 + (self.prnu * np.asarray(electrons, dtype=float)) ** 2
 
@@ -166,34 +124,22 @@ class NoiseModel:
     def noise_averaged(self, electrons: ArrayLike, frames: int = 1) -> Array:
         """Noise in the mean of several frames: temporal noise falls with their root, the pattern stays.
 
-        Parameters
-        ----------
-        electrons : array_like (...)
-            The mean signal in electrons.
-        frames : int
-            How many.
+        Args:
+            electrons: (...), the mean signal in electrons.
+            frames: How many.
 
-        Returns
-        -------
-        array (...)
-            A standard deviation in electrons.
+        Returns: (...), a standard deviation in electrons.
         """
         return np.sqrt(self.temporal_variance(electrons) / frames + self.pattern_variance(electrons))
 
     def noise_less_dark(self, electrons: ArrayLike, darks: int) -> Array:
         """Noise in one frame less the mean of several dark ones: their noise for the DSNU.
 
-        Parameters
-        ----------
-        electrons : array_like (...)
-            The mean signal in electrons.
-        darks : int
-            How many.
+        Args:
+            electrons: (...), the mean signal in electrons.
+            darks: How many.
 
-        Returns
-        -------
-        array (...)
-            A standard deviation in electrons.
+        Returns: (...), a standard deviation in electrons.
         """
         shade = (self.prnu * np.asarray(electrons, dtype=float)) ** 2
         return np.sqrt(self.temporal_variance(electrons) + self.dark_noise_e**2 / darks + shade)
@@ -203,19 +149,12 @@ class NoiseModel:
 
         y = (f - d) / (F - d) · mean: the dark stack enters above and below, with weight 1 - e/F in all.
 
-        Parameters
-        ----------
-        electrons : array_like (...)
-            The mean signal e in electrons.
-        darks, flats : int
-            How many dark and how many flat frames were averaged.
-        flat_electrons : float
-            The mean signal of the flat field, F.
+        Args:
+            electrons: (...), the mean signal e in electrons.
+            darks, flats: How many dark and how many flat frames were averaged.
+            flat_electrons: The mean signal of the flat field, F.
 
-        Returns
-        -------
-        array (...)
-            A standard deviation in electrons.
+        Returns: (...), a standard deviation in electrons.
         """
         share = np.asarray(electrons, dtype=float) / flat_electrons
         dark = (1 - share) ** 2 * self.dark_noise_e**2 / darks
@@ -228,23 +167,12 @@ class NoiseModel:
 def average(frames: Sequence[ArrayLike]) -> Array:
     """The mean of frames of the same scene. It costs n times the exposure; a thing that moves blurs.
 
-    Parameters
-    ----------
-    frames : sequence of array_like (height, width)
-        In any unit, such as DN.
+    Args:
+        frames: sequence of (height, width), in any unit, such as DN.
 
-    Returns
-    -------
-    array (height, width)
-        In the same unit.
+    Returns: (height, width), in the same unit.
+    Raises: ValueError for no frames, or frames of different sizes.
 
-    Raises
-    ------
-    ValueError
-        For no frames, or frames of different sizes.
-
-    Examples
-    --------
     >>> average([[[10, 20]], [[12, 26]]])
     array([[11., 23.]])
     """
@@ -254,26 +182,14 @@ def average(frames: Sequence[ArrayLike]) -> Array:
 def less_dark(frame: ArrayLike, dark: ArrayLike) -> Array:
     """A frame less a dark frame: offsets, DSNU and dark current are gone.
 
-    Parameters
-    ----------
-    frame : array_like (height, width)
-        In DN.
-    dark : array_like (height, width)
-        In DN, of the same exposure and temperature. Best is the average of many: one alone adds its own noise, up to √2
-        times as much where there is no light.
+    Args:
+        frame: (height, width), in DN.
+        dark: (height, width), in DN, of the same exposure and temperature. Best is the average of many: one alone adds
+            its own noise, up to √2 times as much where there is no light.
 
-    Returns
-    -------
-    array (height, width)
-        In DN above black.
+    Returns: (height, width), in DN above black.
+    Raises: ValueError for frames of different sizes.
 
-    Raises
-    ------
-    ValueError
-        For frames of different sizes.
-
-    Examples
-    --------
     >>> less_dark([[110, 240]], [[10, 40]])
     array([[100., 200.]])
     """
@@ -286,23 +202,14 @@ def flattened(frame: ArrayLike, dark: ArrayLike, flat: ArrayLike) -> Array:
 
     PRNU, vignetting and dust are gone, noise is larger where the flat field is dark.
 
-    Parameters
-    ----------
-    frame, dark, flat : array_like (height, width)
-        In DN: the scene, nothing, and an even light.
+    Args:
+        frame, dark, flat: (height, width), in DN: the scene, nothing, and an even light.
 
-    Returns
-    -------
-    array (height, width)
-        In DN above black; NaN where the flat field is not above the dark: a dead pixel has no answer.
+    Returns:
+        (height, width), in DN above black; NaN where the flat field is not above the dark: a dead pixel has no answer.
 
-    Raises
-    ------
-    ValueError
-        For frames of different sizes.
+    Raises: ValueError for frames of different sizes.
 
-    Examples
-    --------
     The second pixel answers half as much to the same light:
 
     >>> flattened(frame=[[110, 60]], dark=[[10, 10]], flat=[[210, 110]])
@@ -320,34 +227,19 @@ def merged(frames: Sequence[ArrayLike], exposures_s: Sequence[float], model: Noi
     Each frame tells x = e / t with variance (σ_d² + x t) / t²; the weights are its inverse, with x from all of them:
     weights from a frame's own noise would prefer those that chance made dark. Saturated pixels have no weight.
 
-    Parameters
-    ----------
-    frames : sequence of array_like (height, width)
-        In DN.
-    exposures_s : sequence of float
-        In seconds, one for each frame.
-    model : NoiseModel
-        Of the sensor.
+    Args:
+        frames: sequence of (height, width), in DN.
+        exposures_s: In seconds, one for each frame.
+        model: Of the sensor.
 
-    Returns
-    -------
-    rate : array (height, width)
-        In electrons per second; NaN where every frame is saturated.
-    deviation : array (height, width)
-        In electrons per second.
+    Returns:
+        rate: (height, width), in electrons per second; NaN where every frame is saturated.
+        deviation: (height, width), in electrons per second.
 
-    Raises
-    ------
-    ValueError
-        Unless there is one time above 0 for each frame, and the frames have one size.
+    Raises: ValueError unless there is one time above 0 for each frame, and the frames have one size.
+    Source: S. W. Hasinoff, F. Durand and W. T. Freeman, Noise-optimal capture for high dynamic range photography, CVPR
+    2010, equation 5, without the patterns.
 
-    References
-    ----------
-    S. W. Hasinoff, F. Durand and W. T. Freeman, Noise-optimal capture for high dynamic range photography, CVPR 2010,
-    equation 5, without the patterns.
-
-    Examples
-    --------
     The second pixel is saturated in the longer frame, and 1000 electrons in 0.01 s in the shorter one:
 
     >>> model = NoiseModel(gain_dn_per_e=0.5, dark_noise_e=5, black_dn=100, saturation_dn=4000)
@@ -403,34 +295,17 @@ def smoothed(frame: ArrayLike, model: NoiseModel, method: str = "non-local", str
 
     The frame is stabilised first, so that one strength suits all of it.
 
-    Parameters
-    ----------
-    frame : array_like (height, width)
-        In DN.
-    model : NoiseModel
-        Of the sensor.
-    method : {"non-local", "gaussian"}
-        "gaussian" blurs by `strength` pixels, noise and detail alike; "non-local" averages patches that differ by no
-        more than `strength` times what noise would make of equal ones.
-    strength : float
-        In pixels, or times the noise.
+    Args:
+        frame: (height, width), in DN.
+        model: Of the sensor.
+        method: {"non-local", "gaussian"}. "gaussian" blurs by `strength` pixels, noise and detail alike; "non-local"
+            averages patches that differ by no more than `strength` times what noise would make of equal ones.
+        strength: In pixels, or times the noise.
 
-    Returns
-    -------
-    array (height, width)
-        In electrons.
+    Returns: (height, width), in electrons.
+    Raises: ValueError for another method, and a strength that is not above 0.
+    Source: A. Buades, B. Coll and J.-M. Morel, A non-local algorithm for image denoising, CVPR 2005.
 
-    Raises
-    ------
-    ValueError
-        For another method, and a strength that is not above 0.
-
-    References
-    ----------
-    A. Buades, B. Coll and J.-M. Morel, A non-local algorithm for image denoising, CVPR 2005.
-
-    Examples
-    --------
     Grey of 600 ± 25 electrons:
 
     >>> sensor = Sensor()

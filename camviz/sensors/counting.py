@@ -18,25 +18,14 @@ def poisson(mean: ArrayLike, rng: np.random.Generator) -> Floats:
     sqrt(μ - 5/36) z + (z² - 1)/6): 5/36 is the variance of the bend, 1/18, and of the rounding, 1/12. That is within
     7e-4 of Poisson's law, in total variation.
 
-    Parameters
-    ----------
-    mean : array_like, any shape
-        How many are expected, such as electrons; below zero counts as none.
-    rng : numpy.random.Generator
-        Draws them.
+    Args:
+        mean: any shape, how many are expected, such as electrons; below zero counts as none.
+        rng: Draws them.
 
-    Returns
-    -------
-    array, any shape
-        Counts, float32.
+    Returns: any shape, counts, float32.
+    Source: E. A. Cornish and R. A. Fisher, Moments and cumulants in the specification of distributions, Rev. Inst. Int.
+    Stat. 5 (1938).
 
-    References
-    ----------
-    E. A. Cornish and R. A. Fisher, Moments and cumulants in the specification of distributions, Rev. Inst. Int. Stat. 5
-    (1938).
-
-    Examples
-    --------
     The variance of counts is their mean:
 
     >>> counts = poisson(np.full(100_000, 50.0), np.random.default_rng(0))

@@ -14,27 +14,16 @@ ZERO_CELSIUS_K = 273.15
 def band_gap_ev(temperature_c: ArrayLike) -> Any:
     """Silicon's band gap: E_g = 1.1557 - 7.021e-4 T² / (1108 + T), T in kelvin.
 
-    Parameters
-    ----------
-    temperature_c : array_like (...)
-        In °C.
+    Args:
+        temperature_c: (...), in °C.
 
-    Returns
-    -------
-    array (...)
-        In electron volts.
+    Returns: array (...), in electron volts.
 
-    Raises
-    ------
-    ValueError
-        Below absolute zero.
+    Raises:
+        ValueError: Below absolute zero.
 
-    References
-    ----------
-    Y. P. Varshni, Temperature dependence of the energy gap in semiconductors, Physica 34 (1967).
+    Source: Y. P. Varshni, Temperature dependence of the energy gap in semiconductors, Physica 34 (1967).
 
-    Examples
-    --------
     >>> band_gap_ev(300 - 273.15).round(4)
     np.float64(1.1108)
     """
@@ -47,27 +36,16 @@ def dark_current_ratio(temperature_c: ArrayLike, reference_c: ArrayLike) -> Any:
 
     Electrons climb by way of traps in the middle of the gap: D ∝ T^1.5 exp(-E_g / 2kT).
 
-    Parameters
-    ----------
-    temperature_c, reference_c : array_like (...)
-        In °C.
+    Args:
+        temperature_c, reference_c: (...), in °C.
 
-    Returns
-    -------
-    array (...)
-        A ratio, 1 at the reference.
+    Returns: array (...), a ratio, 1 at the reference.
 
-    Raises
-    ------
-    ValueError
-        Below absolute zero.
+    Raises:
+        ValueError: Below absolute zero.
 
-    References
-    ----------
-    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 7.
+    Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 7.
 
-    Examples
-    --------
     Cooled from 20 °C to -20 °C, a sensor has a fiftieth of its dark current:
 
     >>> dark_current_ratio(-20, reference_c=20).round(3)
@@ -83,27 +61,16 @@ def doubling_temperature_k(temperature_c: ArrayLike) -> Any:
 
     ln 2 / (d ln D / dT) = ln 2 · T / (3/2 + (E_g - T E_g') / 2kT): it grows with the temperature.
 
-    Parameters
-    ----------
-    temperature_c : array_like (...)
-        In °C.
+    Args:
+        temperature_c: (...), in °C.
 
-    Returns
-    -------
-    array (...)
-        In kelvin.
+    Returns: array (...), in kelvin.
 
-    Raises
-    ------
-    ValueError
-        Below absolute zero.
+    Raises:
+        ValueError: Below absolute zero.
 
-    References
-    ----------
-    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 7, for the law of which this is the slope.
+    Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 7, for the law of which this is the slope.
 
-    Examples
-    --------
     >>> doubling_temperature_k([-20, 20, 60]).round(1)
     array([ 6.1,  8.1, 10.3])
     """

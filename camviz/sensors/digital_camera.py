@@ -37,23 +37,14 @@ class Channels(NamedTuple):
 class Shot:
     """One photograph, step by step; `balanced` and `picture` are developed when asked for.
 
-    Attributes
-    ----------
-    camera : DigitalCamera
-        That took it.
-    exposure_s : float
-        In seconds.
-    light : array (height, width, 3)
-        The scene's linear light, 1 for a white wall.
-    illuminance_lux : array (height, width, 3)
-        What arrives on the sensor.
-    photons : array (height, width)
-        What is expected behind each pixel's own filter.
-    exposure : Exposure
-        The sensor's steps from there on.
+    Attributes:
+        camera: That took it.
+        exposure_s: In seconds.
+        light: (height, width, 3), the scene's linear light, 1 for a white wall.
+        illuminance_lux: (height, width, 3), what arrives on the sensor.
+        photons: (height, width), what is expected behind each pixel's own filter.
+        exposure: The sensor's steps from there on.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera
     >>> from camviz import Intrinsics
     >>> camera = DigitalCamera(Camera(Intrinsics.from_fov(8, 6, 10)))
@@ -93,42 +84,22 @@ class DigitalCamera:
     red, green and blue are taken to be what the filters let through. Their peaks are published as equal, so a filter is
     taken to pass all at its peak, where the sensor's quantum efficiency, a single figure or a curve, applies.
 
-    Parameters
-    ----------
-    camera : Camera
-        Where it stands and looks, its lens and its pixels.
-    sensor : Sensor
-        Behind the filters.
-    pitch_um : float
-        From pixel to pixel.
-    f_number : float
-        Of the lens, N.
-    transmittance : float
-        The share of light that the lens lets through, above 0 and at most 1.
-    pattern : Pattern
-        Of the filters.
-    filters : str
-        One of the cameras that `camviz.colour.sensitivities` knows.
-    illuminant : str
-        One of the lights that `camviz.colour.illuminant` knows.
-    scene_lux : float
-        On the white wall.
-    temperature_c : float
-        Of the sensor.
-    demosaicing : str
-        One of `camviz.mosaics.ALGORITHMS`.
+    Args:
+        camera: Where it stands and looks, its lens and its pixels.
+        sensor: Behind the filters.
+        pitch_um: From pixel to pixel.
+        f_number: Of the lens, N.
+        transmittance: The share of light that the lens lets through, above 0 and at most 1.
+        pattern: Of the filters.
+        filters: One of the cameras that `camviz.colour.sensitivities` knows.
+        illuminant: One of the lights that `camviz.colour.illuminant` knows.
+        scene_lux: On the white wall.
+        temperature_c: Of the sensor.
+        demosaicing: One of `camviz.mosaics.ALGORITHMS`.
 
-    Raises
-    ------
-    ValueError
-        For a pitch, f-number or light that is not positive, and a transmittance outside 0 … 1.
+    Raises: ValueError for a pitch, f-number or light that is not positive, and a transmittance outside 0 … 1.
+    Source: EMVA Standard 1288, release 4.0 linear (2021), for the sensor; Szeliski (2022), section 2.3, for the chain.
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021), for the sensor; Szeliski (2022), section 2.3, for the chain.
-
-    Examples
-    --------
     10 000 lux on a white wall are π L T / (4 N²) = 10 000 · 0.9 / 64 lux on the sensor:
 
     >>> from camviz.cameras import Camera
@@ -161,45 +132,26 @@ class DigitalCamera:
     def shoot(self, scene: Scene, exposure_s: float, rng: np.random.Generator, supersample: int = 1) -> Shot:
         """Photograph a scene.
 
-        Parameters
-        ----------
-        scene : Scene
-            What is photographed.
-        exposure_s : float
-            In seconds.
-        rng : numpy.random.Generator
-            Draws the noise.
-        supersample : int
-            Each pixel's light is the mean of supersample² rays.
+        Args:
+            scene: What is photographed.
+            exposure_s: In seconds.
+            rng: Draws the noise.
+            supersample: Each pixel's light is the mean of supersample² rays.
 
-        Returns
-        -------
-        Shot
-            Every step of it.
+        Returns: Every step of it.
         """
         return self.take(render(scene, self.camera, supersample), exposure_s, rng)
 
     def take(self, light: ArrayLike, exposure_s: float, rng: np.random.Generator) -> Shot:
         """Photograph a picture of light, as `render` traces it.
 
-        Parameters
-        ----------
-        light : array_like (height, width, 3)
-            Linear, 1 for a white wall.
-        exposure_s : float
-            In seconds.
-        rng : numpy.random.Generator
-            Draws the noise.
+        Args:
+            light: (height, width, 3), linear, 1 for a white wall.
+            exposure_s: In seconds.
+            rng: Draws the noise.
 
-        Returns
-        -------
-        Shot
-            Every step of it.
-
-        Raises
-        ------
-        ValueError
-            For light that has not the camera's size.
+        Returns: Every step of it.
+        Raises: ValueError for light that has not the camera's size.
         """
         linear = np.asarray(light, dtype=np.float32)
         pixels = self.camera.intrinsics
@@ -213,15 +165,10 @@ class DigitalCamera:
     def illuminance_lux(self, light: Floats) -> Floats:
         """The light on the sensor: E = π L T cos⁴θ / (4 N²), with π L = light · scene_lux for a matt surface.
 
-        Parameters
-        ----------
-        light : array (height, width, 3)
-            Linear, 1 for a white wall.
+        Args:
+            light: (height, width, 3), linear, 1 for a white wall.
 
-        Returns
-        -------
-        array (height, width, 3)
-            In lux, float32.
+        Returns: (height, width, 3), in lux, float32.
         """
         on_axis = self.scene_lux * self.transmittance / (4 * self.f_number**2)
         return light * (np.float32(on_axis) * self._falloff)[..., None]
@@ -249,15 +196,10 @@ class DigitalCamera:
     def white_exposure_s(self, share: float = 0.8) -> float:
         """The exposure at which a white wall on the axis fills the fullest channel to a share of saturation.
 
-        Parameters
-        ----------
-        share : float
-            0 … 1.
+        Args:
+            share: 0 … 1.
 
-        Returns
-        -------
-        float
-            In seconds.
+        Returns: In seconds.
         """
         lux = self.scene_lux * self.transmittance / (4 * self.f_number**2)
         fullest = self.channels.electrons[list(self.pattern.present)].max()
@@ -266,15 +208,10 @@ class DigitalCamera:
     def developed(self, raw: ArrayLike) -> Array:
         """Linear light of raw numbers: offset off, white balanced, demosaiced.
 
-        Parameters
-        ----------
-        raw : array_like (height, width)
-            In DN.
+        Args:
+            raw: (height, width), in DN.
 
-        Returns
-        -------
-        array (height, width, 3)
-            Linear; 1 where the fullest channel saturates.
+        Returns: (height, width, 3), linear; 1 where the fullest channel saturates.
         """
         electrons = (np.asarray(raw, dtype=float) - self.sensor.offset_dn) / self.sensor.gain_dn_per_e
         balance = (self._balance / self.sensor.saturation_e)[self.pattern.channels(*electrons.shape)]

@@ -13,21 +13,14 @@ from numpy.typing import ArrayLike
 class EfficiencyCurve:
     """Quantum efficiency by wavelength; straight lines between the values, nothing beyond them.
 
-    Parameters
-    ----------
-    wavelength_nm : tuple of float
-        Increasing.
-    value : tuple of float
-        Electrons per photon, 0 … 1.
+    Args:
+        wavelength_nm: Increasing.
+        value: Electrons per photon, 0 … 1.
 
-    Raises
-    ------
-    ValueError
-        For fewer than two values or unequal numbers of them, wavelengths that do not increase, and values outside 0 …
-        1.
+    Raises:
+        ValueError: For fewer than two values or unequal numbers of them, wavelengths that do not increase, and values
+            outside 0 … 1.
 
-    Examples
-    --------
     >>> EfficiencyCurve((400, 600), (0.2, 0.6)).at([300, 500, 600])
     array([0. , 0.4, 0.6])
     """
@@ -49,14 +42,9 @@ class EfficiencyCurve:
     def at(self, wavelength_nm: ArrayLike) -> Any:
         """The efficiency at wavelengths.
 
-        Parameters
-        ----------
-        wavelength_nm : array_like (...)
-            In nanometres.
+        Args:
+            wavelength_nm: (...), in nanometres.
 
-        Returns
-        -------
-        array (...)
-            Electrons per photon, 0 … 1.
+        Returns: array (...), electrons per photon, 0 … 1.
         """
         return np.interp(np.asarray(wavelength_nm, dtype=float), self.wavelength_nm, self.value, left=0.0, right=0.0)

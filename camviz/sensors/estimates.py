@@ -11,181 +11,77 @@ these very pixels. Sections are those of EMVA Standard 1288, release 4.0 linear.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from math import hypot, inf, isfinite, nan, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from camviz.sensors.checks import Checks
 from camviz.sensors.estimate import CERTAIN, PROMISE, UNKNOWN, Estimate, combined, of
 from camviz.sensors.hidden import QUANTISED, ROUNDING
 from camviz.sensors.readings import Readings
-from camviz.sensors.scale import CLIPPED, Scale
-from camviz.sensors.statistics import Pair, Part, Stack, parts_of_difference
+from camviz.sensors.scale import CLIPPED
+from camviz.sensors.statistics import Part, parts_of_difference
+from camviz.sensors.transfer import Transfer, ratio
 
-Array = NDArray[np.float64]
-
-ALIKE = 0.005  # of K
 PATTERNS_ALIKE = 0.01  # of PRNU
 
 
-class Estimates:
-    """The estimate of every figure of a measurement."""
+class Estimates(Transfer):
+    """The estimate of every figure of a measurement.
 
-    def __init__(self, found: Readings) -> None:
-        self.found = found
+    With `checks` the bounds reach as far as the model is off; without, they are those of a camera that obeys it.
+    """
+
+    def __init__(self, found: Readings, checks: Checks | None = None) -> None:
+        super().__init__(found)
+        self.checks = checks
+
+    @property
+    def smoothed(self) -> bool:
+        """True where neighbours share their noise, which makes that of rows and of columns larger, too."""
+        return self.checks is not None and self.checks.shared_share > PROMISE
 
     @cached_property
-    def scale(self) -> Scale:
-        found = self.found
-        seen: list[Pair | Stack] = [one for level in found.levels for one in (level.bright, level.dark)]
-        return Scale.of([*seen, *(one for one in (found.bright, found.dark) if one)], found.step, found.saturated)
+    def unchecked(self) -> Estimates:
+        """The estimates as if the model held."""
+        return Estimates(self.found)
+
+    # Gain and efficiency ----------------------------------------------------------------------------------------------
 
     @property
     def clipped(self) -> bool:
         """True where the black level cuts the noise of the dark frames off, of pairs or of the stack."""
         return self.dark_share > CLIPPED
 
-    @cached_property
-    def bright(self) -> list[Estimate]:
-        """σ²_y of each level, DN², of pixels about their row's mean where rows have noise of their own."""
-        return [self._pixels(one.bright) for one in self.found.levels]
-
-    @cached_property
-    def dark(self) -> list[Estimate]:
-        """σ²_y.dark of each level, DN², as `bright`. Levels that share their dark frames share the estimate."""
-        return self._shared(self._pixels)
-
-    def _pixels(self, seen: Pair) -> Estimate:
-        found = self.found
-        if found.noisy_rows:
-            return self.scale.noise(seen.within_rows, seen.within_error, seen.ends)
-        return self.scale.noise(found.temporal(seen), seen.total_error, seen.ends)
-
-    def _total(self, seen: Pair) -> Estimate:
-        """The total noise; of few rows, the mean of their difference takes some of the rows' own noise away."""
-        noise = self.scale.noise(self.found.temporal(seen), seen.total_error, seen.ends)
-        taken = max(seen.row_variance, 0) / seen.rows if self.found.noisy_rows else 0.0
-        return replace(noise, error=hypot(noise.error, taken))
-
-    def _shared(self, make: Callable[[Pair], Estimate]) -> list[Estimate]:
-        pairs = {id(one.dark): one.dark for one in self.found.levels}
-        made = {key: make(dark) for key, dark in pairs.items()}
-        return [made[id(one.dark)] for one in self.found.levels]
-
-    @cached_property
-    def bright_means(self) -> list[Estimate]:
-        return [self.scale.mean(one.bright) for one in self.found.levels]
-
-    @cached_property
-    def dark_means(self) -> list[Estimate]:
-        return self._shared(self.scale.mean)
-
-    def signal(self, i: int) -> Estimate:
-        """μ_y − μ_y.dark of one level, DN."""
-        return combined([1, -1], [self.bright_means[i], self.dark_means[i]])
-
-    @cached_property
-    def used(self) -> list[int]:
-        """The levels that are fitted: the linear ones whose bright frames do not reach the ceiling."""
-        levels, linear = self.found.levels, np.flatnonzero(self.found.linear).tolist()
-        free = [i for i in linear if self.scale.clipped(levels[i].bright.ends)[1] <= CLIPPED]
-        return free or linear
-
-    # Gain and efficiency ----------------------------------------------------------------------------------------------
-
-    @cached_property
+    @property
     def gain(self) -> Estimate:
-        """K, DN per electron: by the standard's equation, or without the dark frames where these hide their noise.
-
-        Where rows have noise of their own, K comes from pixels about their row's mean, unless that changes it by less
-        than `ALIKE`: then it is the standard's, with bounds that reach the other.
-        """
-        standard = self._gain_from_both(self.bright, self.dark)
-        if self.found.noisy_rows:
-            total = [self._total(one.bright) for one in self.found.levels]
-            whole = self._gain_from_both(total, self._shared(self._total))
-            if abs(whole.value / standard.value - 1) < ALIKE and whole.within(PROMISE):
-                ends = (*standard.bounds, whole.low, whole.high)
-                standard = Estimate(whole.value, whole.error, min(ends), max(ends))
-        if standard.within(PROMISE):
-            return standard
-        other = self._gain_from_bright()
-        return other if other.within(PROMISE) or not standard.value > 0 else standard
-
-    def _gain_from_both(self, bright: list[Estimate], dark: list[Estimate]) -> Estimate:
-        """The slope of σ²_y − σ²_y.dark over μ_y − μ_y.dark through the origin (section 6.4).
-
-        Chance in the signal makes the slope smaller, by its own square's share of the signal's: `high` allows for it.
-        """
-        x = self.found.signal[self.used]
-        weights = (x / np.sum(x * x)).tolist()
-        both = [*weights, *(-one for one in weights)]
-        means = combined(both, self._both(self.bright_means, self.dark_means))  # 1: the weights are those of a slope
-        slope = of(_ratio, combined(both, self._both(bright, dark)), means)
-        smaller = sum(self.signal(i).error ** 2 for i in self.used) / float(np.sum(x * x))
-        return _positive(Estimate(slope.value, slope.error, slope.low, slope.high + abs(slope.value) * smaller))
-
-    def _gain_from_bright(self) -> Estimate:
-        """The slope of σ²_y over μ_y, of levels that neither rounding nor clipping touches, surer levels first.
-
-        The dark frames enter neither; the intercept takes whatever noise is not the photons'.
-        """
-        levels, square = self.found.levels, self.scale.step**2
-        clear = [
-            i
-            for i in self.used
-            if self.bright[i].value > 1.5 * QUANTISED * square
-            and sum(self.scale.clipped(levels[i].bright.ends)) < CLIPPED
-        ]
-        if len(clear) < 3:
-            return UNKNOWN
-        x = np.array([self.bright_means[i].value for i in clear])
-        sure = np.array([max(self.bright[i].error, 1e-12) for i in clear]) ** -2
-        apart = x - np.sum(sure * x) / np.sum(sure)
-        below = float(np.sum(sure * apart * x))
-        if not below > 0:
-            return UNKNOWN
-        weights = (sure * apart / below).tolist()
-        noise, means = ([every[i] for i in clear] for every in (self.bright, self.bright_means))
-        return _positive(of(_ratio, combined(weights, noise), combined(weights, means)))
-
-    def _both(self, bright: list[Estimate], dark: list[Estimate]) -> list[Estimate]:
-        return [bright[i] for i in self.used] + [dark[i] for i in self.used]
+        """K, DN per electron (section 6.4)."""
+        return self.fitted_gain
 
     @cached_property
     def responsivity(self) -> Estimate:
-        """R, DN per photon; DN per second of exposure where the photons are not known (section 6.3)."""
+        """R, DN per photon (section 6.3), with what light that flickers may change of it."""
+        one, checks = self.fitted_responsivity, self.checks
+        if not checks:
+            return one
         light = self.light[self.used]
-        if not np.isfinite(light).all():
-            return UNKNOWN
-        weights = (light / np.sum(light * light)).tolist()
-        both = [*weights, *(-one for one in weights)]
-        return _positive(combined(both, self._both(self.bright_means, self.dark_means)))
-
-    @cached_property
-    def lit(self) -> bool:
-        """True where the photons of every level are known."""
-        return bool(np.isfinite(self.found.photons).all())
-
-    @cached_property
-    def light(self) -> Array:
-        """Photons per pixel, or the exposure in seconds where they are not known."""
-        return self.found.photons if self.lit else self.found.exposures_s
+        weights = light / np.sum(light * light)
+        moved = weights * np.hypot(checks.flicker * self.found.signal[self.used] / sqrt(2), checks.wander)
+        return replace(one, error=hypot(one.error, float(np.sqrt(moved @ moved))))
 
     @cached_property
     def efficiency(self) -> Estimate:
         """η = R / K."""
-        return of(_ratio, self.responsivity, self.gain) if self.lit else UNKNOWN
+        return of(ratio, self.responsivity, self.gain) if self.lit else UNKNOWN
 
     # The dark ---------------------------------------------------------------------------------------------------------
 
     @cached_property
     def dark_variance(self) -> Estimate:
         """σ²_y.dark, DN², at an exposure of no time, with the rows' noise (section 7.1)."""
-        parts, t = self._shared(self._total), self.found.exposures_s
+        parts, t = self.shared(self._total), self.found.exposures_s
         weights = np.full(len(t), 1 / len(t))
         if self.found.several_exposures:
             weights -= t.mean() * (t - t.mean()) / np.sum((t - t.mean()) ** 2)
@@ -200,7 +96,7 @@ class Estimates:
     @cached_property
     def threshold(self) -> Estimate:
         """μ_e.min = ½ + sqrt(σ² + ¼), electrons, σ = σ_y.dark / K: where the signal is as large as its noise."""
-        return of(lambda variance, gain: threshold(_ratio(variance, gain**2)), self.dark_variance, self.gain)
+        return of(lambda variance, gain: threshold(ratio(variance, gain**2)), self.dark_variance, self.gain)
 
     @cached_property
     def threshold_photons(self) -> Estimate:
@@ -208,7 +104,7 @@ class Estimates:
         if not self.lit:
             return UNKNOWN
         return of(
-            lambda variance, gain, response: _ratio(gain * threshold(_ratio(variance, gain**2)), response),
+            lambda variance, gain, response: ratio(gain * threshold(ratio(variance, gain**2)), response),
             *(self.dark_variance, self.gain, self.responsivity),
         )
 
@@ -220,12 +116,16 @@ class Estimates:
 
     @cached_property
     def dark_current(self) -> Estimate:
-        """μ_I, electrons per second (section 7.2)."""
+        """μ_I, electrons per second (section 7.2); where it may be a drift of the offset, as their noise bounds it."""
         if not self.found.several_exposures:
             return UNKNOWN
-        t = self.found.exposures_s
-        weights = (t - t.mean()) / np.sum((t - t.mean()) ** 2)
-        return of(_ratio, combined(weights.tolist(), self.dark_means), self.gain)
+        if not self.checks:
+            return Checks(self).dark_current_of_means
+        means, noise = self.checks.dark_current_of_means, self.checks.dark_current_of_noise
+        if noise and self.checks.spoiling("dark_current_e_per_s") and not self.checks.spoiling("gain_dn_per_e"):
+            low, high = noise.bounds
+            return Estimate(means.value, 0.0, min(low, high), max(low, high))
+        return means
 
     @cached_property
     def dark_share(self) -> float:
@@ -260,6 +160,9 @@ class Estimates:
         high = max(float(found.signal[beyond]), value) + lost
         hidden = self.dark_means[peak]
         low, high = min(low, value) - (hidden.high - hidden.value), high + hidden.value - hidden.low
+        if self.checks:  # where the light is brightest, the frames are full first
+            darker, brighter = self.checks.shaded_ends
+            low, high = low * (1 + darker), high * (1 + brighter)
         level, middle = (Estimate(one, error, low, high) for one in (value, (low + high) / 2))
         return middle if middle.within(PROMISE) and not level.within(PROMISE) else level
 
@@ -294,28 +197,29 @@ class Estimates:
     @cached_property
     def full_well(self) -> Estimate:
         """μ_e.sat, electrons (section 6.6)."""
-        return of(_ratio, self.saturation_dn, self.gain)
+        return of(ratio, self.saturation_dn, self.gain)
 
     @cached_property
     def dynamic_range(self) -> Estimate:
         """μ_e.sat / μ_e.min, where K is in both: μ_y.sat / (K/2 + sqrt(σ²_y.dark + K²/4))."""
         return of(
-            lambda full, variance, gain: _ratio(full, gain * threshold(_ratio(variance, gain**2))),
+            lambda full, variance, gain: ratio(full, gain * threshold(ratio(variance, gain**2))),
             *(self.saturation_dn, self.dark_variance, self.gain),
         )
 
     @cached_property
-    def linearity_error(self) -> float:
-        """How far each of the linearity's deviations may be off, a fraction: twice what the surest level cannot tell.
+    def linearity_error(self) -> tuple[float, float]:
+        """How far each of the linearity's deviations may be off, fractions: its standard error, and what is hidden.
 
-        The line takes up no more than the largest of the levels' own errors.
+        Twice what the surest level cannot tell: the line takes up no more than the largest of the levels' own errors.
         """
-        found = self.found
-        worst = 0.0
+        found, chance, hidden = self.found, 0.0, 0.0
         for i in np.flatnonzero(found.judged_levels).tolist():
-            low, high = self.signal(i).bounds
-            worst = max(worst, (high - low) / 2 / float(found.signal[i]))
-        return 2 * worst
+            seen, signal = self.signal(i), float(found.signal[i])
+            moved = hypot(self.checks.flicker * signal / sqrt(2), self.checks.wander) if self.checks else 0.0
+            chance = max(chance, hypot(seen.error, moved) / signal)
+            hidden = max(hidden, (seen.high - seen.low) / 2 / signal)
+        return 2 * chance, 2 * hidden
 
     # Patterns ---------------------------------------------------------------------------------------------------------
 
@@ -327,7 +231,7 @@ class Estimates:
         return replace(seen, value=max(seen.value, 0.0))
 
     def _dark_pattern_of_pairs(self) -> Estimate:
-        return combined(self.found.pattern_weights.tolist(), self._shared(self.scale.pattern))
+        return combined(self.found.pattern_weights.tolist(), self.shared(self.scale.pattern))
 
     @cached_property
     def dsnu(self) -> Estimate:
@@ -344,14 +248,23 @@ class Estimates:
         """
         found = self.found
         if not (found.bright and found.dark):
-            return self._prnu_of_pairs()
+            return self._less_shading(self._prnu_of_pairs())
         if self.beyond:
             return UNKNOWN
         apart = self._gain_part(parts_of_difference(found.bright, found.dark)["whole"])
         standard = _excess(found.bright.pattern, found.dark.pattern, self.stack_signal.value)
         if not abs(standard - apart.value) <= PATTERNS_ALIKE * apart.value:
-            return apart
-        return Estimate(standard, apart.error, min(apart.low, standard), max(apart.high, standard))
+            return self._less_shading(apart)
+        one = Estimate(standard, apart.error, min(apart.low, standard), max(apart.high, standard))
+        return self._less_shading(one)
+
+    def _less_shading(self, one: Estimate, kinds: tuple[int, ...] = (0, 1, 2)) -> Estimate:
+        """With a lower bound that leaves smooth light out."""
+        if not self.checks:
+            return one
+        smooth = sum(self.checks.shaded[kind] for kind in kinds)
+        low = sqrt(max(max(one.low, 0) ** 2 - smooth, 0))
+        return replace(one, low=low) if smooth else one
 
     def _gain_part(self, part: Part) -> Estimate:
         """A part of the pattern of the gain, a fraction, of the stacks' difference.
@@ -378,7 +291,7 @@ class Estimates:
         found = self.found
         weights, fitted = found.gain_pattern_weights, np.flatnonzero(found.linear).tolist()
         bright = [self.scale.pattern(found.levels[i].bright) for i in fitted]
-        shared = self._shared(self.scale.pattern)
+        shared = self.shared(self.scale.pattern)
         both = combined([*weights, *(-one for one in weights)], [*bright, *(shared[i] for i in fitted)])
         once = [weight * float(found.signal[i]) for weight, i in zip(weights, fitted, strict=True)]
         signals = combined(once, [self.signal(i) for i in fitted])  # 1, since the weights are those of a slope
@@ -393,7 +306,9 @@ class Estimates:
         bright, dark = self.found.bright, self.found.dark
         assert bright
         assert dark
-        return combined([1, -1], [self.scale.mean(bright), self.scale.mean(dark)])
+        signal = combined([1, -1], [self.scale.mean(bright), self.scale.mean(dark)])
+        drift = sqrt(2 * dark.frame_means) if dark.restless else 0.0  # of the offset, between the stacks
+        return replace(signal, error=hypot(signal.error, drift))
 
     @cached_property
     def beyond(self) -> bool:
@@ -410,9 +325,10 @@ class Estimates:
         if not (found.bright and found.dark):
             return {}
         dark, apart = found.dark.parts, parts_of_difference(found.bright, found.dark)
-        for name in dark:
+        for kind, name in enumerate(dark):
             split[f"dsnu_{name}_e"] = of(_root_over, self.scale.pattern(found.dark, dark[name]), self.gain)
-            split[f"prnu_{name}"] = UNKNOWN if self.beyond else self._gain_part(apart[name])
+            gain = UNKNOWN if self.beyond else self._gain_part(apart[name])
+            split[f"prnu_{name}"] = self._less_shading(gain, (kind,))
         return split
 
 
@@ -424,18 +340,9 @@ def threshold(variance_e: float) -> float:
     return 0.5 + sqrt(variance_e + 0.25) if variance_e > 0 else 1.0 if variance_e <= 0 else nan
 
 
-def _ratio(above: float, below: float) -> float:
-    return above / below if below > 0 else nan
-
-
 def _root_over(variance: float, signal: float) -> float:
-    return _ratio(sqrt(max(variance, 0)), signal)
+    return ratio(sqrt(max(variance, 0)), signal)
 
 
 def _excess(bright: float, dark: float, signal: float) -> float:
     return _root_over(bright - dark, signal)
-
-
-def _positive(one: Estimate) -> Estimate:
-    """An estimate of a figure whose true value is above zero."""
-    return replace(one, low=max(one.low, 0.0)) if one.value > 0 else UNKNOWN

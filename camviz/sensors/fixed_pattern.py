@@ -14,15 +14,10 @@ from camviz.sensors.counting import Floats
 class FixedPattern:
     """What differs from pixel to pixel of one specimen, the same in every frame.
 
-    Attributes
-    ----------
-    gain : array (height, width)
-        PRNU: a factor about 1.
-    offset_e : array (height, width)
-        DSNU, in electrons.
+    Attributes:
+        gain: (height, width), PRNU: a factor about 1.
+        offset_e: (height, width), DSNU, in electrons.
 
-    Examples
-    --------
     >>> pattern = Sensor(prnu=0.01, dsnu_e=3).pattern(200, 200)
     >>> pattern.gain.std().round(3), pattern.offset_e.std().round(1)
     (np.float32(0.01), np.float32(3.0))

@@ -13,10 +13,12 @@ from math import nan, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.sensors.checks import Checks
 from camviz.sensors.estimates import Estimates, threshold
 from camviz.sensors.hidden import QUANTISED, ROUNDING
 from camviz.sensors.readings import Readings
 from camviz.sensors.statistics import straight_line
+from camviz.sensors.transfer import Transfer
 from camviz.sensors.trust import Figure, judged
 
 Array = NDArray[np.float64]
@@ -43,29 +45,17 @@ class Measurement(Readings):
     The attributes are the standard's estimates, trusted or not; NaN where there is none. `judged` holds those that can
     be trusted, bounds for the others, and `why` they are withheld; `figures` the trusted values alone.
 
-    Parameters
-    ----------
-    levels : tuple of Level
-        Two or more, of rising brightness.
-    bright, dark : Stack, optional
-        Statistics of many frames of one exposure, for the fixed patterns.
-    step : float
-        The difference of neighbouring digital numbers: 1, but 16 where 12 bits were stored in the upper bits of 16.
-    flicker_counts : bool
-        Whether a change of the light between the two frames of a pair counts as noise, as it did in release 3 of the
-        standard, and no longer does in release 4.0.
+    Args:
+        levels: tuple of Level, two or more, of rising brightness.
+        bright, dark: Stack, optional, statistics of many frames of one exposure, for the fixed patterns.
+        step: float, the difference of neighbouring digital numbers: 1, but 16 where 12 bits were stored in the upper
+            bits of 16.
+        flicker_counts: bool, whether a change of the light between the two frames of a pair counts as noise, as it did
+            in release 3 of the standard, and no longer does in release 4.0.
 
-    Raises
-    ------
-    ValueError
-        With fewer than two levels, where none is brighter than the dark, or where all are saturated.
+    Raises: ValueError with fewer than two levels, where none is brighter than the dark, or where all are saturated.
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
-
-    Examples
-    --------
     Frames of a simulated sensor give its gain and efficiency back:
 
     >>> sensor, rng = Sensor(quantum_efficiency=0.5, gain_dn_per_e=0.4), np.random.default_rng(0)
@@ -80,7 +70,7 @@ class Measurement(Readings):
     @cached_property
     def estimates(self) -> Estimates:
         """Every figure with its standard error, and with what rounding and clipping may hide of it."""
-        return Estimates(self)
+        return Estimates(self, Checks(Transfer(self)))
 
     @cached_property
     def gain_dn_per_e(self) -> float:
@@ -133,8 +123,8 @@ class Measurement(Readings):
 
     @cached_property
     def full_well_e(self) -> float:
-        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks."""
-        return self.estimates.full_well.value
+        """μ_e.sat, the saturation capacity in electrons: of the level where the variance peaks, under even light."""
+        return self.estimates.unchecked.full_well.value
 
     @cached_property
     def clipped(self) -> bool:
@@ -146,15 +136,10 @@ class Measurement(Readings):
     def snr(self, electrons: ArrayLike) -> Array:
         """Signal to noise of one pixel, patterns left out: μ_e / sqrt(σ_d² + 1/(12 K²) + μ_e).
 
-        Parameters
-        ----------
-        electrons : array_like (...)
-            The mean signal μ_e in electrons.
+        Args:
+            electrons: (...), the mean signal μ_e in electrons.
 
-        Returns
-        -------
-        array (...)
-            A ratio.
+        Returns: (...), a ratio.
         """
         mean = np.asarray(electrons, dtype=float)
         return mean / np.sqrt((self.dark_noise_dn / self.gain_dn_per_e) ** 2 + mean)
@@ -206,9 +191,7 @@ class Measurement(Readings):
     def pattern_split(self) -> dict[str, dict[str, float]]:
         """DSNU and PRNU as row, column and pixel parts.
 
-        Returns
-        -------
-        dict
+        Returns:
             "dsnu_e" in electrons and "prnu" in fractions, each a dictionary of the parts; empty without stacks. A part
             whose variance came out below zero, which chance does where there is none, is 0.
         """
@@ -234,24 +217,16 @@ class Measurement(Readings):
         A figure is told where the truth lies within 3 % of it (DSNU, PRNU 5 %; 0.26 dB), even if chance is at four
         standard errors.
 
-        Returns
-        -------
-        dict of float
-            By name, fractions and decibels (20 log10); NaN where these frames cannot tell one.
+        Returns: By name, fractions and decibels (20 log10); NaN where these frames cannot tell one.
         """
         return {name: self.judged[name].value for name in FIGURES}
 
     def why(self, name: str) -> str:
         """Why a figure is withheld.
 
-        Parameters
-        ----------
-        name : str
-            Of the figure.
+        Args:
+            name: Of the figure.
 
-        Returns
-        -------
-        str
-            One clause; "" for a figure that is told.
+        Returns: One clause; "" for a figure that is told.
         """
         return self.judged[name].why

@@ -19,29 +19,17 @@ MEASURED = "measured in another way"
 class PublishedSensor:
     """A sensor as its sheet describes it.
 
-    Attributes
-    ----------
-    name : str
-        Of the sensor.
-    technology : str
-        "CMOS" or "CCD".
-    camera : str
-        In which it was measured.
-    pitch_um : float
-        From pixel to pixel.
-    sensor : Sensor
-        What it does. Where EMVA 1288 was followed, the full well is the saturation capacity.
-    stated_dynamic_range_db : float
-        NaN where the sheet gives none.
-    source : str
-        The sheet.
-    assumed : tuple of str
-        The figures that no sheet gives, and that we had to choose.
-    basis : str
-        What sort of sheet: measured after EMVA 1288, a maker's data sheet, or measured in another way.
+    Attributes:
+        name: Of the sensor.
+        technology: "CMOS" or "CCD".
+        camera: In which it was measured.
+        pitch_um: From pixel to pixel.
+        sensor: What it does. Where EMVA 1288 was followed, the full well is the saturation capacity.
+        stated_dynamic_range_db: NaN where the sheet gives none.
+        source: The sheet.
+        assumed: The figures that no sheet gives, and that we had to choose.
+        basis: What sort of sheet: measured after EMVA 1288, a maker's data sheet, or measured in another way.
 
-    Examples
-    --------
     >>> sheet = PUBLISHED[0]
     >>> sheet.name, sheet.sensor.full_well_e, sheet.sensor.read_noise_e
     ('IMX174', 32691, 6.83)
@@ -191,19 +179,12 @@ PUBLISHED = (
 class MeasuredShutter:
     """How long a telephone's rolling shutter takes from the first row of a frame to the last.
 
-    Attributes
-    ----------
-    name : str
-        Of the telephone.
-    width, height : int
-        Of its frames, in pixels.
-    frame_s : float
-        In seconds.
-    source : str
-        Who measured it.
+    Attributes:
+        name: Of the telephone.
+        width, height: Of its frames, in pixels.
+        frame_s: In seconds.
+        source: Who measured it.
 
-    Examples
-    --------
     >>> f"{MeasuredShutter('example', 640, 480, 0.0288, 'made up').row_s * 1e6:.0f} µs a row"
     '60 µs a row'
     """

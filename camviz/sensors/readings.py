@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 LINEAR = 0.7  # of saturation: the range in which gain and responsivity are fitted
 LINEARITY = (0.05, 0.95)  # of saturation: the range in which the linearity error is judged
+EARLY = 0.75  # of the largest signal: where the variance peaks below, its noise is not the photons'
 SURELY = 5.0  # standard deviations
 
 
@@ -26,21 +27,13 @@ SURELY = 5.0  # standard deviations
 class Level:
     """One exposure of a photon transfer: a pair of bright and a pair of dark frames.
 
-    Parameters
-    ----------
-    exposure_s : float
-        In seconds.
-    bright, dark : Pair
-        Statistics of two frames each; `of` makes them.
-    photons : float
-        Per pixel; NaN where unknown.
+    Args:
+        exposure_s: In seconds.
+        bright, dark: Statistics of two frames each; `of` makes them.
+        photons: Per pixel; NaN where unknown.
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    Examples
-    --------
     Half the mean square of the frames' difference is the noise of one frame:
 
     >>> level = Level.of(0.01, bright=[[[10, 12]], [[12, 10]]], dark=[[[2, 2]], [[2, 2]]])
@@ -59,24 +52,13 @@ class Level:
     ) -> Level:
         """The level of two bright and two dark frames.
 
-        Parameters
-        ----------
-        exposure_s : float
-            In seconds.
-        bright, dark : sequence of array_like (height, width)
-            Two frames each, in DN.
-        photons : float
-            Per pixel; NaN where unknown.
+        Args:
+            exposure_s: In seconds.
+            bright, dark: sequence of (height, width), two frames each, in DN.
+            photons: Per pixel; NaN where unknown.
 
-        Returns
-        -------
-        Level
-            With the statistics of the frames.
-
-        Raises
-        ------
-        ValueError
-            Unless there are two frames of each kind, of one shape.
+        Returns: Level with the statistics of the frames.
+        Raises: ValueError unless there are two frames of each kind, of one shape.
         """
         for name, frames in (("bright", bright), ("dark", dark)):
             if len(frames) != 2:
@@ -129,7 +111,7 @@ class Readings:
         return np.array([self.temporal(one.dark) for one in self.levels])
 
     def temporal(self, seen: Pair) -> float:
-        """The total temporal variance (DN²) of a pair's frames, with the noise that a row shares."""
+        """The total temporal variance (DN²) of a pair's frames, with the noise that a row or a column shares."""
         return seen.variance + (seen.drift**2 / 2 if self.flicker_counts else 0)
 
     @cached_property
@@ -139,13 +121,29 @@ class Readings:
         Without it the mean of a row's N pixels varies by 1/N of their own variance. Dark and bright pairs are asked
         apart: lamps flicker in rows under a rolling shutter.
         """
-        dark = {id(one.dark): one.dark for one in self.levels}.values()
-        return _noisy_rows(list(dark)) or _noisy_rows([one.bright for one in self.levels])
+        return any(_noisy([(one.row_means, one.rows, one.columns, one.within) for one in kind]) for kind in self._kinds)
+
+    @cached_property
+    def noisy_columns(self) -> bool:
+        """True where the pixels of a column share noise, as `noisy_rows`."""
+        return any(
+            _noisy([(one.column_means, one.columns, one.rows, one.within) for one in kind]) for kind in self._kinds
+        )
+
+    @property
+    def noisy_lines(self) -> bool:
+        """True where rows or columns have noise of their own."""
+        return self.noisy_rows or self.noisy_columns
+
+    @property
+    def _kinds(self) -> tuple[list[Pair], list[Pair]]:
+        """The dark pairs, each once, and the bright ones."""
+        return list({id(one.dark): one.dark for one in self.levels}.values()), [one.bright for one in self.levels]
 
     @cached_property
     def pixel_variance(self) -> Array:
-        """σ²_y, DN², as far as photons make it: of pixels about their row's mean where rows have noise of their own."""
-        return np.array([one.bright.within_rows for one in self.levels]) if self.noisy_rows else self.variance
+        """σ²_y, DN², as far as photons make it: of pixels alone where rows or columns have noise of their own."""
+        return np.array([one.bright.within for one in self.levels]) if self.noisy_lines else self.variance
 
     @cached_property
     def photons(self) -> Array:
@@ -165,17 +163,28 @@ class Readings:
 
     @cached_property
     def saturated(self) -> bool:
-        """True where the variance falls again beyond its peak, by more than chance: its own, of pixels and of rows."""
+        """True where the variance falls again beyond its peak, by more than chance, of pixels, rows and columns."""
         highest, last = self.levels[self.peak].bright, self.levels[-1].bright
-        errors = [one.within_error if self.noisy_rows else one.total_error for one in (highest, last)]
+        errors = [one.within_error if self.noisy_lines else one.total_error for one in (highest, last)]
         return bool(self.pixel_variance[self.peak] - self.pixel_variance[-1] > SURELY * hypot(*errors))
+
+    @cached_property
+    def peaks_early(self) -> bool:
+        """True where the variance peaks long before the signal ends, as of no camera whose noise is the photons'."""
+        return self.saturated and bool(self.signal[self.peak] < EARLY * self.signal.max())
+
+    @cached_property
+    def top(self) -> int:
+        """The level at which the camera is taken to be full: of the peak; the brightest where that is none or early."""
+        if self.peaks_early:
+            return int(np.argmax(self.signal))
+        return self.peak if self.saturated else len(self.levels) - 1
 
     @cached_property
     def linear(self) -> NDArray[np.bool_]:
         """The levels (n,) that gain and responsivity are fitted to: up to 70 % of saturation."""
-        top = self.peak if self.saturated else len(self.levels) - 1
-        chosen = (self.signal <= LINEAR * self.signal[top]) & (np.arange(len(self.levels)) <= top)
-        return chosen if chosen.any() else np.arange(len(self.levels)) == top
+        chosen = (self.signal <= LINEAR * self.signal[self.top]) & (np.arange(len(self.levels)) <= self.top)
+        return chosen if chosen.any() else np.arange(len(self.levels)) == self.top
 
     @cached_property
     def several_exposures(self) -> bool:
@@ -184,7 +193,7 @@ class Readings:
     @cached_property
     def judged_levels(self) -> NDArray[np.bool_]:
         """The levels (n,) whose deviations from a straight line are judged: 5–95 % of saturation."""
-        top = self.signal[self.peak if self.saturated else -1]
+        top = self.signal[self.top]
         return (self.signal >= LINEARITY[0] * top) & (self.signal <= LINEARITY[1] * top)
 
     @cached_property
@@ -225,10 +234,13 @@ class Readings:
         return list(sure * square / np.sum(sure * square**2))
 
 
-def _noisy_rows(seen: Sequence[Pair]) -> bool:
-    """Whether the means of rows vary by more than their pixels' own noise explains, beyond chance."""
-    asked = [one for one in seen if one.rows > 2 and one.columns > 1 and one.within_rows > 0]
+def _noisy(seen: Sequence[tuple[float, int, int, float]]) -> bool:
+    """Whether the means of lines vary by more than their pixels' own noise explains, beyond chance.
+
+    Of each pair: the variance of the lines' means, how many lines and pixels in a line, and the pixels' variance.
+    """
+    asked = [one for one in seen if one[1] > 2 and one[2] > 1 and one[3] > 0]
     if not asked:
         return False
-    ratios = [one.row_means * one.columns / one.within_rows for one in asked]
-    return bool(np.mean(ratios) > 1 + SURELY * sqrt(2 / ((asked[0].rows - 1) * len(asked))))
+    ratios = [means * count / pixels for means, _, count, pixels in asked]
+    return bool(np.mean(ratios) > 1 + SURELY * sqrt(2 / ((asked[0][1] - 1) * len(asked))))

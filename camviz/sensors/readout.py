@@ -27,17 +27,11 @@ FORGOTTEN = 1e-7  # the share of a charge below which the trail that it leaves i
 class CcdRegister:
     """A bucket brigade at one moment: where all the charge is.
 
-    Attributes
-    ----------
-    area : array (height, width)
-        Electrons still on the light-sensitive area.
-    register : array (width,)
-        Electrons in the register.
-    read : array (n,)
-        Electrons read so far.
+    Attributes:
+        area: (height, width), electrons still on the light-sensitive area.
+        register: (width,), electrons in the register.
+        read: (n,), electrons read so far.
 
-    Examples
-    --------
     >>> halted = bucket_brigade([[1, 2], [3, 4]], ticks=1)
     >>> halted.area.sum() + halted.register.sum() + halted.read.sum()  # none is lost
     np.float64(10.0)
@@ -53,29 +47,14 @@ def bucket_brigade(electrons: ArrayLike, ticks: int) -> CcdRegister:
 
     A row enters the register when the one before has been read out, all with perfect transfer.
 
-    Parameters
-    ----------
-    electrons : array_like (height, width)
-        Charges in electrons; row 0 is the first to be read.
-    ticks : int
-        How many pixels have been read.
+    Args:
+        electrons: (height, width), charges in electrons; row 0 is the first to be read.
+        ticks: How many pixels have been read.
 
-    Returns
-    -------
-    CcdRegister
-        Where all the charge is.
+    Returns: Where all the charge is.
+    Raises: ValueError for fewer than 0 or more than height · width ticks.
+    Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 1.
 
-    Raises
-    ------
-    ValueError
-        For fewer than 0 or more than height · width ticks.
-
-    References
-    ----------
-    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 1.
-
-    Examples
-    --------
     >>> bucket_brigade([[1, 2], [3, 4]], ticks=3)
     CcdRegister(area=array([[0., 0.],
            [0., 0.]]), register=array([4., 0.]), read=array([1., 2., 3.]))
@@ -99,31 +78,15 @@ def transferred(electrons: ArrayLike, efficiency: float, overscan: int = 0) -> A
     Row i needs n = i + 1 shifts; what is left behind k times comes k rows later, a share C(n+k-1, k) c^n (1-c)^k: the
     negative binomial law.
 
-    Parameters
-    ----------
-    electrons : array_like (height, width)
-        Charges in electrons; row 0 is the first to be read.
-    efficiency : float
-        The share of a charge that a shift moves, c, above 0.5 and at most 1.
-    overscan : int
-        Further shifts, of empty rows, that show the trail of the last row.
+    Args:
+        electrons: (height, width), charges in electrons; row 0 is the first to be read.
+        efficiency: The share of a charge that a shift moves, c, above 0.5 and at most 1.
+        overscan: Further shifts, of empty rows, that show the trail of the last row.
 
-    Returns
-    -------
-    array (height + overscan, width)
-        In electrons.
+    Returns: (height + overscan, width), in electrons.
+    Raises: ValueError for an efficiency outside (0.5, 1].
+    Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 5.
 
-    Raises
-    ------
-    ValueError
-        For an efficiency outside (0.5, 1].
-
-    References
-    ----------
-    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 5.
-
-    Examples
-    --------
     A trail of 0.9 · 0.1^k behind a single charge:
 
     >>> transferred([[1000], [0], [0]], efficiency=0.9)[:, 0].round(6)
@@ -151,31 +114,15 @@ def smeared(electrons: ArrayLike, exposure_s: float, row_shift_s: float) -> Arra
     q + t_shift/t_exposure · (sum of its column): half of it gathered on the way in, half on the way out. That is a CCD
     without a shutter or a shielded storage; the stripe runs through the whole column of anything bright.
 
-    Parameters
-    ----------
-    electrons : array_like (height, width)
-        Charges in electrons.
-    exposure_s : float
-        In seconds.
-    row_shift_s : float
-        How long a row stays under the next one's light, in seconds.
+    Args:
+        electrons: (height, width), charges in electrons.
+        exposure_s: In seconds.
+        row_shift_s: How long a row stays under the next one's light, in seconds.
 
-    Returns
-    -------
-    array (height, width)
-        In electrons.
+    Returns: (height, width), in electrons.
+    Raises: ValueError for times below zero, and an exposure of no time.
+    Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 5.
 
-    Raises
-    ------
-    ValueError
-        For times below zero, and an exposure of no time.
-
-    References
-    ----------
-    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 5.
-
-    Examples
-    --------
     With shifts a hundredth of the exposure long, a lamp adds 1 % of its charge to its whole column:
 
     >>> smeared([[0], [1000], [0]], exposure_s=0.01, row_shift_s=0.0001)[:, 0]
@@ -196,29 +143,14 @@ def bloomed(electrons: ArrayLike, full_well_e: float) -> Array:
 
     Channel stops keep columns apart; what reaches the column's end is lost. An anti-blooming drain instead is `fill`.
 
-    Parameters
-    ----------
-    electrons : array_like (height, width)
-        Charges in electrons.
-    full_well_e : float
-        What a well holds.
+    Args:
+        electrons: (height, width), charges in electrons.
+        full_well_e: What a well holds.
 
-    Returns
-    -------
-    array (height, width)
-        In electrons.
+    Returns: (height, width), in electrons.
+    Raises: ValueError for a full well that is not above 0.
+    Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 4.
 
-    Raises
-    ------
-    ValueError
-        For a full well that is not above 0.
-
-    References
-    ----------
-    J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 4.
-
-    Examples
-    --------
     >>> bloomed([[0], [0], [100], [0], [0]], full_well_e=40)[:, 0]
     array([ 0., 30., 40., 30.,  0.])
     """
@@ -243,22 +175,13 @@ def bloomed(electrons: ArrayLike, full_well_e: float) -> Array:
 def row_times(height: int, row_s: float, exposure_s: float = 0.0) -> Array:
     """When each row of a rolling shutter is in the middle of its exposure; row 0 begins at 0.
 
-    Parameters
-    ----------
-    height : int
-        How many rows.
-    row_s : float
-        From one row to the next, in seconds; 0 is a global shutter.
-    exposure_s : float
-        In seconds.
+    Args:
+        height: How many rows.
+        row_s: From one row to the next, in seconds; 0 is a global shutter.
+        exposure_s: In seconds.
 
-    Returns
-    -------
-    array (height,)
-        In seconds.
+    Returns: (height,), in seconds.
 
-    Examples
-    --------
     >>> row_times(4, row_s=0.001, exposure_s=0.010)
     array([0.005, 0.006, 0.007, 0.008])
     """
@@ -268,27 +191,16 @@ def row_times(height: int, row_s: float, exposure_s: float = 0.0) -> Array:
 def rolling_rays(camera: Camera, poses: RigidTransform) -> tuple[Array, Array]:
     """A camera's rays, each row at its own pose.
 
-    Parameters
-    ----------
-    camera : Camera
-        Its own pose does not count.
-    poses : RigidTransform
-        One world_from_cam for each row.
+    Args:
+        camera: Its own pose does not count.
+        poses: One world_from_cam for each row.
 
-    Returns
-    -------
-    origins : array (height, 1, 3)
-        In metres.
-    directions : array (height, width, 3)
-        Unit vectors; NaN where there is no ray.
+    Returns:
+        origins: (height, 1, 3), in metres.
+        directions: (height, width, 3), unit vectors; NaN where there is no ray.
 
-    Raises
-    ------
-    ValueError
-        Unless there is one pose for each row.
+    Raises: ValueError unless there is one pose for each row.
 
-    Examples
-    --------
     A camera that glides to the right at 1 m/s, rows 0.1 s apart:
 
     >>> from camviz.cameras import Camera
@@ -315,36 +227,18 @@ def rolling_picture(
 
     Each row is traced at the middle of its exposure, so the picture is distorted and not blurred.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is photographed.
-    camera : Camera
-        Its own pose does not count.
-    motion : callable
-        Gives the poses world_from_cam at times (n,) in seconds.
-    row_s : float
-        From one row to the next, in seconds.
-    exposure_s : float
-        In seconds.
+    Args:
+        scene: What is photographed.
+        camera: Its own pose does not count.
+        motion: Gives the poses world_from_cam at times (n,) in seconds.
+        row_s: From one row to the next, in seconds.
+        exposure_s: In seconds.
 
-    Returns
-    -------
-    array (height, width, 3)
-        Linear light, float32.
+    Returns: (height, width, 3), linear light, float32.
+    Raises: ValueError unless the motion gives one pose for each row.
+    Source: E. Ringaby and P.-E. Forssén, Efficient video rectification and stabilisation for cell-phones, Int. J.
+    Comput. Vis. 96 (2012).
 
-    Raises
-    ------
-    ValueError
-        Unless the motion gives one pose for each row.
-
-    References
-    ----------
-    E. Ringaby and P.-E. Forssén, Efficient video rectification and stabilisation for cell-phones, Int. J. Comput. Vis.
-    96 (2012).
-
-    Examples
-    --------
     An upright edge leans when the camera glides to the left, by f / z · 0.5 m = 1 pixel a row:
 
     >>> from camviz.cameras import Camera
@@ -366,25 +260,13 @@ def rolling_picture(
 def gliding(camera: Camera, velocity_m_per_s: ArrayLike) -> Callable[[Array], RigidTransform]:
     """The motion of a camera that starts where it stands, and moves with a constant velocity.
 
-    Parameters
-    ----------
-    camera : Camera
-        Where it starts and looks.
-    velocity_m_per_s : array_like (3,)
-        In the world, in metres per second.
+    Args:
+        camera: Where it starts and looks.
+        velocity_m_per_s: (3,), in the world, in metres per second.
 
-    Returns
-    -------
-    callable
-        Gives the poses world_from_cam at times (n,) in seconds.
+    Returns: Gives the poses world_from_cam at times (n,) in seconds.
+    Raises: ValueError for another shape.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera
     >>> from camviz import Intrinsics
     >>> motion = gliding(Camera(Intrinsics.from_fov(4, 3, 90)), (0, 0, 2))

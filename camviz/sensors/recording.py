@@ -36,8 +36,6 @@ _LAYOUT = (
 class RecordingError(ValueError):
     """Frames that cannot be measured; the message is one sentence that says which and why.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> read_recording(Path("nowhere"))
     Traceback (most recent call last):
@@ -62,21 +60,13 @@ class Shot:
 class Recording:
     """All shots of a camera at one setting: pairs for the photon transfer, and at most one stack of either kind.
 
-    Attributes
-    ----------
-    source : Path
-        The folder or descriptor file.
-    pairs : tuple of Shot
-        Two frames of one light each.
-    bright_stack, dark_stack : Shot, optional
-        Many frames of one light.
-    release : float
-        Of the standard that the data were taken for.
-    size : tuple of int, optional
-        Width and height in pixels, where they were said.
+    Attributes:
+        source: The folder or descriptor file.
+        pairs: Two frames of one light each.
+        bright_stack, dark_stack: Many frames of one light.
+        release: Of the standard that the data were taken for.
+        size: Width and height in pixels, where they were said.
 
-    Examples
-    --------
     >>> from math import nan
     >>> from pathlib import Path
     >>> from camviz.sensors.recording import Shot
@@ -95,15 +85,10 @@ class Recording:
     def with_photons_per_ms(self, photons_per_ms: float) -> Recording:
         """The same with the light known.
 
-        Parameters
-        ----------
-        photons_per_ms : float
-            Per pixel and millisecond of exposure.
+        Args:
+            photons_per_ms: Per pixel and millisecond of exposure.
 
-        Returns
-        -------
-        Recording
-            Its dark shots stay dark.
+        Returns: Its dark shots stay dark.
         """
 
         def lit(shot: Shot) -> Shot:
@@ -120,23 +105,12 @@ def read_recording(path: str | Path) -> Recording:
     TIFF; where an exposure has more than two frames of a kind, these are also its stack. A descriptor is one of the
     emva1288 project, `.txt`.
 
-    Parameters
-    ----------
-    path : str or Path
-        The folder or the descriptor file.
+    Args:
+        path: The folder or the descriptor file.
 
-    Returns
-    -------
-    Recording
-        Its frames are not yet read.
+    Returns: Its frames are not yet read.
+    Raises: RecordingError in one sentence, for what is not there, is not complete or has another name.
 
-    Raises
-    ------
-    RecordingError
-        In one sentence, for what is not there, is not complete or has another name.
-
-    Examples
-    --------
     >>> from pathlib import Path
     >>> import cv2
     >>> Path("ten_ms").mkdir()
@@ -162,27 +136,13 @@ def read_recording(path: str | Path) -> Recording:
 def measure(recording: Recording) -> Measurement:
     """Read all the frames of a recording, one shot at a time, and measure.
 
-    Parameters
-    ----------
-    recording : Recording
-        As `read_recording` gives it.
+    Args:
+        recording: As `read_recording` gives it.
 
-    Returns
-    -------
-    Measurement
-        Of the camera.
+    Returns: Measurement of the camera.
+    Raises: RecordingError in one sentence, for frames that cannot be read or measured.
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    Raises
-    ------
-    RecordingError
-        In one sentence, for frames that cannot be read or measured.
-
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
-
-    Examples
-    --------
     A simulated camera of 0.4 DN per electron, 1 to 8 ms:
 
     >>> from pathlib import Path
@@ -380,7 +340,7 @@ class _Reader:
 
 def _grey(path: Path) -> Frame:
     """A frame (height, width) of 8 or 16 bits, or one of 32 bits whose values are whole numbers of 16."""
-    from camviz.calibration.picture_files import PictureError, picture_kind, read_picture
+    from camviz.colour.picture_files import PictureError, picture_kind, read_picture
 
     try:
         if picture_kind(path) == "JPEG":

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
+from camviz.sensors.ends import Ends
 from camviz.sensors.estimate import Estimate
 from camviz.sensors.hidden import (
     ROUNDING,
@@ -19,7 +20,7 @@ from camviz.sensors.hidden import (
     missed_beyond,
     rounding_bias,
 )
-from camviz.sensors.statistics import Ends, Pair, Part, Stack
+from camviz.sensors.statistics import Pair, Part, Stack
 
 CLIPPED = 0.005  # of the pixels at an end of the scale: beyond this share a level is left out of the fits
 MISSED = 20.0  # values: with a mean of so many, none is seen beyond an end once in 5e8 times
@@ -63,7 +64,7 @@ class Scale:
 
     def moved(self, seen: Pair | Stack) -> float:
         """By how much rounding may move a pixel's mean, DN: half a step where there is no noise."""
-        least, _ = before_rounding(seen.within_rows / self.step**2)
+        least, _ = before_rounding(seen.within / self.step**2)
         return self.step * rounding_bias(sqrt(max(least - ROUNDING, 0)))
 
     def mean(self, seen: Pair | Stack) -> Estimate:
@@ -81,7 +82,12 @@ class Scale:
         Clipping a share p leaves a pattern under Gaussian noise at least 1 - p of its deviation (the first term of the
         Hermite series of the clipped covariance). The other terms mix the parts, so that a part may be none at all.
         """
-        variance, error = (max(part.variance, 0), part.error) if part else (seen.pattern, seen.pattern_error)
+        if part:
+            variance, error = max(part.variance, 0), part.error
+        elif isinstance(seen, Stack):
+            variance, error = seen.whole.variance, seen.whole.error
+        else:
+            variance, error = seen.pattern, seen.pattern_error
         lost, deviation, moved = sum(self.clipped(seen.ends)), sqrt(max(variance, 0)), self.moved(seen)
         high = ((deviation + moved) / (1 - lost)) ** 2 if lost < 1 else inf
         low = 0.0 if part and lost > CLIPPED else max(deviation - moved, 0) ** 2

@@ -27,26 +27,14 @@ def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator)
 
     A random number of photons, thinned at random, is again Poisson: e ~ Poisson(η μ_p).
 
-    Parameters
-    ----------
-    photons : array_like, any shape
-        How many photons arrive on average.
-    efficiency : array_like, any shape
-        η, electrons per photon.
-    rng : numpy.random.Generator
-        Draws the electrons.
+    Args:
+        photons: any shape, how many photons arrive on average.
+        efficiency: any shape, η, electrons per photon.
+        rng: Draws the electrons.
 
-    Returns
-    -------
-    array, any shape
-        Electrons, float32.
+    Returns: any shape, electrons, float32.
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
-
-    Examples
-    --------
     >>> convert(np.full(100_000, 1000), 0.6, np.random.default_rng(0)).mean().round()
     np.float32(600.0)
     """
@@ -56,28 +44,15 @@ def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator)
 def leak(shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: float, rng: np.random.Generator) -> Floats:
     """Electrons that heat sets free during the exposure: Poisson(dark current · t).
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Of what is returned.
-    dark_current_e_per_s : float
-        In electrons per second and pixel.
-    exposure_s : float
-        In seconds.
-    rng : numpy.random.Generator
-        Draws the electrons.
+    Args:
+        shape: Of what is returned.
+        dark_current_e_per_s: In electrons per second and pixel.
+        exposure_s: In seconds.
+        rng: Draws the electrons.
 
-    Returns
-    -------
-    array, any shape
-        Electrons, float32.
+    Returns: any shape, electrons, float32.
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
-
-    Examples
-    --------
     >>> leak((500, 500), dark_current_e_per_s=2, exposure_s=10, rng=np.random.default_rng(0)).mean().round()
     np.float32(20.0)
     """
@@ -87,20 +62,12 @@ def leak(shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: float,
 def fill(electrons: ArrayLike, full_well_e: float) -> Floats:
     """What the wells hold of charges.
 
-    Parameters
-    ----------
-    electrons : array_like, any shape
-        Charges in electrons.
-    full_well_e : float
-        The most that a well holds.
+    Args:
+        electrons: any shape, charges in electrons.
+        full_well_e: The most that a well holds.
 
-    Returns
-    -------
-    array, any shape
-        Electrons, float32.
+    Returns: any shape, electrons, float32.
 
-    Examples
-    --------
     >>> fill([9_000, 12_000], full_well_e=10_000)
     array([ 9000., 10000.], dtype=float32)
     """
@@ -110,22 +77,13 @@ def fill(electrons: ArrayLike, full_well_e: float) -> Floats:
 def read(charge_e: ArrayLike, offset_e: ArrayLike, read_noise_e: float, rng: np.random.Generator) -> Floats:
     """The signal as the amplifier reports it: with each pixel's own offset, and fresh noise each time.
 
-    Parameters
-    ----------
-    charge_e, offset_e : array_like, any shape
-        In electrons.
-    read_noise_e : float
-        A standard deviation in electrons.
-    rng : numpy.random.Generator
-        Draws the noise.
+    Args:
+        charge_e, offset_e: any shape, in electrons.
+        read_noise_e: A standard deviation in electrons.
+        rng: Draws the noise.
 
-    Returns
-    -------
-    array, any shape
-        In electrons, float32.
+    Returns: any shape, in electrons, float32.
 
-    Examples
-    --------
     >>> read(np.zeros(100_000), offset_e=0, read_noise_e=5, rng=np.random.default_rng(0)).std().round(1)
     np.float32(5.0)
     """
@@ -140,22 +98,13 @@ def read(charge_e: ArrayLike, offset_e: ArrayLike, read_noise_e: float, rng: np.
 def amplify(signal_e: ArrayLike, gain_dn_per_e: float, offset_dn: float) -> Floats:
     """The voltage before the converter, counted in its steps: K e + offset.
 
-    Parameters
-    ----------
-    signal_e : array_like, any shape
-        In electrons.
-    gain_dn_per_e : float
-        K.
-    offset_dn : float
-        The black level.
+    Args:
+        signal_e: any shape, in electrons.
+        gain_dn_per_e: K.
+        offset_dn: The black level.
 
-    Returns
-    -------
-    array, any shape
-        In DN, not yet whole, float32.
+    Returns: any shape, in DN, not yet whole, float32.
 
-    Examples
-    --------
     >>> amplify([0, 100], gain_dn_per_e=0.5, offset_dn=64)
     array([ 64., 114.], dtype=float32)
     """
@@ -165,20 +114,12 @@ def amplify(signal_e: ArrayLike, gain_dn_per_e: float, offset_dn: float) -> Floa
 def quantise(voltage_dn: ArrayLike, bits: int) -> Words:
     """The nearest whole digital numbers; what lies beyond 0 … 2^bits - 1 is cut off.
 
-    Parameters
-    ----------
-    voltage_dn : array_like, any shape
-        In DN.
-    bits : int
-        Of the converter, at most 16.
+    Args:
+        voltage_dn: any shape, in DN.
+        bits: Of the converter, at most 16.
 
-    Returns
-    -------
-    array, any shape
-        In DN, uint16.
+    Returns: any shape, in DN, uint16.
 
-    Examples
-    --------
     >>> quantise([-3, 10.4, 10.6, 9000], bits=12)
     array([   0,   10,   11, 4095], dtype=uint16)
     """
@@ -190,23 +131,14 @@ def quantise(voltage_dn: ArrayLike, bits: int) -> Words:
 class Exposure:
     """One frame, step by step; all arrays of one shape.
 
-    Attributes
-    ----------
-    photons : array (height, width)
-        Expected on each pixel.
-    photoelectrons, dark_electrons : array (height, width)
-        Freed by light and by heat.
-    charge_e : array (height, width)
-        What the well holds, in electrons.
-    signal_e : array (height, width)
-        As read, in electrons, with offsets and read noise.
-    voltage_dn : array (height, width)
-        In steps of the converter.
-    dn : array (height, width)
-        The digital numbers.
+    Attributes:
+        photons: (height, width), expected on each pixel.
+        photoelectrons, dark_electrons: (height, width), freed by light and by heat.
+        charge_e: (height, width), what the well holds, in electrons.
+        signal_e: (height, width), as read, in electrons, with offsets and read noise.
+        voltage_dn: (height, width), in steps of the converter.
+        dn: (height, width), the digital numbers.
 
-    Examples
-    --------
     >>> frame = Sensor().expose(np.full((4, 4), 1e6), 0.01, 20, np.random.default_rng(0))
     >>> frame.charge_e.max() == Sensor().full_well_e  # overexposed
     np.True_
@@ -231,50 +163,26 @@ class Sensor:
     PRNU acts on the light, DSNU on what is read; the read noise is what is left in an exposure too short for dark
     current.
 
-    Parameters
-    ----------
-    quantum_efficiency : float or EfficiencyCurve
-        Electrons per photon at `measured_at_nm`, or by wavelength.
-    full_well_e : float
-        Electrons that a pixel holds.
-    read_noise_e : float
-        A standard deviation in electrons.
-    gain_dn_per_e : float
-        DN per electron.
-    offset_dn : float
-        The black level.
-    bits : int
-        Of the converter, 1 to 16.
-    dark_current_e_per_s : float
-        Electrons per second and pixel at the reference temperature.
-    reference_temperature_c : float
-        In °C.
-    dsnu_e : float
-        The pattern in the dark, a standard deviation in electrons.
-    dsnu_column_share, dsnu_row_share : float
-        Of its variance, what is the same down each column, and along each row.
-    prnu : float
-        The pattern that light brings, a standard deviation as a fraction of the signal.
-    prnu_column_share, prnu_row_share : float
-        Of its variance, what is the same down each column, and along each row.
-    measured_at_nm : float
-        A wavelength.
-    fill_factor : float
-        A share of the pixel.
-    specimen : int
-        The serial number of this piece of silicon: another number, another pattern.
+    Args:
+        quantum_efficiency: Electrons per photon at `measured_at_nm`, or by wavelength.
+        full_well_e: Electrons that a pixel holds.
+        read_noise_e: A standard deviation in electrons.
+        gain_dn_per_e: DN per electron.
+        offset_dn: The black level.
+        bits: Of the converter, 1 to 16.
+        dark_current_e_per_s: Electrons per second and pixel at the reference temperature.
+        reference_temperature_c: In °C.
+        dsnu_e: The pattern in the dark, a standard deviation in electrons.
+        dsnu_column_share, dsnu_row_share: Of its variance, what is the same down each column, and along each row.
+        prnu: The pattern that light brings, a standard deviation as a fraction of the signal.
+        prnu_column_share, prnu_row_share: Of its variance, what is the same down each column, and along each row.
+        measured_at_nm: A wavelength.
+        fill_factor: A share of the pixel.
+        specimen: The serial number of this piece of silicon: another number, another pattern.
 
-    Raises
-    ------
-    ValueError
-        For a value that its parameter does not take, naming it.
+    Raises: ValueError for a value that its parameter does not take, naming it.
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
-
-    Examples
-    --------
     1000 photons are 600 electrons, and 64 + 0.38 · 600 = 292 DN:
 
     >>> sensor = Sensor(quantum_efficiency=0.6, gain_dn_per_e=0.38, offset_dn=64)
@@ -325,15 +233,10 @@ class Sensor:
 
         A sensor with a single figure has that figure at every wavelength.
 
-        Parameters
-        ----------
-        wavelength_nm : array_like (...), optional
-            In nanometres; by default `measured_at_nm`.
+        Args:
+            wavelength_nm: (...), in nanometres; by default `measured_at_nm`.
 
-        Returns
-        -------
-        array (...)
-            0 … 1, the fill factor included.
+        Returns: array (...), 0 … 1, the fill factor included.
         """
         if isinstance(self.quantum_efficiency, EfficiencyCurve):
             wavelength = self.measured_at_nm if wavelength_nm is None else wavelength_nm
@@ -344,30 +247,20 @@ class Sensor:
     def dark_current(self, temperature_c: float) -> float:
         """Dark current at a temperature, from that at the reference temperature.
 
-        Parameters
-        ----------
-        temperature_c : float
-            In °C.
+        Args:
+            temperature_c: In °C.
 
-        Returns
-        -------
-        float
-            In electrons per second and pixel.
+        Returns: In electrons per second and pixel.
         """
         return self.dark_current_e_per_s * float(dark_current_ratio(temperature_c, self.reference_temperature_c))
 
     def pattern(self, height: int, width: int) -> FixedPattern:
         """This specimen's fixed pattern: the same at every call, so that it can be measured and taken out.
 
-        Parameters
-        ----------
-        height, width : int
-            In pixels.
+        Args:
+            height, width: In pixels.
 
-        Returns
-        -------
-        FixedPattern
-            Its arrays are read-only.
+        Returns: Its arrays are read-only.
         """
         gain = Spread(self.prnu, self.prnu_column_share, self.prnu_row_share)
         offset = Spread(self.dsnu_e, self.dsnu_column_share, self.dsnu_row_share)
@@ -376,26 +269,16 @@ class Sensor:
     def expose(self, photons: ArrayLike, exposure_s: float, temperature_c: float, rng: np.random.Generator) -> Exposure:
         """One frame of monochromatic light at `measured_at_nm`. For light of many colours, see `collect`.
 
-        Parameters
-        ----------
-        photons : array_like (height, width)
-            The number expected on each pixel during the whole exposure.
-        exposure_s : float
-            In seconds.
-        temperature_c : float
-            In °C.
-        rng : numpy.random.Generator
-            Draws the noise.
+        Args:
+            photons: (height, width), the number expected on each pixel during the whole exposure.
+            exposure_s: In seconds.
+            temperature_c: In °C.
+            rng: Draws the noise.
 
-        Returns
-        -------
-        Exposure
-            Every step of it.
+        Returns: Every step of it.
 
-        Raises
-        ------
-        ValueError
-            For photons that are not (height, width), not finite or below zero, and an exposure below zero.
+        Raises:
+            ValueError: For photons that are not (height, width), not finite or below zero, and an exposure below zero.
         """
         photons = _picture(photons, "photons")
         return self.collect(photons * np.float32(self.efficiency()), exposure_s, temperature_c, rng, photons)
@@ -410,28 +293,18 @@ class Sensor:
     ) -> Exposure:
         """One frame, from the photoelectrons expected on each pixel.
 
-        Parameters
-        ----------
-        electrons : array_like (height, width)
-            The number expected during the whole exposure.
-        exposure_s : float
-            In seconds.
-        temperature_c : float
-            In °C.
-        rng : numpy.random.Generator
-            Draws the noise.
-        photons : array_like (height, width), optional
-            Photons expected, which are only reported.
+        Args:
+            electrons: (height, width), the number expected during the whole exposure.
+            exposure_s: In seconds.
+            temperature_c: In °C.
+            rng: Draws the noise.
+            photons: (height, width), photons expected, which are only reported.
 
-        Returns
-        -------
-        Exposure
-            Every step of it.
+        Returns: Every step of it.
 
-        Raises
-        ------
-        ValueError
-            For electrons that are not (height, width), not finite or below zero, and an exposure below zero.
+        Raises:
+            ValueError: For electrons that are not (height, width), not finite or below zero, and an exposure below
+                zero.
         """
         expected = _picture(electrons, "electrons")
         if not (isfinite(exposure_s) and exposure_s >= 0):
@@ -461,17 +334,11 @@ class Sensor:
     def dark_noise_e(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
         """Read noise and the dark current's own, without quantisation: sqrt(σ_read² + D t).
 
-        Parameters
-        ----------
-        exposure_s : float
-            In seconds.
-        temperature_c : float, optional
-            In °C; by default the reference temperature.
+        Args:
+            exposure_s: In seconds.
+            temperature_c: In °C; by default the reference temperature.
 
-        Returns
-        -------
-        float
-            A standard deviation in electrons.
+        Returns: A standard deviation in electrons.
         """
         current = self.dark_current(self.reference_temperature_c if temperature_c is None else temperature_c)
         return float(np.sqrt(self.read_noise_e**2 + current * exposure_s))
@@ -481,19 +348,12 @@ class Sensor:
 
         η μ_p / sqrt(σ_d² + σ_q²/K² + η μ_p) with σ_q² = 1/12.
 
-        Parameters
-        ----------
-        photons : array_like (...)
-            On the pixel, μ_p.
-        exposure_s : float
-            In seconds.
-        temperature_c : float, optional
-            In °C; by default the reference temperature.
+        Args:
+            photons: (...), on the pixel, μ_p.
+            exposure_s: In seconds.
+            temperature_c: In °C; by default the reference temperature.
 
-        Returns
-        -------
-        array (...)
-            A ratio.
+        Returns: array (...), a ratio.
         """
         signal = np.multiply(photons, self.efficiency())
         return signal / np.sqrt(self._floor_e(exposure_s, temperature_c) ** 2 + signal)
@@ -503,17 +363,11 @@ class Sensor:
 
         From η μ = sqrt(σ² + η μ): η μ = ½ + sqrt(σ² + ¼). EMVA 1288 prints its approximation σ + ½ (section 6.6).
 
-        Parameters
-        ----------
-        exposure_s : float
-            In seconds.
-        temperature_c : float, optional
-            In °C; by default the reference temperature.
+        Args:
+            exposure_s: In seconds.
+            temperature_c: In °C; by default the reference temperature.
 
-        Returns
-        -------
-        float
-            Photons on the pixel.
+        Returns: Photons on the pixel.
         """
         floor = self._floor_e(exposure_s, temperature_c)
         return (0.5 + (floor**2 + 0.25) ** 0.5) / float(self.efficiency())
@@ -521,17 +375,11 @@ class Sensor:
     def dynamic_range(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
         """Saturation over absolute sensitivity threshold.
 
-        Parameters
-        ----------
-        exposure_s : float
-            In seconds.
-        temperature_c : float, optional
-            In °C; by default the reference temperature.
+        Args:
+            exposure_s: In seconds.
+            temperature_c: In °C; by default the reference temperature.
 
-        Returns
-        -------
-        float
-            A plain ratio; 20 log10 of it is in dB, log2 in stops.
+        Returns: A plain ratio; 20 log10 of it is in dB, log2 in stops.
         """
         saturation = self.saturation_e / float(self.efficiency())
         return saturation / self.threshold_photons(exposure_s, temperature_c)
@@ -544,22 +392,12 @@ class Sensor:
 def decibel(ratio: ArrayLike) -> Any:
     """20 log10: how EMVA 1288 writes ratios of signals.
 
-    Parameters
-    ----------
-    ratio : array_like (...)
-        A ratio above 0.
+    Args:
+        ratio: (...), a ratio above 0.
 
-    Returns
-    -------
-    array (...)
-        In dB.
+    Returns: array (...), in dB.
+    Source: EMVA Standard 1288, release 4.0 linear (2021).
 
-    References
-    ----------
-    EMVA Standard 1288, release 4.0 linear (2021).
-
-    Examples
-    --------
     >>> decibel([10, 1000])
     array([20., 60.])
     """

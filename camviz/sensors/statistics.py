@@ -6,47 +6,24 @@ A frame is an array (height, width) of digital numbers (DN). Equations: EMVA Sta
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import hypot, inf, isfinite, nan, sqrt
-from typing import Any
+from math import hypot, isfinite, nan, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-
-@dataclass(frozen=True)
-class Ends:
-    """The smallest and the largest digital number of some frames, and which share of the pixels each of them has."""
-
-    lowest: float = -inf
-    highest: float = inf
-    at_lowest: float = 0.0
-    at_highest: float = 0.0
-
-    @classmethod
-    def of(cls, *frames: NDArray[Any]) -> Ends:
-        """Those of frames of one shape."""
-        lowest, highest = min(one.min() for one in frames), max(one.max() for one in frames)
-        counts = [sum(int(np.count_nonzero(one == end)) for one in frames) for end in (lowest, highest)]
-        size = len(frames) * frames[0].size
-        return cls(float(lowest), float(highest), counts[0] / size, counts[1] / size)
-
-    def joined(self, other: Ends, share: float) -> Ends:
-        """Those of these frames and others, which are this share of all."""
-        lowest, highest = min(self.lowest, other.lowest), max(self.highest, other.highest)
-        parts = ((self, 1 - share), (other, share))
-        at_lowest = sum(weight * one.at_lowest for one, weight in parts if one.lowest == lowest)
-        at_highest = sum(weight * one.at_highest for one, weight in parts if one.highest == highest)
-        return Ends(lowest, highest, at_lowest, at_highest)
+from camviz.sensors.ends import ANY, Ends
+from camviz.sensors.neighbours import UNSHADED, Shading, Shared, shared_by_neighbours
 
 
 @dataclass(frozen=True)
 class Pair:
     """Two frames of the same light: their mean (DN), and what varies in time and what in space, variances (DN²).
 
-    Noise that a whole row shares, other in each frame, is part of the temporal `variance`, as of the standard's total
-    temporal noise. `row_means` tells it: the temporal variance of a row's mean, σ²_row + σ²_pixel / columns.
+    Noise that a whole row or a whole column shares, other in each frame, is part of the temporal `variance`, as of the
+    standard's total temporal noise. `row_means` and `column_means` tell it: the temporal variance of a row's mean is
+    σ²_row + σ²_pixel / columns.
     """
 
     mean: float
@@ -54,10 +31,15 @@ class Pair:
     pattern: float  # spatial, of what both frames share; below zero where chance outweighs it
     pixels: int
     drift: float = 0.0  # by how much the second frame is brighter, DN: the light flickered
-    ends: Ends = Ends()
+    ends: Ends = ANY
     rows: int = 1
     row_means: float = 0.0
     row_pattern: float = 0.0  # spatial, of the rows' means
+    column_means: float = 0.0
+    column_pattern: float = 0.0
+    kurtosis: float = 3.0  # of the difference of the frames: 3 of Gaussian noise
+    shared: tuple[Shared, ...] = ()  # what neighbours share of the noise of pixels, at `LAGS`
+    shading: Shading = UNSHADED  # of the mean of both frames
 
     @property
     def samples(self) -> int:
@@ -69,58 +51,83 @@ class Pair:
         return self.pixels // self.rows
 
     @property
-    def within_rows(self) -> float:
-        """The temporal variance (DN²) of pixels about their row's mean: without the noise that a row shares.
+    def within(self) -> float:
+        """The temporal variance (DN²) of pixels, without the noise that a row or a column shares.
 
-        Σ (d - mean of its row)² has (rows)(columns - 1) degrees of freedom, and Σ (d - mean)² is that and the rows'.
+        Σ (d - means of its row and its column)² has (rows - 1)(columns - 1) degrees of freedom, and Σ (d - mean)² is
+        that and what the means of rows and of columns have.
         """
-        if self.rows < 2 or self.columns < 2:
-            return self.variance
-        between = self.row_means * (self.rows - 1) / self.rows
-        return max(self.variance - between, 0.0) * self.columns / (self.columns - 1)
+        return within(self.variance, self.row_means, self.column_means, (self.rows, self.columns))
 
     @property
     def row_variance(self) -> float:
         """σ²_row (DN²), the temporal noise that the pixels of a row share; below zero where chance outweighs it."""
-        return self.row_means - self.within_rows / self.columns if self.rows > 1 else 0.0
+        return self.row_means - self.within / self.columns if self._lines else 0.0
+
+    @property
+    def column_variance(self) -> float:
+        """σ²_column (DN²), as `row_variance`."""
+        return self.column_means - self.within / self.rows if self._lines else 0.0
+
+    @property
+    def _lines(self) -> bool:
+        return self.rows > 1 and self.columns > 1
 
     @property
     def total(self) -> float:
-        """σ² = σ²_pixel + σ²_row (DN²), without the bias of a difference whose mean over few rows was taken off."""
-        return self.within_rows + self.row_variance
+        """σ² = σ²_pixel + σ²_row + σ²_column (DN²), without the bias of a difference whose mean was taken off."""
+        return self.within + self.row_variance + self.column_variance
 
     @property
-    def relative_error(self) -> float:
-        """One standard deviation of the temporal variance, of Gaussian noise, relative to it: sqrt(2 / pixels).
-
-        Row noise has one sample for each row: it adds 2 σ⁴ of the rows' means over the number of rows.
-        """
-        return self.total_error / self.variance if self.variance > 0 else sqrt(2 / self.pixels)
+    def _tails(self) -> float:
+        """How much wider than of Gaussian noise a variance scatters: more where few pixels have much of it."""
+        return sqrt(max((self.kurtosis - 1) / 2, 1.0))
 
     @property
     def within_error(self) -> float:
-        """One standard deviation of `within_rows`, DN²."""
-        return self.within_rows * sqrt(2 / (self.pixels - self.rows)) if self.columns > 1 else 0.0
+        """One standard deviation of `within`, DN²."""
+        return self.within * sqrt(2 / max((self.rows - 1) * (self.columns - 1), self.columns - 1, 1)) * self._tails
 
     @property
     def total_error(self) -> float:
-        """One standard deviation of `total`, DN²."""
-        of_rows = self.row_means * sqrt(2 / (self.rows - 1)) if self.rows > 1 else 0.0
-        return sqrt(self.within_error**2 + of_rows**2)
+        """One standard deviation of `total`, DN²: rows and columns have one sample for each, of their means."""
+        lines = ((self.row_means, self.rows), (self.column_means, self.columns)) if self._lines else ()
+        return hypot(self.within_error, *(means * sqrt(2 / (count - 1)) for means, count in lines))
 
     @property
     def mean_error(self) -> float:
-        """One standard deviation of `mean`, DN, by noise of pixels and of rows."""
-        each = self.row_means / self.rows if self.rows > 1 else self.variance / self.pixels
-        return sqrt(each / 2)
+        """One standard deviation of `mean`, DN, by noise of pixels, rows and columns."""
+        if not self._lines:
+            return sqrt(self.variance / self.pixels / 2)
+        each = self.row_means / self.rows + self.column_means / self.columns - self.within / self.pixels
+        return sqrt(max(each, self.within / self.pixels) / 2)
 
     @property
     def pattern_error(self) -> float:
         """One standard deviation of `pattern`, DN²: that of a covariance of two Gaussian frames."""
         pattern = max(self.pattern, 0)
-        total = self.within_rows + pattern
-        of_rows = self.row_means * (self.row_means + 2 * max(self.row_pattern, 0)) / max(self.rows - 1, 1)
-        return sqrt((total**2 + pattern**2) / self.pixels + of_rows)
+        total = self.within + pattern
+        of_lines = sum(
+            means * (means + 2 * max(fixed, 0)) / max(count - 1, 1)
+            for means, fixed, count in (
+                (self.row_means, self.row_pattern, self.rows),
+                (self.column_means, self.column_pattern, self.columns),
+            )
+        )
+        return sqrt((total**2 + pattern**2) / self.pixels + of_lines)
+
+
+def within(variance: float, row_means: float, column_means: float, size: tuple[int, int]) -> float:
+    """The variance (DN²) of pixels about the means of their row and their column, of frames of `size` rows and columns.
+
+    `variance` is that of all pixels about their mean, the others those of the means of rows and of columns. It is what
+    σ²_pixel is in σ²_pixel + σ²_row + σ²_column. A frame of one row or one column has no such parts.
+    """
+    rows, columns = size
+    if rows < 2 or columns < 2:
+        return variance
+    between = row_means * (rows - 1) / rows + column_means * (columns - 1) / columns
+    return max(variance - between, 0.0) * rows * columns / ((rows - 1) * (columns - 1))
 
 
 def pair(first: ArrayLike, second: ArrayLike) -> Pair:
@@ -138,16 +145,22 @@ def pair(first: ArrayLike, second: ArrayLike) -> Pair:
     # var (a + b) - var (a - b) = 4 cov (a, b)
     shared = float(total.var()) / 4 - variance / 2
     rows = a.shape[0] if a.ndim == 2 else 1
-    mean, drift = float(total.mean()) / 2, float(difference.mean())
-    return Pair(mean, variance, shared, a.size, drift, Ends.of(a, b), rows, *_of_rows(difference, total))
+    drift = float(difference.mean())
+    seen = Pair(float(total.mean()) / 2, variance, shared, a.size, drift, Ends.of(a, b), rows)
+    if a.ndim != 2 or min(a.shape) < 2:
+        return seen
+    row_means, row_pattern = _of_means(difference.mean(axis=1), total.mean(axis=1))
+    column_means, column_pattern = _of_means(difference.mean(axis=0), total.mean(axis=0))
+    pixels, kurtosis = shared_by_neighbours(difference)
+    seen = replace(seen, row_means=row_means, row_pattern=row_pattern)
+    seen = replace(seen, column_means=column_means, column_pattern=column_pattern)
+    return replace(seen, kurtosis=kurtosis, shared=pixels, shading=Shading.of(total / 2))
 
 
-def _of_rows(difference: NDArray[np.float64], total: NDArray[np.float64]) -> tuple[float, float]:
-    """The temporal and the spatial variance (DN²) of the means of a pair's rows."""
-    if difference.ndim != 2 or difference.shape[0] < 2:
-        return 0.0, 0.0
-    in_time = float(difference.mean(axis=1).var(ddof=1)) / 2
-    return in_time, float(total.mean(axis=1).var(ddof=1)) / 4 - in_time / 2
+def _of_means(difference: NDArray[np.float64], total: NDArray[np.float64]) -> tuple[float, float]:
+    """The temporal and the spatial variance (DN²) of the means of a pair's rows or columns."""
+    in_time = float(difference.var(ddof=1)) / 2
+    return in_time, float(total.var(ddof=1)) / 4 - in_time / 2
 
 
 def frame_variance(frame: ArrayLike) -> float:
@@ -167,19 +180,23 @@ class Part:
 class Stack:
     """Many frames of the same light: their mean picture (height, width), how many, and the temporal variance (DN²).
 
-    `row_means` is the temporal variance (DN²) of a row's mean, σ²_row + σ²_pixel / columns; the light's own flicker,
-    which the whole frame shares, is not in it. Where it is not given, the noise has no part that rows share.
+    `row_means` and `column_means` are the temporal variances (DN²) of the mean of a row, σ²_row + σ²_pixel / columns,
+    and of a column. The light's own flicker, which the whole frame shares, is not in them: `frame_means` is the
+    temporal variance of a frame's mean. Where they are not given, the noise has no part that rows or columns share.
     """
 
     picture: NDArray[np.float64]
     count: int
     variance: float
     row_means: float = nan
-    ends: Ends = Ends()
+    ends: Ends = ANY
+    column_means: float = nan
+    frame_means: float = 0.0
 
     def __post_init__(self) -> None:
-        if not isfinite(self.row_means):
-            object.__setattr__(self, "row_means", self.variance / self.picture.shape[1])
+        for name, count in zip(("column_means", "row_means"), self.picture.shape, strict=True):
+            if not isfinite(getattr(self, name)):
+                object.__setattr__(self, name, self.variance / count)
 
     @property
     def samples(self) -> int:
@@ -191,10 +208,14 @@ class Stack:
         return float(self.picture.mean())
 
     @property
-    def within_rows(self) -> float:
-        """The temporal variance (DN²) of pixels about their row's mean."""
-        columns = self.picture.shape[1]
-        return max(self.variance - self.row_means, 0.0) * columns / max(columns - 1, 1)
+    def within(self) -> float:
+        """The temporal variance (DN²) of pixels, without the noise that a row or a column shares."""
+        return within(self.steady, self.row_means, self.column_means, (self.picture.shape[0], self.picture.shape[1]))
+
+    @property
+    def steady(self) -> float:
+        """The temporal variance (DN²) without that of the frames' means, which is the same for every pixel."""
+        return max(self.variance - self.frame_means, 0.0)
 
     @property
     def left_over(self) -> float:
@@ -203,34 +224,49 @@ class Stack:
 
     @property
     def mean_error(self) -> float:
-        """One standard deviation of `mean`, DN, by noise of pixels and of rows."""
-        return sqrt(self.row_means / self.picture.shape[0] / self.count)
+        """One standard deviation of `mean`, DN, by noise of pixels, rows and columns."""
+        rows, columns = self.picture.shape
+        each = self.row_means / rows + self.column_means / columns - self.within / self.picture.size
+        return sqrt(max(each, self.within / self.picture.size) / self.count)
+
+    @property
+    def restless(self) -> bool:
+        """True where the frames' means differ by more than their noise: the light flickers, or the offset drifts."""
+        return self.frame_means > self.mean_error**2 * self.count * (1 + 5 * sqrt(2 / (self.count - 1)))
 
     @cached_property
     def pattern(self) -> float:
-        """The variance (DN²) over the pixels of the true pattern: of the picture, less what averaging left."""
+        """The variance (DN²) over the pixels of the true pattern: of the picture, less what averaging left.
+
+        By the standard's equation, which takes flicker of the light for noise of each pixel; `whole` does not.
+        """
         return float(np.var(self.picture, ddof=1)) - self.left_over
+
+    @cached_property
+    def whole(self) -> Part:
+        """The variance (DN²) of the true pattern without the flicker's share, and its standard error."""
+        variance = float(np.var(self.picture, ddof=1)) - self.steady / self.count
+        return Part(variance, hypot(*(part.error for part in self.parts.values())))
 
     def split(self) -> dict[str, float]:
         """The pattern's variance (DN²) as "row" + "column" + "pixel" (EMVA 1288 release 4.0, section 8.2).
 
         A column's mean over M rows still holds 1/M of the pixels' own variance, s²_cav = s²_col + s²_pix/M, and a row's
         mean 1/N of it; with s² = s²_row + s²_col + s²_pix these are three equations for three variances. Before, what
-        averaging over L frames left is taken off: of the rows' means their own temporal variance over L, which includes
-        noise that a row shares.
+        averaging over L frames left is taken off: of the means of rows and of columns their own temporal variance over
+        L, which includes noise that a row or a column shares.
         """
         return {name: part.variance for name, part in self.parts.items()}
 
     @cached_property
     def parts(self) -> dict[str, Part]:
         """As `split`, each with its standard error by the noise that averaging left: the pattern is taken as it is."""
-        left = _Left(self.left_over, self.within_rows / self.count, self.row_means / self.count, self.count - 1)
-        return _parts(self.picture, left)
+        return _parts(self.picture, _Left.of(self))
 
     @property
     def pattern_error(self) -> float:
         """One standard deviation of `pattern`, DN²."""
-        return hypot(*(part.error for part in self.parts.values()))
+        return self.whole.error
 
 
 def parts_of_difference(bright: Stack, dark: Stack) -> dict[str, Part]:
@@ -239,37 +275,51 @@ def parts_of_difference(bright: Stack, dark: Stack) -> dict[str, Part]:
     The dark pattern drops out, and so does its chance covariance with the pattern of the gain, which s²_y − s²_y.dark
     still holds.
     """
-    each = [(one.left_over, one.within_rows / one.count, one.row_means / one.count) for one in (bright, dark)]
-    whole, pixel, rows = (sum(both) for both in zip(*each, strict=True))
-    parts = _parts(bright.picture - dark.picture, _Left(whole, pixel, rows, min(bright.count, dark.count) - 1))
-    total = float(np.var(bright.picture - dark.picture, ddof=1)) - whole
+    picture, left = bright.picture - dark.picture, _Left.of(bright).and_of(_Left.of(dark))
+    parts = _parts(picture, left)
+    total = float(np.var(picture, ddof=1)) - left.whole
     return {**parts, "whole": Part(total, hypot(*(part.error for part in parts.values())))}
 
 
 @dataclass(frozen=True)
 class _Left:
-    """The temporal variances (DN²) that averaging left in a picture, in all, of pixels about their row's mean and of
-    the rows' means; and how often they were seen less one."""
+    """The temporal variances (DN²) that averaging left in a picture: in all, of pixels, and of the means of rows and of
+    columns; and how often they were seen less one."""
 
     whole: float
     pixel: float
     rows: float
+    columns: float
     freedom: int
+
+    @classmethod
+    def of(cls, one: Stack) -> _Left:
+        whole, pixel, rows, columns = (
+            variance / one.count for variance in (one.steady, one.within, one.row_means, one.column_means)
+        )
+        return cls(whole, pixel, rows, columns, one.count - 1)
+
+    def and_of(self, other: _Left) -> _Left:
+        """What is left in the difference of two pictures."""
+        return _Left(
+            self.whole + other.whole,
+            self.pixel + other.pixel,
+            self.rows + other.rows,
+            self.columns + other.columns,
+            min(self.freedom, other.freedom),
+        )
 
 
 def _parts(picture: NDArray[np.float64], left: _Left) -> dict[str, Part]:
     """The row, column and pixel parts of the pattern in a picture, as `Stack.split` explains."""
     rows, columns = picture.shape
-    of_columns = float(np.var(picture.mean(axis=0))) - left.pixel / rows
-    of_rows = float(np.var(picture.mean(axis=1))) - left.rows
+    of_columns = float(np.var(picture.mean(axis=0))) - left.columns * (columns - 1) / columns
+    of_rows = float(np.var(picture.mean(axis=1))) - left.rows * (rows - 1) / rows
     pattern = float(np.var(picture, ddof=1)) - left.whole
     pixel = (pattern - of_columns - of_rows) / (1 - 1 / rows - 1 / columns)
-    freedom = left.freedom * max(rows - 1, 1)
     pixel_error = _error(left.pixel, pixel, rows * columns, left.freedom * rows * columns)
-    # What the mean of all rows' noise adds to each pixel's temporal variance, known from so many frames.
-    pixel_error = hypot(pixel_error, _error(left.rows / rows, 0.0, left.freedom, left.freedom))
-    row_error = _error(left.rows, of_rows, rows - 1, freedom)
-    column_error = _error(left.pixel / rows, of_columns, columns - 1, freedom * columns)
+    row_error = _error(left.rows, of_rows, rows - 1, left.freedom * (rows - 1))
+    column_error = _error(left.columns, of_columns, columns - 1, left.freedom * (columns - 1))
     return {
         "row": Part(of_rows - pixel / columns, hypot(row_error, pixel_error / columns)),
         "column": Part(of_columns - pixel / rows, hypot(column_error, pixel_error / rows)),
@@ -294,7 +344,7 @@ def stack(frames: Iterable[ArrayLike]) -> Stack:
 
     ValueError where there are fewer than two or their shapes differ.
     """
-    count, total, squares, ends, rows = 0, np.zeros(()), np.zeros(()), Ends(), []
+    count, total, squares, ends, rows, columns = 0, np.zeros(()), np.zeros(()), ANY, [], []
     for frame in frames:
         values = np.asarray(frame, dtype=float)
         if count and values.shape != total.shape:
@@ -302,20 +352,22 @@ def stack(frames: Iterable[ArrayLike]) -> Stack:
         count, total, squares = count + 1, total + values, squares + values**2
         if values.ndim == 2:
             rows.append(values.mean(axis=1))
+            columns.append(values.mean(axis=0))
             ends = ends.joined(Ends.of(values), 1 / count) if count > 1 else Ends.of(values)
     if count < 2 or total.ndim != 2:
         raise ValueError(f"a stack is two or more frames (height, width), got {count} of shape {total.shape}")
     picture = total / count
     variance = float(np.mean(squares / count - picture**2)) * count / (count - 1)
-    return Stack(picture, count, variance, _row_means(np.array(rows)), ends)
+    means = [_line_means(np.array(lines)) for lines in (rows, columns)]
+    return Stack(picture, count, variance, means[0], ends, means[1], float(np.var(np.mean(rows, axis=1), ddof=1)))
 
 
-def _row_means(rows: NDArray[np.float64]) -> float:
-    """The temporal variance (DN²) of the rows' means (frames, rows), without what all rows of a frame share."""
-    frames, height = rows.shape
+def _line_means(lines: NDArray[np.float64]) -> float:
+    """The temporal variance (DN²) of the means (frames, rows) of rows, without what all rows of a frame share."""
+    frames, height = lines.shape
     if height < 2:
         return nan
-    left = rows - rows.mean(axis=0) - rows.mean(axis=1, keepdims=True) + rows.mean()
+    left = lines - lines.mean(axis=0) - lines.mean(axis=1, keepdims=True) + lines.mean()
     return float(np.sum(left**2)) / ((frames - 1) * (height - 1))
 
 

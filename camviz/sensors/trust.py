@@ -72,11 +72,11 @@ def _all(e: Estimates) -> dict[str, Estimate]:
 
 def _linearity(e: Estimates) -> dict[str, Estimate]:
     smallest, largest, mean = e.found.linearity
-    off = e.linearity_error if isfinite(mean) else nan
-    if not off < 0.5:  # no signal to speak of
+    chance, hidden = e.linearity_error if isfinite(mean) else (nan, nan)
+    if not CERTAIN * chance + hidden < 0.5:  # no signal to speak of
         return dict.fromkeys(LINEARITY_NAMES, Estimate(mean, 0.0, -inf, inf))
     return {
-        name: Estimate(value, 0.0, value - off, value + off)
+        name: Estimate(value, chance, value - hidden, value + hidden)
         for name, value in zip(LINEARITY_NAMES, (mean, smallest, largest), strict=True)
     }
 
@@ -86,19 +86,27 @@ def _log(value: float) -> float:
 
 
 def _judged(e: Estimates, name: str, one: Estimate) -> Figure:
+    spoilt = e.checks.spoiling(name) if e.checks else ""
+    if e.checks and spoilt and (name != "dark_current_e_per_s" or e.checks.spoiling("gain_dn_per_e")):
+        return Figure(nan, nan, nan, spoilt)
     low, high = one.bounds
     if not name.startswith("linearity") and not name.endswith("_db"):
         low = max(low, 0.0)
-    told = kept(name, one)
+    if high < low:
+        return Figure(nan, nan, nan, spoilt or _why(e, name, one))
+    told = kept(name, one) and not spoilt
     if name in SPLIT and not told:  # parts of one picture share its chance, so that only a ceiling is sure
         low = min(low, 0.0)
-    return Figure(one.value if told else nan, low, high, "" if told else _why(e, name, one))
+    return Figure(one.value if told else nan, low, high, "" if told else spoilt or _why(e, name, one))
 
 
 # Reasons --------------------------------------------------------------------------------------------------------------
 
 
 def _why(e: Estimates, name: str, one: Estimate) -> str:
+    widened = e.checks.widening(name) if e.checks else ""
+    if widened and _narrower(name, _all(e.unchecked)[name], one):
+        return widened
     if not name.startswith(("prnu", "linearity", "gain")) and not kept("gain_dn_per_e", e.gain):
         return f"K is not known, since {_why(e, 'gain_dn_per_e', e.gain)}"
     if not isfinite(one.value):
@@ -112,6 +120,12 @@ def _why(e: Estimates, name: str, one: Estimate) -> str:
         return f"these frames are too few to tell: ± {100 * (one.bounds[1] - one.value):.2g} % of the signal"
     off = max(one.bounds[1] - one.value, one.value - one.bounds[0])
     return f"these frames are too few to tell: ± {_share(off, one.value, name)}"
+
+
+def _narrower(name: str, plain: Estimate, one: Estimate) -> bool:
+    """Whether a figure would be told, or be known twice as well, if the model held."""
+    (low, high), (least, most) = plain.bounds, one.bounds
+    return kept(name, plain) or 2 * (high - low) < most - least
 
 
 def _share(off: float, value: float, name: str) -> str:

@@ -15,23 +15,12 @@ ROUNDED = 1e-10  # of the terms of a sum: what is left of them is the rounding o
 def to_homogeneous(uv: ArrayLike) -> Array:
     """Pixels as homogeneous points.
 
-    Parameters
-    ----------
-    uv : array_like (..., 2)
-        In pixels.
+    Args:
+        uv: (..., 2), in pixels.
 
-    Returns
-    -------
-    array (..., 3)
-        Homogeneous, their last coordinate 1.
+    Returns: (..., 3), homogeneous, their last coordinate 1.
+    Raises: ValueError for another shape.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    Examples
-    --------
     >>> to_homogeneous([3, 4])
     array([3., 4., 1.])
     """
@@ -42,18 +31,11 @@ def to_homogeneous(uv: ArrayLike) -> Array:
 def from_homogeneous(points: ArrayLike) -> Array:
     """Points of homogeneous ones.
 
-    Parameters
-    ----------
-    points : array_like (..., n + 1)
-        Homogeneous, on any scale.
+    Args:
+        points: (..., n + 1), homogeneous, on any scale.
 
-    Returns
-    -------
-    array (..., n)
-        NaN for a point at infinity.
+    Returns: (..., n), NaN for a point at infinity.
 
-    Examples
-    --------
     >>> from_homogeneous([[6, 8, 2], [1, 0, 0]])
     array([[ 3.,  4.],
            [nan, nan]])
@@ -84,27 +66,13 @@ def singular_values(values: ArrayLike, name: str) -> tuple[Array, Array, Array]:
 def cross_matrix(v: ArrayLike) -> Array:
     """The matrix [v]× of a vector, so that [v]× w = v × w.
 
-    Parameters
-    ----------
-    v : array_like (..., 3)
-        In any unit.
+    Args:
+        v: (..., 3), in any unit.
 
-    Returns
-    -------
-    array (..., 3, 3)
-        Antisymmetric.
+    Returns: (..., 3, 3), antisymmetric.
+    Raises: ValueError for another shape.
+    Source: Hartley & Zisserman (2004), eq. A4.5.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), eq. A4.5.
-
-    Examples
-    --------
     >>> cross_matrix((1, 2, 3))
     array([[ 0., -3.,  2.],
            [ 3.,  0., -1.],
@@ -116,27 +84,13 @@ def cross_matrix(v: ArrayLike) -> Array:
 def projection_matrix(camera: Camera) -> Array:
     """The matrix P = K [R | t] of a perspective camera.
 
-    Parameters
-    ----------
-    camera : Camera
-        With a lens that keeps straight lines straight.
+    Args:
+        camera: With a lens that keeps straight lines straight.
 
-    Returns
-    -------
-    array (3, 4)
-        From homogeneous world points in metres to homogeneous pixels.
+    Returns: (3, 4), from homogeneous world points in metres to homogeneous pixels.
+    Raises: ValueError for a lens that bends.
+    Source: Hartley & Zisserman (2004), eq. 6.8.
 
-    Raises
-    ------
-    ValueError
-        For a lens that bends.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), eq. 6.8.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz import look_at
     >>> camera = Camera(Intrinsics(640, 480, 500, 500, 320, 240), world_from_cam=look_at((0, 0, -2), (0, 0, 0)))
@@ -154,18 +108,11 @@ def projection_matrix(camera: Camera) -> Array:
 def right_from_left(left: Camera, right: Camera) -> RigidTransform:
     """The transform [R | t] that takes points in the left camera's frame to the right one's.
 
-    Parameters
-    ----------
-    left, right : Camera
-        With any lenses.
+    Args:
+        left, right: With any lenses.
 
-    Returns
-    -------
-    RigidTransform
-        t in metres: where the left camera stands as the right one sees it.
+    Returns: t in metres: where the left camera stands as the right one sees it.
 
-    Examples
-    --------
     A camera that stands 10 cm to the right sees the left one 10 cm to the left:
 
     >>> from camviz.cameras import Camera, Intrinsics
@@ -181,27 +128,13 @@ def right_from_left(left: Camera, right: Camera) -> RigidTransform:
 def essential(right_from_left: RigidTransform) -> Array:
     """The essential matrix E = [t]× R: corresponding rays satisfy r_rightᵀ E r_left = 0.
 
-    Parameters
-    ----------
-    right_from_left : RigidTransform
-        [R | t], in any unit of length.
+    Args:
+        right_from_left: [R | t], in any unit of length.
 
-    Returns
-    -------
-    array (3, 3)
-        On the scale of t.
+    Returns: (3, 3), on the scale of t.
+    Raises: ValueError when t = 0: two cameras in one place see the same rays and no epipolar plane.
+    Source: Hartley & Zisserman (2004), section 9.6.
 
-    Raises
-    ------
-    ValueError
-        When t = 0: two cameras in one place see the same rays and no epipolar plane.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 9.6.
-
-    Examples
-    --------
     Cameras side by side see a point in the same row, y_right = y_left:
 
     >>> from camviz.poses import RigidTransform
@@ -219,27 +152,13 @@ def essential(right_from_left: RigidTransform) -> Array:
 def fundamental(left: Camera, right: Camera) -> Array:
     """The fundamental matrix F = K_right⁻ᵀ E K_left⁻¹: corresponding pixels satisfy x_rightᵀ F x_left = 0.
 
-    Parameters
-    ----------
-    left, right : Camera
-        With perspective lenses; `epipolar_curve` is for the others.
+    Args:
+        left, right: With perspective lenses; `epipolar_curve` is for the others.
 
-    Returns
-    -------
-    array (3, 3)
-        Of rank 2, on the scale of t over pixels².
+    Returns: (3, 3), of rank 2, on the scale of t over pixels².
+    Raises: ValueError for a lens that bends, or without a baseline.
+    Source: Hartley & Zisserman (2004), section 9.2.
 
-    Raises
-    ------
-    ValueError
-        For a lens that bends, or without a baseline.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 9.2.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.poses import RigidTransform
     >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
@@ -258,29 +177,14 @@ def fundamental(left: Camera, right: Camera) -> Array:
 def essential_from_fundamental(F: ArrayLike, left: Intrinsics, right: Intrinsics) -> Array:
     """The essential matrix of a fundamental one: E = K_rightᵀ F K_left.
 
-    Parameters
-    ----------
-    F : array_like (3, 3)
-        The fundamental matrix, on any scale.
-    left, right : Intrinsics
-        Of the two cameras.
+    Args:
+        F: (3, 3), the fundamental matrix, on any scale.
+        left, right: Of the two cameras.
 
-    Returns
-    -------
-    array (3, 3)
-        On the scale of F.
+    Returns: (3, 3), on the scale of F.
+    Raises: ValueError for another shape.
+    Source: Hartley & Zisserman (2004), eq. 9.12.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), eq. 9.12.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.poses import RigidTransform
     >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
@@ -296,30 +200,17 @@ def essential_from_fundamental(F: ArrayLike, left: Intrinsics, right: Intrinsics
 def epipoles(F: ArrayLike) -> tuple[Array, Array]:
     """The left and the right epipole, each the image of the other camera's centre: F e_left = 0 and Fᵀ e_right = 0.
 
-    Parameters
-    ----------
-    F : array_like (3, 3)
-        The fundamental matrix, on any scale.
+    Args:
+        F: (3, 3), the fundamental matrix, on any scale.
 
-    Returns
-    -------
-    left : array (3,)
-        A homogeneous unit vector; `from_homogeneous` gives the pixel. Its last coordinate is 0 where the other camera
-        lies parallel to the image, as in a rectified pair.
-    right : array (3,)
-        Likewise.
+    Returns:
+        left: (3,), a homogeneous unit vector; `from_homogeneous` gives the pixel. Its last coordinate is 0 where the
+            other camera lies parallel to the image, as in a rectified pair.
+        right: (3,), likewise.
 
-    Raises
-    ------
-    ValueError
-        For an F of rank below 2, or of another shape.
+    Raises: ValueError for an F of rank below 2, or of another shape.
+    Source: Hartley & Zisserman (2004), section 9.2.
 
-    References
-    ----------
-    Hartley & Zisserman (2004), section 9.2.
-
-    Examples
-    --------
     A camera that moves straight ahead sees where it goes in the middle of its picture:
 
     >>> from camviz.cameras import Camera, Intrinsics
@@ -342,30 +233,17 @@ def epipolar_lines(F: ArrayLike, uv_left: ArrayLike) -> Array:
 
     `epipolar_lines(F.T, uv_right)` goes back.
 
-    Parameters
-    ----------
-    F : array_like (3, 3)
-        The fundamental matrix, on any scale.
-    uv_left : array_like (..., 2)
-        In pixels.
+    Args:
+        F: (3, 3), the fundamental matrix, on any scale.
+        uv_left: (..., 2), in pixels.
 
-    Returns
-    -------
-    array (..., 3)
-        a u + b v + c = 0 with a² + b² = 1, so that (a, b, c) · (u, v, 1) is a distance in pixels. NaN at the epipole,
-        which has every line, and where the line is at infinity.
+    Returns:
+        (..., 3), a u + b v + c = 0 with a² + b² = 1, so that (a, b, c) · (u, v, 1) is a distance in pixels. NaN at the
+        epipole, which has every line, and where the line is at infinity.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
+    Raises: ValueError for another shape.
+    Source: Hartley & Zisserman (2004), section 9.2.
 
-    References
-    ----------
-    Hartley & Zisserman (2004), section 9.2.
-
-    Examples
-    --------
     In a rectified pair it is the row v = 50:
 
     >>> from camviz.cameras import Camera, Intrinsics
@@ -391,25 +269,13 @@ def _vanish(lines: Array, F: Array, x: Array) -> np.ndarray:
 def clip_lines(lines: ArrayLike, intrinsics: Intrinsics) -> Array:
     """The part of each line inside the image.
 
-    Parameters
-    ----------
-    lines : array_like (..., 3)
-        a u + b v + c = 0 in pixels.
-    intrinsics : Intrinsics
-        Of the image.
+    Args:
+        lines: (..., 3), a u + b v + c = 0 in pixels.
+        intrinsics: Of the image.
 
-    Returns
-    -------
-    array (..., 2, 2)
-        Two end pixels, on the image's border; NaN for a line that misses the image.
+    Returns: (..., 2, 2), two end pixels, on the image's border; NaN for a line that misses the image.
+    Raises: ValueError for another shape.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    Examples
-    --------
     >>> from camviz.cameras import Intrinsics
     >>> clip_lines([0, 1, -50], Intrinsics(640, 480, 500, 500, 320, 240)).tolist()  # the row v = 50
     [[639.5, 50.0], [-0.5, 50.0]]
@@ -433,27 +299,14 @@ def epipolar_curve(left: Camera, right: Camera, uv_left: ArrayLike, distances: A
 
     A straight ray is a straight line to a perspective camera and a curve to every other.
 
-    Parameters
-    ----------
-    left, right : Camera
-        With any lenses.
-    uv_left : array_like (..., 2)
-        In pixels.
-    distances : array_like (n,)
-        In metres, along the ray from the left camera's centre; inf gives the ray's vanishing point.
+    Args:
+        left, right: With any lenses.
+        uv_left: (..., 2), in pixels.
+        distances: (n,), in metres, along the ray from the left camera's centre; inf gives the ray's vanishing point.
 
-    Returns
-    -------
-    array (..., n, 2)
-        In pixels; NaN where the right camera has no image of it.
+    Returns: (..., n, 2), in pixels; NaN where the right camera has no image of it.
+    Raises: ValueError for another shape.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    Examples
-    --------
     The disparity of points straight ahead is f B / Z, 50 and 25 pixels, and 0 at infinity:
 
     >>> from camviz.cameras import Camera, Intrinsics
@@ -478,25 +331,13 @@ def epipolar_curve(left: Camera, right: Camera, uv_left: ArrayLike, distances: A
 def line_distance(lines: ArrayLike, uv: ArrayLike) -> Array:
     """Distances of pixels from lines.
 
-    Parameters
-    ----------
-    lines : array_like (..., 3)
-        a u + b v + c = 0 with a² + b² = 1, in pixels, as `epipolar_lines` gives them.
-    uv : array_like (..., 2)
-        In pixels.
+    Args:
+        lines: (..., 3), a u + b v + c = 0 with a² + b² = 1, in pixels, as `epipolar_lines` gives them.
+        uv: (..., 2), in pixels.
 
-    Returns
-    -------
-    array (...)
-        In pixels, not negative.
+    Returns: (...), in pixels, not negative.
+    Raises: ValueError for another shape.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    Examples
-    --------
     >>> line_distance([0.6, 0.8, -5], [10, 5])  # 6 + 4 - 5
     np.float64(5.0)
     """
@@ -506,29 +347,14 @@ def line_distance(lines: ArrayLike, uv: ArrayLike) -> Array:
 def symmetric_distance(F: ArrayLike, uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
     """How far pixels lie from each other's epipolar lines: √(d(x_right, F x_left)² + d(x_left, Fᵀ x_right)²).
 
-    Parameters
-    ----------
-    F : array_like (3, 3)
-        The fundamental matrix, on any scale.
-    uv_left, uv_right : array_like (..., 2)
-        Pairs in pixels.
+    Args:
+        F: (3, 3), the fundamental matrix, on any scale.
+        uv_left, uv_right: (..., 2), pairs in pixels.
 
-    Returns
-    -------
-    array (...)
-        In pixels.
+    Returns: (...), in pixels.
+    Raises: ValueError for another shape.
+    Source: Hartley & Zisserman (2004), eq. 11.10, of which it is the root of each term.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), eq. 11.10, of which it is the root of each term.
-
-    Examples
-    --------
     In a rectified pair, rows that differ by 3 pixels do so in both pictures:
 
     >>> from camviz.poses import RigidTransform
@@ -548,29 +374,14 @@ def sampson_distance(F: ArrayLike, uv_left: ArrayLike, uv_right: ArrayLike) -> A
     abs(x_rightᵀ F x_left) / √((F x_left)₁² + (F x_left)₂² + (Fᵀ x_right)₁² + (Fᵀ x_right)₂²).
     cv2.sampsonDistance returns the square of this.
 
-    Parameters
-    ----------
-    F : array_like (3, 3)
-        The fundamental matrix, on any scale.
-    uv_left, uv_right : array_like (..., 2)
-        Pairs in pixels.
+    Args:
+        F: (3, 3), the fundamental matrix, on any scale.
+        uv_left, uv_right: (..., 2), pairs in pixels.
 
-    Returns
-    -------
-    array (...)
-        In pixels; 0 for the two epipoles, which satisfy F with every partner.
+    Returns: (...), in pixels; 0 for the two epipoles, which satisfy F with every partner.
+    Raises: ValueError for another shape.
+    Source: Hartley & Zisserman (2004), eq. 11.9, of which it is the root of a term.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), eq. 11.9, of which it is the root of a term.
-
-    Examples
-    --------
     In a rectified pair, rows that differ by 3 pixels meet when each moves by 1.5:
 
     >>> from camviz.poses import RigidTransform

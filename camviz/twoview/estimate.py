@@ -20,30 +20,18 @@ PLAIN = 1.75  # times as much unexplained: below, of 2,000 random scenes 3 to 6 
 def eight_point(uv_left: ArrayLike, uv_right: ArrayLike, normalised: bool = True) -> Array:
     """The fundamental matrix of 8 or more pairs of pixels, by the eight-point algorithm.
 
-    Parameters
-    ----------
-    uv_left, uv_right : array_like (n, 2)
-        Corresponding pixels; pairs with a NaN are left out.
-    normalised : bool
-        False leaves out Hartley's normalisation, to show what it is for.
+    Args:
+        uv_left, uv_right: (n, 2), corresponding pixels; pairs with a NaN are left out.
+        normalised: False leaves out Hartley's normalisation, to show what it is for.
 
-    Returns
-    -------
-    array (3, 3)
-        Of rank 2 and unit norm, its largest entry positive.
+    Returns: (3, 3), of rank 2 and unit norm, its largest entry positive.
 
-    Raises
-    ------
-    ValueError
-        For fewer than 8 pairs, and where they leave F undetermined: all points on one plane, say. Of noisy pairs that
-        is told from 16 on, and where they are normalised.
+    Raises:
+        ValueError: For fewer than 8 pairs, and where they leave F undetermined: all points on one plane, say. Of noisy
+            pairs that is told from 16 on, and where they are normalised.
 
-    References
-    ----------
-    Hartley & Zisserman (2004), algorithm 11.1; degenerate pairs: section 11.9.
+    Source: Hartley & Zisserman (2004), algorithm 11.1; degenerate pairs: section 11.9.
 
-    Examples
-    --------
     Without noise it satisfies every pair:
 
     >>> from camviz.poses import RigidTransform, Rotation
@@ -83,27 +71,13 @@ def linear_fundamental(uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
 
     Nothing makes its rank 2 yet: its epipolar lines do not quite meet.
 
-    Parameters
-    ----------
-    uv_left, uv_right : array_like (n, 2)
-        8 or more pairs of corresponding pixels; pairs with a NaN are left out.
+    Args:
+        uv_left, uv_right: (n, 2), 8 or more pairs of corresponding pixels; pairs with a NaN are left out.
 
-    Returns
-    -------
-    array (3, 3)
-        Of unit norm, its largest entry positive.
+    Returns: (3, 3), of unit norm, its largest entry positive.
+    Raises: ValueError for fewer than 8 pairs, and where they leave F undetermined.
+    Source: Hartley & Zisserman (2004), section 11.1.
 
-    Raises
-    ------
-    ValueError
-        For fewer than 8 pairs, and where they leave F undetermined.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 11.1.
-
-    Examples
-    --------
     Of pixels that are off by half a pixel it has rank 3:
 
     >>> rng = np.random.default_rng(0)
@@ -125,27 +99,13 @@ def linear_fundamental(uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
 def nearest_rank_two(F: ArrayLike) -> Array:
     """The matrix of rank 2 nearest to F in Frobenius norm: its smallest singular value set to 0.
 
-    Parameters
-    ----------
-    F : array_like (3, 3)
-        A matrix on any scale.
+    Args:
+        F: (3, 3), a matrix on any scale.
 
-    Returns
-    -------
-    array (3, 3)
-        A fundamental matrix, on the scale of F.
+    Returns: (3, 3), a fundamental matrix, on the scale of F.
+    Raises: ValueError for another shape, and numbers that are not finite.
+    Source: Hartley & Zisserman (2004), section 11.1.1.
 
-    Raises
-    ------
-    ValueError
-        For another shape, and numbers that are not finite.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 11.1.1.
-
-    Examples
-    --------
     >>> nearest_rank_two(np.diag([3, 2, 1])).diagonal().round(9)
     array([3., 2., 0.])
     """
@@ -156,27 +116,13 @@ def nearest_rank_two(F: ArrayLike) -> Array:
 def nearest_essential(E: ArrayLike) -> Array:
     """The essential matrix nearest to E in Frobenius norm: two equal singular values and a zero.
 
-    Parameters
-    ----------
-    E : array_like (3, 3)
-        A matrix on any scale.
+    Args:
+        E: (3, 3), a matrix on any scale.
 
-    Returns
-    -------
-    array (3, 3)
-        An essential matrix, on the scale of E.
+    Returns: (3, 3), an essential matrix, on the scale of E.
+    Raises: ValueError for another shape, and numbers that are not finite.
+    Source: Hartley & Zisserman (2004), section 11.7.3.
 
-    Raises
-    ------
-    ValueError
-        For another shape, and numbers that are not finite.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 11.7.3.
-
-    Examples
-    --------
     >>> nearest_essential(np.diag([2, 1, 0.1])).diagonal().round(9)
     array([1.5, 1.5, 0. ])
     """
@@ -197,37 +143,20 @@ def ransac_fundamental(
     A pair agrees when its Sampson distance is below the threshold. Samples of 8 pairs are drawn until one free of
     outliers has come with a probability of `confidence`.
 
-    Parameters
-    ----------
-    uv_left, uv_right : array_like (n, 2)
-        Pairs in pixels, some of them wrong; a pair with a NaN agrees with none.
-    threshold_px : float
-        In pixels.
-    rng : numpy.random.Generator
-        Draws the samples.
-    confidence : float
-        Between 0 and 1.
-    max_samples : int
-        The most samples.
+    Args:
+        uv_left, uv_right: (n, 2), pairs in pixels, some of them wrong; a pair with a NaN agrees with none.
+        threshold_px: In pixels.
+        rng: Draws the samples.
+        confidence: Between 0 and 1.
+        max_samples: The most samples.
 
-    Returns
-    -------
-    F : array (3, 3)
-        Of unit norm, fitted to all pairs that agreed with the best sample.
-    agrees : array (n,)
-        True for pairs that agree with F.
+    Returns:
+        F: (3, 3), of unit norm, fitted to all pairs that agreed with the best sample.
+        agrees: (n,), True for pairs that agree with F.
 
-    Raises
-    ------
-    ValueError
-        Where no 8 pairs agree, and for a confidence outside (0, 1).
+    Raises: ValueError where no 8 pairs agree, and for a confidence outside (0, 1).
+    Source: Hartley & Zisserman (2004), algorithm 11.4 and eq. 4.18.
 
-    References
-    ----------
-    Hartley & Zisserman (2004), algorithm 11.4 and eq. 4.18.
-
-    Examples
-    --------
     Of 20 pairs the first 5 are off by 30 pixels:
 
     >>> from camviz.poses import RigidTransform, Rotation
@@ -275,27 +204,13 @@ def decompose_essential(E: ArrayLike) -> list[RigidTransform]:
 
     E = U diag(1, 1, 0) Vᵀ: R is U W Vᵀ or U Wᵀ Vᵀ, t is the last column of U or its opposite. `recover_pose` chooses.
 
-    Parameters
-    ----------
-    E : array_like (3, 3)
-        The essential matrix, on any scale.
+    Args:
+        E: (3, 3), the essential matrix, on any scale.
 
-    Returns
-    -------
-    list of RigidTransform
-        right_from_left = [R | t] with ‖t‖ = 1.
+    Returns: right_from_left = [R | t] with ‖t‖ = 1.
+    Raises: ValueError where E has not two singular values above zero.
+    Source: Hartley & Zisserman (2004), result 9.19.
 
-    Raises
-    ------
-    ValueError
-        Where E has not two singular values above zero.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), result 9.19.
-
-    Examples
-    --------
     A step to the right, to the left, and both with half a turn about the baseline:
 
     >>> from camviz.poses import RigidTransform
@@ -315,30 +230,15 @@ def decompose_essential(E: ArrayLike) -> list[RigidTransform]:
 def recover_pose(E: ArrayLike, rays_left: ArrayLike, rays_right: ArrayLike) -> RigidTransform:
     """Of E's four motions, the one with most points in front of both cameras.
 
-    Parameters
-    ----------
-    E : array_like (3, 3)
-        The essential matrix, on any scale.
-    rays_left, rays_right : array_like (n, 3)
-        Corresponding unit rays, each in its own camera's frame, through any lens:
-        `camera.lens.unproject(camera.intrinsics.from_pixels(uv))`.
+    Args:
+        E: (3, 3), the essential matrix, on any scale.
+        rays_left, rays_right: (n, 3), corresponding unit rays, each in its own camera's frame, through any lens:
+            `camera.lens.unproject(camera.intrinsics.from_pixels(uv))`.
 
-    Returns
-    -------
-    RigidTransform
-        right_from_left with ‖t‖ = 1.
+    Returns: right_from_left with ‖t‖ = 1.
+    Raises: ValueError where two motions have equally many.
+    Source: Hartley & Zisserman (2004), section 9.6.3.
 
-    Raises
-    ------
-    ValueError
-        Where two motions have equally many.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 9.6.3.
-
-    Examples
-    --------
     >>> from camviz.poses import RigidTransform
     >>> points, step = np.array([[0, 0, 4], [1, 0, 5], [0, 1, 3.0]]), np.array([-1, 0, 0])
     >>> rays = [seen / np.linalg.norm(seen, axis=1)[:, None] for seen in (points, points + step)]

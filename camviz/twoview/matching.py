@@ -36,35 +36,18 @@ def disparity(
     by the sum of absolute differences (Konolige); "SGM" semi-global matching (Hirschmüller); "SGM + WLS" the same in
     both directions, filtered along the left picture's edges by weighted least squares (Min), which fills holes.
 
-    Parameters
-    ----------
-    left, right : array (height, width) or (height, width, 3)
-        A rectified pair, grey or sRGB, uint8.
-    method : {"SGM", "BM", "SGM + WLS"}
-        One of METHODS.
-    disparities : int
-        A multiple of 16, less than the width.
-    block_size : int
-        Odd, in pixels; at least 5 for "BM".
+    Args:
+        left, right: (height, width) or (height, width, 3), a rectified pair, grey or sRGB, uint8.
+        method: {"SGM", "BM", "SGM + WLS"}, one of METHODS.
+        disparities: A multiple of 16, less than the width.
+        block_size: Odd, in pixels; at least 5 for "BM".
 
-    Returns
-    -------
-    array (height, width)
-        In pixels of the left picture, float32; NaN where no match was found.
+    Returns: (height, width), in pixels of the left picture, float32; NaN where no match was found.
+    Raises: ValueError for pictures of different sizes, and for what OpenCV does not take.
+    Source: K. Konolige, Small vision systems: hardware and implementation, Robotics Research (1998); H. Hirschmüller,
+    Stereo processing by semiglobal matching and mutual information, IEEE Trans. Pattern Anal. Mach. Intell. 30 (2008);
+    D. Min et al., Fast global image smoothing based on weighted least squares, IEEE Trans. Image Process. 23 (2014).
 
-    Raises
-    ------
-    ValueError
-        For pictures of different sizes, and for what OpenCV does not take.
-
-    References
-    ----------
-    K. Konolige, Small vision systems: hardware and implementation, Robotics Research (1998); H. Hirschmüller, Stereo
-    processing by semiglobal matching and mutual information, IEEE Trans. Pattern Anal. Mach. Intell. 30 (2008); D. Min
-    et al., Fast global image smoothing based on weighted least squares, IEEE Trans. Image Process. 23 (2014).
-
-    Examples
-    --------
     Noise that was moved by 7 pixels:
 
     >>> left = np.random.default_rng(0).integers(0, 256, (48, 96), dtype=np.uint8)
@@ -98,19 +81,12 @@ def disparity(
 class MatchingScore:
     """How disparities compare with the true ones.
 
-    Attributes
-    ----------
-    compared : int
-        Pixels whose truth is known; the rest are shares of them.
-    missing : float
-        The share without a disparity.
-    bad : float
-        The share that has none, or one that is off by more than the threshold.
-    mean_error : float
-        The mean distance from the truth in pixels, of those that have one.
+    Attributes:
+        compared: Pixels whose truth is known; the rest are shares of them.
+        missing: The share without a disparity.
+        bad: The share that has none, or one that is off by more than the threshold.
+        mean_error: The mean distance from the truth in pixels, of those that have one.
 
-    Examples
-    --------
     >>> score = MatchingScore(compared=200, missing=0.25, bad=0.5, mean_error=0.8)
     >>> round(score.compared * (score.bad - score.missing))  # how many are wrong
     50
@@ -125,30 +101,15 @@ class MatchingScore:
 def matching_score(disparity: ArrayLike, truth: ArrayLike, threshold: float = 1.0) -> MatchingScore:
     """The score of disparities against true ones; a missing pixel counts as bad.
 
-    Parameters
-    ----------
-    disparity, truth : array_like (...)
-        In pixels; NaN = none, and not known.
-    threshold : float
-        In pixels: what is off by more is bad.
+    Args:
+        disparity, truth: (...), in pixels; NaN = none, and not known.
+        threshold: In pixels: what is off by more is bad.
 
-    Returns
-    -------
-    MatchingScore
-        Its shares are NaN where nothing can be compared.
+    Returns: Its shares are NaN where nothing can be compared.
+    Raises: ValueError for two different shapes.
+    Source: D. Scharstein and R. Szeliski, A taxonomy and evaluation of dense two-frame stereo correspondence
+    algorithms, Int. J. Comput. Vis. 47 (2002), eq. 2.
 
-    Raises
-    ------
-    ValueError
-        For two different shapes.
-
-    References
-    ----------
-    D. Scharstein and R. Szeliski, A taxonomy and evaluation of dense two-frame stereo correspondence algorithms, Int.
-    J. Comput. Vis. 47 (2002), eq. 2.
-
-    Examples
-    --------
     One right, one off by half a pixel, one missing, and one wrong:
 
     >>> matching_score([1, 2, np.nan, 9], [1, 2.5, 3, 5])
@@ -175,29 +136,14 @@ def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tole
     Pixel u of the left row says that its partner is u − d; the partner's own disparity must lead back. It does not for
     points that only one camera sees, nor for most wrong matches.
 
-    Parameters
-    ----------
-    disparity_left, disparity_right : array_like (height, width)
-        In pixels, both positive for points in front of the cameras.
-    tolerance : float
-        In pixels.
+    Args:
+        disparity_left, disparity_right: (height, width), in pixels, both positive for points in front of the cameras.
+        tolerance: In pixels.
 
-    Returns
-    -------
-    array (height, width)
-        In pixels; NaN where they disagree by more.
+    Returns: (height, width), in pixels; NaN where they disagree by more.
+    Raises: ValueError for two different shapes.
+    Source: Szeliski (2022), section 12.4.1.
 
-    Raises
-    ------
-    ValueError
-        For two different shapes.
-
-    References
-    ----------
-    Szeliski (2022), section 12.4.1.
-
-    Examples
-    --------
     The last pixel's partner, three to the left, says 1:
 
     >>> left_right_check([[np.nan, 1, 1, 3]], [[1, 1, 3, 3]])

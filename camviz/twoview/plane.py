@@ -14,27 +14,13 @@ UNDETERMINED = 1e-10  # of the largest singular value: below this is rounding
 def normalising_transform(uv: ArrayLike) -> Array:
     """The transform that takes the centroid of pixels to 0 and their mean distance from it to √2.
 
-    Parameters
-    ----------
-    uv : array_like (n, 2)
-        In pixels.
+    Args:
+        uv: (n, 2), in pixels.
 
-    Returns
-    -------
-    array (3, 3)
-        It acts on homogeneous pixels.
+    Returns: (3, 3). It acts on homogeneous pixels.
+    Raises: ValueError for points that coincide, and another shape.
+    Source: Hartley & Zisserman (2004), section 4.4.4.
 
-    Raises
-    ------
-    ValueError
-        For points that coincide, and another shape.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 4.4.4.
-
-    Examples
-    --------
     The corners of a square of 200 pixels lie 100 √2 from its middle:
 
     >>> normalising_transform([[0, 0], [200, 0], [200, 200], [0, 200]]).round(6)
@@ -56,29 +42,14 @@ def normalising_transform(uv: ArrayLike) -> Array:
 def homography(xy: ArrayLike, uv: ArrayLike) -> Array:
     """The homography from points of a plane to pixels, by DLT on normalised coordinates: λ (u, v, 1)ᵀ = H (x, y, 1)ᵀ.
 
-    Parameters
-    ----------
-    xy : array_like (n, 2)
-        Points of the plane in any unit, or of another picture of it in pixels.
-    uv : array_like (n, 2)
-        Their pixels; a pair with a NaN is left out.
+    Args:
+        xy: (n, 2), points of the plane in any unit, or of another picture of it in pixels.
+        uv: (n, 2), their pixels; a pair with a NaN is left out.
 
-    Returns
-    -------
-    array (3, 3)
-        H, with H[2, 2] = 1.
+    Returns: (3, 3), H, with H[2, 2] = 1.
+    Raises: ValueError for fewer than four points, or when they leave H undetermined.
+    Source: Hartley & Zisserman (2004), algorithm 4.2.
 
-    Raises
-    ------
-    ValueError
-        For fewer than four points, or when they leave H undetermined.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), algorithm 4.2.
-
-    Examples
-    --------
     >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     >>> H = homography(square, 100 * square + [20, 30])
     >>> np.allclose(H, [[100, 0, 20], [0, 100, 30], [0, 0, 1]])

@@ -20,28 +20,15 @@ BESIDE = 1e-9  # of the way in the other directions: less is rounding
 def depth_from_disparity(disparity: ArrayLike, focal_length: float, baseline: float, doffs: float = 0.0) -> Array:
     """Depths Z = f B / (d + doffs) of disparities.
 
-    Parameters
-    ----------
-    disparity : array_like (...)
-        d = u_left − u_right in pixels.
-    focal_length : float
-        f in pixels.
-    baseline : float
-        B in metres.
-    doffs : float
-        cx_right − cx_left in pixels, 0 in a pair that `rectify` made.
+    Args:
+        disparity: (...), d = u_left − u_right in pixels.
+        focal_length: f in pixels.
+        baseline: B in metres.
+        doffs: cx_right − cx_left in pixels, 0 in a pair that `rectify` made.
 
-    Returns
-    -------
-    array (...)
-        In metres; inf at d + doffs = 0 and NaN below it.
+    Returns: (...), in metres; inf at d + doffs = 0 and NaN below it.
+    Source: Szeliski (2022), section 12.1.1.
 
-    References
-    ----------
-    Szeliski (2022), section 12.1.1.
-
-    Examples
-    --------
     >>> depth_from_disparity([50, 10, 0, -1], focal_length=500, baseline=0.1)
     array([ 1.,  5., inf, nan])
     """
@@ -53,28 +40,15 @@ def depth_from_disparity(disparity: ArrayLike, focal_length: float, baseline: fl
 def disparity_from_depth(depth: ArrayLike, focal_length: float, baseline: float, doffs: float = 0.0) -> Array:
     """Disparities d = f B / Z − doffs of depths.
 
-    Parameters
-    ----------
-    depth : array_like (...)
-        Z in metres.
-    focal_length : float
-        f in pixels.
-    baseline : float
-        B in metres.
-    doffs : float
-        cx_right − cx_left in pixels.
+    Args:
+        depth: (...), Z in metres.
+        focal_length: f in pixels.
+        baseline: B in metres.
+        doffs: cx_right − cx_left in pixels.
 
-    Returns
-    -------
-    array (...)
-        In pixels; NaN at and behind the cameras.
+    Returns: (...), in pixels; NaN at and behind the cameras.
+    Source: Szeliski (2022), section 12.1.1.
 
-    References
-    ----------
-    Szeliski (2022), section 12.1.1.
-
-    Examples
-    --------
     >>> disparity_from_depth([1, 5, -1], focal_length=500, baseline=0.1)
     array([50., 10., nan])
     """
@@ -85,28 +59,15 @@ def disparity_from_depth(depth: ArrayLike, focal_length: float, baseline: float,
 def depth_error(depth: ArrayLike, focal_length: float, baseline: float, disparity_error: float = 0.5) -> Array:
     """The error of depth that an error of disparity makes, to first order: ΔZ = Z² Δd / (f B).
 
-    Parameters
-    ----------
-    depth : array_like (...)
-        Z in metres.
-    focal_length : float
-        f in pixels.
-    baseline : float
-        B in metres.
-    disparity_error : float
-        Δd in pixels.
+    Args:
+        depth: (...), Z in metres.
+        focal_length: f in pixels.
+        baseline: B in metres.
+        disparity_error: Δd in pixels.
 
-    Returns
-    -------
-    array (...)
-        In metres.
+    Returns: (...), in metres.
+    Source: D. Gallup et al., Variable baseline/resolution stereo, CVPR 2008.
 
-    References
-    ----------
-    D. Gallup et al., Variable baseline/resolution stereo, CVPR 2008.
-
-    Examples
-    --------
     Five times as far, 25 times as uncertain:
 
     >>> depth_error([1, 5], focal_length=500, baseline=0.1)
@@ -120,26 +81,16 @@ def depth_interval(
 ) -> tuple[Array, Array]:
     """The nearest and farthest depths that an error of disparity allows: exact, where `depth_error` is not.
 
-    Parameters
-    ----------
-    depth : array_like (...)
-        In metres.
-    focal_length : float
-        In pixels.
-    baseline : float
-        In metres.
-    disparity_error : float
-        Either way, in pixels.
+    Args:
+        depth: (...), in metres.
+        focal_length: In pixels.
+        baseline: In metres.
+        disparity_error: Either way, in pixels.
 
-    Returns
-    -------
-    nearest : array (...)
-        In metres.
-    farthest : array (...)
-        In metres; it may be inf.
+    Returns:
+        nearest: (...), in metres.
+        farthest: (...), in metres; it may be inf.
 
-    Examples
-    --------
     At 5 m d = 10, and 10.5 and 9.5 pixels are 4.76 and 5.26 m; at 100 m d = 0.5:
 
     >>> nearest, farthest = depth_interval([5, 100], focal_length=500, baseline=0.1)
@@ -155,15 +106,10 @@ def depth_interval(
 class RectifiedPair:
     """Two perspective cameras with one orientation and one K, their x axis along the baseline, and their originals.
 
-    Attributes
-    ----------
-    left, right : Camera
-        Matching points have the same v in their pictures.
-    left_original, right_original : Camera
-        Those that stand in the same places.
+    Attributes:
+        left, right: Matching points have the same v in their pictures.
+        left_original, right_original: Those that stand in the same places.
 
-    Examples
-    --------
     >>> from camviz.cameras import Camera, Intrinsics
     >>> from camviz.poses import RigidTransform
     >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
@@ -190,27 +136,19 @@ class RectifiedPair:
     def depth(self, disparity: ArrayLike) -> Array:
         """Depths Z = f B / d of disparities.
 
-        Parameters
-        ----------
-        disparity : array_like (...)
-            d = u_left − u_right in pixels.
+        Args:
+            disparity: (...), d = u_left − u_right in pixels.
 
-        Returns
-        -------
-        array (...)
-            In metres, as `depth_from_disparity` gives them.
+        Returns: (...), in metres, as `depth_from_disparity` gives them.
         """
         return depth_from_disparity(disparity, self.focal_length, self.baseline)
 
     def maps(self) -> tuple[Array, Array]:
         """The original pixel behind each rectified one: what cv2.initUndistortRectifyMap makes, for any lens.
 
-        Returns
-        -------
-        left : array (height, width, 2)
-            In pixels; NaN where the original has none.
-        right : array (height, width, 2)
-            Likewise.
+        Returns:
+            left: (height, width, 2), in pixels; NaN where the original has none.
+            right: (height, width, 2), likewise.
         """
         return _map(self.left, self.left_original), _map(self.right, self.right_original)
 
@@ -221,30 +159,15 @@ def rectify(left: Camera, right: Camera, intrinsics: Intrinsics | None = None) -
     Each camera takes half of the rotation between them, then both turn by the least angle that lays their x axis along
     the baseline: Bouguet's method, as cv2.stereoRectify for a horizontal pair.
 
-    Parameters
-    ----------
-    left, right : Camera
-        `right` stands to the right.
-    intrinsics : Intrinsics, optional
-        Of both pictures; without them these keep the left one's size and the smallest focal length, and look where the
-        originals look.
+    Args:
+        left, right: `right` stands to the right.
+        intrinsics: Of both pictures; without them these keep the left one's size and the smallest focal length, and
+            look where the originals look.
 
-    Returns
-    -------
-    RectifiedPair
-        The two cameras, and what they are made of.
+    Returns: The two cameras, and what they are made of.
+    Raises: ValueError when `right` does not stand to the right, and when the originals look along the baseline.
+    Source: G. Bradski and A. Kaehler, Learning OpenCV (2008), chapter 12; Szeliski (2022), section 12.1.1.
 
-    Raises
-    ------
-    ValueError
-        When `right` does not stand to the right, and when the originals look along the baseline.
-
-    References
-    ----------
-    G. Bradski and A. Kaehler, Learning OpenCV (2008), chapter 12; Szeliski (2022), section 12.1.1.
-
-    Examples
-    --------
     Two cameras that are turned towards each other; afterwards a point has the same row in both pictures:
 
     >>> from camviz.cameras import Camera, Intrinsics

@@ -19,30 +19,20 @@ def triangulate(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
     It minimises the sum of squared distances to the rays: for two views, the point is the midpoint of their common
     perpendicular.
 
-    Parameters
-    ----------
-    cameras : sequence of Camera
-        2 or more, in different places.
-    uvs : array_like (cameras, ..., 2)
-        uvs[i] are pixels of cameras[i].
+    Args:
+        cameras: 2 or more, in different places.
+        uvs: (cameras, ..., 2), uvs[i] are pixels of cameras[i].
 
-    Returns
-    -------
-    array (..., 3)
-        In metres; NaN where the rays are parallel (a point at infinity), diverge (they meet behind a camera), or do not
-        exist.
+    Returns:
+        (..., 3), in metres; NaN where the rays are parallel (a point at infinity), diverge (they meet behind a camera),
+        or do not exist.
 
-    Raises
-    ------
-    ValueError
-        For fewer than 2 cameras, cameras all in one place, and pixels that are not one array for each camera.
+    Raises:
+        ValueError: For fewer than 2 cameras, cameras all in one place, and pixels that are not one array for each
+            camera.
 
-    References
-    ----------
-    Szeliski (2022), section 11.2.4.
+    Source: Szeliski (2022), section 11.2.4.
 
-    Examples
-    --------
     A disparity of 10 pixels, with f = 500 and B = 0.1 m, is f B / d = 5 m away:
 
     >>> from camviz.cameras import Camera
@@ -68,29 +58,14 @@ def triangulate_linear(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
 
     It minimises no distance in particular; `refine_points` does.
 
-    Parameters
-    ----------
-    cameras : sequence of Camera
-        2 or more, in different places, with perspective lenses.
-    uvs : array_like (cameras, ..., 2)
-        uvs[i] are pixels of cameras[i].
+    Args:
+        cameras: 2 or more, in different places, with perspective lenses.
+        uvs: (cameras, ..., 2), uvs[i] are pixels of cameras[i].
 
-    Returns
-    -------
-    array (..., 3)
-        In metres; NaN as of `triangulate`.
+    Returns: (..., 3), in metres; NaN as of `triangulate`.
+    Raises: ValueError as of `triangulate`, and for any lens that bends.
+    Source: Hartley & Zisserman (2004), section 12.2.
 
-    Raises
-    ------
-    ValueError
-        As of `triangulate`, and for any lens that bends.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 12.2.
-
-    Examples
-    --------
     >>> from camviz.cameras import Camera
     >>> from camviz.poses import RigidTransform
     >>> from camviz import Intrinsics
@@ -112,33 +87,16 @@ def triangulate_linear(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
 def refine_points(cameras: Sequence[Camera], uvs: ArrayLike, points_world: ArrayLike, steps: int = 20) -> Array:
     """World points moved to the least sum of squared reprojection errors, under any lens, by Gauss–Newton.
 
-    Parameters
-    ----------
-    cameras : sequence of Camera
-        2 or more, in different places.
-    uvs : array_like (cameras, ..., 2)
-        uvs[i] are pixels of cameras[i].
-    points_world : array_like (..., 3)
-        Where to begin, in metres, say from `triangulate`.
-    steps : int
-        At most so many.
+    Args:
+        cameras: 2 or more, in different places.
+        uvs: (cameras, ..., 2), uvs[i] are pixels of cameras[i].
+        points_world: (..., 3), where to begin, in metres, say from `triangulate`.
+        steps: At most so many.
 
-    Returns
-    -------
-    array (..., 3)
-        In metres; NaN where a point has not settled to 1e-7 of its distance.
+    Returns: (..., 3), in metres; NaN where a point has not settled to 1e-7 of its distance.
+    Raises: ValueError as of `triangulate`.
+    Source: Hartley & Zisserman (2004), section 12.5, whose optimum it finds by iteration.
 
-    Raises
-    ------
-    ValueError
-        As of `triangulate`.
-
-    References
-    ----------
-    Hartley & Zisserman (2004), section 12.5, whose optimum it finds by iteration.
-
-    Examples
-    --------
     Rows that differ by 1 pixel are met half way, by 0.5 pixels in either picture:
 
     >>> from camviz.cameras import Camera
@@ -165,30 +123,17 @@ def refine_points(cameras: Sequence[Camera], uvs: ArrayLike, points_world: Array
 def ray_distances(right_from_left: RigidTransform, rays_left: ArrayLike, rays_right: ArrayLike) -> Array:
     """Distances along two rays to where they come nearest to each other.
 
-    Parameters
-    ----------
-    right_from_left : RigidTransform
-        Between the two cameras' frames, in any unit of length.
-    rays_left, rays_right : array_like (..., 3)
-        Unit vectors, each in its own camera's frame.
+    Args:
+        right_from_left: Between the two cameras' frames, in any unit of length.
+        rays_left, rays_right: (..., 3), unit vectors, each in its own camera's frame.
 
-    Returns
-    -------
-    array (..., 2)
-        Along the left and the right ray, in the transform's unit; negative behind a camera, inf or NaN for parallel
-        rays.
+    Returns:
+        (..., 2), along the left and the right ray, in the transform's unit; negative behind a camera, inf or NaN for
+        parallel rays.
 
-    Raises
-    ------
-    ValueError
-        For another shape.
+    Raises: ValueError for another shape.
+    Source: Szeliski (2022), section 11.2.4.
 
-    References
-    ----------
-    Szeliski (2022), section 11.2.4.
-
-    Examples
-    --------
     A ray straight ahead, and one from 1 m to the right that leans by 45° to the left:
 
     >>> from camviz.poses import RigidTransform

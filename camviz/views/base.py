@@ -12,13 +12,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import Cell, Tile
 from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Item, draw_space
+from camviz.views.yours import tried
 
 Function = Callable[..., Any]
 """What a reader writes."""

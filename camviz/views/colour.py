@@ -17,7 +17,6 @@ from camviz.colour import balance, spectra
 from camviz.colour.developing import Shot, developed, errors, in_daylight, xyz_from_raw
 from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_in, placed_image
@@ -27,6 +26,7 @@ from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views import swatches
 from camviz.views.base import Control, View, answered, choice, one_of, slider, switch, without
+from camviz.views.yours import tried
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
 _CHART = (334, {"chart": 410, "photograph": 330, "numbers": 220})

@@ -17,7 +17,6 @@ from scipy.fft import fftshift, rfft2
 
 from camviz import mosaics
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -31,6 +30,7 @@ from camviz.scenes import render, textured_scene, to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views.base import View, choice, slider, without
 from camviz.views.marks import circle
+from camviz.views.yours import tried
 
 LOUPE = 14  # pixels across
 LARGEST = 256  # pixels of a picture's longer side

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz import optics
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_in, placed_image
@@ -25,6 +24,7 @@ from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, t
 from camviz.scenes.aperture import Aperture, ThinLensCamera
 from camviz.views import lens_diagram
 from camviz.views.base import View, choice, positive, slider, step_of, switch
+from camviz.views.yours import tried
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = (0.25, 8, 24), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most

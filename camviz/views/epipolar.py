@@ -14,7 +14,6 @@ import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera, transform
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -27,6 +26,7 @@ from camviz.views import garden
 from camviz.views.base import Drawn, OrbitView, step_of
 from camviz.views.marks import border_arrow, camera_outline, clipped, crop, on_photograph, ring
 from camviz.views.two_cameras import TwoCameras
+from camviz.views.yours import tried
 
 _DISTANCES = np.concatenate([np.geomspace(0.02, 400, 120), [np.inf]])
 _NEAREST, _FARTHEST = 0.3, 30.0  # metres, of the chosen point

@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
 from camviz.draw.panel import image_panel, placed_image
@@ -25,6 +24,7 @@ from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.views import garden
 from camviz.views.base import View, choice, positive, slider
+from camviz.views.yours import tried
 
 FULL_WELL_E = 30_000.0
 READ_NOISE_E = 3.0

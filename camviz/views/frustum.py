@@ -14,7 +14,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics, transform
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import rows
 from camviz.draw.matrix import matrix
@@ -41,6 +40,7 @@ from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
 from camviz.views.base import Drawn, OrbitView, choice, slider, switch
 from camviz.views.marks import border_arrow, clipped
+from camviz.views.yours import tried
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
 _LAYOUT = rows(

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows
 from camviz.draw.items import closed
@@ -27,6 +26,7 @@ from camviz.poses import RigidTransform
 from camviz.scenes import render, to_display
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, balloon_rim, balloon_scene, towards_balloon
 from camviz.views.base import Control, Drawn, OrbitView, choice, slider, switch
+from camviz.views.yours import tried
 
 GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the camera stands before it on the z axis
 BINS = 4

@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -26,6 +25,7 @@ from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.sensors.statistics import slope_through_origin
 from camviz.views import garden
 from camviz.views.base import View, slider, step_of, switch
+from camviz.views.yours import tried
 
 FULL_WELL_E = 15_000.0
 WHITE_E_PER_S = 10_000.0  # electrons that a white surface frees in a second

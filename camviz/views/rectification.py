@@ -15,7 +15,6 @@ import numpy as np
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
-from camviz.course.yours import tried
 from camviz.draw import svg
 from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -29,6 +28,7 @@ from camviz.views.base import View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
+from camviz.views.yours import tried
 
 _WIDTH, _TALLEST = 365, 274
 _MAP_WIDTH, _MAP_TALLEST = 248, 186

@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
-from camviz.course.yours import tried
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -29,6 +28,7 @@ from camviz.optics import (
 )
 from camviz.scenes import to_display
 from camviz.views.base import View, positive, slider, switch
+from camviz.views.yours import tried
 
 FIELD_UM = (320, 240)  # of the sensor that the picture shows
 TOP_PER_MM = 260.0  # the curves' right end

@@ -58,7 +58,7 @@ class TwoCameras(View):
 
     @classmethod
     def of(cls, *cameras: Camera, photographs: tuple[np.ndarray, np.ndarray] | None = None) -> Self:
-        """The view of a calibrated pair, left and right, such as `of(*camviz.load(path).rig)`.
+        """The view of a calibrated pair, left and right, such as `of(*camviz_clinic.load(path).rig)`.
 
         Raises ValueError unless there are two, in different places.
         """

@@ -57,22 +57,13 @@ class Explorer(StillWidget):
     in words above the last good picture. A button makes words twice as large for the back row; CAMVIZ_SCALE (1 to 3)
     does so from the start.
 
-    Parameters
-    ----------
-    view : View
-        The state to begin with.
-    controls : dict of str to Control
-        Those that are shown, by the fields that they change. `explore` makes them.
-    together : tuple of str, optional
-        Controls whose combinations `camviz.record` records.
+    Args:
+        view: The state to begin with.
+        controls: Those that are shown, by the fields that they change. `explore` makes them.
+        together: Controls whose combinations `camviz_school.record` records.
 
-    Raises
-    ------
-    ValueError
-        For what cannot be drawn, when it is set.
+    Raises: ValueError for what cannot be drawn, when it is set.
 
-    Examples
-    --------
     >>> from camviz.views.distortion import DistortionView
     >>> explorer = explore(DistortionView(), "k1")
     >>> explorer.k1 = -100  # the slider ends at -1
@@ -112,20 +103,11 @@ class Explorer(StillWidget):
     def set(self, **changes: Any) -> Explorer:
         """Change the view's fields and redraw, beyond the controls' ranges too.
 
-        Parameters
-        ----------
-        **changes
-            Fields of the view, and their values.
+        Args:
+            **changes: Fields of the view, and their values.
 
-        Returns
-        -------
-        Explorer
-            Itself.
-
-        Raises
-        ------
-        ValueError
-            For what cannot be drawn: it is raised here, where the code is.
+        Returns: Itself.
+        Raises: ValueError for what cannot be drawn: it is raised here, where the code is.
         """
         self._show(self.view.but(**changes), draft=False)
         return self
@@ -222,15 +204,10 @@ class Explorer(StillWidget):
     def in_words(self, error: Exception) -> str:
         """What an error says, the fields of the view by the words that stand beside their controls.
 
-        Parameters
-        ----------
-        error : Exception
-            What a view raised.
+        Args:
+            error: What a view raised.
 
-        Returns
-        -------
-        str
-            One sentence for a reader.
+        Returns: One sentence for a reader.
         """
         if not isinstance(error, ValueError):
             return f"{type(error).__name__}: {error}"
@@ -275,30 +252,18 @@ def explore(view: View, *names: str, together: tuple[str, ...] = (), **ranges: A
 
     The notebook is saved with the picture of the state in which one left it; a cell run again begins with `view`.
 
-    Parameters
-    ----------
-    view : View
-        What is shown.
-    *names
-        Fields that get a control, before those of `ranges`; all of its fields when none of both is given.
-    together : tuple of str, optional
-        Controls that a page without a kernel moves at the same time (`camviz.record`); here all do.
-    **ranges
-        Fields with other limits: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words for a
-        choice.
+    Args:
+        view: What is shown.
+        *names: Fields that get a control, before those of `ranges`; all of its fields when none of both is given.
+        together: Controls that a page without a kernel moves at the same time (`camviz_school.record`); here all do.
+        **ranges: Fields with other limits: `k1=(-0.5, 0.5)` or `k1=(-0.5, 0.5, 0.01)` for a slider, a tuple of words
+            for a choice.
 
-    Returns
-    -------
-    Explorer
-        Live in a notebook.
+    Returns: Live in a notebook.
 
-    Raises
-    ------
-    ValueError
-        Naming the fields there are when one is unknown, and for a range that is none.
+    Raises:
+        ValueError: Naming the fields there are when one is unknown, and for a range that is none.
 
-    Examples
-    --------
     >>> from camviz.views.distortion import DistortionView
     >>> explore(DistortionView(k1=-0.3), "k3", k1=(-0.5, 0.5)).values
     {'k3': 0.0, 'k1': -0.3}

@@ -2,7 +2,7 @@
 
 A block that begins with ```console holds commands, each after `$ `, and below it what it prints. Known are
 `camviz …` and `echo $?`, which prints the status of the command before; a status that no `echo $?` asks for is 0.
-A file that a page shows, its name in backticks above a fence, is written there and then, as in CONTRIBUTING.md. Every
+A file that a page shows, its name in backticks above a fence, is written there and then, as in docs/recipes.md. Every
 page begins in a folder of its own with the files that examples.py writes.
 
 What is printed must be what the page shows, but for this: a line `...` stands for any lines, and `...` inside a line
@@ -23,7 +23,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
-from camviz.commands.command import main
+from camviz_clinic.commands.command import main
 
 HERE = Path(__file__).parent
 BLOCK = re.compile(

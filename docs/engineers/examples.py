@@ -10,18 +10,18 @@ import cv2
 import numpy as np
 from scipy.special import ndtr
 
-from camviz.calibration import calibrate, calibrate_pair, detect
-from camviz.calibration.types import Board
 from camviz.cameras import Camera, Intrinsics
-from camviz.clinic.snapshots import snapshot
-from camviz.clinic.virtual import spread_boards
-from camviz.files.writing import write as write_calibration
 from camviz.lenses import BrownConrady
 from camviz.panoramas.reprojection import equirectangular_camera
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import snapshot as photograph
 from camviz.scenes import textured_scene, to_encoded
 from camviz.sensors import Sensor
+from camviz_clinic.calibration import calibrate, calibrate_pair, detect
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.checks.snapshots import snapshot
+from camviz_clinic.checks.virtual import spread_boards
+from camviz_clinic.files.writing import write as write_calibration
 
 BOARD = Board(9, 6, 0.025)
 LEFT = Camera(Intrinsics(640, 480, 530, 531, 322, 238), BrownConrady(-0.2, 0.05))

@@ -1,6 +1,7 @@
 """The reports of gallery.md: `python docs/engineers/gallery.py FOLDER` writes one HTML file for each, and an index.
 
-The calibrations are virtual, their faults those of camviz/clinic/checks, as strong as the clinic is sure to name.
+The calibrations are virtual, their faults those of camviz_clinic/checks/findings, as strong as the clinic is sure to
+name.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from camviz.clinic import faults
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.inspection import Inspection
-from camviz.clinic.virtual import healthy, healthy_pair
 from camviz.draw.page import document
-from camviz.report.inspection import write_report
+from camviz_clinic.checks import faults
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.inspection import Inspection
+from camviz_clinic.checks.virtual import healthy, healthy_pair
+from camviz_clinic.report.inspection import write_report
 
 SITE = "https://camviz.github.io/camviz/engineers/reports/"
 PAGE = Path(__file__).with_suffix(".md")

@@ -7,14 +7,14 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from camviz.clinic import kinds
+from camviz_clinic.checks import kinds
 
 SOURCE = Path(__file__).with_suffix(".toml")
 PAGE = Path(__file__).with_suffix(".md")
 HEAD = """\
 # From a symptom to its remedy
 
-<!-- Made from symptoms.toml and camviz/clinic/checks by: python docs/engineers/symptoms.py -->
+<!-- Made from symptoms.toml and camviz_clinic/checks/findings by: python docs/engineers/symptoms.py -->
 
 Find what you see in the first column. The likeliest finding comes first, and `camviz inspect` tells which of them it
 is. [The clinic](../clinic.md) says by which number each finding is named and how often that is right.

@@ -71,7 +71,7 @@ def jupyter(front_end: str, folder: Path, home: Path, **environment: str) -> Ite
     port, token = free_port(), secrets.token_hex(16)
     command = [sys.executable, "-m", module, "--no-browser", "--allow-root", "--expose-app-in-browser"]
     command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0", f"--ServerApp.root_dir={folder}"]
-    command += ["--ServerApp.jpserver_extensions=camviz.server=True"]  # as `camviz lab` does
+    command += ["--ServerApp.jpserver_extensions=camviz_school.server=True"]  # as `camviz lab` does
     command += [f"--IdentityProvider.token={token}", f"--{app}.app_settings_dir={home / 'app'}"]
     command += ["--LabApp.extension_manager=readonly", "--ServerApp.ip=127.0.0.1"]
     log = home / "server.log"

@@ -5,8 +5,8 @@ import shutil
 import pytest
 from laboratory import ROOT, jupyterlab
 
-from camviz.course import prose
-from camviz.course.questions import question
+from camviz.draw import prose
+from camviz_school.course.questions import question
 
 pytestmark = [
     pytest.mark.browser,

@@ -5,7 +5,7 @@ import json
 import pytest
 from laboratory import FRONT_ENDS, NOTEBOOKS_OWN, ROOT, Notebook, jupyter
 
-from camviz.course.questions import question
+from camviz_school.course.questions import question
 
 pytestmark = pytest.mark.browser
 

@@ -7,7 +7,7 @@ from laboratory import Notebook, jupyterlab
 
 pytestmark = pytest.mark.browser
 
-SETUP = """from camviz.course.exercises import Tutor
+SETUP = """from camviz_school.course.exercises import Tutor
 from camviz.views.distortion import DistortionView
 from camviz.widgets import explore
 check = Tutor()

@@ -6,8 +6,8 @@ import pytest
 from laboratory import Notebook, jupyterlab
 from playwright.sync_api import expect
 
-from camviz.course.answers import KEPT_IN, read_answers
-from camviz.course.questions import quiz_questions
+from camviz_school.course.answers import KEPT_IN, read_answers
+from camviz_school.course.questions import quiz_questions
 
 pytestmark = pytest.mark.browser
 

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.browser
 CELL = f"""import sys
 sys.path.insert(0, {str(Path(__file__).resolve().parents[1])!r})
 from calibrations import sick
-from camviz import inspect
+from camviz_clinic import inspect
 inspect(sick())
 """
 

@@ -6,12 +6,12 @@ import pytest
 from laboratory import new_page
 from playwright.sync_api import Browser
 
-from camviz.course.material import lesson_paths
-from camviz.course.notebooks import read
-from camviz.teaching import plans
-from camviz.teaching.deck import planned_slides
-from camviz.teaching.numbering import Numbering
-from camviz.teaching.one_page import one_page
+from camviz_school.course.material import lesson_paths
+from camviz_school.course.notebooks import read
+from camviz_school.teaching import plans
+from camviz_school.teaching.deck import planned_slides
+from camviz_school.teaching.numbering import Numbering
+from camviz_school.teaching.one_page import one_page
 
 A4_PT = (595, 842)
 PLANNED = [path for path in lesson_paths() if plans.plan(path.name[:2])]

@@ -15,12 +15,12 @@ sys.path.append(str(ROOT / "benchmarks"))
 
 from smallest import Smallest
 
-from camviz.record import Axis, Budget, Widget, record, write_player
 from camviz.views.base import View
 from camviz.views.distortion import DistortionView
 from camviz.views.frustum import FrustumView
 from camviz.views.readout import ReadoutView
 from camviz.widgets import Explorer, explore
+from camviz_school.record import Axis, Budget, Widget, record, write_player
 
 pytestmark = pytest.mark.browser
 

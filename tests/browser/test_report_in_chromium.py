@@ -12,8 +12,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from calibrations import pair, sick
 
-from camviz.clinic import inspect
-from camviz.report.inspection import write_report
+from camviz_clinic.checks import inspect
+from camviz_clinic.report.inspection import write_report
 
 pytestmark = pytest.mark.browser
 

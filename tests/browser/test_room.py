@@ -14,7 +14,7 @@ from classroom import ask, camviz_class
 from laboratory import AXE, ROOT, new_page
 from playwright.sync_api import expect
 
-from camviz.course.questions import question
+from camviz_school.course.questions import question
 
 pytestmark = pytest.mark.browser
 

@@ -11,9 +11,9 @@ from bs4 import BeautifulSoup, Tag
 from built_site import LESSONS, ROOT, SITE
 from mistune import create_markdown
 
-from camviz.course import prose
-from camviz.course.questions import predict_questions, quiz_questions
-from camviz.samples import local_sample
+from camviz.draw import prose
+from camviz_school.course.questions import predict_questions, quiz_questions
+from camviz_school.samples import local_sample
 
 pytestmark = pytest.mark.browser
 

@@ -14,9 +14,9 @@ from built_site import LESSONS, SITE, served
 from laboratory import new_page
 from playwright.sync_api import Browser, Page
 
-from camviz.course.answers import mark, read_answers
-from camviz.course.learning import class_scores
-from camviz.course.questions import predict_questions, quiz_questions
+from camviz_school.course.answers import mark, read_answers
+from camviz_school.course.learning import class_scores
+from camviz_school.course.questions import predict_questions, quiz_questions
 
 pytestmark = pytest.mark.browser
 

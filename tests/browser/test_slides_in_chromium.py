@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from laboratory import new_page
 
-from camviz.course import notebooks
-from camviz.teaching.deck import deck
-from camviz.teaching.pack import write_pack
+from camviz_school.course import notebooks
+from camviz_school.teaching.deck import deck
+from camviz_school.teaching.pack import write_pack
 
 pytestmark = pytest.mark.browser
 

@@ -17,9 +17,9 @@ import numpy as np
 from mutation import mutants
 from quoting import HERE, LESSONS
 
-from camviz.course import notebooks
-from camviz.course.checks import judge
-from camviz.course.trials import Exercise, quiet
+from camviz_school.course import notebooks
+from camviz_school.course.checks import judge
+from camviz_school.course.trials import Exercise, quiet
 
 TABLES = HERE / "equivalent_mutants"
 

@@ -21,9 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from camviz.course import glossary, notebooks, questions
-from camviz.course.exercises import exercises
-from camviz.teaching import plans
+from camviz_school.course import glossary, notebooks, questions
+from camviz_school.course.exercises import exercises
+from camviz_school.teaching import plans
 
 HERE = Path(__file__).parent
 LESSONS = HERE.parents[1] / "lessons"

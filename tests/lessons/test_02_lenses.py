@@ -6,10 +6,10 @@ from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
 from camviz import optics
-from camviz.course.material import module
 from camviz.scenes.photographs import photograph
 from camviz.views.depth_of_field import DepthOfFieldView
 from camviz.views.lens_elements import LensElementsView
+from camviz_school.course.material import module
 
 lesson02 = module("02")
 

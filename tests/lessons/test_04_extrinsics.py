@@ -10,10 +10,10 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from camviz.course import notebooks
-from camviz.course.exercises import exercise
 from camviz.scenes.standard import board_corners
 from camviz.views.frustum import FrustumView
+from camviz_school.course import notebooks
+from camviz_school.course.exercises import exercise
 
 EXCEPTIONS: dict[str, str] = {}
 

@@ -6,11 +6,11 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
-from camviz.course.checks import judge
-from camviz.course.exercises import exercise
-from camviz.course.material import module
 from camviz.scenes import snapshot, textured_scene
 from camviz.views.rectification import RectificationView
+from camviz_school.course.checks import judge
+from camviz_school.course.exercises import exercise
+from camviz_school.course.material import module
 
 lesson08 = module("08")
 

@@ -12,13 +12,13 @@ from quoting import LESSONS
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from camviz.commands.command import main
-from camviz.course import notebooks
-from camviz.course.exercises import exercise
-from camviz.course.material import module
 from camviz.lenses import DoubleSphere, UnifiedSphere
 from camviz.panoramas.cubemap import FACES, face_camera
 from camviz.panoramas.ring import Ring
+from camviz_clinic.commands.command import main
+from camviz_school.course import notebooks
+from camviz_school.course.exercises import exercise
+from camviz_school.course.material import module
 
 lesson10 = module("10")
 
@@ -265,7 +265,7 @@ def test_the_valley_of_boards_near_the_axis_and_the_pit_of_boards_far_out(says):
     setting = next(cell for cell in code.split("from scipy.spatial.transform import")[1:] if "def boards" in cell)
     exec(
         "from camviz.lenses import UnifiedSphere\nfrom scipy.spatial.transform import"
-        + setting.partition("from camviz.calibration.focal_xi_ambiguity")[0],
+        + setting.partition("from camviz_clinic.calibration.focal_xi_ambiguity")[0],
         namespace,
     )
     rng, corners = np.random.default_rng(4), namespace["board"].corners

@@ -7,10 +7,10 @@ import pytest
 from quoting import LESSONS
 from scipy.ndimage import shift
 
-from camviz.course import notebooks
-from camviz.course.exercises import exercise
-from camviz.course.material import module
 from camviz.lightfields import LightField, from_microlens_image
+from camviz_school.course import notebooks
+from camviz_school.course.exercises import exercise
+from camviz_school.course.material import module
 
 lesson11 = module("11")
 

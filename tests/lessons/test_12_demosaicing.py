@@ -12,13 +12,13 @@ from quoting import LESSONS
 from scipy.ndimage import convolve
 
 from camviz import mosaics
-from camviz.course import notebooks
-from camviz.course.checks import judge
-from camviz.course.exercises import exercise
-from camviz.course.material import module
 from camviz.mosaics import BAYER, PATTERNS
 from camviz.scenes.photographs import photograph
 from camviz.views.demosaicing import DemosaicingView
+from camviz_school.course import notebooks
+from camviz_school.course.checks import judge
+from camviz_school.course.exercises import exercise
+from camviz_school.course.material import module
 
 lesson12 = module("12")
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from camviz.calibration.difference import pixel_grid
-from camviz.clinic.laboratory import GRID, lab_faults
-from camviz.views.fault_lab import FaultLabView
+from camviz_clinic.calibration.difference import pixel_grid
+from camviz_clinic.checks.laboratory import GRID, lab_faults
+from camviz_clinic.views.fault_lab import FaultLabView
 
 EXCEPTIONS: dict[str, str] = {
     "is the answer sheet for patient 3": "it names a patient, not a quantity",
@@ -258,7 +258,7 @@ def test_shapes_and_answers_of_the_exercises(says):
     assert three.value == 3 == len(ANNA.experiment.truth.unproject(np.array([3.0, 4.0])))
     says("A corner is off beyond 6 σ, with σ from exercise 2")
     whole, line = says("Answer 3 if a whole view is off, else 2 if a row or a column is")
-    from camviz.course.material import module
+    from camviz_school.course.material import module
 
     lesson16 = module("16")
 
@@ -478,7 +478,7 @@ def test_hand_and_eye(says):
     from quoting import LESSONS
     from scipy.optimize import least_squares
 
-    from camviz.course import notebooks
+    from camviz_school.course import notebooks
 
     cell = next(
         one for one in notebooks.read(LESSONS / "16_clinic.ipynb").cells if one.source.startswith("from scipy.spatial")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from quoting import HERE, LESSONS
 
-from camviz.course import notebooks
-from camviz.course.checks import judge
-from camviz.course.exercises import exercises
-from camviz.course.trials import HINTS
+from camviz_school.course import notebooks
+from camviz_school.course.checks import judge
+from camviz_school.course.exercises import exercises
+from camviz_school.course.trials import HINTS
 
 ADVERSARIES = 8
 HELD = [path.name.split("_")[1] for path in sorted(HERE.glob("test_[0-9][0-9]_*.py"))]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from mutants import function_of, solution_of
 
-from camviz.course.checks import judge
-from camviz.course.exercises import exercise
+from camviz_school.course.checks import judge
+from camviz_school.course.exercises import exercise
 
 
 def changed(name, *pairs):

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from quoting import LESSONS
 
-from camviz.course import notebooks
-from camviz.course.exercises import exercises
 from camviz.widgets.explorer import Explorer
+from camviz_school.course import notebooks
+from camviz_school.course.exercises import exercises
 
 PATHS = [path for path in sorted(LESSONS.glob("*.ipynb")) if "attempt(" in path.read_text(encoding="utf-8")]
 VISIBLE = 5e-4

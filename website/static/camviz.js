@@ -68,12 +68,12 @@ const answers = {
 };
 
 // What a class's room says of a question while the class votes on it. Its script takes the place of these where a room
-// serves the page (camviz/room/pages/lesson.js); elsewhere nothing does.
+// serves the page (camviz_school/room/pages/lesson.js); elsewhere nothing does.
 window.camvizClassroom = { card: () => null, send: () => {}, said: () => "", settled: () => [] };
 
 const KEPT = "<p>Kept. The answers come with the quiz at the end.</p>";
 
-// A question as question.js shows it: what camviz.widgets.question tells the page in a notebook.
+// A question as question.js shows it: what camviz_school.widgets.question tells the page in a notebook.
 function card(question, made, earlier, silent) {
   const shown = { text: question.text, choices: question.choices.map(({ text }) => text), tries: made.length, earlier };
   if (!made.length) return { ...shown, chosen: null, correct: null, reply: "" };
@@ -128,7 +128,7 @@ function makeLive(place, asked, others) {
   camvizQuestion({ model, el: place });
 }
 
-// Saves both forms of a lesson's quiz as camviz.course.answers writes them: answers_05_3f9a2c1b.csv, without a name.
+// Saves both forms of a lesson's quiz as camviz_school.course.answers writes them: answers_05_3f9a2c1b.csv, without a name.
 function exportAnswers(lesson, others) {
   const { code, made } = answers.history(lesson);
   const rows = others.flatMap((asked) => asked.questions.filter(({ form }) => form).flatMap((one) => {

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 # 1: where the image is -----------------------------------------------------------------------------------------------
 

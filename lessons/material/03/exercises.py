@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 MILLIONTH = 1e-6
 

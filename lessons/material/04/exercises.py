@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import Arguments, Array, Exercise
 from camviz.poses import RigidTransform, Rotation
+from camviz_school.course.checks import Arguments, Array, Exercise
 
 SINGLE_PRECISION = 1e-5
 ROUNDING = 1e-6  # how far each element of MᵀM, and the determinant, may be from a rotation's
@@ -626,8 +626,10 @@ def _parts(r: Array) -> tuple[float, Array, Array]:
 
 
 def _rodrigues_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    sides = rng.choice([-1, 1], 3)
     for low, high in ((0.4, 1.4), (1.7, 3.0), (3.3, 6.0), (1e-4, 1e-3)):
-        axis = rng.uniform(0.2, 1, 3) * rng.choice([-1, 1], 3)
+        sides = -sides  # to either side of each axis
+        axis = rng.uniform(0.2, 1, 3) * sides
         yield (float(rng.uniform(low, high)) * axis / np.linalg.norm(axis),)
     yield (np.array([np.pi, 0, 0])[rng.permutation(3)],)
     yield (np.zeros(3),)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 # 1: the radial polynomial --------------------------------------------------------------------------------------------
 
@@ -465,9 +465,9 @@ def five_divisions(r_d, k1):
 
 
 @UNDISTORT.wrong(
-    "You divide again and again, and where that has not settled you answer NaN, though there is a point: for a strong "
-    "pincushion, say r_d = 6 with k1 = 0.5, it never settles, and near the fold it takes thousands of rounds. Newton's "
-    "steps arrive in a dozen."
+    "You divide again and again, and where that has not settled you answer NaN, though there is a point. For a strong "
+    "pincushion, say r_d = 6 with k1 = 0.5, it never settles. Near the fold it takes thousands of rounds, and "
+    "Newton's steps arrive in a dozen."
 )
 def divided_and_looked_back(r_d, k1):
     r = np.asarray(r_d, dtype=float)

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import Arguments, Array, Exercise
-from camviz.course.trials import Function
 from camviz.poses import Rotation
+from camviz_school.course.checks import Arguments, Array, Exercise
+from camviz_school.course.trials import Function
 
 # 1: the number everybody quotes --------------------------------------------------------------------------------------
 
@@ -347,7 +347,7 @@ CONSTRAINTS = Exercise(
 
 @CONSTRAINTS.right
 def as_camviz_has_them(H):
-    from camviz.calibration.zhang import constraints as of_the_closed_form
+    from camviz_clinic.calibration.zhang import constraints as of_the_closed_form
 
     return of_the_closed_form(H)
 
@@ -503,7 +503,7 @@ POSE = Exercise(
 
 @POSE.right
 def as_camviz_has_it(H, K):
-    from camviz.calibration.zhang import board_pose as of_the_closed_form
+    from camviz_clinic.calibration.zhang import board_pose as of_the_closed_form
 
     pose = of_the_closed_form(H, K)
     return pose.rotation.as_matrix(), pose.translation

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
-from camviz.course.trials import Function
 from camviz.poses import Rotation
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.trials import Function
 
 # What several of them need -------------------------------------------------------------------------------------------
 
@@ -296,7 +296,7 @@ def right_epipole(F: Array) -> Array:
 
 
 def _epipole_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for _ in range(4):
+    for _ in range(12):  # a singular vector has either sign
         yield (_F(rng),)
 
 
@@ -437,6 +437,8 @@ def _pairs(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
 def _eight_point_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for n in (12, 20, 50):
         yield _pairs(rng, n)
+    left, right = _pairs(rng, 30)
+    yield left - 500, right - 400  # beyond the upper left corner, most of them
 
 
 def _good_with_noise(function: Function, rng: np.random.Generator) -> str:
@@ -603,12 +605,12 @@ def _distances(R: Array, t: Array, rays_left: Array, rays_right: Array) -> Array
 
 
 def _in_front_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """Of two scenes, one of them small, in random order the true motion, the opposite one and the two turned by 180°.
+    """Of three scenes, one of them small, in random order the true motion, the opposite one and the two turned by 180°.
 
     They turn about the baseline. Some of the pairs are mistakes: their rays meet behind both cameras if the motion is
     the true one.
     """
-    for n, size in zip(rng.integers(8, 16, 2), (1.0, 0.01), strict=True):  # of a garden, and of a watch
+    for n, size in zip(rng.integers(16, 24, 3), (1.0, 0.01, 1.0), strict=True):  # of a garden, and of a watch
         (R, t), points = _motion(rng), rng.uniform([-2, -1.5, 3], [2, 1.5, 8], (n, 3))
         t = t * [1, 1, 0.2]  # much to the side: about as far as to the front it could be taken for its reverse
         t, points = size * t, size * points

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
 from camviz.poses import Rotation
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 # 1: depth ------------------------------------------------------------------------------------------------------------
 

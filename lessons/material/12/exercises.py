@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
 from camviz.mosaics import XTRANS
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 RGGB = np.array([[0, 1], [1, 2]])
 X_TRANS = np.array(XTRANS.tile)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 PHOTONS_PER_LUX = 4091.0  # of 555 nm, per second and µm²: 1/683 W/m² over h c / λ
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 # 1: how noise adds ----------------------------------------------------------------------------------------------------
 

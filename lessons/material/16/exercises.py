@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.course.checks import Arguments, Array, Exercise
 from camviz.poses import Rotation
+from camviz_school.course.checks import Arguments, Array, Exercise
 
 RAYLEIGH = np.sqrt(2 * np.log(2))  # the median length of a residual over the σ of its coordinates
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from camviz.calibration.types import Calibration
-from camviz.clinic import Inspection, faults, kinds
-from camviz.clinic.evidence import Evidence
-from camviz.clinic.virtual import healthy
-from camviz.course.checks import Verdict
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.checks import Inspection, faults, kinds
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.virtual import healthy
+from camviz_school.course.checks import Verdict
 
 if TYPE_CHECKING:
-    from camviz.views.fault_lab import FaultLabView
+    from camviz_clinic.views.fault_lab import FaultLabView
 
 HEALTHY = "healthy"
 
@@ -106,7 +106,7 @@ class Patient:
         return Inspection.of(self.evidence)
 
     def _ipython_display_(self) -> None:
-        from camviz.widgets.inspection import LiveInspection
+        from camviz_clinic.report.notebook import LiveInspection
 
         words = f"<p><b>{escape(self.name)}.</b> “{escape(self.story)}”</p>"
         live = LiveInspection(Inspection(self.calibration, (), ()))
@@ -117,7 +117,7 @@ class Patient:
 
 def anna_and_ben() -> tuple[FaultLabView, FaultLabView]:
     """Two calibrations of one camera: Anna's from sharp corners of boards held parallel, Ben's from tilted ones."""
-    from camviz.views.fault_lab import FaultLabView
+    from camviz_clinic.views.fault_lab import FaultLabView
 
     anna = FaultLabView(fault="parallel boards", strength=1.0, noise=0.14, seed=5, told=False)
     return anna, anna.but(strength=0.0, noise=0.39)
@@ -162,7 +162,7 @@ def reply(patient: Patient, answer: Any, attempt: int) -> Verdict:
 def _hint(finding: str, attempt: int) -> str:
     if finding == HEALTHY:
         return "Go through the views one by one. What do you see that noise would not do?"
-    from camviz.views.clinic.catalogue import title_of
+    from camviz_clinic.views.catalogue import title_of
 
     kind = kinds()[finding]
     if attempt == 1:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camviz.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 
 # 1: from the profile to the line spread ------------------------------------------------------------------------------
 

@@ -1,0 +1,143 @@
+"""A calibration's problem to first order: its Jacobian, its normal equations, and the covariances they give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from camviz.cameras import transform
+from camviz.lenses.base import Array
+from camviz_clinic.calibration.arrowhead import Arrowhead
+from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
+from camviz_clinic.calibration.problem import POSE, Problem
+from camviz_clinic.calibration.types import Board
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation(Problem):
+    """The problem near its own cameras and poses, where a pixel is a linear function of the parameters.
+
+    The covariances of poses are those of their twists. A prior counts in them as what it is, a measurement that nobody
+    made: they are Bayes' for a lens drawn from it, σ² (JᵀJ + PᵀP)⁻¹ with P of the prior's rows, which is the scatter of
+    repeated calibrations and the mean square of the pull. mrcal takes the scatter alone, which for a strong prior goes
+    to 0. `held_by_priors` says how many parameters are assumed so, and not measured.
+    """
+
+    @cached_property
+    def normal_equations(self) -> Arrowhead:
+        """JᵀJ and Jᵀr over the views that have a say, J being the derivative of the *projected* corners."""
+        parts = [Arrowhead.of(*self._measured(name)) for name in self.cameras]
+        normal = sum(parts[1:], start=parts[0])
+        for rows, residuals in self._assumed.values():
+            normal = normal.with_shared(rows, residuals)
+        return normal
+
+    @cached_property
+    def _assumed(self) -> dict[str, tuple[Array, Array]]:
+        """By camera, the prior's derivative (n, s) by the shared parameters and its residuals (n,), in pixels."""
+        assumed = {}
+        for name, prior in self.at_work.items():
+            by_intrinsics, residuals = prior.rows(self.cameras[name].lens, self.estimated[name])
+            rows = np.zeros((len(residuals), len(self.parameters)))
+            rows[:, self.intrinsics_of(name)] = by_intrinsics
+            assumed[name] = rows, residuals
+        return assumed
+
+    def _measured(self, name: str) -> tuple[Array, Array, Array]:
+        """Camera `name`'s J by the shared parameters and by the poses, and its r; zero where a corner has no say."""
+        by_shared, by_pose = self.jacobian(name)
+        views, unused = self.posed, ~self.used[name][self.posed]
+        residuals = self.residuals[name][views].copy()
+        for values in (by_shared, by_pose, residuals):
+            values[unused] = 0
+        rows = (int(views.sum()), 2 * unused.shape[1])
+        return by_shared.reshape(*rows, by_shared.shape[-1]), by_pose.reshape(*rows, len(POSE)), residuals.reshape(rows)
+
+    def jacobian(self, name: str) -> tuple[Array, Array]:
+        """How camera `name`'s pixels follow the parameters, over the views that have a say.
+
+        By the shared ones, (views, corners, 2, s), and by the view's own twist, (views, corners, 2, 6).
+        """
+        camera, points_first = self.cameras[name], self.points_first[self.posed]
+        points_cam = transform(camera.cam_from_world, points_first)
+        _, by_point, by_intrinsics = pixel_jacobian(camera, points_cam, self.estimated[name])
+        by_first = by_point @ camera.cam_from_world.rotation.as_matrix()
+        by_shared = np.zeros((*points_cam.shape[:-1], 2, len(self.parameters)))
+        by_shared[..., self.intrinsics_of(name)] = by_intrinsics
+        if place := self.place_of(name):
+            by_shared[..., place] = by_point @ twist_jacobian(points_cam)
+        if self.warp_place:
+            normals = self.first_from_board[self.posed].rotation.as_matrix()[:, None, :, 2:]
+            by_shared[..., self.warp_place] = (by_first @ normals) * sagittas(self.board)[:, None, :]
+        return by_shared, by_first @ twist_jacobian(points_first)
+
+    # What it says
+
+    @property
+    def sigma(self) -> float:
+        """The standard deviation in pixels of one coordinate of a detected corner: σ² = ‖x‖²/(N - k).
+
+        k is less by what the priors hold of the parameters (mrcal's formulation.org has that trace, and neglects it).
+        NaN where there are no more measurements than parameters.
+        """
+        left = self.measurements - self.unknowns + sum(self.held_by_priors.values())
+        return float(np.sqrt(self.sum_of_squares / left)) if left > 0 else np.nan
+
+    @cached_property
+    def held_by_priors(self) -> dict[str, float]:
+        """How many of a camera's parameters its prior determines, and not the corners: tr P (JᵀJ + PᵀP)⁻¹ Pᵀ."""
+        return {
+            name: float(np.einsum("ns,st,nt->", rows, self.normal_equations.covariance, rows))
+            for name, (rows, _) in self._assumed.items()
+        }
+
+    @cached_property
+    def covariance(self) -> Array:
+        """σ² (JᵀJ)⁻¹ of the shared `parameters`, (s, s), the poses being free to follow."""
+        return self.sigma**2 * self.normal_equations.covariance
+
+    def intrinsics_covariance(self, name: str) -> Array:
+        """Of the `estimated` intrinsics of camera `name`, (n, n)."""
+        place = self.intrinsics_of(name)
+        return self.covariance[place, place]
+
+    @cached_property
+    def pose_covariance(self) -> Array:
+        """Of every view's twist, (views, 6, 6), radians and metres; NaN for a view without a say."""
+        normal = self.normal_equations
+        covariance = np.full((self.views, len(POSE), len(POSE)), np.nan)
+        follows = normal.pose_response @ normal.covariance @ np.swapaxes(normal.pose_response, 1, 2)
+        covariance[self.posed] = self.sigma**2 * (normal.block_inverses + follows)
+        return covariance
+
+    @cached_property
+    def cross_covariance(self) -> Array:
+        """Between every view's twist and the shared parameters, (views, 6, s); NaN for a view without a say."""
+        normal = self.normal_equations
+        covariance = np.full((self.views, len(POSE), len(self.parameters)), np.nan)
+        covariance[self.posed] = -(self.sigma**2) * normal.pose_response @ normal.covariance
+        return covariance
+
+    @cached_property
+    def mean_twist_covariance(self) -> Array:
+        """Of the shared parameters and the mean of all views' twists together, (s + 6, s + 6)."""
+        return self.joined_with_mean_twist(self.normal_equations.covariance)
+
+    def joined_with_mean_twist(self, shared: Array) -> Array:
+        """`mean_twist_covariance` if the shared parameters had the covariance `shared` (s, s) for σ = 1.
+
+        With Wᵢ and Cᵢ of `Arrowhead`, a twist is -Wᵢ δ and noise of covariance Cᵢ⁻¹ that is its own. The mean of n:
+        -W̄ δ, and noise of covariance Σ Cᵢ⁻¹/n².
+        """
+        normal = self.normal_equations
+        follow = np.concatenate([np.eye(len(self.parameters)), -normal.pose_response.mean(axis=0)])
+        covariance = follow @ shared @ follow.T
+        covariance[-len(POSE) :, -len(POSE) :] += normal.block_inverses.mean(axis=0) / len(normal.block_inverses)
+        return self.sigma**2 * covariance
+
+
+def sagittas(board: Board) -> Array:
+    """How far a corner rises by a sagitta of one along x and along y, (corners, 2)."""
+    return np.stack([board.warped((1, 0))[:, 2], board.warped((0, 1))[:, 2]], axis=-1)

@@ -1,0 +1,218 @@
+"""Where the boards were, how they were held, and what their poses hide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import cos, radians
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camviz.cameras import Camera
+from camviz.distortion import fold_angle
+from camviz.lenses.base import Array
+from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.cross_validation import held_out
+from camviz_clinic.checks.evidence import Evidence, NotChecked
+from camviz_clinic.checks.observed import Observed
+from camviz_clinic.checks.registry import Finding, LabFault, Rng, finding
+from camviz_clinic.checks.virtual import single, spread_boards
+
+COVERED = 0.4  # of the image: the outermost corners are a square inside the board
+CELLS = 64  # along the longer side of the image, to measure areas
+WIDEST = radians(110)  # off the axis: the widest common fisheyes see 220°
+SAME_WAY_DEG = 20.0  # between the normals of two boards
+UNCERTAIN = 0.01  # of the focal length
+HELD_OUT = 2.0  # times what noise leads to
+FEWEST_VIEWS = 3
+
+
+@finding(
+    "low-coverage",
+    severity="warning",
+    view="coverage",
+    symptom="The board was seen in too little of the image.",
+    causes=("views that all show the board in the same part of the image, or far away",),
+    remedy="Add views with the board close to each border and corner of the image.",
+    threshold="They cover less than two fifths of the image, or of what a fisheye of 220° fills of it.",
+    explains=("fold", "near-pole", "inverse-not-converged"),
+)
+def low_coverage(evidence: Evidence) -> Iterator[Finding]:
+    """The check lays the outlines of the board in all views over the image."""
+    if not evidence.calibration.detections:
+        raise NotChecked("the file holds no detected corners of a known board")
+    for name, pixels in evidence.calibration.detections.items():
+        share = coverage(pixels, evidence.calibration.cameras[name])
+        if share < COVERED:
+            sentence = f"{name}: the board was seen in {share:.0%} of the image, over {len(pixels)} views."
+            yield low_coverage.found(sentence, share, "of the image", name)
+
+
+def coverage(pixels: Array, camera: Camera) -> float:
+    """The share of an image that lies inside the convex outline of some view's corners (views, corners, 2).
+
+    Beyond a fisheye's circle only the cells count in which corners were seen all the same.
+    """
+    grid = camera.intrinsics
+    scale = CELLS / max(grid.width, grid.height)
+    cells = np.zeros((max(1, round(grid.height * scale)), max(1, round(grid.width * scale))), np.uint8)
+    for view in pixels:
+        seen = view[np.isfinite(view).all(axis=-1)]
+        if len(seen) > 2:
+            outline = cv2.convexHull(np.round((seen + 0.5) * scale * 16 - 8).astype(np.int32))
+            cv2.fillConvexPoly(cells, outline, 1, shift=4)
+    return float(cells.mean() / np.mean(within_reach(camera, *cells.shape) | (cells > 0)))
+
+
+def within_reach(camera: Camera, rows: int, columns: int) -> NDArray[np.bool_]:
+    """In which of rows × columns cells of its image a camera can see something: false beyond a fisheye's circle.
+
+    A fold or a pole nearer than that takes no cell away: missing views lead to it, and must not hide behind it.
+    """
+    grid, lens = camera.intrinsics, camera.lens
+    if lens.goes_round:
+        return np.ones((rows, columns), bool)
+    u = (np.arange(columns) + 0.5) * grid.width / columns - 0.5
+    v = (np.arange(rows) + 0.5) * grid.height / rows - 0.5
+    z = lens.unproject(grid.from_pixels(np.stack(np.meshgrid(u, v), axis=-1)))[..., 2]
+    turns_back = bool(lens.denominator_terms) or fold_angle(lens) < WIDEST
+    return np.where(np.isfinite(z), z >= cos(WIDEST), turns_back)
+
+
+@low_coverage.fault(
+    "boards in the middle",
+    "of a side",
+    (0.15, 0.25, 0.4),
+    promised=0.25,
+    beyond_doubt=(0.25, 0.35),
+    lab=LabFault(
+        0.25,
+        "the boards stay inside {0:.0%} of the width and height",
+        none=1,
+        spread=lambda strength: {"window": 1 - 0.75 * strength},
+    ),
+)
+def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
+    """The boards stay inside this part of the sides."""
+    set_up = single(rng)
+    poses = spread_boards(rng, set_up.cameras, set_up.board, 15, (15, 40), strength)
+    set_up = replace(set_up, cam_from_board=poses)
+    return Evidence(set_up.solved(set_up.observed(rng)))
+
+
+@finding(
+    "parallel-boards",
+    severity="warning",
+    view="correlation",
+    symptom="The focal length is uncertain, and correlated with the distance of the boards.",
+    causes=("boards that were all held parallel to each other, usually to the image",),
+    remedy="Add views with the board tilted by 30° to 45°, to different sides.",
+    threshold="No two boards are more than 20° apart, or the focal length is uncertain by more than 1 %.",
+    explains=("aspect", "principal-point", "split-disagreement"),
+)
+def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
+    """The check compares the normals of the boards in the camera's frame."""
+    poses = {name: pose for name, pose in evidence.cam_from_board.items() if not pose.single and len(pose) > 1}
+    if not poses:
+        raise NotChecked("it needs the poses of at least two boards, and the file has none")
+    for name, pose in poses.items():
+        normals = pose.rotation.as_matrix()[..., 2]
+        spread = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1).min())))
+        uncertain = evidence.focal_uncertainty(name)
+        if spread < SAME_WAY_DEG:
+            more = "" if uncertain is None else f" The focal length is uncertain by {uncertain:.2%} (1σ)."
+            sentence = f"{name}: no two of the {len(pose)} boards differ by more than {spread:.1f}° in tilt.{more}"
+            yield parallel_boards.found(sentence, spread, "°", name)
+        elif uncertain is not None and uncertain * _share_of_noise(evidence, name) > UNCERTAIN:
+            sentence = (
+                f"{name}: the focal length is uncertain by {uncertain:.2%} (1σ), with {len(pose)} boards whose tilts "
+                f"differ by up to {spread:.0f}°."
+            )
+            yield parallel_boards.found(sentence, uncertain * 100, "%", name)
+
+
+def _share_of_noise(evidence: Evidence, name: str) -> float:
+    """σ of the corners by their median over σ by their squares: 1, or less where a few are far out.
+
+    What those few do to the focal length is their own doing, not that of the boards' tilts.
+    """
+    observed = evidence.observed.get(name)
+    return 1.0 if observed is None else min(1.0, observed.scatter / observed.adjustment.sigma)
+
+
+@parallel_boards.fault(
+    "parallel boards",
+    "°",
+    (0.5, 3, 8),
+    promised=8,
+    beyond_doubt=(3, 8),
+    lab=LabFault(
+        8,
+        "no board is tilted by more than {0:.1f}°",
+        none=40,
+        spread=lambda strength: {"tilt_deg": (15 * (1 - strength), 40 * (1 - strength) + 8 * strength)},
+    ),
+)
+def all_parallel(rng: Rng, strength: float) -> Evidence:
+    """No board is tilted by more."""
+    set_up = single(rng, tilt_deg=(0, strength))
+    return Evidence(set_up.solved(set_up.observed(rng)))
+
+
+@finding(
+    "pose-absorbs-error",
+    severity="fault",
+    view="cross-validation",
+    symptom="The error is low, and the camera matrix absurd.",
+    causes=(
+        "an error of the camera that the pose of each board takes up",
+        "numbers of the camera that were changed after the solution",
+    ),
+    remedy="Solve again with tilted boards at varied distances and a still camera. "
+    "Trust held-out corners rather than the error of the fit.",
+    threshold="The errors are twice as large as noise makes them, in the median of the views.",
+    explains=("views-differ", "outlier-view", "outlier-line", "corners-set-aside"),
+)
+def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
+    """The check fits each view's pose to one half of its corners and tries it on the other half."""
+    for name, observed in evidence.with_corners().items():
+        ratio = held_out_ratio(observed)
+        if ratio > HELD_OUT:
+            sentence = (
+                f"{name}: where each pose is fitted to one half of the board, the other half is {ratio:.1f} times as "
+                f"far off as noise explains. The error of the fit is {observed.adjustment.rms:.3g} px."
+            )
+            yield pose_absorbs_error.found(sentence, ratio, "times", name)
+
+
+def held_out_ratio(observed: Observed) -> float:
+    """How many times larger the errors of held-out corners are than noise makes them, in the median of the views.
+
+    Each corner's squared error is divided by its variance; `camviz_clinic.calibration.cross_validation` explains both.
+    """
+    aside = replace(observed.adjustment, set_aside=observed.best.set_aside)
+    result = held_out(aside, camera=observed.name)
+    squares = np.moveaxis(result.residuals**2 / result.variances, 1, 0).reshape(observed.adjustment.views, -1)
+    known = np.isfinite(squares).any(axis=1)
+    if known.sum() < FEWEST_VIEWS:
+        return 0.0
+    return float(np.sqrt(np.median(np.nanmean(squares[known], axis=1))))
+
+
+@pose_absorbs_error.fault(
+    "moved centre",
+    "% of the width",
+    (0.3, 1, 3, 8),
+    promised=8,
+    beyond_doubt=(8, 10),
+    stage="solution",
+    lab=LabFault(8, "cx is moved by {0:.1f} % of the width, and the poses follow"),
+)
+def moved_centre(solution: Adjustment, strength: float) -> Adjustment:
+    """The principal point was moved, and the poses follow."""
+    ((name, camera),) = solution.cameras.items()
+    grid = camera.intrinsics
+    shifted = replace(camera, intrinsics=replace(grid, cx=grid.cx + strength / 100 * grid.width))
+    return replace(solution, cameras={name: shifted}).refined(only_poses=True)

@@ -1,0 +1,88 @@
+"""Quick pictures of a flat board by a virtual camera: no tracer, so that hundreds of them can be made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camviz.cameras import Camera
+from camviz.lenses import Lens
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.boards.picture import whiteness
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.checks.virtual import single, spread_boards
+
+SIDE = 480  # pixels along the longer side
+TILT_DEG = (15, 35)
+BLACK, WHITE, BEHIND = 40.0, 225.0, 130.0  # grey of ink, of paper, and of what is behind the board
+TEXELS = 32  # along `square_size`
+MARGIN = 0.6  # white around the board, in `square_size`
+FINER = 2  # samples along each side of a pixel
+BLUR = 0.6  # pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Pictured:
+    """A camera, a board's poses before it, and pictures of them by their names."""
+
+    camera: Camera
+    board: Board
+    cam_from_board: RigidTransform
+    pictures: dict[str, NDArray[np.uint8]] = field(repr=False)
+
+    @property
+    def corners(self) -> Array:
+        """Where the corners are, (views, corners, 2)."""
+        return np.array([self.camera.project(pose.apply(self.board.corners)) for pose in self.cam_from_board])
+
+
+def pictured(
+    rng: np.random.Generator, board: Board, views: int, lens: Lens | None = None, noise: float = 2.0, side: int = SIDE
+) -> Pictured:
+    """Pictures of a board by a random camera, `side` pixels along the longer side, with this lens or one of its own."""
+    drawn = single(rng, views=1).camera
+    camera = Camera(drawn.intrinsics.within(side), lens or drawn.lens)
+    poses = spread_boards(rng, (camera,), board, views, TILT_DEG)
+    names = [f"view{view + 1:02}.png" for view in range(views)]
+    pictures = {name: snapshot(camera, board, pose, rng, noise) for name, pose in zip(names, poses, strict=True)}
+    return Pictured(camera, board, poses, pictures)
+
+
+def snapshot(
+    camera: Camera, board: Board, cam_from_board: RigidTransform, rng: np.random.Generator, noise: float = 2.0
+) -> NDArray[np.uint8]:
+    """The board at a pose, uint8 grey (height, width), a little out of focus, with noise of this σ in grey levels."""
+    grid, texel = camera.intrinsics, board.square_size / TEXELS
+    paper = BLACK + (WHITE - BLACK) * whiteness(board, TEXELS, MARGIN)
+    left, top = (edge - MARGIN * board.square_size for edge in board.area[:2])
+    to_board = cam_from_board.rotation.as_matrix()  # rows times this are in the board's frame
+    directions, origin = _rays(camera) @ to_board, -cam_from_board.translation @ to_board
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = -origin[2] / directions[..., 2]
+        x, y = np.moveaxis((origin + along[..., None] * directions)[..., :2], -1, 0)
+    behind = ~(along > 0)
+    across, down = ((np.where(behind, -1e6, at) - edge) / texel - 0.5 for at, edge in ((x, left), (y, top)))
+    seen = cv2.remap(
+        paper.astype(np.float32),
+        across.astype(np.float32),
+        down.astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=BEHIND,
+    )
+    picture = seen.reshape(grid.height, FINER, grid.width, FINER).mean(axis=(1, 3))
+    picture = cv2.GaussianBlur(picture, (0, 0), BLUR) + rng.normal(0, noise, picture.shape)
+    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+
+
+@lru_cache(maxsize=1)
+def _rays(camera: Camera) -> Array:
+    """The directions (FINER * height, FINER * width, 3) in which a camera samples."""
+    grid = camera.intrinsics
+    u, v = np.meshgrid(*((np.arange(FINER * side) + 0.5) / FINER - 0.5 for side in (grid.width, grid.height)))
+    return np.asarray(camera.lens.unproject(grid.from_pixels(np.stack([u, v], axis=-1))))

@@ -1,0 +1,196 @@
+"""A calibration at a glance: where it comes from, its numbers with their uncertainties, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from camviz_clinic.calibration.guidance import instruction, next_board_poses
+from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.calibration.uncertainty import largest_expected_error, projection_uncertainty
+from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.stamps import holds_for
+from camviz_clinic.checks.task import TaskError, task_errors
+
+GOOD = 1.0  # pixels: where the largest expected error is below this, no more pictures are asked for (AprilCal's limit)
+UNKNOWN = "not in the file"
+MOST_CAMERAS = 4
+RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
+LEGEND = "± is one standard deviation; uncertainty: of the pixel where a far point is seen, by corner noise alone."
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """What an engineer asks of a calibration first, in words and numbers without markup."""
+
+    evidence: Evidence
+    at: float | None = None  # metres, a distance at which errors are told too
+    goal: float = GOOD
+
+    @classmethod
+    def of(cls, calibration: Calibration, at: float | None = None, goal: float = GOOD) -> Summary:
+        """The summary of a calibration by itself."""
+        return cls(Evidence(calibration), at, goal)
+
+    @property
+    def calibration(self) -> Calibration:
+        """What it is of."""
+        return self.evidence.calibration
+
+    @cached_property
+    def origin(self) -> tuple[str, ...]:
+        """The file, when it was made or else written, its format, the cameras, and how many pictures were used."""
+        calibration, cameras = self.calibration, self.calibration.cameras
+        path = calibration.source
+        known = path.name and path.exists()
+        made = ", ".join(dict.fromkeys(stamp.made for stamp in calibration.stamps.values() if stamp.made))
+        written = f"written {datetime.fromtimestamp(path.stat().st_mtime):%Y-%m-%d %H:%M}" if known else ""
+        written = f"calibrated {made}" if made else written
+        sizes = {f"{k.width} × {k.height}" for k in (camera.intrinsics for camera in cameras.values())}
+        named = ", ".join(list(cameras)[:MOST_CAMERAS]) + ", …" * (len(cameras) > MOST_CAMERAS)
+        shown = "one camera" if named == "camera" else f"{len(cameras)} camera{'s' * (len(cameras) > 1)}: {named}"
+        shown += f", {', '.join(sorted(sizes))} px"
+        parts = (path.name, written, calibration.format, shown, self.pictures)
+        return tuple(part for part in parts if part)
+
+    @property
+    def pictures(self) -> str:
+        """How many pictures were used, of how many that were given."""
+        calibration = self.calibration
+        used = [calibration.used(name).any(axis=1) for name in calibration.detections]
+        if used:
+            count, given = sum(int(mask.sum()) for mask in used), sum(mask.size for mask in used)
+            return f"{count} of {given + len({name for name, _ in calibration.skipped})} pictures used"
+        views = sum(len(errors) for errors in calibration.per_view_errors.values())
+        return f"{views} views" if views else "the file does not name its pictures"
+
+    def rms(self, name: str) -> float | None:
+        """The RMS in pixels of a camera's corners: the file's, else of its corners; None where both are unknown."""
+        stated, observed = self.calibration.rms(name), self.evidence.observed.get(name)
+        if stated is not None or observed is None:
+            return stated
+        used = observed.adjustment.used[name]
+        return float(np.sqrt(np.mean(np.sum(observed.residuals[used] ** 2, axis=-1)))) if used.any() else None
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The cameras that are told of: those that differ, the first few of many."""
+        return tuple(self.evidence.cameras)[:MOST_CAMERAS]
+
+    @cached_property
+    def uncertainty(self) -> dict[str, tuple[float, float] | None]:
+        """By camera, 1σ in pixels of where a far point is seen, in the middle and in the worst corner of the picture.
+
+        None where the file's corners do not determine it; NaN for a corner of the picture that has no ray.
+        """
+        return {name: self._uncertainty(name) for name in self.names}
+
+    def _uncertainty(self, name: str) -> tuple[float, float] | None:
+        k = self.calibration.cameras[name].intrinsics
+        right, bottom = k.width - 1, k.height - 1
+        pixels = [(right / 2, bottom / 2), (0, 0), (right, 0), (0, bottom), (right, bottom)]
+        try:
+            middle, *corners = projection_uncertainty(self.evidence.adjustment(name), pixels, camera=name)
+        except (ValueError, np.linalg.LinAlgError):  # no corners or poses, or too few to solve from
+            return None
+        return (float(middle), float(np.max(corners))) if np.isfinite(middle) else None
+
+    @cached_property
+    def task(self) -> tuple[TaskError, ...]:
+        """What the first cameras, and each pair, are worth to a task."""
+        return task_errors(self.evidence, self.at, self.names)
+
+    @cached_property
+    def largest_errors(self) -> dict[str, float]:
+        """By camera, the largest expected error of a far point in pixels (Max ERE), where the corners determine it."""
+        found = {name: self.largest_error(name) for name in self.names}
+        return {name: error for name, error in found.items() if error is not None}
+
+    def largest_error(self, name: str) -> float | None:
+        """A camera's largest expected error of a far point in pixels; None where the corners do not determine it."""
+        known = self.uncertainty[name] if name in self.names else self._uncertainty(name)
+        return largest_expected_error(self.evidence.adjustment(name), name) if known else None
+
+    def table(self) -> dict[str, dict[str, str]]:
+        """By camera: every number with its ± σ, the RMS and the uncertainty of projection, as text."""
+        return {name: dict(self._rows(name)) for name in self.names}
+
+    def _rows(self, name: str) -> Iterator[tuple[str, str]]:
+        camera = self.calibration.cameras[name]
+        grid, lens = camera.intrinsics, camera.lens
+        rms, known = self.rms(name), self.uncertainty[name]
+        yield RMS, UNKNOWN if rms is None else f"{rms:.3f} px"
+        middle, corner = (UNKNOWN,) * 2 if known is None else map(_pixels, known)
+        yield MIDDLE, middle
+        yield CORNER, corner
+        yield "image", f"{grid.width} × {grid.height} px"
+        yield "lens", type(lens).__name__
+        values = {key: getattr(grid, key) for key in ("fx", "fy", "cx", "cy", "skew")} | _parameters(lens)
+        for key, value in values.items():
+            sigma = self.evidence.sigma_of(name, key)
+            if sigma is not None or value or key in ("cx", "cy"):
+                yield key, measured(value, sigma)
+
+    @property
+    def holds(self) -> tuple[str, ...]:
+        """What the calibration of each camera holds for, in sentences; nothing where the file does not say."""
+        said = (holds_for(self.calibration, name) for name in self.names)
+        return tuple(sentence for sentence in said if sentence)
+
+    def lines(self) -> Iterator[str]:
+        """The same in a few lines: the origin, what it holds for, and each camera's RMS and uncertainty."""
+        yield " · ".join(self.origin)
+        yield from self.holds
+        for name, rows in self.table().items():
+            pinhole = ", ".join(f"{key} = {rows[key]}" for key in ("fx", "fy", "cx", "cy"))
+            others = "; ".join(f"{key} {rows[key]}" for key in (RMS, MIDDLE, CORNER) if rows[key] != UNKNOWN)
+            yield f"{name}: {pinhole} px{'; ' * bool(others)}{others}."
+        for each in self.task:
+            yield each.sentence
+
+    @cached_property
+    def guidance(self) -> str:
+        """Whether there are enough pictures, else where to hold the board next; of the camera that is known worst."""
+        if not self.largest_errors:
+            return "Nothing needs doing that this file could tell: it lacks the corners, which camviz calibrate keeps."
+        name = max(self.largest_errors, key=lambda each: self.largest_errors[each])
+        largest, of = self.largest_errors[name], "" if len(self.names) == 1 else f" of {name}"
+        said = f"where it is worst{of}, a far point is expected to be {largest:.2g} px off (Max ERE)"
+        if largest <= self.goal:
+            return f"There are enough pictures: {said}, within the goal of {self.goal:g} px."
+        try:
+            best = next_board_poses(self.evidence.adjustment(name), camera=name)[0]
+        except (ValueError, np.linalg.LinAlgError):  # no pose shows the whole board
+            return f"Take more pictures with the board near the corners: {said}, and the goal is {self.goal:g} px."
+        hold = instruction(self.evidence.adjustment(name), best, name)
+        return (
+            f"Take one picture more: {hold}. Now, {said}, and the goal is {self.goal:g} px; that picture would take "
+            f"the mean uncertainty from {best.before:.2g} px to {best.after:.2g} px."
+        )
+
+
+def measured(value: float, sigma: float | None) -> str:
+    """A number with its standard deviation, both to the second digit of that: "532.92 ± 0.41".
+
+    >>> measured(532.9187, 0.4112), measured(0.0828, 0.000213), measured(0.25, None), measured(1, 0)
+    ('532.92 ± 0.41', '0.08280 ± 0.00021', '0.25', '1 ± 0')
+    """
+    if sigma is None:
+        return f"{value:.6g}".replace("-", "−")
+    if not (np.isfinite(sigma) and sigma > 0):
+        return f"{value:.6g} ± {sigma:g}".replace("-", "−")
+    decimals = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 9))
+    return f"{value:.{decimals}f} ± {sigma:.{decimals}f}".replace("-", "−")
+
+
+def _parameters(lens: Any) -> dict[str, float]:
+    return {key: float(getattr(lens, key)) for key in lens.parameters()}
+
+
+def _pixels(sigma: float) -> str:
+    return f"±{sigma:.2g} px" if np.isfinite(sigma) else "no ray"

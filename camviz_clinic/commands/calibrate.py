@@ -1,0 +1,416 @@
+"""`camviz calibrate`: from pictures of a board to a calibration file."""
+
+from __future__ import annotations
+
+import argparse
+import glob
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from camviz.lenses import calibration_models
+from camviz_clinic.commands.boards import add_board, board_of
+from camviz_clinic.commands.common import (
+    FOUND,
+    OK,
+    Refusal,
+    add_command,
+    add_megapixels,
+    bounded,
+    millimetres,
+    narrator,
+    pixels,
+    refuse_exhausted,
+    refuse_output,
+    size,
+    write_calibration,
+    write_whole,
+)
+from camviz_clinic.commands.corners import add_corners, corners_of
+from camviz_clinic.commands.gate import EPILOG as GATE
+from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
+
+if TYPE_CHECKING:
+    from camviz_clinic.calibration import CannotCalibrate
+    from camviz_clinic.checks import Inspection
+    from camviz_clinic.files import Board, Calibration
+    from camviz_clinic.files.corners import LoadedCorners
+
+CALIBRATE = """\
+Finds a board (a chessboard, a ChArUco board, Kalibr's AprilGrid, a grid of circles) in pictures and solves for the
+camera that took them, or with --right for a pair of cameras. IMAGES are files, folders, or patterns such as
+'left*.jpg'. Pictures without the board, of another size, or that cannot be read are named and skipped. Corners and
+whole views that contradict the rest are set aside, named, and kept in the file. What is written is OpenCV's YAML, with
+all that a later inspection needs. With --report, or where a gate is given, the calibration is inspected as well;
+findings make it fail only where there is a gate.
+
+With --corners nothing is looked for in pictures: the corners come from files of other programs, which docs/formats.md
+lists. --board, --square-mm and --size say what those files do not hold. IMAGES are then for the report alone, and
+--right names the files of the right camera's corners.
+
+The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
+(left07.jpg and right07.jpg), else by their order. So do the views in files of corners, but not by their order.
+"""
+MODELS = {name: model.says for name, (_, model) in calibration_models().items()}
+EXAMPLES = """\
+examples:
+  camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
+  camviz calibrate --corners corners.vnl --board 9x6 --square-mm 25 --size 640x480
+  camviz calibrate --corners left.vnl --right right.vnl --board 9x6 --square-mm 25 --size 640x480
+  camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
+  camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
+  camviz calibrate shots/ --board 9x6 --square-mm 25 --fail-on warning --limit rms-px=0.5 --junit clinic.xml
+"""
+STATUS = """\
+exit status:
+  0  the calibration is written, and passes the gate where there is one
+  1  it is written, and the gate fails it
+  2  it cannot be solved, or the command cannot be used; one sentence on stderr says why
+  3  something is missing on this machine
+"""
+MOST_WORDS = 1000
+FINDERS = ("auto", "sectors", "classic")
+PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
+
+
+def add(commands: Any) -> None:
+    command = add_command(commands, "calibrate", calibrate, "calibrate a camera or a pair from pictures", CALIBRATE)
+    models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
+    command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
+    command.add_argument("images", metavar="IMAGES", nargs="*", help="pictures, folders of them, or patterns")
+    command.add_argument(
+        "--right", metavar="IMAGES", nargs="+", help="those of the right camera, or files of its corners"
+    )
+    add_board(command, required=False, default=False)
+    add_corners(command)
+    add_baseline(command)
+    command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILES do not hold it")
+    command.add_argument("--model", choices=list(MODELS), default="standard", help="which lens (default: standard)")
+    command.add_argument("--fix", metavar="NAMES", default="", help="parameters not to solve for, such as k3 or p1,p2")
+    command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
+    command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
+    command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
+    add_seconds(command)
+    command.add_argument(
+        "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
+    )
+    command.add_argument(
+        "--conditions",
+        metavar="TEXT",
+        type=_remark,
+        default="",
+        help="what else it holds for, to be kept in OUT, such as 'focus taped at 2 m, binning 2x2, 21 °C'",
+    )
+    command.add_argument("--goal", metavar="PX", type=pixels, help="the largest expected error wanted (default: 1 px)")
+    command.add_argument("--report", metavar="REPORT.html", type=Path, help="inspect it and write a page with pictures")
+    add_megapixels(command)
+    add_gate(command)
+
+
+def add_baseline(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--baseline-mm", metavar="MM", type=millimetres, help="the distance of a pair's cameras, to check the board by"
+    )
+
+
+def add_seconds(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--seconds",
+        metavar="S",
+        type=bounded("a time in seconds", 0.1, 3600, "s"),
+        help="how long to look for the board in one picture (default: 120 where several processes look)",
+    )
+
+
+def calibrate(options: argparse.Namespace) -> int:
+    """Detect, solve and write the calibration, whole or not at all; inspect it where that is asked for."""
+    from camviz_clinic.calibration import CannotCalibrate
+    from camviz_clinic.checks import inspect
+    from camviz_clinic.files import CalibrationError
+
+    _refuse_words(options)
+    left = pictures(options.images) if options.images else []
+    right = _right(options)
+    sources = [*left, *right, *(options.corners or [])]
+    refuse_output(options.output, "calibration", *sources)
+    if options.report:
+        refuse_output(options.report, "page", options.output, *sources)
+    gate = given_gate(options)
+    refuse_junit(options, options.output, *([options.report] if options.report else []), *sources)
+    try:
+        calibration = _of_corners(left, right, options) if options.corners else _of_pictures(left, right, options)
+    except CannotCalibrate as error:
+        raise Refusal(_complaint(error, left + right, options)) from error
+    calibration = _stamped(calibration, left, right, options)
+    try:
+        write_calibration(calibration, options.output, "opencv")
+    except CalibrationError as error:
+        raise Refusal(str(error)) from error
+    except OSError as error:
+        refuse_exhausted(error)
+        raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
+    calibration = replace(calibration, source=options.output)
+    told = narrator(options.output)
+    for sentence in report(calibration):
+        told(sentence)
+    for sentence in worth(calibration, options.goal):
+        told(sentence)
+    if doctored := _prescribed(left + right, options, calibration):
+        told(f"Is the board as described? {doctored}")
+    told(f"{options.output}: written.")
+    decides = gate.asked or options.junit is not None
+    if not (options.report or decides):
+        return OK
+    outcome = gate.judge(inspect(calibration))
+    told("\n".join(["", outcome.inspection.as_text(), *outcome.lines()]))
+    if options.report:
+        folders = [each[0].parent for each in (left or options.corners, right) if each]
+        _page(outcome.inspection, dict(zip(calibration.cameras, folders, strict=True)), options.report)
+        told(f"{options.report}: open it in a browser.")
+    write_junit(options, {str(options.output): outcome})
+    return OK if outcome.passed or not decides else FOUND
+
+
+def _refuse_words(options: argparse.Namespace) -> None:
+    """Refuses a command that lacks what it works on, or that says it twice."""
+    square = options.square_mm or isinstance(options.board, Path)
+    needed = {"IMAGES": options.images, "--board": options.board, "--square-mm": square}
+    missing = [word for word, given in needed.items() if not given]
+    if missing and not options.corners:
+        raise Refusal(f"the following arguments are required: {', '.join(missing)}; see `camviz calibrate --help`.")
+    if options.size and not options.corners:
+        raise Refusal("--size is for --corners: pictures have a size of their own.")
+
+
+def _right(options: argparse.Namespace) -> list[Path]:
+    """The right camera's pictures, or with --corners the files of its corners."""
+    words = options.right or []
+    return [Path(word) for word in words] if options.corners else pictures(words)
+
+
+def _of_corners(paths: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
+    """The camera or the pair of the corners in files."""
+    from camviz_clinic.calibration import calibrate
+
+    found = corners_of(options, paths)
+    if right:
+        return _pair_of_corners(found, corners_of(options, [], files=right), options)
+    told = found.detections.skipped
+    calibration = _solved(lambda: calibrate(found.detections, found.board, options.model, **_how(options)), told)
+    return replace(calibration, notes=found.notes + calibration.notes)
+
+
+def _pair_of_corners(left: LoadedCorners, right: LoadedCorners, options: argparse.Namespace) -> Calibration:
+    """The pair of two cameras' corners, whose views find each other by their names."""
+    from camviz_clinic.calibration import calibrate_pair
+    from camviz_clinic.calibration.pairing import paired_detections
+
+    if left.board != right.board:
+        described = (
+            f"{each.columns}×{each.rows} inner corners, {1000 * each.square_size:.6g} mm apart"
+            for each in (left.board, right.board)
+        )
+        raise Refusal(
+            f"{options.right[0]}: expected the board of {options.corners[0]} ({next(described)}), got "
+            f"{next(described)}."
+        )
+    both = paired_detections(left.detections, right.detections)
+    skipped = both[0].skipped + both[1].skipped
+    calibration = _solved(lambda: calibrate_pair(*both, left.board, options.model, **_how(options)), skipped)
+    return replace(calibration, notes=tuple(dict.fromkeys(left.notes + right.notes)) + calibration.notes)
+
+
+def _of_pictures(left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
+    """The camera or the pair that took pictures."""
+    board = board_of(options)
+    return _pair(left, right, board, options) if right else _single(left, board, options)
+
+
+def _stamped(calibration: Calibration, left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
+    """With what the calibration of each camera holds for; and a note where the setting changed between its pictures."""
+    from camviz import __version__
+    from camviz_clinic.calibration.stamp import Stamp, now
+    from camviz_clinic.checks.stamps import settings_differ
+
+    made = {"made": now(), "program": f"camviz {__version__}", "model": options.model, "conditions": options.conditions}
+    stamps = {
+        name: Stamp.of(pictures, views=int(calibration.used(name).any(axis=1).sum()), **made)
+        for name, pictures in zip(calibration.cameras, (left, right), strict=False)
+    }
+    notes = [f"{name}: {said}" for name, stamp in stamps.items() for said in settings_differ(stamp)]
+    return replace(calibration, stamps=stamps, notes=(*calibration.notes, *notes))
+
+
+def _complaint(error: CannotCalibrate, paths: list[Path], options: argparse.Namespace) -> str:
+    """Why there is no calibration; and what of the board is not as described, in place of a guess at what it is."""
+    from camviz_clinic.calibration.detection import NoBoard
+
+    doctored = _prescribed(paths, options)
+    said = error.said if doctored and isinstance(error, NoBoard) else str(error)
+    return f"{said}. {doctored}".rstrip()
+
+
+def _prescribed(paths: list[Path], options: argparse.Namespace, calibration: Calibration | None = None) -> str:
+    """What the pictures show that is not as the board is described, and what to try; empty where nothing is."""
+    from camviz_clinic.checks.doctor import Shown, diagnose, prescription
+
+    if options.corners:
+        return ""
+    shown = Shown.of(paths, board_of(options))
+    baseline = None if options.baseline_mm is None else options.baseline_mm / 1000
+    return prescription(diagnose(replace(shown, calibration=calibration, baseline=baseline)))
+
+
+def _page(inspection: Inspection, folders: Mapping[str, Path], page: Path) -> None:
+    from camviz_clinic.report.inspection import write_report
+
+    write_whole(page, lambda path: write_report(inspection, path, images=folders))
+
+
+def pictures(words: Sequence[str]) -> list[Path]:
+    """The files that words name: themselves, those of a folder, or those of a pattern; each once, in natural order."""
+    found: dict[Path, None] = {}
+    for word in words:
+        if "\0" in word:
+            raise Refusal(f"{word!r} is not a file name.")
+        path = Path(word)
+        if path.is_dir():
+            paths = sorted((each for each in path.iterdir() if PICTURES.fullmatch(each.suffix)), key=_natural)
+            if not paths:
+                raise Refusal(f"{path}: there are no pictures in this folder.")
+        elif path.exists():
+            paths = [path]
+        else:
+            paths = sorted(map(Path, glob.glob(word)), key=_natural)
+            if not paths:
+                what = "no picture fits this pattern" if glob.has_magic(word) else "there is no such picture or folder"
+                raise Refusal(f"{word}: {what}.")
+        found |= dict.fromkeys(paths)
+    return list(found)
+
+
+def report(calibration: Calibration) -> list[str]:
+    """What came out, in sentences."""
+    said = [f"{picture}: skipped, {why}." for picture, why in calibration.skipped]
+    said += calibration.notes
+    for name, camera in calibration.cameras.items():
+        deviations = np.sqrt(np.diag(calibration.intrinsics_covariance[name]))
+        of = dict(zip(calibration.estimated[name], deviations, strict=True))
+        grid = camera.intrinsics
+        values = [
+            f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]:.2f}" if key in of else "")
+            for key in ("fx", "fy", "cx", "cy")
+        ]
+        used = calibration.used(name)
+        views = int(used.any(axis=1).sum())
+        said.append(
+            f"{name}: {', '.join(values)} px; RMS error {calibration.rms(name):.3f} px over {used.sum()} corners in "
+            f"{views} views."
+        )
+    if "right" in calibration.cameras:
+        x, y, z = 1000 * calibration.cameras["right"].centre
+        length = np.sqrt(x * x + y * y + z * z)
+        said.append(f"right stands {length:.2f} mm from left: x = {x:.2f}, y = {y:.2f}, z = {z:.2f} mm in its frame.")
+    return said
+
+
+def worth(calibration: Calibration, goal: float | None) -> list[str]:
+    """What it is worth to a task, and whether there are enough pictures."""
+    from camviz_clinic.checks.summary import GOOD, Summary
+
+    summary = Summary.of(calibration, goal=goal or GOOD)
+    return [*(each.sentence for each in summary.task), summary.guidance]
+
+
+def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Calibration:
+    from camviz_clinic.calibration import calibrate, detect
+
+    with Bar() as bar:
+        detections = detect(paths, board, progress=bar, **_search(options))
+    return _solved(lambda: calibrate(detections, board, options.model, **_how(options)), detections.skipped)
+
+
+def _pair(left: list[Path], right: list[Path], board: Board, options: argparse.Namespace) -> Calibration:
+    from camviz_clinic.calibration import CannotCalibrate, calibrate_pair, detect_pair
+    from camviz_clinic.calibration.pairing import paired
+    from camviz_clinic.checks.doctor import Shown, diagnose, prescription
+
+    pairs = paired(left, right)
+    with Bar() as bar:
+        both = detect_pair(pairs.left, pairs.right, board, progress=bar, **_search(options))
+    skipped = both[0].skipped + both[1].skipped + pairs.lonely
+    try:
+        calibration = _solved(lambda: calibrate_pair(*both, board, options.model, **_how(options)), skipped)
+    except CannotCalibrate as error:
+        if turned := prescription(diagnose(Shown(board, {}, both=both), "corner-order")):
+            raise Refusal(f"{error}. {turned}") from error
+        raise
+    return replace(calibration, skipped=calibration.skipped + pairs.lonely)
+
+
+def _solved(solve: Callable[[], Calibration], skipped: Sequence[tuple[str, str]]) -> Calibration:
+    """The solution; where there is none, the complaint names the pictures that are missing in it."""
+    from camviz_clinic.calibration import CannotCalibrate
+
+    try:
+        return solve()
+    except CannotCalibrate as error:
+        named = ", ".join(f"{picture} ({why})" for picture, why in skipped[:3])
+        more = f" and {len(skipped) - 3} more" * (len(skipped) > 3)
+        raise CannotCalibrate(f"{error}{'; skipped: ' * bool(skipped)}{named}{more}") from error
+    except ValueError as error:  # a parameter to fix that the model does not have
+        if not str(error).startswith("fixed"):
+            raise
+        raise Refusal(f"{error}.") from error
+
+
+def _search(options: argparse.Namespace) -> dict[str, Any]:
+    return {"finder": options.finder, "workers": options.workers, "seconds": options.seconds}
+
+
+def _how(options: argparse.Namespace) -> dict[str, Any]:
+    return {"fixed": tuple(re.findall(r"[^,\s]+", options.fix)), "robust": not options.keep_outliers}
+
+
+def _natural(path: Path) -> tuple[Any, ...]:
+    """left2 before left10."""
+    return tuple(int(part) if part.isdigit() else part for part in re.split(r"([0-9]+)", path.name.lower()))
+
+
+def _remark(text: str) -> str:
+    words = " ".join(text.split())
+    if len(words) > MOST_WORDS:
+        raise argparse.ArgumentTypeError(f"expected at most {MOST_WORDS} characters, got {len(words)}")
+    return words
+
+
+def _count(text: str) -> int:
+    if not re.fullmatch("[0-9]{1,3}", text) or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a number of processes from 1 to 999, got {text!r}")
+    return int(text)
+
+
+class Bar:
+    """A bar on stderr, where that is a terminal, that grows with the pictures and goes when all is done."""
+
+    WIDTH = 30
+
+    def __enter__(self) -> Bar:
+        self.shown = sys.stderr.isatty()
+        return self
+
+    def __call__(self, done: int, count: int) -> None:
+        if self.shown:
+            full = self.WIDTH * done // count
+            bar = "█" * full + "░" * (self.WIDTH - full)
+            line = f"\r{bar} {done} of {count} pictures".encode(sys.stderr.encoding, "replace")
+            print(line.decode(sys.stderr.encoding), end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self.shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,273 @@
+"""The fault lab: one virtual camera, one fault of any strength, and everything that moves when it is solved again.
+
+A reader's own functions can measure every view and name what is off, beside the right answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from camviz.draw import plot, svg
+from camviz.draw.flow import rows
+from camviz.draw.panel import Panel, image_in
+from camviz.draw.picture import Picture
+from camviz.draw.readout import listed, true_minus
+from camviz.views.base import choice, slider, switch
+from camviz.views.marks import arrows, shortened
+from camviz.views.view_bars import LABEL, ViewChooser
+from camviz.views.yours import tried
+from camviz_clinic.checks.laboratory import BOARD, VIEWS, Experiment, experiment, lab_faults
+from camviz_clinic.checks.registry import Finding
+
+_COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
+_MOST = 3  # findings that have room
+_FAR = 4.0  # standard deviations
+_LONGEST = 90.0  # picture units of an arrow
+_EVERYTHING = "bars picture estimates findings"
+_ERRORS = (366, {"residuals": 440, "bars": 300, "numbers": 220})
+_LAYOUTS = {"bars picture": rows(_ERRORS), _EVERYTHING: rows(_ERRORS, (272, {"estimates": 340}))}
+_FINDINGS = (340, 620)  # where they begin, and how wide they are together
+_VERDICTS = ("0, nothing is off", "1, a corner is off", "2, a row or a column is off", "3, a whole view is off")
+
+
+@dataclass(frozen=True)
+class FaultLabView(ViewChooser):
+    """What a fault does to a calibration, and what it does not: the fit, the estimates against the truth, the findings.
+
+    Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
+    boards and noise. Arrows lead from a detected corner of the chosen view to its projection. A click on a bar
+    chooses its view.
+
+    `panels` says what is drawn: everything, or "bars picture", the errors of the fit alone. `yours` is a reader's
+    function of residuals (views, corners, 2) to the RMS (views,) of every view, and `verdict` one of residuals (views,
+    rows, columns, 2) to 0 … 3, for nothing, a corner, a line or a whole view; what they answer is orange.
+    """
+
+    title: ClassVar[str] = "Fault lab"
+    layouts = _LAYOUTS
+
+    fault: str = choice(*lab_faults(), help="what is wrong")
+    strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
+    noise: float = slider(0.15, 0.02, 0.5, 0.01, unit="px", help="standard deviation of a corner's coordinates")
+    seed: int = slider(1, 1, 20, 1, label="camera", help="another camera, other boards, other noise")
+    view: int = slider(1, 1, VIEWS, 1, label="view", help="whose residuals are shown; or click its bar")
+    told: bool = switch(True, label="show the findings", help="hide them to make a diagnosis of your own")
+
+    panels: str = _EVERYTHING
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+    verdict: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+
+    @cached_property
+    def experiment(self) -> Experiment:
+        """The calibration shown, and its truth."""
+        return experiment(self.fault, float(self.strength), float(self.noise), round(self.seed))
+
+    @property
+    def count(self) -> int:
+        return VIEWS
+
+    def worst(self) -> Self:
+        """The same, with the view of the largest error chosen."""
+        return self.but(view=int(np.nanargmax(self.experiment.errors)) + 1)
+
+    def numbers(self) -> dict[str, str]:
+        """How well it fits, how far off it takes itself to be, and how far off it is."""
+        made = self.experiment
+        return {
+            "error of the fit": f"{made.solved.rms:.2f} px",
+            "believes to be off by": f"{figures(float(np.nanmedian(made.believed)))} px",
+            "is off by": f"{figures(float(np.nanmedian(made.off.length)))} px",
+        }
+
+    def description(self) -> str:
+        cause = f"{self.fault}, strength {self.strength:g}: {self.experiment.words}; " if self.told else ""
+        if self.panels != _EVERYTHING:
+            return f"{cause}error of the fit {self.numbers()['error of the fit']}."
+        told = self._diagnosis() if self.told else "Findings hidden."
+        numbers = listed(self.numbers())
+        estimates = "; ".join(
+            f"{k} {'+' if e > 0 else '−'}{figures(abs(e))} ± {figures(s)} px"
+            for k, (e, s) in self.experiment.estimates.items()
+        )
+        return f"{cause}{numbers}. Estimated less true: {estimates}. {told}"
+
+    def _diagnosis(self) -> str:
+        findings = self.experiment.inspection.findings
+        return " ".join(f"{one.severity} {one.id}: {one.sentence}" for one in findings) or "Nothing found."
+
+    # The picture -----------------------------------------------------------------------------------------------------
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        layout = _LAYOUTS[self.panels]
+        parts = {"residuals": self._image_panel(), "bars": self._bars_panel(), "numbers": self._headline()}
+        if self.panels == _EVERYTHING:
+            findings = self._findings(draft)
+            tiles = {f"finding {i + 1}": body for i, body in enumerate(findings)}
+            parts |= {"estimates": self._estimates_panel()} | tiles
+            layout = rows(
+                _ERRORS, (272, {"estimates": _FINDINGS[0], **dict.fromkeys(tiles, _FINDINGS[1] / len(tiles))})
+            )
+        words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
+        return self.tiled(layout, parts, described=words)
+
+    def _headline(self) -> str:
+        told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
+                "is off by": "against the true camera"}  # fmt: skip
+        parts = []
+        shown = 3 if self.panels == _EVERYTHING else 1
+        for i, (name, value) in enumerate(list(self.numbers().items())[:shown]):
+            y = 26 + 72 * i
+            parts.append(svg.text((750, y), name, "title"))
+            parts.append(svg.text((750, y + 29), value, f"label{' red' if i == 2 and self._astray else ''}",
+                                  style="font-size:26px;font-weight:600"))  # fmt: skip
+            parts.append(svg.text((750, y + 48), told[name], "note"))
+        words = f"In this calibration, {self.experiment.words}." if self.strength else "A healthy calibration."
+        words = words if self.told else "What is wrong here?"
+        return "".join(parts) + svg.paragraph((750, 32 + 72 * shown), words, 200, "label") + self._your_verdict()
+
+    def _your_verdict(self) -> str:
+        """What the reader's triage says of all residuals together."""
+        if self.verdict is None:
+            return ""
+        residuals = self.experiment.residuals.reshape(VIEWS, BOARD.rows, BOARD.columns, 2)
+        answer, problem = tried(self.verdict, (residuals,), 0.0)
+        if problem:
+            return svg.paragraph((750, 322), problem, 200)
+        known = answer in range(len(_VERDICTS))
+        words = _VERDICTS[int(answer)] if known else f"{answer:g}, which is none of 0 to {len(_VERDICTS) - 1}"
+        return svg.text((750, 322), "Your verdict", "title") + svg.paragraph((750, 342), words, 200, "orange")
+
+    @property
+    def _astray(self) -> bool:
+        made = self.experiment
+        return bool(np.nanmedian(made.off.length) > 3 * np.nanmedian(made.believed))
+
+    @property
+    def _bars(self) -> Panel:
+        tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
+        return plot.plot_panel("bars", 498, 34, 232, 288, (0.5, VIEWS + 0.5), (0, tallest))
+
+    def _bars_panel(self) -> str:
+        panel, errors = self._bars, self.experiment.errors
+        x = np.arange(1, VIEWS + 1)
+        content = plot.grid(panel, xticks=[])
+        right, chosen = (0.38, "fill-orange") if self.yours is None else (0.0, "fill-sky")
+        for mask, class_ in ((x != self.index + 1, "fill-blue"), (x == self.index + 1, chosen)):
+            content += plot.bars(panel, x - 0.38, x + right, np.where(mask, errors, np.nan), class_)
+        content += self._your_bars(panel, x)
+        median = float(np.nanmedian(errors))
+        content += plot.level(panel, median, "ink dashed")
+        shown = panel.show(content, title="Error of every view", hint="click a bar", drag="bars", label=LABEL)
+        names = [(float(i), f"{i}") for i in x.tolist()]
+        return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
+
+    def _your_bars(self, panel: Panel, x: np.ndarray) -> str:
+        """The reader's own bars beside the right ones; each that lies above the panel ends at its edge."""
+        if self.yours is None:
+            return ""
+        answer, problem = tried(self.yours, (self.experiment.residuals,), self.experiment.errors)
+        if problem:
+            return svg.paragraph((10, 18), problem, panel.width - 20, "note halo")
+        names = [("blue thick", "RMS of the view"), ("orange thick", "yours")]
+        return plot.bars(panel, x, x + 0.38, answer, "fill-orange") + plot.legend(panel, names)
+
+    def _image_panel(self) -> str:
+        made, i = self.experiment, self.index
+        k = made.camera.intrinsics
+        panel = image_in(_LAYOUTS[self.panels]["residuals"], "picture", k.width, k.height)
+        seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
+        starts = panel.place(seen)
+        ends, cut = shortened(starts, panel.place(seen - scale * residuals), _LONGEST)
+        grid = panel.place(seen - residuals).reshape(BOARD.rows, BOARD.columns, 2)
+        content = svg.path([*grid, *grid.swapaxes(0, 1)], "muted thin")
+        content += arrows(starts[~cut], ends[~cut], "orange") + arrows(starts[cut], ends[cut], "red")
+        content += svg.dots(starts, "green", 3.5)
+        note = "red: longer than drawn" if cut.any() else "from detected to projected"
+        return panel.show(content, title=f"View {i + 1}: residuals × {scale:g}", note=note)
+
+    @property
+    def arrow_scale(self) -> float:
+        """How much longer arrows are than residuals: by the noise alone, so that a fault makes them grow."""
+        return float(max(1, round(1.8 / self.noise) * 5))
+
+    def _estimates_panel(self) -> str:
+        estimates = self.experiment.estimates
+        values = np.array(list(estimates.values()))
+        reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + values[:, 1])), 3.0)
+        panel = Panel("estimates", 46, 400, 150, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
+        content = svg.line(panel.place([(0, 0), (0, panel.bottom)]), "ink")
+        beside = ""
+        for i, (name, (error, sigma)) in enumerate(estimates.items()):
+            y, far = i + 0.6, abs(error) > _FAR * sigma
+            class_ = "red" if far else "green"
+            content += svg.line(panel.place([(error - sigma, y), (error + sigma, y)]), f"{class_} thick")
+            content += svg.dots(panel.place([(error, y)]), class_, 8)
+            level = panel.y + panel.place((0, y))[1] + 4
+            beside += svg.text((panel.x - 10, level), name, "label end")
+            words = f"{_signed(error, sigma)} px"
+            beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
+        shown = panel.show(content, title="Estimate ± 1σ, less the truth")
+        ticks = [(float(t), true_minus(f"{t:g}")) for t in plot.ticks(-reach, reach, 3)]
+        below = "".join(
+            svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
+            for px, (_, words) in zip(panel.place([(t, 0) for t, _ in ticks])[:, 0], ticks, strict=True)
+        )
+        note = "In pixels; k1 and k2 at the corner. Red: more than 4σ off."
+        return shown + beside + below + svg.paragraph((10, panel.y + panel.height + 38), note, 310)
+
+    def _findings(self, draft: bool) -> list[str]:
+        """What the clinic finds, a tile for each, the worst first."""
+        (left, whole), y = _FINDINGS, _ERRORS[0] + 26
+        x, room = left + 10, whole - 20
+        head = svg.text((x, y), "What the clinic finds", "title")
+        if not self.told:
+            return [
+                head + svg.paragraph((x, y + 30), "Hidden. Make your diagnosis, then switch them on.", room, "label")
+            ]
+        if draft:
+            return [head + svg.text((x, y + 34), "measuring …", "label", style="font-size:20px")]
+        inspection = self.experiment.inspection
+        if not inspection.findings:
+            words = f"{len(inspection.checked)} checks were made."
+            return [head + svg.text((x, y + 36), "Nothing found.", "green", style="font-size:22px;font-weight:600")
+                    + svg.paragraph((x, y + 62), words, room)]  # fmt: skip
+        found = grouped(inspection.findings)
+        width = whole / min(len(found), _MOST)
+        tiles = [self._finding(x + width * i, y + 28, width, *one) for i, one in enumerate(found[:_MOST])]
+        if len(found) > _MOST:
+            more = f"and {len(found) - _MOST} more"
+            tiles[-1] += svg.text((x + width * (_MOST - 1), y), more, "note")
+        return [head + tiles[0], *tiles[1:]]
+
+    def _finding(self, x: float, y: float, width: float, finding: Finding, count: int) -> str:
+        times, colour = f" × {count}" if count > 1 else "", _COLOURS[finding.severity]
+        return (
+            svg.rectangle(x, y - 14, 4, 60 + 154 * _FINDINGS[1] / width / _MOST, f"fill-{colour}")
+            + svg.text((x + 12, y), f"{finding.id}{times}", f"title {colour}")
+            + svg.paragraph((x + 12, y + 30), f"{finding.severity}: {_short(finding.sentence)}", width - 28, "label")
+        )
+
+
+def grouped(findings: tuple[Finding, ...]) -> list[tuple[Finding, int]]:
+    """The first finding of every id, and how many there are of it."""
+    ids = [finding.id for finding in findings]
+    return [(finding, ids.count(finding.id)) for i, finding in enumerate(findings) if finding.id not in ids[:i]]
+
+
+def figures(value: float) -> str:
+    """A length in two figures, and never in powers of ten."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}" if value >= 0.01 else "0"
+
+
+def _signed(error: float, sigma: float) -> str:
+    return f"{'+' if error > 0 else '−'}{figures(abs(error))} ± {figures(sigma)}"
+
+
+def _short(sentence: str, letters: int = 176) -> str:
+    """A sentence that fits its tile, cut between words where it does not."""
+    return sentence if len(sentence) <= letters else sentence[:letters].rsplit(" ", 1)[0] + " …"

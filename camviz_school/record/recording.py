@@ -1,0 +1,301 @@
+"""`record`: a widget is drawn along everything that moves it, and what comes out is stored for a page of its own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from html import escape
+from importlib.resources import files
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from camviz.draw.flow import Tile
+from camviz.draw.picture import Picture
+from camviz.widgets import Explorer
+from camviz_school.record.axes import Axis
+from camviz_school.record.packing import Images, Pack, hashed, script, transferred, webp
+from camviz_school.record.panes import Pane, Values, pane
+
+# Of the positions that a budget allows: the last share is drawn first, and tells how many more are possible.
+SHARES = (1.0, 0.75, 0.52, 0.37, 0.27, 0.2, 0.14, 0.1, 0.07)
+PLAYER = "replay.js"
+
+
+class BudgetError(ValueError):
+    """A pane that is too large for its budget, even with the fewest positions.
+
+    >>> issubclass(BudgetError, ValueError)
+    True
+    """
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a pane may cost, and how many positions it may have.
+
+    Args:
+        size: In bytes as transferred (gzip), all its photographs included.
+        positions: States that are drawn. A pane whose fewest positions are more keeps those.
+        slider, grid, orbit: Positions at most: of a slider, of a slider among those that belong together, of the
+            onlooker all around.
+
+    >>> Budget().count(Axis.slider("k1", -1, 1, 0.01, 0), 0.5, together=False)
+    20
+    """
+
+    size: int = 2_500_000
+    positions: int = 400
+    slider: int = 41
+    grid: int = 15
+    orbit: int = 24
+
+    def count(self, axis: Axis, share: float, *, together: bool) -> int:
+        """At how many positions an axis is recorded, of a slider at least its ends and its first value.
+
+        Args:
+            axis: What is moved.
+            share: Of the most positions, 0 … 1.
+            together: Whether the axis is one of those whose combinations are recorded.
+
+        Returns: At least 3.
+        """
+        most = self.grid if together else self.orbit if axis.period else self.slider
+        return max(3, round(share * most))
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Positions in every combination of some axes; the others stay at their first value."""
+
+    axes: tuple[Axis, ...]
+    values: tuple[tuple[Any, ...], ...]
+
+    def states(self) -> Iterator[Values]:
+        """Each combination, the last axis quickest."""
+        for combination in product(*self.values):
+            yield {axis.name: value for axis, value in zip(self.axes, combination, strict=True)}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recorded pane: its files in a folder, what it holds, what it cost, and how it stands on a page.
+
+    Attributes:
+        title: The pane's name.
+        folder: Where the files are.
+        pack: The name of the script that holds all texts.
+        files: The names of all files that the page needs, `pack` and photographs among them.
+        positions: States that were drawn.
+        counts: Positions of each axis by its name.
+        size: Bytes as transferred (gzip) once all photographs are there; the stills of `html` come on top.
+        still: What stands on the page before any script.
+        controls: Of the pane, for which `html` keeps room.
+
+    >>> from pathlib import Path
+    >>> Recording("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, None).html("dots/")[:63]
+    '<div class="camviz-recorded" data-recording="dots/d.js" data-po'
+    """
+
+    title: str
+    folder: Path
+    pack: str
+    files: tuple[str, ...]
+    positions: int
+    counts: dict[str, int]
+    size: int
+    still: Picture | None = field(repr=False, compare=False)
+    controls: int = 0
+
+    def html(self, base: str = "") -> str:
+        """The pane for a page that loads `replay.js`.
+
+        Before any script, and without JavaScript, it is the first picture: an external SVG a tile, with its alternative
+        text.
+
+        Args:
+            base: The folder's address from the page, with its "/".
+
+        Returns: HTML, one element.
+        Raises: OSError where the folder cannot be written.
+        """
+        stills = _room(self.controls) + _stills(self.still, self.folder, base) if self.still else ""
+        words = f"A still picture. With JavaScript it moves: {self.positions} positions are recorded."
+        return (
+            f'<div class="camviz-recorded" data-recording="{escape(base + self.pack)}" '
+            f'data-positions="{self.positions}">{stills}<p class="camviz-recorded-line">{words}</p></div>'
+        )
+
+
+def record(widget: Explorer | Pane, folder: str | Path, *, budget: Budget | None = None) -> Recording:
+    """Record a widget into a folder of files named by their content; see `camviz_school.record` for the page.
+
+    Every slider is drawn at up to `budget.slider` positions with all else at its first value, every choice and switch
+    in each of its values, the axes that belong together in all combinations, and the onlooker from all around. Where
+    they would be too many or too large, positions are thinned. The same budget gives the same positions on any machine.
+
+    Args:
+        widget: What is recorded.
+        folder: Where the files go; it is made if need be.
+        budget: What the pane may cost.
+
+    Returns: What is in the folder.
+    Raises: BudgetError where the fewest positions are still too large.
+
+    >>> import anywidget, traitlets
+    >>> from camviz_school.record import Axis, Widget
+    >>> class Dot(anywidget.AnyWidget):
+    ...     _esm = "export default { render() {} }"
+    ...     x = traitlets.Int(0).tag(sync=True)
+    >>> made = record(Widget(Dot(), (Axis.slider("x", 0, 100, 1, first=0),), title="A dot"), "recorded")
+    >>> made.positions, made.counts, len(made.files)
+    (41, {'x': 41}, 2)
+    """
+    return _Recorder(pane(widget), Path(folder), budget or Budget()).recording()
+
+
+def write_player(folder: str | Path) -> Path:
+    """Write `replay.js` into a folder; a page loads it as <script src="replay.js" defer></script>.
+
+    Args:
+        folder: It is made if need be.
+
+    Returns: Path of the script.
+
+    >>> write_player("recorded").name
+    'replay.js'
+    """
+    path = Path(folder) / PLAYER
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text((files("camviz_school.record") / PLAYER).read_text(encoding="utf-8"), encoding="utf-8")
+    return path
+
+
+class _Recorder:
+    """One pane on its way into a folder. States are drawn once, whatever sheet they are in."""
+
+    def __init__(self, pane: Pane, folder: Path, budget: Budget) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._pane, self._folder, self._budget = pane, folder, budget
+        self._images = Images()
+        self._drawn: dict[tuple[Any, ...], dict[str, Any]] = {}
+        self._source, source = script(pane.sources)
+        self._scripts = {self._source: source}
+        self._says = ""
+
+    def recording(self) -> Recording:
+        """The finest of SHARES that holds the budget."""
+        kept = self._within(SHARES[-1])
+        if kept is None:
+            raise BudgetError(self._says)
+        for share in SHARES[:-1]:
+            states = len(self._states(self._sheets(share)))
+            more = states / kept.positions
+            if more > 1 and kept.size * more <= self._budget.size and states <= self._budget.positions:
+                finer = self._within(share)
+                if finer:
+                    return self._written(finer)
+        return self._written(kept)
+
+    def _within(self, share: float) -> Recording | None:
+        """The recording with that share of the positions; None where it breaks the budget, which `_says` why."""
+        sheets = self._sheets(share)
+        states = self._states(sheets)
+        for key, values in states.items():
+            if key not in self._drawn:
+                self._drawn[key] = self._frame(values)
+        pack, content, images = self._packed(sheets)
+        size = transferred(content) + sum(len(self._images.data[name]) for name in images)
+        if size > self._budget.size:
+            limit = f"{self._budget.size / 1e6:g} MB: they take {size / 1e6:.1f} MB"
+            self._says = f"{self._pane.title}: its fewest positions, {len(states)}, do not fit into {limit}."
+            return None
+        self._scripts[pack] = content
+        counts = {sheet.axes[0].name: len(sheet.values[0]) for sheet in sheets if len(sheet.axes) == 1}
+        names = (pack, self._source, *images)
+        still, controls = self._pane.still(), len(self._pane.traits.get("controls", ()))
+        return Recording(self._pane.title, self._folder, pack, names, len(states), counts, size, still, controls)
+
+    def _written(self, kept: Recording) -> Recording:
+        """The recording, its files written."""
+        for name in kept.files[:2]:
+            (self._folder / name).write_bytes(self._scripts[name])
+        self._images.write(kept.files[2:], self._folder)
+        return kept
+
+    def _sheets(self, share: float) -> list[Sheet]:
+        """Each axis alone, and those that belong together."""
+        alone = [((axis,), False) for axis in self._pane.axes]
+        joint = tuple(axis for axis in self._pane.axes if axis.name in self._pane.together)
+        wanted = [*alone, (joint, True)] if len(joint) > 1 else alone
+        return [
+            Sheet(axes, tuple(axis.thinned(self._budget.count(axis, share, together=many)) for axis in axes))
+            for axes, many in wanted
+        ] or [Sheet((), ())]
+
+    def _key(self, values: Values) -> tuple[Any, ...]:
+        return tuple(values.get(axis.name, axis.first) for axis in self._pane.axes)
+
+    def _states(self, sheets: list[Sheet]) -> dict[tuple[Any, ...], Values]:
+        """Every state of the sheets once, the first one first."""
+        first: dict[str, Any] = {axis.name: axis.first for axis in self._pane.axes}
+        states: dict[tuple[Any, ...], Values] = {self._key(first): first}
+        for sheet in sheets:
+            states |= {self._key(values): {**first, **values} for values in sheet.states()}
+        return states
+
+    def _frame(self, values: Values) -> dict[str, Any]:
+        """A state's traits, its photographs apart."""
+        frame: dict[str, Any] = self._images.stored(self._pane.frame(values))
+        return frame
+
+    def _packed(self, sheets: list[Sheet]) -> tuple[str, bytes, list[str]]:
+        """The pack's name and content, and the names of its photographs."""
+        pack, numbers = Pack(), dict[str, int]()  # of frames, by what is in them: those that are alike are kept once
+        first = {axis.name: axis.first for axis in self._pane.axes}
+
+        def number(values: Values) -> int:
+            frame = pack.packed(self._drawn[self._key({**first, **values})])
+            return numbers.setdefault(json.dumps(frame), len(numbers))
+
+        told = [
+            {
+                "axes": [axis.name for axis in sheet.axes],
+                "values": sheet.values,
+                "frames": [*map(number, sheet.states())],
+            }
+            for sheet in sheets
+        ]
+        content = {
+            "source": self._source,
+            "title": self._pane.title,
+            "traits": self._pane.traits,
+            "axes": [{"name": axis.name, "first": axis.first, "period": axis.period} for axis in self._pane.axes],
+            "positions": len(self._states(sheets)),
+            "sheets": told,
+            "frames": [json.loads(frame) for frame in numbers],
+            "pieces": pack.pieces,
+        }
+        name, script_ = script(content)
+        return name, script_, list(pack.images)
+
+
+def _room(controls: int) -> str:
+    """As much room as the pane's controls and buttons will take (explorer.css), so that nothing jumps."""
+    columns = "grid-template-columns:repeat(auto-fill,minmax(min(290px,100%),1fr))"
+    rows = '<i style="height:26px"></i>' * controls + '<i style="height:26px;grid-column:1/-1"></i>'
+    return f'<div aria-hidden="true" style="display:grid;{columns};gap:4px 22px;padding:6px 2px 8px">{rows}</div>'
+
+
+def _stills(picture: Picture, folder: Path, base: str) -> str:
+    """The picture as a figure whose tiles are SVG files in the folder, loaded when they come near the screen."""
+    picture = replace(picture, photographs={name: webp(data) for name, data in picture.photographs.items()})
+
+    def address(tile: Tile) -> str:
+        drawn = picture.document(tile).encode()
+        name = f"{hashed(drawn)}.svg"
+        (folder / name).write_bytes(drawn)
+        return base + name
+
+    return picture.figure(address)
