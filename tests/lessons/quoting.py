@@ -93,7 +93,7 @@ def _texts(number: str) -> Iterator[tuple[str, str]]:
             yield f"question {one.name}", _stated(choice.text)
             yield f"question {one.name}", _stated(choice.reply)
     for one in exercises(number).values():
-        for text in (*one.hints, one.praise, *(known.explanation for known in one.misconceptions)):
+        for text in (*one.hints, one.praise, *(known.explanation for known in (*one.misconceptions, *one.conventions))):
             yield f"exercise {one.name}", _stated(text)
     planned = plans.plan(number)
     if planned:

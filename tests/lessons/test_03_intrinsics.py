@@ -182,7 +182,7 @@ def test_k_holds_the_place_of_the_sensor_at_the_focus_setting(says):
 def test_the_field_of_view_of_a_centred_camera_and_the_half_pixel_at_its_edges(says):
     (two,) = says("With the principal point in the middle it is 2 atan(width / 2f).")
     (again,) = says("This is 2 atan(width / 2f), which holds when the principal point is in the middle.")
-    low, high = says("With centres at integers the edges lie at −0.5 and width − 0.5.")
+    low, high = says("With centres at integers, as everywhere in this lesson, the edges lie at −0.5 and width − 0.5")
     (begins,) = says("the picture begins at −0.5, half a pixel before column 0")
     assert low.value == begins.value == -0.5
     assert high.value == 0.5

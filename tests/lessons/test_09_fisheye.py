@@ -501,5 +501,3 @@ def test_what_a_teacher_draws_and_shows(says):
     at_60, right = ([r(np.radians(one.value)) for r in RADIUS.values()] for one in (middle, side))
     assert at_60 == [tangent, half_tan, angle, half_sin, sine]
     assert right[1:] == [two, at_90, also, 1]
-    says("the lens of the lesson's first picture sees both hands")
-    assert 150 * np.pi / 2 < 239.5
