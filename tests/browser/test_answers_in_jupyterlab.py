@@ -36,7 +36,7 @@ TINY = """() => [...document.querySelectorAll(".camviz-question *")]
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "lab").mkdir()
-    sources = ["from camviz.widgets import ask, quiz", 'ask("05.far_rays")', 'quiz("05")']
+    sources = ["from camviz_school.widgets import ask, quiz", 'ask("05.far_rays")', 'quiz("05")']
     cells = [
         {"cell_type": "code", "metadata": {}, "source": source, "outputs": [], "execution_count": None, "id": f"c{i}"}
         for i, source in enumerate(sources)

@@ -21,7 +21,7 @@ RESTART = """async () => {
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "lab").mkdir()
-    sources = ["from camviz.widgets import quiz", 'quiz("05", "A")', 'quiz("05")']
+    sources = ["from camviz_school.widgets import quiz", 'quiz("05", "A")', 'quiz("05")']
     cells = [
         {"cell_type": "code", "metadata": {}, "source": source, "outputs": [], "execution_count": None, "id": f"c{i}"}
         for i, source in enumerate(sources)
