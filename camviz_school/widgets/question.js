@@ -63,13 +63,14 @@ function cardForm(name, number, send) {
     show(next) {
       if (card?.tries && !next.tries) rows.querySelectorAll("input").forEach((radio) => { radio.checked = false; });
       const first = card === null;
+      const answered = first || next.chosen !== card.chosen || next.tries !== card.tries; // else a choice is being made
       card = next;
       if (first) {
         text.innerHTML = card.text;
         rows.append(...card.choices.map((_, index) => choiceRow(name, card, index)));
-      } else if (card.chosen !== null) {
+      } else if (card.chosen !== null && (answered || closed())) {
         rows.querySelectorAll("input")[card.chosen].checked = true;
-      } else if (card.held) {
+      } else if (card.chosen === null && card.held) {
         rows.querySelectorAll("input").forEach((radio) => { radio.checked = false; }); // was not counted
       }
       const [verdict, colour] = closed() || card.voting ? ["", " camviz-kept"]
