@@ -40,7 +40,6 @@ autosummary_generate = True
 autosummary_imported_members = True
 autosummary_ignore_module_all = False
 autodoc_typehints = "none"  # docstrings.py writes them
-python_maximum_signature_line_length = 90
 autodoc_member_order = "bysource"
 default_role = "literal"
 
