@@ -16,11 +16,11 @@ from camviz.views.intrinsics import IntrinsicsView
 from camviz.views.light_field import LightFieldView
 from camviz.views.noise import PhotonTransferView
 from camviz.views.omnidirectional import OmnidirectionalView
-from camviz.views.pinhole import PinholeView
 from camviz.views.rectification import RectificationView
 from camviz.views.sharpness import SharpnessView
 from camviz_clinic.views.calibration import CalibrationView
 from camviz_clinic.views.fault_lab import FaultLabView
+from camviz_school.views.pinhole import PinholeView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(

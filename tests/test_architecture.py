@@ -3,8 +3,11 @@
 import ast
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
+import nbformat
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,7 +35,7 @@ LAYERS = {
     "camviz_school": (
         ("samples", "server"),
         ("course",),
-        ("room", "teaching"),
+        ("room", "teaching", "views"),
         ("record", "widgets"),
         ("commands",),
     ),
@@ -49,9 +52,16 @@ WHAT_IS_TRUE = (
 HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
 
 
+LESSONS = {path.name[:2]: path for path in sorted((ROOT / "lessons").glob("*.ipynb"))}
+BESIDE = sorted((ROOT / "lessons/material").glob("[0-9][0-9]/*.py"))
+"""What lies beside a lesson: its exercises, and the modules that a lesson imports from `camviz_school.views`."""
+
+VIEWS = {f"camviz_school.views.{path.stem}": path for path in BESIDE if path.stem != "exercises"}
+
+
 def modules() -> dict[str, Path]:
-    """Every module of the three packages by its dotted name."""
-    found = {}
+    """Every module of the three packages, and every one beside a lesson, by its dotted name."""
+    found = dict(VIEWS)
     for path in (path for package in STREET for path in (ROOT / package).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
@@ -67,15 +77,15 @@ def above(name: str) -> set[str]:
     return {".".join(parts[:end]) for end in range(1, len(parts))}
 
 
-def imported(path: Path) -> set[str]:
-    """The modules of the street that a file imports anywhere: at its top, inside functions, for its types alone, and
+def imported(source: str) -> set[str]:
+    """The modules of the street that code imports anywhere: at its top, inside functions, for its types alone, and
     by a string that names one, as for `import_module`."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: imports are absolute here"
+            assert node.level == 0, f"{ast.unparse(node)}: imports are absolute here"
             whole = {f"{node.module}.{alias.name}" for alias in node.names}  # of a package, its modules by name
             names |= whole & MODULES.keys() or {node.module or ""}
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -83,7 +93,28 @@ def imported(path: Path) -> set[str]:
     return names & MODULES.keys() - {"camviz"}
 
 
-GRAPH = {name: imported(path) - {name, *above(name)} for name, path in MODULES.items()}
+GRAPH = {name: imported(path.read_text(encoding="utf-8")) - {name, *above(name)} for name, path in MODULES.items()}
+
+
+def told(number: str) -> set[str]:
+    """The modules that a lesson imports itself, in its notebook or in the files beside it."""
+    cells = nbformat.read(LESSONS[number], 4).cells
+    lines = [line for cell in cells if cell.cell_type == "code" for line in cell.source.splitlines()]
+    notebook = "\n".join(line for line in lines if not line.lstrip().startswith(("%", "!")))
+    own = [path.read_text(encoding="utf-8") for path in BESIDE if path.parent.name == number]
+    return set().union(*map(imported, [notebook, *own]))
+
+
+TOLD = {number: told(number) for number in LESSONS}
+
+
+def reached(names: Iterable[str]) -> set[str]:
+    """These modules, those that they import, those that these import, and so on."""
+    seen, left = set[str](), set(names)
+    while left:
+        seen |= left
+        left = {other for name in left for other in GRAPH[name]} - seen
+    return seen
 
 
 def part(name: str) -> str:
@@ -153,7 +184,35 @@ def test_what_is_true_needs_nothing_that_draws(name: str) -> None:
     assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
 
 
-def test_the_lessons_material_is_read_by_the_course_alone() -> None:
-    """No module of the package imports a lesson's own: they are loaded by `camviz_school.course.material`."""
-    named = [name for name, path in MODULES.items() if "lessons.material" in path.read_text(encoding="utf-8")]
-    assert named == []
+def test_no_package_imports_what_lies_beside_a_lesson() -> None:
+    """camviz itself names it, which says where old names are."""
+    packages = {name: others for name, others in GRAPH.items() if name not in VIEWS and name != "camviz"}
+    beside = {"camviz_school.views", *VIEWS}
+    assert [f"{name} names {other}" for name, others in packages.items() for other in others & beside] == []
+
+
+def test_what_lies_beside_a_lesson_serves_that_lesson_and_no_other() -> None:
+    home = {name: path.parent.name for name, path in VIEWS.items()}
+    used = {(name, number) for number, names in TOLD.items() for name in reached(names) & VIEWS.keys()}
+    assert used == set(home.items())
+
+
+def test_the_modules_beside_the_lessons_have_names_of_their_own() -> None:
+    """All are modules of one package, where of two with the same name only the first would be found."""
+    counts = Counter(path.stem for path in BESIDE if path.stem != "exercises")
+    assert [name for name, count in counts.items() if count > 1] == []
+
+
+def test_a_module_is_found_beside_its_lesson_without_server_room_or_quiz() -> None:
+    """What is imported to find it costs no more than the course's folder."""
+    name, path = next(iter(VIEWS.items()))
+    code = f"import sys, camviz_school.views; print(*sys.modules); import {name}; print({name}.__file__)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded, file = done.stdout.splitlines()
+    assert Path(file) == path
+    ours = {name for name in loaded.split() if name.startswith("camviz")}
+    assert ours == {
+        "camviz_school",
+        *(f"camviz_school.{one}" for one in ("course", "course.material", "views")),
+    }
+    assert "numpy" not in loaded.split()
