@@ -56,7 +56,11 @@ __all__ = ["Camera", "Intrinsics", "Rig", "__version__", "explore", "look_at", *
 _MOVED = {
     ("camviz", "camviz_clinic"): "Calibration calibration clinic commands files inspect load meshes plots report",
     ("camviz", "camviz_school"): "course join record room samples server teaching",
-    ("camviz.views", "camviz_school.views"): "pinhole",
+    (
+        "camviz.views",
+        "camviz_school.views",
+    ): "depth_of_field fisheye intrinsics lens_diagram lens_elements mirror_drawings "
+    "omnidirectional pinhole rectification ring rotation stereo_pair",
 }
 """What stood elsewhere before camviz became three packages: the old place, the new one, and the names that moved."""
 

@@ -8,9 +8,9 @@ import pytest
 
 from camviz import optics
 from camviz.scenes import aperture, to_display
-from camviz.views import lens_diagram
-from camviz.views.depth_of_field import GLOBE_M, DepthOfFieldView, _garden
-from camviz.views.lens_elements import LensElementsView
+from camviz_school.views import lens_diagram
+from camviz_school.views.depth_of_field import GLOBE_M, DepthOfFieldView, _garden
+from camviz_school.views.lens_elements import LensElementsView
 
 ENDS = [
     (name, value)

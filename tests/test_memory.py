@@ -17,9 +17,9 @@ from camviz.views.exposure import ExposureView
 from camviz.views.frustum import FrustumView
 from camviz.views.light_field import LightFieldView
 from camviz.views.noise import PhotonTransferView
-from camviz.views.omnidirectional import OmnidirectionalView
 from camviz.widgets import explore
 from camviz.widgets.memory import give_back
+from camviz_school.views.omnidirectional import OmnidirectionalView
 
 PROGRAM = """
 import numpy as np, psutil

@@ -23,12 +23,12 @@ from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
-from camviz.views import stereo_pair
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
-from camviz.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
 from camviz.views.yours import tried
+from camviz_school.views import stereo_pair
+from camviz_school.views.stereo_pair import COARSE, FINE, WRONG, Source, Stage, seen_from_there
 
 _WIDTH, _TALLEST = 365, 274
 _MAP_WIDTH, _MAP_TALLEST = 248, 186

@@ -33,7 +33,7 @@ from camviz.scenes import textured_scene, to_display
 from camviz.views import garden
 from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
-from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
+from camviz_school.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
 UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))

@@ -22,9 +22,9 @@ from camviz.draw.readout import listed, readout
 from camviz.poses import RigidTransform
 from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera
-from camviz.views import lens_diagram
 from camviz.views.base import View, choice, positive, slider, step_of, switch
 from camviz.views.yours import tried
+from camviz_school.views import lens_diagram
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = (0.25, 8, 24), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most
