@@ -53,14 +53,15 @@ _PARTS = (
 __all__ = ["Camera", "Intrinsics", "Rig", "__version__", "explore", "look_at", *_PARTS]
 
 
+_BESIDE_LESSONS = (
+    "colour demosaicing depth_of_field exposure fisheye garden_field image_sensor intrinsics lens_diagram "
+    "lens_elements light_field microlens_diagram mirror_drawings noise omnidirectional pinhole readout rectification "
+    "ring rotation sharpness stereo_pair swatches"
+)
 _MOVED = {
     ("camviz", "camviz_clinic"): "Calibration calibration clinic commands files inspect load meshes plots report",
     ("camviz", "camviz_school"): "course join record room samples server teaching",
-    (
-        "camviz.views",
-        "camviz_school.views",
-    ): "depth_of_field fisheye intrinsics lens_diagram lens_elements mirror_drawings "
-    "omnidirectional pinhole rectification ring rotation stereo_pair",
+    ("camviz.views", "camviz_school.views"): _BESIDE_LESSONS,
 }
 """What stood elsewhere before camviz became three packages: the old place, the new one, and the names that moved."""
 

@@ -22,10 +22,10 @@ from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.lightfields import LightField, aperture, refocus, to_microlens_image
 from camviz.scenes import to_display
-from camviz.views import garden_field, microlens_diagram
 from camviz.views.base import Control, View, answered, choice, slider, step_of, switch, without
 from camviz.views.depth_wedge import metres
 from camviz.views.marks import on_photograph, ring
+from camviz_school.views import garden_field, microlens_diagram
 
 PITCH = 0.002  # metres between microlenses, of the camera that would record the garden's field
 _LOW, _HIGH = garden_field.SLOPES
