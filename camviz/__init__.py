@@ -58,10 +58,12 @@ _BESIDE_LESSONS = (
     "lens_elements light_field microlens_diagram mirror_drawings noise omnidirectional pinhole readout rectification "
     "ring rotation sharpness stereo_pair swatches"
 )
+_CALIBRATIONS = "board_pictures calibration fault_lab focal_xi_ambiguity one_board"
 _MOVED = {
     ("camviz", "camviz_clinic"): "Calibration calibration clinic commands files inspect load meshes plots report",
     ("camviz", "camviz_school"): "course join record room samples server teaching",
-    ("camviz.views", "camviz_school.views"): _BESIDE_LESSONS,
+    ("camviz.views", "camviz_school.views"): f"{_BESIDE_LESSONS} {_CALIBRATIONS}",
+    ("camviz_clinic.views", "camviz_school.views"): _CALIBRATIONS,
 }
 """What stood elsewhere before camviz became three packages: the old place, the new one, and the names that moved."""
 

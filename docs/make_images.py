@@ -7,11 +7,11 @@ from camviz.lenses import BrownConrady
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
-from camviz_clinic.views.calibration import CalibrationView
-from camviz_clinic.views.fault_lab import FaultLabView
+from camviz_school.views.calibration import CalibrationView
 from camviz_school.views.colour import ColourView
 from camviz_school.views.demosaicing import DemosaicingView
 from camviz_school.views.depth_of_field import DepthOfFieldView
+from camviz_school.views.fault_lab import FaultLabView
 from camviz_school.views.fisheye import FisheyeView
 from camviz_school.views.image_sensor import ImageSensorView
 from camviz_school.views.intrinsics import IntrinsicsView

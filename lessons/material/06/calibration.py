@@ -23,9 +23,9 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import Drawn, OrbitView
-from camviz_clinic.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
 from camviz_clinic.views.chessboard import outline, rim, squares
-from camviz_clinic.views.one_board import FromEach, from_each, panel_of_each
+from camviz_school.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
+from camviz_school.views.one_board import FromEach, from_each, panel_of_each
 
 _MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 _CELLS = (16, 12)  # of the coverage map
