@@ -25,8 +25,11 @@ from camviz.views.measured_noise import MeasuredNoiseView
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.catalogue import VIEWS, Case
 
-SHARED = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras")
-"""Classes of what several views have in common; they draw nothing themselves."""
+SHARED = (
+    *("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras"),
+    *("CameraMatrix", "ErrorBars", "RectifiedPair", "RefocusedField"),
+)
+"""Classes of what views are made of; they draw no picture themselves."""
 
 
 def words(svg: str) -> str:

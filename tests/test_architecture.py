@@ -197,6 +197,22 @@ def test_what_lies_beside_a_lesson_serves_that_lesson_and_no_other() -> None:
     assert used == set(home.items())
 
 
+def test_few_modules_elsewhere_serve_one_lesson_alone() -> None:
+    """A module that only a lesson reaches belongs beside that lesson. Nine of the seventeen that are left are the files
+    of camviz.lightfields, which camviz offers for their own sake."""
+    used = set().union(*GRAPH.values(), *TOLD.values())
+    shared = reached(MODULES.keys() - VIEWS.keys() - used)
+    lessons = Counter(name for names in TOLD.values() for name in reached(names))
+    alone = [name for name in MODULES if lessons[name] == 1 and name not in shared | VIEWS.keys()]
+    assert len(alone) <= 17, alone
+
+
+def test_the_modules_beside_the_lessons_are_short() -> None:
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in VIEWS.values()}
+    assert [path for path, lines in lengths.items() if lines > 400] == []
+    assert sum(lengths.values()) <= 8200
+
+
 def test_the_modules_beside_the_lessons_have_names_of_their_own() -> None:
     """All are modules of one package, where of two with the same name only the first would be found."""
     counts = Counter(path.stem for path in BESIDE if path.stem != "exercises")
