@@ -7,7 +7,6 @@ from quoting import LESSONS
 from scipy.constants import physical_constants
 
 from camviz.scenes import to_display
-from camviz.sensors import decibel
 from camviz.sensors.correction import NoiseModel, merged
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import Level
@@ -332,10 +331,6 @@ def test_the_published_ratios_have_the_decibels_of_the_standard(says):
     """A dynamic range of 1220.69871336 is 61.732 dB, not the 142.14 of the file that gives it."""
     ratio, _ = published_ratio()
     assert ratio == pytest.approx(1220.69871336, rel=1e-5)
-    assert lesson15.dynamic_range_db(np.array(1220.69871336), np.array(0.5)) == pytest.approx(61.732, abs=5e-4)
-    for saturation, dark_noise in cases(lesson15.DECIBELS):
-        expected = decibel(saturation / (dark_noise + 0.5))
-        np.testing.assert_allclose(lesson15.dynamic_range_db(saturation, dark_noise), expected)
     signals, claimed, range_of, wrong = says(
         "That file claims a largest signal to noise ratio of 118.2, or 95.45 dB, and a dynamic range of 1220.7, or "
         "142.14 dB."
@@ -344,25 +339,28 @@ def test_the_published_ratios_have_the_decibels_of_the_standard(says):
     assert range_of == ratio
     assert claimed == 20 * np.log(118.205880802)
     assert signals == 118.205880802
-    (ten,) = says("A ratio of ten should be 20 dB.")
-    assert ten == decibel(10.0)
-    (times,) = says("Every figure was 2.3026 times too large")
+    (times,) = says("Every figure in decibels is 2.3026 times too large")
     assert times == np.log(10)
 
 
-def test_decibels(says):
-    for known, decibels in (
-        says("A ratio of 1000 must be 60 dB"),
-        says("saturation 1000 times the threshold is 60 dB"),
-    ):
-        assert decibels == 10 * np.log10(known.value**2)
-    (signals,) = says("EMVA 1288 counts a ratio of signals, with 20.")
-    assert 10 * np.log10(7.0**2) == pytest.approx(signals.value * np.log10(7.0))
-    (halved,) = says("You halved the 20 and left the logarithm as it was.")
-    (kept,) = says("A decibel is a twentieth of it: keep the 20.")
-    assert halved == kept.value == signals.value
-    (base,) = says("You *multiplied* by ln 10. The natural logarithm is too large by that factor already")
-    assert np.log(7.0) / np.log10(7.0) == pytest.approx(np.log(base.value))
+def test_the_least_light_has_a_signal_equal_to_its_noise(says):
+    """The answer is put back into SNR = 1, and compared with the published camera's."""
+    for dark_noise, efficiency in cases(lesson15.THRESHOLD):
+        electrons = efficiency * lesson15.threshold_photons(dark_noise, efficiency)
+        np.testing.assert_allclose(electrons, np.sqrt(dark_noise**2 + electrons), rtol=1e-12)
+    _, sigma = published_ratio()
+    (needed,) = says("The published camera needs 25.4 photons.")
+    assert needed == lesson15.threshold_photons(sigma, REFERENCE["η"])
+    assert needed == (sigma + 0.5) / REFERENCE["η"]  # by the approximation as well
+    says("With a perfect amplifier a pixel needs 1 electron and not none")
+    assert lesson15.threshold_photons(0.0, 1.0) == 1
+    half, wrong = says("For σ_d = 0 and η = 0.5 it says 1.5.")
+    assert wrong == lesson15.threshold_as_given(0.0, half.value)
+    efficiency, photons, electrons, under_the_root = says(
+        "with η = 0.5 it says 1.5 photons. They give 0.75 electrons. Is their noise, √0.75, as large as they are?"
+    )
+    assert photons == wrong.value
+    assert electrons == under_the_root.value == efficiency.value * wrong.value
 
 
 # 7: real data ---------------------------------------------------------------------------------------------------------
