@@ -77,7 +77,12 @@ def above(name: str) -> set[str]:
     return {".".join(parts[:end]) for end in range(1, len(parts))}
 
 
-def imported(source: str) -> set[str]:
+def imported(path: Path) -> set[str]:
+    """The modules of the street that a file imports."""
+    return named(path.read_text(encoding="utf-8"))
+
+
+def named(source: str) -> set[str]:
     """The modules of the street that code imports anywhere: at its top, inside functions, for its types alone, and
     by a string that names one, as for `import_module`."""
     names = set()
@@ -93,7 +98,7 @@ def imported(source: str) -> set[str]:
     return names & MODULES.keys() - {"camviz"}
 
 
-GRAPH = {name: imported(path.read_text(encoding="utf-8")) - {name, *above(name)} for name, path in MODULES.items()}
+GRAPH = {name: imported(path) - {name, *above(name)} for name, path in MODULES.items()}
 
 
 def told(number: str) -> set[str]:
@@ -101,8 +106,7 @@ def told(number: str) -> set[str]:
     cells = nbformat.read(LESSONS[number], 4).cells
     lines = [line for cell in cells if cell.cell_type == "code" for line in cell.source.splitlines()]
     notebook = "\n".join(line for line in lines if not line.lstrip().startswith(("%", "!")))
-    own = [path.read_text(encoding="utf-8") for path in BESIDE if path.parent.name == number]
-    return set().union(*map(imported, [notebook, *own]))
+    return named(notebook).union(*(imported(path) for path in BESIDE if path.parent.name == number))
 
 
 TOLD = {number: told(number) for number in LESSONS}
@@ -115,6 +119,14 @@ def reached(names: Iterable[str]) -> set[str]:
         seen |= left
         left = {other for name in left for other in GRAPH[name]} - seen
     return seen
+
+
+def of_one_lesson() -> list[str]:
+    """The modules of the packages that one lesson reaches, and nothing else."""
+    used = set().union(*GRAPH.values(), *TOLD.values())
+    shared = reached(MODULES.keys() - VIEWS.keys() - used)
+    lessons = Counter(name for names in TOLD.values() for name in reached(names))
+    return [name for name in MODULES if lessons[name] == 1 and name not in shared | VIEWS.keys()]
 
 
 def part(name: str) -> str:
@@ -200,11 +212,7 @@ def test_what_lies_beside_a_lesson_serves_that_lesson_and_no_other() -> None:
 def test_few_modules_elsewhere_serve_one_lesson_alone() -> None:
     """A module that only a lesson reaches belongs beside that lesson. Nine of the seventeen that are left are the files
     of camviz.lightfields, which camviz offers for their own sake."""
-    used = set().union(*GRAPH.values(), *TOLD.values())
-    shared = reached(MODULES.keys() - VIEWS.keys() - used)
-    lessons = Counter(name for names in TOLD.values() for name in reached(names))
-    alone = [name for name in MODULES if lessons[name] == 1 and name not in shared | VIEWS.keys()]
-    assert len(alone) <= 17, alone
+    assert len(of_one_lesson()) <= 17
 
 
 def test_the_modules_beside_the_lessons_are_short() -> None:
