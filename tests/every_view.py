@@ -27,7 +27,7 @@ from camviz_clinic.views.catalogue import VIEWS, Case
 
 SHARED = (
     *("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras"),
-    *("CameraMatrix", "ErrorBars", "RectifiedPair", "RefocusedField"),
+    *("CameraMatrix", "ErrorBars", "RefocusedField", "TurningPair"),
 )
 """Classes of what views are made of; they draw no picture themselves."""
 

@@ -25,8 +25,8 @@ from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
 from camviz.views.yours import tried
 from camviz_school.views import stereo_pair
-from camviz_school.views.rectified_pair import RectifiedPair
 from camviz_school.views.stereo_pair import WRONG, Source, seen_from_there
+from camviz_school.views.turning_pair import TurningPair
 
 _WIDTH, _TALLEST = 365, 274
 _MAP_WIDTH, _MAP_TALLEST = 248, 186
@@ -38,7 +38,7 @@ _ROWS = 12  # epipolar lines in a picture's height
 
 
 @dataclass(frozen=True)
-class RectificationView(RectifiedPair):
+class RectificationView(TurningPair):
     """A pair from as it was taken to rectified, drawn: both pictures, the disparities, the depths and the wedge.
 
     `panels` names what stands below the two pictures: the disparity map, the second map, and the wedge with its depth.

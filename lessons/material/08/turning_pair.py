@@ -27,7 +27,7 @@ _GARDEN = Source(
 
 
 @dataclass(frozen=True)
-class RectifiedPair(View):
+class TurningPair(View):
     """A pair from as it was taken (`rectify` 0) to rectified (1), its disparities, its depths, and what they are worth.
 
     (column, row) is a pixel of the *rectified* left picture and `disparity` a shift from there to the right one; both
