@@ -9,7 +9,7 @@ test:
 lint:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	.ci/types
 	$(BIN)/codespell
 
 browser:

@@ -65,7 +65,7 @@ def notebook_of_later_views() -> nbformat.NotebookNode:
     """An explorer for each row of LATER, as wireframes."""
     cells = ["import os\nos.environ['CAMVIZ_RENDERER'] = 'wire'\nfrom camviz.widgets import explore"]
     for module, view, *_ in LATER:
-        cells.append(f"from camviz.views.{module} import {view}\nexplore({view}())")
+        cells.append(f"from camviz_school.views.{module} import {view}\nexplore({view}())")
     return _notebook(cells)
 
 

@@ -23,11 +23,10 @@ from statistics import median
 ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "pyproject.toml").is_file())
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from test_architecture import GRAPH, LAYERS, MODULES, STREET, house, imported  # noqa: E402
+from test_architecture import LAYERS, MODULES, STREET, VIEWS, house, imported, of_one_lesson  # noqa: E402
 
 PAGE = ROOT / "docs/house.md"
 SECTIONS = re.compile(r"^\s*(Args|Returns|Raises|Source|Attributes|Yields):", re.MULTILINE)
-LESSON = re.compile(r"lessons/(?:material/)?(\d\d)")
 FIRST_READING = (
     *("README.md", "camviz/__init__.py", "camviz/cameras.py", "camviz/lenses/perspective.py", "camviz/lenses/base.py"),
     *("camviz/lenses/brown_conrady.py", "camviz/distortion.py", "camviz/twoview/epipolar.py", "camviz/views/base.py"),
@@ -46,11 +45,6 @@ Row = tuple[str, str, str]
 
 def lines(paths: Iterable[Path]) -> int:
     return sum(path.read_text(encoding="utf-8").count("\n") for path in paths)
-
-
-def own_views() -> list[Path]:
-    """The files of lessons' own views: what lies beside a lesson and is not its exercises."""
-    return [path for path in ROOT.glob("lessons/material/*/*.py") if path.stem != "exercises"]
 
 
 def docstrings_and_code(path: Path) -> tuple[int, int, list[float]]:
@@ -73,26 +67,6 @@ def docstrings_and_code(path: Path) -> tuple[int, int, list[float]]:
             body = sum(line in code for line in range(end + 1, (node.end_lineno or end) + 1))
             shares.append((end - first.lineno + 1) / max(1, body))
     return len(said), len(code - said), shares
-
-
-def of_one_lesson() -> list[str]:
-    """Modules of the packages that nothing uses but one lesson, with what only they use."""
-    users: dict[str, set[str]] = {name: set() for name in MODULES}
-    for path in [*ROOT.glob("lessons/*.ipynb"), *ROOT.glob("lessons/material/*/*.py")]:
-        text = path.read_text(encoding="utf-8")
-        for name in re.findall(r"camviz[\w.]*", text):
-            if name in users and (lesson := LESSON.search(path.as_posix())):
-                users[name].add(lesson[1])
-    changed = True
-    while changed:
-        changed = False
-        for one, others in GRAPH.items():
-            by = users[one] if len(users[one]) == 1 else {one}
-            for other in others:
-                if not by <= users[other]:
-                    users[other] |= by
-                    changed = True
-    return sorted(name for name, by in users.items() if len(by) == 1 and next(iter(by)).isdigit())
 
 
 def measured() -> list[Row]:
@@ -118,7 +92,7 @@ def measured() -> list[Row]:
     long = [path for path in MODULES.values() if lines([path]) > 400 and "lines" not in path.read_text()[:400]]
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     top = {path.partition("/")[0] for path in tracked.splitlines() if not path.startswith(".")}
-    sizes = [lines(packages[name]) for name in STREET] + [lines(own_views())]
+    sizes = [lines(packages[name]) for name in STREET] + [lines(VIEWS.values())]
     documented, code = map(sum, zip(*said.values(), strict=True))
     core = said["camviz"][0] / said["camviz"][1]
     return [

@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform
 
 from camviz.scenes import aperture, parallax, textured_scene, to_display
 from camviz.scenes.aperture import ThinLensCamera
-from camviz.views.depth_of_field import DRAFT, FINE, DepthOfFieldView
+from camviz_school.views.depth_of_field import DRAFT, FINE, DepthOfFieldView
 
 POINTS = 64  # of the lens
 

@@ -53,18 +53,29 @@ _PARTS = (
 __all__ = ["Camera", "Intrinsics", "Rig", "__version__", "explore", "look_at", *_PARTS]
 
 
+_BESIDE_LESSONS = (
+    "colour demosaicing depth_of_field exposure fisheye garden_field image_sensor intrinsics lens_diagram "
+    "lens_elements light_field microlens_diagram mirror_drawings noise omnidirectional pinhole readout rectification "
+    "ring rotation sharpness stereo_pair swatches"
+)
+_CALIBRATIONS = "board_pictures calibration fault_lab focal_xi_ambiguity one_board"
 _MOVED = {
-    "camviz_clinic": "Calibration calibration clinic commands files inspect load meshes plots report",
-    "camviz_school": "course join record room samples server teaching",
+    ("camviz", "camviz_clinic"): "Calibration calibration clinic commands files inspect load meshes plots report",
+    ("camviz", "camviz_school"): "course join record room samples server teaching",
+    ("camviz.views", "camviz_school.views"): f"{_BESIDE_LESSONS} {_CALIBRATIONS}",
+    ("camviz_clinic.views", "camviz_school.views"): _CALIBRATIONS,
 }
-"""What stood in camviz before it became three packages."""
+"""What stood elsewhere before camviz became three packages: the old place, the new one, and the names that moved."""
 
 
 def _where(name: str) -> str:
-    """Where a name that has moved stands now; empty for every other."""
-    new = {"clinic": "checks"}.get(name, name)
-    homes = [home for home, names in _MOVED.items() if name in names.split()]
-    return f"camviz.{name} is now {homes[0]}.{new}" if homes else ""
+    """Where a full name that has moved, or what holds it, stands now; empty for every other."""
+    for (old, new), names in _MOVED.items():
+        moved = name.removeprefix(f"{old}.").partition(".")[0]
+        if name.startswith(f"{old}.") and moved in names.split():
+            renamed = {"clinic": "checks"}.get(moved, moved)
+            return f"{old}.{moved} is now {new}.{renamed}"
+    return ""
 
 
 class _Moved:
@@ -72,8 +83,7 @@ class _Moved:
 
     @staticmethod
     def find_spec(name: str, path: Any = None, target: Any = None) -> None:
-        house, _, rest = name.partition(".")
-        if house == "camviz" and (where := _where(rest.partition(".")[0])):
+        if where := _where(name):
             raise ImportError(where)
 
 
@@ -85,7 +95,7 @@ def __getattr__(name: str) -> Any:
         return import_module(f"camviz.{name}")
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
-    raise AttributeError(_where(name) or f"module 'camviz' has no attribute {name!r}")
+    raise AttributeError(_where(f"camviz.{name}") or f"module 'camviz' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

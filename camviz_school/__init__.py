@@ -2,6 +2,7 @@
 
     course     exercises and their checkers, questions, the glossary, the notebooks themselves
     widgets    `ask` and `quiz`: a question in a notebook
+    views      the visualizers that one lesson alone uses; their files are in lessons/material
     teaching   a teacher's edition: plans, keys, sheets, slides
     room       a class that votes
     record     widgets that answer without a kernel, for pages

@@ -4,23 +4,23 @@ from pathlib import Path
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
-from camviz.views.colour import ColourView
-from camviz.views.demosaicing import DemosaicingView
-from camviz.views.depth_of_field import DepthOfFieldView
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
-from camviz.views.fisheye import FisheyeView
 from camviz.views.frustum import FrustumView
-from camviz.views.image_sensor import ImageSensorView
-from camviz.views.intrinsics import IntrinsicsView
-from camviz.views.light_field import LightFieldView
-from camviz.views.noise import PhotonTransferView
-from camviz.views.omnidirectional import OmnidirectionalView
-from camviz.views.pinhole import PinholeView
-from camviz.views.rectification import RectificationView
-from camviz.views.sharpness import SharpnessView
-from camviz_clinic.views.calibration import CalibrationView
-from camviz_clinic.views.fault_lab import FaultLabView
+from camviz_school.views.calibration import CalibrationView
+from camviz_school.views.colour import ColourView
+from camviz_school.views.demosaicing import DemosaicingView
+from camviz_school.views.depth_of_field import DepthOfFieldView
+from camviz_school.views.fault_lab import FaultLabView
+from camviz_school.views.fisheye import FisheyeView
+from camviz_school.views.image_sensor import ImageSensorView
+from camviz_school.views.intrinsics import IntrinsicsView
+from camviz_school.views.light_field import LightFieldView
+from camviz_school.views.noise import PhotonTransferView
+from camviz_school.views.omnidirectional import OmnidirectionalView
+from camviz_school.views.pinhole import PinholeView
+from camviz_school.views.rectification import RectificationView
+from camviz_school.views.sharpness import SharpnessView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(

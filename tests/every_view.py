@@ -13,6 +13,7 @@ from calibrations import bare, pair, single
 
 import camviz.views
 import camviz_clinic.views
+import camviz_school.views
 from camviz.draw.picture import Picture
 from camviz.optics import SlantedEdge
 from camviz.sensors import Sensor
@@ -24,8 +25,11 @@ from camviz.views.measured_noise import MeasuredNoiseView
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.catalogue import VIEWS, Case
 
-SHARED = ("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras")
-"""Classes of what several views have in common; they draw nothing themselves."""
+SHARED = (
+    *("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras"),
+    *("CameraMatrix", "ErrorBars", "RefocusedField", "TurningPair"),
+)
+"""Classes of what views are made of; they draw no picture themselves."""
 
 
 def words(svg: str) -> str:
@@ -34,12 +38,10 @@ def words(svg: str) -> str:
 
 
 def classes() -> dict[str, type[View]]:
-    """Every class of view in camviz.views and camviz_clinic.views, by name."""
-    found = [
-        *pkgutil.walk_packages(camviz.views.__path__, "camviz.views."),
-        *pkgutil.walk_packages(camviz_clinic.views.__path__, "camviz_clinic.views."),
-    ]
-    modules = [importlib.import_module(each.name) for each in found]
+    """Every class of view in the packages and beside the lessons, by name."""
+    packages = (camviz.views, camviz_clinic.views, camviz_school.views)
+    found = [one for each in packages for one in pkgutil.walk_packages(each.__path__, f"{each.__name__}.")]
+    modules = [importlib.import_module(one.name) for one in found if not one.name.endswith(".exercises")]
     found = [one for module in modules for one in vars(module).values() if isclass(one) and issubclass(one, View)]
     return {one.__name__: one for one in found if one.__name__ not in SHARED}
 

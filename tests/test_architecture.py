@@ -3,8 +3,11 @@
 import ast
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
+import nbformat
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,7 +35,7 @@ LAYERS = {
     "camviz_school": (
         ("samples", "server"),
         ("course",),
-        ("room", "teaching"),
+        ("room", "teaching", "views"),
         ("record", "widgets"),
         ("commands",),
     ),
@@ -49,9 +52,16 @@ WHAT_IS_TRUE = (
 HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
 
 
+LESSONS = {path.name[:2]: path for path in sorted((ROOT / "lessons").glob("*.ipynb"))}
+BESIDE = sorted((ROOT / "lessons/material").glob("[0-9][0-9]/*.py"))
+"""What lies beside a lesson: its exercises, and the modules that a lesson imports from `camviz_school.views`."""
+
+VIEWS = {f"camviz_school.views.{path.stem}": path for path in BESIDE if path.stem != "exercises"}
+
+
 def modules() -> dict[str, Path]:
-    """Every module of the three packages by its dotted name."""
-    found = {}
+    """Every module of the three packages, and every one beside a lesson, by its dotted name."""
+    found = dict(VIEWS)
     for path in (path for package in STREET for path in (ROOT / package).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
@@ -68,14 +78,19 @@ def above(name: str) -> set[str]:
 
 
 def imported(path: Path) -> set[str]:
-    """The modules of the street that a file imports anywhere: at its top, inside functions, for its types alone, and
+    """The modules of the street that a file imports."""
+    return named(path.read_text(encoding="utf-8"))
+
+
+def named(source: str) -> set[str]:
+    """The modules of the street that code imports anywhere: at its top, inside functions, for its types alone, and
     by a string that names one, as for `import_module`."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: imports are absolute here"
+            assert node.level == 0, f"{ast.unparse(node)}: imports are absolute here"
             whole = {f"{node.module}.{alias.name}" for alias in node.names}  # of a package, its modules by name
             names |= whole & MODULES.keys() or {node.module or ""}
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -84,6 +99,34 @@ def imported(path: Path) -> set[str]:
 
 
 GRAPH = {name: imported(path) - {name, *above(name)} for name, path in MODULES.items()}
+
+
+def told(number: str) -> set[str]:
+    """The modules that a lesson imports itself, in its notebook or in the files beside it."""
+    cells = nbformat.read(LESSONS[number], 4).cells
+    lines = [line for cell in cells if cell.cell_type == "code" for line in cell.source.splitlines()]
+    notebook = "\n".join(line for line in lines if not line.lstrip().startswith(("%", "!")))
+    return named(notebook).union(*(imported(path) for path in BESIDE if path.parent.name == number))
+
+
+TOLD = {number: told(number) for number in LESSONS}
+
+
+def reached(names: Iterable[str]) -> set[str]:
+    """These modules, those that they import, those that these import, and so on."""
+    seen, left = set[str](), set(names)
+    while left:
+        seen |= left
+        left = {other for name in left for other in GRAPH[name]} - seen
+    return seen
+
+
+def of_one_lesson() -> list[str]:
+    """The modules of the packages that one lesson reaches, and nothing else."""
+    used = set().union(*GRAPH.values(), *TOLD.values())
+    shared = reached(MODULES.keys() - VIEWS.keys() - used)
+    lessons = Counter(name for names in TOLD.values() for name in reached(names))
+    return [name for name in MODULES if lessons[name] == 1 and name not in shared | VIEWS.keys()]
 
 
 def part(name: str) -> str:
@@ -153,7 +196,47 @@ def test_what_is_true_needs_nothing_that_draws(name: str) -> None:
     assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
 
 
-def test_the_lessons_material_is_read_by_the_course_alone() -> None:
-    """No module of the package imports a lesson's own: they are loaded by `camviz_school.course.material`."""
-    named = [name for name, path in MODULES.items() if "lessons.material" in path.read_text(encoding="utf-8")]
-    assert named == []
+def test_no_package_imports_what_lies_beside_a_lesson() -> None:
+    """camviz itself names it, which says where old names are."""
+    packages = {name: others for name, others in GRAPH.items() if name not in VIEWS and name != "camviz"}
+    beside = {"camviz_school.views", *VIEWS}
+    assert [f"{name} names {other}" for name, others in packages.items() for other in others & beside] == []
+
+
+def test_what_lies_beside_a_lesson_serves_that_lesson_and_no_other() -> None:
+    home = {name: path.parent.name for name, path in VIEWS.items()}
+    used = {(name, number) for number, names in TOLD.items() for name in reached(names) & VIEWS.keys()}
+    assert used == set(home.items())
+
+
+def test_few_modules_elsewhere_serve_one_lesson_alone() -> None:
+    """A module that only a lesson reaches belongs beside that lesson. Nine of the seventeen that are left are the files
+    of camviz.lightfields, which camviz offers for their own sake."""
+    assert len(of_one_lesson()) <= 17
+
+
+def test_the_modules_beside_the_lessons_are_short() -> None:
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in VIEWS.values()}
+    assert [path for path, lines in lengths.items() if lines > 400] == []
+    assert sum(lengths.values()) <= 8200
+
+
+def test_the_modules_beside_the_lessons_have_names_of_their_own() -> None:
+    """All are modules of one package, where of two with the same name only the first would be found."""
+    counts = Counter(path.stem for path in BESIDE if path.stem != "exercises")
+    assert [name for name, count in counts.items() if count > 1] == []
+
+
+def test_a_module_is_found_beside_its_lesson_without_server_room_or_quiz() -> None:
+    """What is imported to find it costs no more than the course's folder."""
+    name, path = next(iter(VIEWS.items()))
+    code = f"import sys, camviz_school.views; print(*sys.modules); import {name}; print({name}.__file__)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded, file = done.stdout.splitlines()
+    assert Path(file) == path
+    ours = {name for name in loaded.split() if name.startswith("camviz")}
+    assert ours == {
+        "camviz_school",
+        *(f"camviz_school.{one}" for one in ("course", "course.material", "views")),
+    }
+    assert "numpy" not in loaded.split()

@@ -12,8 +12,8 @@ import pytest
 from camviz.cameras import Camera, transform
 from camviz.lenses import BrownConrady
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.views.board_pictures import FREE, TRUTH
-from camviz_clinic.views.calibration import CalibrationView
+from camviz_school.views.board_pictures import FREE, TRUTH
+from camviz_school.views.calibration import CalibrationView
 
 FLAGS = {
     "f only": cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3,

@@ -15,7 +15,7 @@ from camviz_clinic.checks.virtual import healthy
 from camviz_clinic.commands.command import main
 from camviz_clinic.report.inspection import report
 from camviz_clinic.report.notebook import inspect as inspect_in_a_notebook
-from camviz_school.course.material import module
+from camviz_school.views.ward import Patient, reply
 
 DATA = Path(__file__).parent / "data"
 TOY = '''
@@ -126,9 +126,8 @@ def test_the_page_and_the_statistics_have_a_row_for_it(folder):
 
 
 def test_the_ward_knows_its_name(folder):
-    ward = module("16", "ward")
-    patient = ward.Patient("Patient 1", "", Inspection, "fold")
-    assert "portrait" in ward.reply(patient, "flu", 1).message
+    patient = Patient("Patient 1", "", Inspection, "fold")
+    assert "portrait" in reply(patient, "flu", 1).message
 
 
 def test_a_declaration_that_cannot_be_is_refused_in_words():

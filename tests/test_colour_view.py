@@ -14,8 +14,8 @@ from camviz.colour import balance, spectra
 from camviz.colour.spaces import to_srgb
 from camviz.scenes.light import to_display, to_encoded, to_linear
 from camviz.scenes.photographs import photograph
-from camviz.views.colour import LAMPS, LAYOUTS, PARTS, ColourView
 from camviz_school.course.material import module
+from camviz_school.views.colour import LAMPS, LAYOUTS, PARTS, ColourView
 
 lesson13 = module("13")
 

@@ -9,8 +9,8 @@ from camviz import mosaics
 from camviz.mosaics import BAYER, PATTERNS, XTRANS
 from camviz.scenes import to_display, to_linear
 from camviz.scenes.photographs import photograph
-from camviz.views.demosaicing import LAYOUTS, LOUPE, DemosaicingView, _everywhere, nearest_carrier
 from camviz_school.course.material import module
+from camviz_school.views.demosaicing import LAYOUTS, LOUPE, DemosaicingView, _everywhere, nearest_carrier
 
 edge_green, malvar_green = module("12").edge_green, module("12").malvar_green
 

@@ -8,9 +8,10 @@ import pytest
 
 from camviz import optics
 from camviz.scenes import aperture, to_display
-from camviz.views import lens_diagram
-from camviz.views.depth_of_field import GLOBE_M, DepthOfFieldView, _garden
-from camviz.views.lens_elements import LensElementsView
+from camviz_school.views import lens_diagram
+from camviz_school.views.depth_of_field import DepthOfFieldView
+from camviz_school.views.garland import GLOBE_M, garden_with_lamps
+from camviz_school.views.lens_elements import LensElementsView
 
 ENDS = [
     (name, value)
@@ -162,7 +163,7 @@ def test_a_fixed_exposure_dims_with_the_square_of_the_f_number():
 
 def test_the_photograph_is_the_one_that_traces_every_ray():
     view = DepthOfFieldView(f_number=1.4, focus_m=1.5)
-    exact = to_display(aperture.photograph(_garden(), view.lens, 64))
+    exact = to_display(aperture.photograph(garden_with_lamps(), view.lens, 64))
     assert cv2.PSNR(view.image(64), exact) > 34
 
 

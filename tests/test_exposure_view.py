@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camviz.views.exposure import FULL_WELL_E, ExposureView, seconds
+from camviz_school.views.exposure import FULL_WELL_E, ExposureView, seconds
 
 BASE = ExposureView(f_number=2.0, vignetting="cos⁴ and rim", metering="average")
 ENDS = [

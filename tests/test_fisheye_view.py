@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from camviz.scenes import snapshot, textured_scene
-from camviz.views.fisheye import EQUATIONS, LENSES, FisheyeView
 from camviz_school.course.exercises import exercises
+from camviz_school.views.fisheye import EQUATIONS, LENSES, FisheyeView
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from test_tiles import problems, unit_on_a_telephone
 from camviz.cameras import Camera, Intrinsics
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors import decibel, gliding, rolling_picture
-from camviz.views.image_sensor import ImageSensorView
-from camviz.views.readout import LARGE, ROWS, ReadoutView, fan
 from camviz_school.course.material import module
+from camviz_school.views.image_sensor import ImageSensorView
+from camviz_school.views.readout import LARGE, ROWS, ReadoutView, fan
 
 expected_electrons, row_time = module("14").expected_electrons, module("14").row_time
 

@@ -9,10 +9,10 @@ from scipy import ndimage
 
 from camviz.lightfields import LightField
 from camviz.scenes import to_display, to_linear
-from camviz.views import garden_field
-from camviz.views.light_field import LightFieldView
-from camviz.views.microlens_diagram import _FILM, _LENS_X, _PITCH, _PLACE, drawn
 from camviz_school.course.exercises import exercises
+from camviz_school.views import garden_field
+from camviz_school.views.light_field import LightFieldView
+from camviz_school.views.microlens_diagram import _FILM, _LENS_X, _PITCH, _PLACE, drawn
 
 GLOBE, BALL, PICTURE = (118, 48), (78, 98), (84, 33)  # columns and rows of the middle view
 

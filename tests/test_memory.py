@@ -11,15 +11,15 @@ import pytest
 from camviz.cameras import Camera, Intrinsics
 from camviz.scenes import snapshot, textured_scene
 from camviz.scenes.scene import _kept_rays
-from camviz.views import garden_field
 from camviz.views.epipolar import EpipolarView
-from camviz.views.exposure import ExposureView
 from camviz.views.frustum import FrustumView
-from camviz.views.light_field import LightFieldView
-from camviz.views.noise import PhotonTransferView
-from camviz.views.omnidirectional import OmnidirectionalView
 from camviz.widgets import explore
 from camviz.widgets.memory import give_back
+from camviz_school.views import garden_field
+from camviz_school.views.exposure import ExposureView
+from camviz_school.views.light_field import LightFieldView
+from camviz_school.views.noise import PhotonTransferView
+from camviz_school.views.omnidirectional import OmnidirectionalView
 
 PROGRAM = """
 import numpy as np, psutil

@@ -8,8 +8,8 @@ from every_view import words
 from camviz.lenses import UnifiedSphere
 from camviz.panoramas.reprojection import reproject
 from camviz.scenes import snapshot, textured_scene
-from camviz.views.omnidirectional import BLIND_DEG, OmnidirectionalView
 from camviz_school.course.exercises import exercises
+from camviz_school.views.omnidirectional import BLIND_DEG, OmnidirectionalView
 
 
 def test_the_window_shows_what_a_camera_in_its_place_would_have_seen():

@@ -9,7 +9,7 @@ from test_tiles import problems, unit_on_a_telephone
 
 from camviz import optics
 from camviz.scenes import to_linear
-from camviz.views.pinhole import PIXELS, TOWER, TOWER_M, WALL_MM, PinholeView
+from camviz_school.views.pinhole import PIXELS, TOWER, TOWER_M, WALL_MM, PinholeView
 
 ENDS = [
     (name, value)

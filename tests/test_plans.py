@@ -1,15 +1,12 @@
 """Plans by the minute: they add up, they stand at places that their lesson has, and a wrong one is refused in words."""
 
-import pkgutil
 import re
-from dataclasses import is_dataclass
-from importlib import import_module
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import pytest
+from every_view import classes
 
-from camviz import views
 from camviz_school.course import notebooks
 from camviz_school.course.material import material
 from camviz_school.teaching import markup, plans
@@ -129,12 +126,8 @@ def said(plan):
 
 def names_of_controls():
     """The names of all fields of all views that something else stands on, `hide_fold` for "hide what folds"."""
-    found = set()
-    for module in pkgutil.iter_modules(views.__path__):
-        for one in vars(import_module(f"camviz.views.{module.name}")).values():
-            if isinstance(one, type) and is_dataclass(one) and hasattr(one, "controls"):
-                found |= {name for name, control in one.controls().items() if name != control.label and "_" in name}
-    return found
+    controls = chain.from_iterable(view.controls().items() for view in classes().values())
+    return {name for name, control in controls if name != control.label and "_" in name}
 
 
 @EACH

@@ -14,11 +14,11 @@ import traitlets
 
 from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import View, choice, slider, switch
-from camviz.views.readout import ReadoutView
 from camviz.widgets import explore
 from camviz_school.record import Axis, Budget, BudgetError, Recording, Widget, record
 from camviz_school.record.packing import Images, Pack
 from camviz_school.record.panes import Explored
+from camviz_school.views.readout import ReadoutView
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 

@@ -12,8 +12,8 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw.shades import heat_map
 from camviz.lenses import BrownConrady, Equidistant, Perspective
 from camviz.scenes import snapshot, textured_scene
-from camviz.views import stereo_pair
-from camviz.views.rectification import RectificationView
+from camviz_school.views import stereo_pair
+from camviz_school.views.rectification import RectificationView
 
 VIEW = RectificationView()
 CONTROLS = RectificationView.controls()

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.views.ring import RingView
+from camviz_school.views.ring import RingView
 
 
 def test_the_numbers_are_those_of_two_lines_of_sight():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from camviz.views.frustum import FrustumView
-from camviz.views.rotation import RotationView
+from camviz_school.views.rotation import RotationView
 
 ANGLES = [(0.0, 0.0, 0.0), (30.0, 20.0, 10.0), (-170.0, 65.0, 120.0), (20.0, 90.0, -35.0), (180.0, -90.0, -180.0)]
 

@@ -14,7 +14,7 @@ from every_view import STATES, classes, figure
 from camviz.draw import svg
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.views.distortion import DistortionView
-from camviz.views.pinhole import PinholeView
+from camviz_school.views.pinhole import PinholeView
 
 SVG = "{http://www.w3.org/2000/svg}"
 LINK = "{http://www.w3.org/1999/xlink}href"

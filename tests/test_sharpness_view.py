@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camviz.optics import SlantedEdge
-from camviz.views.sharpness import FIELD_UM, SharpnessView
+from camviz_school.views.sharpness import FIELD_UM, SharpnessView
 
 BASE = SharpnessView(f_number=4.0, defocus_um=10.0)
 ENDS = [

@@ -1,7 +1,8 @@
 """Where the lessons are, and what belongs to one of them alone: `material/NN` beside the notebooks.
 
 A lesson's folder holds its `lesson.toml` (camviz_school.course.catalogue), its `questions.toml`, its `exercises.py`,
-the teacher's `plan.toml`, its own terms for the glossary in `glossary.toml`, and what else only that lesson needs.
+the teacher's `plan.toml`, its own terms for the glossary in `glossary.toml`, and the views and other modules that only
+that lesson needs, which are imported from `camviz_school.views`.
 """
 
 from __future__ import annotations
@@ -48,12 +49,12 @@ def lesson_paths(folder: Path | None = None) -> list[Path]:
 
 
 @lru_cache
-def module(lesson: str, name: str = "exercises") -> ModuleType:
-    """A Python module of a lesson's material, such as `module("16", "ward")`. Raises ValueError when it has none."""
-    path = material(lesson, f"{name}.py")
-    if not (lesson.isalnum() and name.isidentifier() and path.is_file()):
-        raise ValueError(f"there is no {name}.py in the material of lesson {lesson!r}")
-    full_name = f"camviz_lesson_{lesson}.{name}"
+def module(lesson: str) -> ModuleType:
+    """A lesson's exercises.py. Raises ValueError when it has none."""
+    path = material(lesson, "exercises.py")
+    if not (lesson.isalnum() and path.is_file()):
+        raise ValueError(f"there is no exercises.py in the material of lesson {lesson!r}")
+    full_name = f"camviz_lesson_{lesson}.exercises"
     spec = spec_from_file_location(full_name, path)
     assert spec is not None
     assert spec.loader is not None

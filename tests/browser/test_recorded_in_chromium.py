@@ -18,9 +18,9 @@ from smallest import Smallest
 from camviz.views.base import View
 from camviz.views.distortion import DistortionView
 from camviz.views.frustum import FrustumView
-from camviz.views.readout import ReadoutView
 from camviz.widgets import Explorer, explore
 from camviz_school.record import Axis, Budget, Widget, record, write_player
+from camviz_school.views.readout import ReadoutView
 
 pytestmark = pytest.mark.browser
 

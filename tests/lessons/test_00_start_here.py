@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from camviz.cameras import Intrinsics
 from camviz.colour import spaces
 from camviz.scenes import to_linear
-from camviz.views.exposure import ExposureView
 from camviz.views.frustum import FrustumView
 from camviz_school.course.glossary import term
+from camviz_school.views.exposure import ExposureView
 
 EXCEPTIONS: dict[str, str] = {}
 

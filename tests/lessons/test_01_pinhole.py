@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import jn_zeros
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.views.pinhole import PinholeView
+from camviz_school.views.pinhole import PinholeView
 
 EXCEPTIONS = {
     "found 1.9": "Rayleigh's own choice of 1891, which no formula gives exactly",

@@ -7,9 +7,9 @@ from scipy.special import jn_zeros
 
 from camviz import optics
 from camviz.scenes.photographs import photograph
-from camviz.views.depth_of_field import DepthOfFieldView
-from camviz.views.lens_elements import LensElementsView
 from camviz_school.course.material import module
+from camviz_school.views.depth_of_field import DepthOfFieldView
+from camviz_school.views.lens_elements import LensElementsView
 
 lesson02 = module("02")
 

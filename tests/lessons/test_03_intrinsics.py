@@ -7,7 +7,8 @@ import pytest
 from camviz.scenes.balloon import BALLOON, balloon_in_sight, towards_balloon
 from camviz.scenes.photographs import photograph
 from camviz.scenes.standard import textured_scene
-from camviz.views.intrinsics import GLOBE, GLOBE_RADIUS, IntrinsicsView
+from camviz_school.views.camera_matrix import GLOBE, GLOBE_RADIUS
+from camviz_school.views.intrinsics import IntrinsicsView
 
 EXCEPTIONS: dict[str, str] = {}
 

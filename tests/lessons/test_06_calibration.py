@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from camviz_clinic.views.calibration import CalibrationView
+from camviz_school.views.calibration import CalibrationView
 
 EXCEPTIONS: dict[str, str] = {}
 

@@ -7,10 +7,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
 from camviz.scenes import snapshot, textured_scene
-from camviz.views.rectification import RectificationView
 from camviz_school.course.checks import judge
 from camviz_school.course.exercises import exercise
 from camviz_school.course.material import module
+from camviz_school.views.rectification import RectificationView
 
 lesson08 = module("08")
 

@@ -14,11 +14,11 @@ from scipy.ndimage import convolve
 from camviz import mosaics
 from camviz.mosaics import BAYER, PATTERNS
 from camviz.scenes.photographs import photograph
-from camviz.views.demosaicing import DemosaicingView
 from camviz_school.course import notebooks
 from camviz_school.course.checks import judge
 from camviz_school.course.exercises import exercise
 from camviz_school.course.material import module
+from camviz_school.views.demosaicing import DemosaicingView
 
 lesson12 = module("12")
 

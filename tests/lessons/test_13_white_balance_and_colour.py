@@ -13,11 +13,11 @@ from scipy.optimize import minimize
 from camviz.colour import balance, spectra
 from camviz.colour.spaces import delta_e_2000, to_lab
 from camviz.scenes.photographs import photograph
-from camviz.views.colour import ColourView
 from camviz_school.course import notebooks
 from camviz_school.course.checks import judge
 from camviz_school.course.exercises import exercise
 from camviz_school.course.material import module
+from camviz_school.views.colour import ColourView
 
 lesson13 = module("13")
 

@@ -12,10 +12,10 @@ from scipy.stats import nbinom
 from camviz.scenes.photographs import photograph
 from camviz.sensors import PUBLISHED, SHUTTERS, Sensor, decibel, smeared, transferred
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, KAF_3200ME
-from camviz.views.image_sensor import ImageSensorView
-from camviz.views.readout import LARGE, ReadoutView, fan
 from camviz_school.course import notebooks
 from camviz_school.course.material import module
+from camviz_school.views.image_sensor import ImageSensorView
+from camviz_school.views.readout import LARGE, ReadoutView, fan
 
 lesson14 = module("14")
 

@@ -11,9 +11,9 @@ from camviz.sensors.correction import NoiseModel, merged
 from camviz.sensors.measurement import Measurement
 from camviz.sensors.readings import Level
 from camviz.sensors.statistics import pair
-from camviz.views.noise import PhotonTransferView
 from camviz_school.course import notebooks
 from camviz_school.course.material import module
+from camviz_school.views.noise import PhotonTransferView
 
 lesson15 = module("15")
 

@@ -9,8 +9,8 @@ from scipy.special import j1
 
 from camviz.optics import SlantedEdge
 from camviz.scenes import to_linear
-from camviz.views.exposure import ExposureView
-from camviz.views.sharpness import SharpnessView
+from camviz_school.views.exposure import ExposureView
+from camviz_school.views.sharpness import SharpnessView
 
 EXCEPTIONS: dict[str, str] = {
     "near 0.1 to 0.2 cycles per pixel": "where phones put the peak of their sharpening, as a rule",

@@ -16,7 +16,7 @@ from camviz_clinic.checks.virtual import healthy
 from camviz_school.course.checks import Verdict
 
 if TYPE_CHECKING:
-    from camviz_clinic.views.fault_lab import FaultLabView
+    from camviz_school.views.fault_lab import FaultLabView
 
 HEALTHY = "healthy"
 
@@ -117,7 +117,7 @@ class Patient:
 
 def anna_and_ben() -> tuple[FaultLabView, FaultLabView]:
     """Two calibrations of one camera: Anna's from sharp corners of boards held parallel, Ben's from tilted ones."""
-    from camviz_clinic.views.fault_lab import FaultLabView
+    from camviz_school.views.fault_lab import FaultLabView
 
     anna = FaultLabView(fault="parallel boards", strength=1.0, noise=0.14, seed=5, told=False)
     return anna, anna.but(strength=0.0, noise=0.39)

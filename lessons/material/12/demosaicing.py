@@ -7,16 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, ClassVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import fftshift, rfft2
 
 from camviz import mosaics
-from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -26,14 +24,14 @@ from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
 from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
 from camviz.mosaics.measures import Measures
-from camviz.scenes import render, textured_scene, to_display, to_linear
-from camviz.scenes.photographs import photograph
+from camviz.scenes import to_display
 from camviz.views.base import View, choice, slider, without
 from camviz.views.marks import circle
 from camviz.views.yours import tried
+from camviz_school.views import mosaic_steps
+from camviz_school.views.mosaic_steps import Source
 
 LOUPE = 14  # pixels across
-LARGEST = 256  # pixels of a picture's longer side
 _KEY = 62  # units right of a picture, for the key of its map
 _BESIDE = (506, {"picture": 550, "loupe": 150, "numbers": 260})
 LAYOUTS = {
@@ -44,8 +42,6 @@ LAYOUTS = {
 }
 _WORST = 60.0  # of the map of errors, in units of CIELAB
 _TICKS = [(-0.5, "−½"), (0.0, "0"), (0.5, "½")]
-
-Source = tuple[str, float] | tuple[bytes, tuple[int, ...]]
 
 
 @dataclass(frozen=True)
@@ -110,22 +106,22 @@ class DemosaicingView(View):
     @cached_property
     def truth(self) -> NDArray[np.uint8]:
         """The picture, not blurred, as sRGB bytes (height, width, 3)."""
-        return _shown(self.source)
+        return mosaic_steps.shown(self.source)
 
     @cached_property
     def measured(self) -> Array:
         """The mosaic (height, width), linear."""
-        return _measured(self.source, self.filters, self.spots_px)
+        return mosaic_steps.measured(self.source, self.filters, self.spots_px)
 
     @cached_property
     def rebuilt(self) -> NDArray[np.uint8]:
         """The demosaiced picture, as sRGB bytes (height, width, 3)."""
-        return _rebuilt(self.source, self.filters, self.spots_px, self.used)
+        return mosaic_steps.rebuilt(self.source, self.filters, self.spots_px, self.used)
 
     @cached_property
     def measures(self) -> Measures:
         """How far it is from the picture."""
-        return _compared(self.source, self.filters, self.spots_px, self.used)
+        return mosaic_steps.compared(self.source, self.filters, self.spots_px, self.used)
 
     @cached_property
     def your_picture(self) -> tuple[NDArray[np.uint8] | None, str]:
@@ -295,7 +291,7 @@ class DemosaicingView(View):
 
     def _spectrum_panel(self, photographs: dict[str, bytes]) -> str:
         panel = plot.plot_panel("spectrum", 772, 232, 148, 148, (-0.5, 0.5), (0.5, -0.5))
-        photographs["spectrum"] = jpeg(_spectrum(self.source, self.filters, self.spots_px))
+        photographs["spectrum"] = jpeg(mosaic_steps.spectrum(self.source, self.filters, self.spots_px))
         places = _everywhere(self.filters, 0.5)
         content = svg.image("spectrum", 0, 0, panel.width, panel.height) + _rings(panel.place(places), 9)
         axes = plot.axes(panel, "fu [cycles/px]", "fv [cycles/px]", _TICKS, _TICKS)
@@ -370,63 +366,3 @@ def _place(carrier: Carrier) -> str:
         )
         words.append(("−" if frequency < 0 else "") + name)
     return f"({', '.join(words)})"
-
-
-# Each step of the chain, kept for as long as nothing before it changes -----------------------------------------------
-
-
-@lru_cache(maxsize=2)
-def _light(source: Source) -> NDArray:
-    """The picture in linear light (height, width, 3)."""
-    name, given = source
-    if isinstance(name, bytes):
-        return _reduced(np.frombuffer(name, np.uint8).reshape(given), LARGEST)  # type: ignore[arg-type]
-    if name == "zone plate":
-        return mosaics.zone_plate(256, float(given))  # type: ignore[arg-type]
-    return _reduced(photograph("astronaut"), 256) if name == "astronaut" else _garden()
-
-
-def _reduced(picture: NDArray[np.uint8], largest: int) -> NDArray[np.float32]:
-    """Light averaged over areas, so that what another camera interpolated is mostly gone."""
-    light = to_linear(picture).astype(np.float32)
-    scale = largest / max(light.shape[:2])
-    return cv2.resize(light, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else light
-
-
-@lru_cache(maxsize=1)
-def _garden() -> NDArray:
-    camera = Camera(Intrinsics.from_fov(256, 256, 40))
-    return np.clip(render(textured_scene(), camera, supersample=3), 0, 1)
-
-
-@lru_cache(maxsize=2)
-def _shown(source: Source) -> NDArray[np.uint8]:
-    return to_display(_light(source))
-
-
-@lru_cache(maxsize=2)
-def _measured(source: Source, pattern: Pattern, spots_px: float) -> Array:
-    return mosaics.mosaic(mosaics.low_pass(_light(source), spots_px), pattern)
-
-
-@lru_cache(maxsize=2)
-def _rebuilt(source: Source, pattern: Pattern, spots_px: float, algorithm: str) -> NDArray[np.uint8]:
-    return to_display(mosaics.demosaic(_measured(source, pattern, spots_px), pattern, algorithm))
-
-
-@lru_cache(maxsize=2)
-def _compared(source: Source, pattern: Pattern, spots_px: float, algorithm: str) -> Measures:
-    return mosaics.compare(_rebuilt(source, pattern, spots_px, algorithm), _shown(source))
-
-
-@lru_cache(maxsize=2)
-def _spectrum(source: Source, pattern: Pattern, spots_px: float) -> NDArray[np.uint8]:
-    """The mosaic's spectrum as a grey picture, by logarithm: −½ … ½ cycles/pixel each way, zero in the middle."""
-    values = _measured(source, pattern, spots_px).astype(np.float32)
-    values = values - values.mean()
-    height, width = values.shape
-    values *= np.outer(np.hanning(height), np.hanning(width)).astype(np.float32)
-    half = fftshift(np.abs(rfft2(values)), axes=0)
-    small = cv2.resize(half, (66, 132), interpolation=cv2.INTER_AREA)
-    level = np.log10(np.maximum(np.hstack([small[::-1, :0:-1], small]), 1e-6))
-    return np.clip(255 * (level - level.max() + 3) / 3, 0, 255).astype(np.uint8)

@@ -17,24 +17,21 @@ from camviz.draw import svg
 from camviz.draw.flow import rows, shortened
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
-from camviz.draw.readout import listed, signed, true_minus
+from camviz.draw.readout import listed, signed
 from camviz.draw.space import Item, Label, OrbitCamera, camera_body, space_panel
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import Drawn, OrbitView
-from camviz_clinic.views.board_pictures import FREE, INTRINSICS, BoardPictures, middle_of, transform_each
 from camviz_clinic.views.chessboard import outline, rim, squares
-from camviz_clinic.views.one_board import FromEach, from_each, panel_of_each
+from camviz_school.views.board_pictures import FREE, INTRINSICS, middle_of, transform_each
+from camviz_school.views.error_bars import NOTHING, PIXELS, ErrorBars, number
+from camviz_school.views.one_board import FromEach, from_each, panel_of_each
 
 _MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 _CELLS = (16, 12)  # of the coverage map
-_LONGEST = 225  # units, of a bar
 _REACH = 300.0  # pixels at the ends of the strip
-_LOW, _HIGH = 0.05, 50.0  # pixels at the ends of the bars
 _NORMAL = 0.07  # metres, the length of the handle that tilts a board
-_PIXELS = ("fx", "fy", "cx", "cy")
-_NOTHING = "No board is seen: nothing to estimate from"
 _EVERYTHING = "picture space estimate errors"
 _LAYOUTS = {
     "picture fit": shortened(rows((464, {"picture": 620, "estimate": 340})), estimate=350),
@@ -49,11 +46,10 @@ _LAYOUTS = {
 }
 _ROW = 22  # units, from one estimate to the next
 _STRIP = Panel("estimates", 356, 428, 254, _ROW * len(INTRINSICS), -1, 1, 0, len(INTRINSICS))
-_ERRORS = 630  # where they begin
 
 
 @dataclass(frozen=True)
-class CalibrationView(OrbitView, BoardPictures):
+class CalibrationView(OrbitView, ErrorBars):
     """Corners and their residuals, the boards in space, the estimate ± σ against the truth, and two kinds of error.
 
     `panels` says what is drawn: everything; "picture fit", the corners with the estimate and its RMS error alone; or
@@ -106,8 +102,8 @@ class CalibrationView(OrbitView, BoardPictures):
 
     def _written(self, name: str) -> str:
         value, sigma = self.estimates[name]
-        true = f" (true {_number(name, self.true[name])})" if self.truth else ""
-        return f"{_number(name, value)} ± {_spread(name, sigma)}{true}"
+        true = f" (true {number(name, self.true[name])})" if self.truth else ""
+        return f"{number(name, value)} ± {_spread(name, sigma)}{true}"
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -254,22 +250,14 @@ class CalibrationView(OrbitView, BoardPictures):
         parts += [svg.text((at, 54), words, "note end") for at, words in zip(x, heads, strict=True)]
         for row, name in enumerate(FREE[self.free] if self.estimates else ()):
             y = 80 + 24 * row
-            true = _number(name, self.true[name]) if self.truth else ""
-            words = (true, _number(name, self.estimates[name][0]))
+            true = number(name, self.true[name]) if self.truth else ""
+            words = (true, number(name, self.estimates[name][0]))
             parts.append(svg.text((x[0], y), name, "number"))
             parts += [svg.text((at, y), one, "number end") for at, one in zip(x[1:], words, strict=True)]
         if self.adjustment is None:
-            return "".join(parts) + svg.paragraph((x[0], 80), _NOTHING, 300, "label")
+            return "".join(parts) + svg.paragraph((x[0], 80), NOTHING, 300, "label")
         return "".join(parts) + self._bar(
             x[0], 80 + 24 * len(FREE[self.free]) + 20, "RMS error of all its corners", self.adjustment.rms, "fill-blue"
-        )
-
-    def _bar(self, x: float, y: float, words: str, value: float, class_: str) -> str:
-        """An error in pixels as a bar, with its name above it and its number at its end."""
-        return (
-            svg.text((x, y + 10), words, "note halo")
-            + svg.rectangle(x, y + 16, _LONGEST * _share(value), 14, class_, rx=2)
-            + svg.text((x + 6 + _LONGEST * _share(value), y + 28), f"{_digits(value)} px", "number halo")
         )
 
     def _estimates(self) -> str:
@@ -284,8 +272,8 @@ class CalibrationView(OrbitView, BoardPictures):
             class_ = "number" if free else "number fill-muted"
             parts.append(svg.text((x[0], y), name, class_))
             words = (
-                _number(name, self.true[name]) if self.truth else "",
-                _number(name, value) if np.isfinite(value) else "",
+                number(name, self.true[name]) if self.truth else "",
+                number(name, value) if np.isfinite(value) else "",
                 _spread(name, sigma) if free else "held",
             )
             parts += [svg.text((at, y), one, f"{class_} end") for at, one in zip(x[1:], words, strict=True)]
@@ -336,64 +324,9 @@ class CalibrationView(OrbitView, BoardPictures):
         at = camera.intrinsics.from_pixels((-0.5, -0.5))
         ray = camera.lens.unproject(at)
         ideal = ray[:2] / ray[2] if np.isfinite(ray).all() else at  # the corner may lie beyond a fold
-        moved = {name: BrownConrady(**{name: 1.0}).distort(ideal) - ideal for name in INTRINSICS if name not in _PIXELS}
+        moved = {name: BrownConrady(**{name: 1.0}).distort(ideal) - ideal for name in INTRINSICS if name not in PIXELS}
         scaled = {name: float(camera.intrinsics.fx * np.linalg.norm(shift)) for name, shift in moved.items()}
-        return dict.fromkeys(_PIXELS, 1.0) | scaled
-
-    # The errors ------------------------------------------------------------------------------------------------------
-
-    def _errors(self) -> str:
-        if self.adjustment is None:
-            return svg.paragraph((_ERRORS, 402), _NOTHING, 320, "label")
-        bars = [("on the boards it was fitted to", self.adjustment.rms, "fill-blue")]
-        bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
-        parts = [svg.text((_ERRORS, 402), "Two kinds of error", "title")]
-        parts += [self._bar(_ERRORS, 412 + 48 * i, *bar) for i, bar in enumerate(bars)]
-        return self._noise_mark() + "".join(parts) + self._per_board() + self._facts()
-
-    def _noise_mark(self) -> str:
-        """What the noise alone would leave: √2 times its standard deviation in u and v."""
-        if self.seen is not None or self.noise < _LOW:
-            return ""
-        x = _ERRORS + _LONGEST * _share(np.sqrt(2) * self.noise)
-        return svg.segments([(x, 426), (x, 474)], [(x, 444), (x, 492)], "ink") + svg.text(
-            (x, 508), "noise alone", "tick middle"
-        )
-
-    def _per_board(self) -> str:
-        errors = self.per_board
-        top = max(np.nanmax(errors, initial=0), 1e-9)
-        step = min(26.0, 320 / len(errors))
-        parts = [svg.text((_ERRORS, 534), "RMS of each board", "note")]
-        for i, error in enumerate(errors):
-            x, picked = _ERRORS + step * i, i == self.index
-            if np.isfinite(error):
-                height = 42 * error / top
-                class_ = "fill-orange" if picked else "fill-blue" if self.used[i] else "fill-muted"
-                parts.append(svg.rectangle(x, 586 - height, 0.72 * step, height, class_))
-            parts.append(
-                svg.text((x + 0.36 * step, 602), str(i + 1), "tick middle orange" if picked else "tick middle")
-            )
-        chosen = errors[self.index]
-        if np.isfinite(chosen):
-            parts.append(svg.text((950, 534), f"board {self.index + 1}: {_digits(chosen)} px", "note end"))
-        return "".join(parts)
-
-    def levers(self) -> list[str]:
-        """fx over the picked board's distance Z, which is all that a board held flat shows: true and estimated."""
-        rows = [("true", self.truth, self.cam_from_board)] if self.truth else []
-        rows += [("found", self.camera, self.estimated_poses)] if self.camera else []
-        return [f"{name:6}{self._lever(camera, poses)}" for name, camera, poses in rows]
-
-    def _lever(self, camera: Camera, poses: RigidTransform) -> str:
-        f, z = camera.intrinsics.fx, transform(poses[self.index], middle_of(self.board))[2]
-        return f"{_number('fx', f)} / {z:.3f} m = {f / z:.0f}"
-
-    def _facts(self) -> str:
-        lines = [svg.text((_ERRORS, 640 + 19 * i), words, "number") for i, words in enumerate(self.levers())]
-        words = f"correlation of fx with Z: {signed(self.correlation, 4)}"
-        title = svg.text((_ERRORS, 622), f"fx / Z of board {self.index + 1}, px/m", "note")
-        return title + "".join(lines) + svg.text((_ERRORS, 680), words if self.used[self.index] else "", "note")
+        return dict.fromkeys(PIXELS, 1.0) | scaled
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
@@ -430,21 +363,8 @@ def _squeezed(pixels: np.ndarray | float) -> np.ndarray:
     return np.clip(np.arcsinh(2 * np.asarray(pixels)) / np.arcsinh(2 * _REACH), -1.1, 1.1)
 
 
-def _share(pixels: float) -> float:
-    """0 … 1 for pixels from _LOW to _HIGH, on a logarithmic scale."""
-    return float(np.clip(np.log(max(pixels, 1e-9) / _LOW) / np.log(_HIGH / _LOW), 0.01, 1))
-
-
-def _number(name: str, value: float) -> str:
-    return true_minus(f"{value:.1f}" if name in _PIXELS else f"{value:.4f}")
-
-
 def _spread(name: str, sigma: float) -> str:
     """Two significant digits, as metrology asks (GUM, 7.2.6): where little is known, rounding decides the third."""
-    if sigma >= (1e4 if name in _PIXELS else 1e3):
+    if sigma >= (1e4 if name in PIXELS else 1e3):
         return "unknown"
-    return f"{sigma:.4f}" if name not in _PIXELS and sigma < 1 else f"{float(f'{sigma:.2g}'):g}"
-
-
-def _digits(value: float) -> str:
-    return f"{value:.3f}" if value < 1 else f"{value:.3g}"
+    return f"{sigma:.4f}" if name not in PIXELS and sigma < 1 else f"{float(f'{sigma:.2g}'):g}"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import degrees, isfinite
 from typing import Any, ClassVar, Self
 
@@ -26,17 +26,14 @@ from camviz.lenses import Lens, UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.panoramas.cubemap import cubemap_camera
 from camviz.panoramas.mirrors import Catadioptric, MirrorLens, direction_error, miss
-from camviz.panoramas.mirrors import photograph as photographed
-from camviz.panoramas.reprojection import equirectangular_camera, reproject, window
-from camviz.poses import RigidTransform, Rotation
-from camviz.scenes import textured_scene, to_display
+from camviz.panoramas.reprojection import equirectangular_camera, window
 from camviz.views import garden
 from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
-from camviz.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
+from camviz_school.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
+from camviz_school.views.mirror_photographs import UP, resampled, traced
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
-UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))
 _DRAFT, _FINE = 160, 480  # pixels across the doughnut
 _COUNTED = 400  # pixels across the picture whose focal length is told
 _OF_THE_WINDOW = {"yaw_deg", "pitch_deg", "hfov_deg", "unroll", "model", "eye"}  # the mirror stands still
@@ -201,7 +198,7 @@ class OmnidirectionalView(OrbitView):
         if draft or self.central:
             picture = garden.glimpse(camera) if draft else garden.taken(camera, side)[0].copy()
         else:
-            picture = _traced(self.rig, side).copy()
+            picture = traced(self.rig, side).copy()
         rim, blind = (side / 2 * self._share(angle) for angle in (self.rim_angle_deg, BLIND_DEG))
         y, x = np.ogrid[:side, :side]
         r2 = (x - (side - 1) / 2) ** 2 + (y - (side - 1) / 2) ** 2
@@ -224,12 +221,12 @@ class OmnidirectionalView(OrbitView):
             parts["space"], attached = self._space_panel(picture, draft)
             photographs |= attached
         if self._has("window"):
-            photographs["window"] = jpeg(_resampled(picture, camera, self._seen(draft), draft))
+            photographs["window"] = jpeg(resampled(picture, camera, self._seen(draft), draft))
             parts["window"] = self._window_panel()
         if self._has("section"):
             parts["section"] = self._section_panel()
         if self._has("unrolled"):
-            photographs["unrolled"] = jpeg(_resampled(picture, camera, self._unrolled(draft), draft))
+            photographs["unrolled"] = jpeg(resampled(picture, camera, self._unrolled(draft), draft))
             parts["unrolled"] = self._unrolled_panel()
         if self._has("yours"):
             parts["yours"], attached = self._your_panel(picture, draft)
@@ -394,13 +391,3 @@ class OmnidirectionalView(OrbitView):
     def _looking(self, yaw_deg: float, pitch_deg: float) -> Self:
         yaw = (yaw_deg + 180) % 360 - 180
         return self.but(yaw_deg=round(float(yaw), 1), pitch_deg=round(float(min(30, max(-70, pitch_deg))), 1))
-
-
-def _resampled(picture: np.ndarray, source: Camera, target: Camera, draft: bool) -> np.ndarray:
-    return np.asarray(reproject(picture, source, target, antialias=not draft), dtype=np.uint8)
-
-
-@lru_cache(maxsize=2)
-def _traced(rig: Catadioptric, side: int) -> np.ndarray:
-    """The garden in the mirror (side, side, 3), every ray followed from where it leaves the mirror."""
-    return to_display(photographed(textured_scene(), rig, picture_pixels(side, rig.rim()), UP))

@@ -24,9 +24,9 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
-from camviz.views import swatches
 from camviz.views.base import Control, View, answered, choice, one_of, slider, switch, without
 from camviz.views.yours import tried
+from camviz_school.views import swatches
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
 _CHART = (334, {"chart": 410, "photograph": 330, "numbers": 220})

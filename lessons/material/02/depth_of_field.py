@@ -20,19 +20,17 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, band, curve, legend, logarithmic, logarithmic_grid, logs, plot_panel, upright
 from camviz.draw.readout import listed, readout
 from camviz.poses import RigidTransform
-from camviz.scenes import Rectangle, Scene, Texture, parallax, textured_scene, to_display
+from camviz.scenes import parallax, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera
-from camviz.views import lens_diagram
 from camviz.views.base import View, choice, positive, slider, step_of, switch
 from camviz.views.yours import tried
+from camviz_school.views import lens_diagram
+from camviz_school.views.garland import GLOBE_M, GLOBE_Z, STAND, garden_with_lamps
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = (0.25, 8, 24), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most
 SHOWN = 64  # points in the picture of the aperture
 _NEAREST_M = 1.0  # of what is in the picture, in most states
-GLOBE_Z = 3.3  # of the globe in the world, towards which the camera looks along +z
-STAND = (0.58, 0.45)  # x and y of the camera
-GLOBE_M = 0.54  # the globe's diameter
 LIGHT_N = 4.0  # the f-number for which a fixed exposure is right
 _LAYOUTS = {
     "rays photograph blur": rows(
@@ -208,7 +206,7 @@ class DepthOfFieldView(View):
         It is traced through `samples` points of the lens, at first as many as the blur needs.
         """
         samples = samples or self.samples_for(*(DRAFT if rough else FINE))
-        light = parallax.photograph(_garden(), self.lens, samples, rough=rough)
+        light = parallax.photograph(garden_with_lamps(), self.lens, samples, rough=rough)
         share = self.lens.points(samples)[1].mean()
         return to_display(light * np.float32(self.brightness / share))
 
@@ -374,17 +372,6 @@ class DepthOfFieldView(View):
 def _photographed(view: DepthOfFieldView, rough: bool) -> bytes:
     """The view's photograph as JPEG, which no reader's function changes."""
     return jpeg(view.image(rough=rough))
-
-
-@lru_cache(maxsize=1)
-def _garden() -> Scene:
-    """The garden with a garland of lamps before its wall: points of light, which show the aperture's shape."""
-    garden, glow, side = textured_scene(), Texture.plain((1.0, 0.9, 0.72)), 0.036
-    lights = [
-        Rectangle(np.array([x, y, 6.3]), np.array([side, 0, 0]), np.array([0, side, 0]), glow, shade=20, name="garland")
-        for x, y in zip(np.linspace(-1.5, 0.94, 6), [-0.62, -0.72, -0.86, -0.74, -0.7, -0.84], strict=True)
-    ]
-    return Scene([*lights, *garden.surfaces], garden.sky)
 
 
 def _log10(values: np.ndarray) -> np.ndarray:
