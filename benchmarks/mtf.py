@@ -16,7 +16,7 @@ sys.path.append(str(Path(__file__).parent.parent / "tests"))
 
 from test_slanted_edge import photograph, true_mtf50
 
-from camviz.optics import SlantedEdge
+from camviz_clinic.measuring.sharpness import SlantedEdge
 
 EDGES = [
     ("pixel", 0.0),

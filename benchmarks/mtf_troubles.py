@@ -21,9 +21,9 @@ sys.path.append(str(Path(__file__).parent.parent / "tests"))
 
 from test_slanted_edge import second_antiderivative, true_mtf50
 
-from camviz.optics import SlantedEdge
 from camviz.scenes import to_encoded
 from camviz_clinic.commands.mtf import ends_of_scale, linear_light
+from camviz_clinic.measuring.sharpness import SlantedEdge
 
 EACH = 400
 FALSE_ERRORS, FALSE_SHARE = 3.0, 0.03

@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 
 from camviz.sensors import Sensor
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
-from camviz.sensors.recording import measure, read_recording
 from camviz.views.noise import PhotonTransferView
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.measuring.noise.recording import measure, read_recording
 
 SENSOR = Sensor(prnu=0.01, dsnu_e=5, dark_current_e_per_s=100)
 EXPOSURES_S = np.linspace(0.02, 1, 50)

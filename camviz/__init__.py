@@ -18,6 +18,7 @@ The names below are imported when they are first used, so that `import camviz` c
 """
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -53,18 +54,30 @@ _PARTS = (
 __all__ = ["Camera", "Intrinsics", "Rig", "__version__", "explore", "look_at", *_PARTS]
 
 
-_MOVED = {
-    "camviz_clinic": "Calibration calibration clinic commands files inspect load meshes plots report",
-    "camviz_school": "course join record room samples server teaching",
-}
-"""What stood in camviz before it became three packages."""
+_MOVED = (
+    ("", "camviz_clinic", "Calibration calibration clinic:checks commands files inspect load meshes plots report"),
+    ("", "camviz_school", "course join record room samples server teaching"),
+    ("optics.", "camviz_clinic.measuring.sharpness", "SlantedEdge slanted_edge edge_error edge_line edge_profile"),
+    (
+        "optics.",
+        "camviz_clinic.measuring.sharpness",
+        "edge_refusal edge_rows edge_sides",
+    ),
+    ("sensors.", "camviz_clinic.measuring.noise", "Level Measurement Recording RecordingError measure read_recording"),
+    ("sensors.", "camviz_clinic.measuring.noise", "checks ends estimate estimates hidden measurement neighbours"),
+    ("sensors.", "camviz_clinic.measuring.noise", "readings recording scale transfer trust"),
+    ("views.", "camviz_clinic.views", "measured_edge measured_noise"),
+)
+"""What stood in camviz once: in which part, where it is now, and its names; `old:new` where that is another one."""
 
 
 def _where(name: str) -> str:
-    """Where a name that has moved stands now; empty for every other."""
-    new = {"clinic": "checks"}.get(name, name)
-    homes = [home for home, names in _MOVED.items() if name in names.split()]
-    return f"camviz.{name} is now {homes[0]}.{new}" if homes else ""
+    """Where a name that has moved, such as "load" or "optics.SlantedEdge", stands now; empty for every other."""
+    for part, home, names in _MOVED:
+        for old, _, new in (each.partition(":") for each in names.split()):
+            if part + old == name:
+                return f"camviz.{name} is now {home}.{new or old}"
+    return ""
 
 
 class _Moved:
@@ -73,11 +86,20 @@ class _Moved:
     @staticmethod
     def find_spec(name: str, path: Any = None, target: Any = None) -> None:
         house, _, rest = name.partition(".")
-        if house == "camviz" and (where := _where(rest.partition(".")[0])):
+        if house == "camviz" and (where := _where(rest)):
             raise ImportError(where)
 
 
 sys.meta_path.append(_Moved)
+
+
+def _answering(part: str) -> Callable[[str], Any]:
+    """The `__getattr__` of a part from which names have moved."""
+
+    def answer(name: str) -> Any:
+        raise AttributeError(_where(f"{part}.{name}") or f"module 'camviz.{part}' has no attribute {name!r}")
+
+    return answer
 
 
 def __getattr__(name: str) -> Any:

@@ -22,7 +22,7 @@ LAYERS = {
         ("widgets",),
     ),
     "camviz_clinic": (
-        ("calibration",),
+        ("calibration", "measuring"),
         ("files",),
         ("checks",),
         ("views",),
@@ -42,7 +42,7 @@ LAYERS = {
 WHAT_IS_TRUE = (
     *("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics"),
     *("optics", "panoramas", "poses", "scenes", "sensors", "twoview"),
-    *("calibration", "checks", "files", "samples"),
+    *("calibration", "checks", "files", "measuring", "samples"),
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
 

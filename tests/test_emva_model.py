@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from odd_cameras import BY_GAIN, ODD, ORDINARY, PRNU, Kind, against, asked, faults, frames, ordinary, shooting
 
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.neighbours import LAGS, Shading, shared_by_neighbours
-from camviz.sensors.statistics import pair, stack
-from camviz.sensors.trust import judged
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.neighbours import LAGS, Shading, shared_by_neighbours
+from camviz_clinic.measuring.noise.statistics import pair, stack
+from camviz_clinic.measuring.noise.trust import judged
 
 SIZE = (64, 96)
 REASONS = {

@@ -15,10 +15,10 @@ import pytest
 from commandline import refused
 from test_slanted_edge import photograph, second_antiderivative, true_mtf50
 
-from camviz.optics.edge_refusal import MOST_ANGLE_DEG, MOST_CLIPPED
-from camviz.optics.slanted_edge import SlantedEdge
 from camviz.scenes import to_encoded
 from camviz_clinic.commands.mtf import ends_of_scale, figures, linear_light
+from camviz_clinic.measuring.sharpness.edge_refusal import MOST_ANGLE_DEG, MOST_CLIPPED
+from camviz_clinic.measuring.sharpness.slanted_edge import SlantedEdge
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 

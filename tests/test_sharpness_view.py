@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from camviz.optics import SlantedEdge
 from camviz.views.sharpness import FIELD_UM, SharpnessView
+from camviz_clinic.measuring.sharpness import SlantedEdge
 
 BASE = SharpnessView(f_number=4.0, defocus_um=10.0)
 ENDS = [

@@ -7,10 +7,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import j1
 
-from camviz.optics import SlantedEdge
 from camviz.scenes import to_linear
 from camviz.views.exposure import ExposureView
 from camviz.views.sharpness import SharpnessView
+from camviz_clinic.measuring.sharpness import SlantedEdge
 
 EXCEPTIONS: dict[str, str] = {
     "near 0.1 to 0.2 cycles per pixel": "where phones put the peak of their sharpening, as a rule",

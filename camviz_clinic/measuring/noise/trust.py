@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isfinite, log10, nan
 
-from camviz.sensors.estimate import CERTAIN, PROMISE, UNKNOWN, Estimate, of
-from camviz.sensors.estimates import Estimates
-from camviz.sensors.hidden import QUANTISED
+from camviz_clinic.measuring.noise.estimate import CERTAIN, PROMISE, UNKNOWN, Estimate, of
+from camviz_clinic.measuring.noise.estimates import Estimates
+from camviz_clinic.measuring.noise.hidden import QUANTISED
 
 DECIBELS = 0.26  # 20 log10 of 1.03
 PATTERN = 0.05

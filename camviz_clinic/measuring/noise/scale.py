@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
-from camviz.sensors.ends import Ends
-from camviz.sensors.estimate import Estimate
-from camviz.sensors.hidden import (
+from camviz_clinic.measuring.noise.ends import Ends
+from camviz_clinic.measuring.noise.estimate import Estimate
+from camviz_clinic.measuring.noise.hidden import (
     ROUNDING,
     before_rounding,
     clipped_bias,
@@ -20,7 +20,7 @@ from camviz.sensors.hidden import (
     missed_beyond,
     rounding_bias,
 )
-from camviz.sensors.statistics import Pair, Part, Stack
+from camviz_clinic.measuring.noise.statistics import Pair, Part, Stack
 
 CLIPPED = 0.005  # of the pixels at an end of the scale: beyond this share a level is left out of the fits
 MISSED = 20.0  # values: with a mean of so many, none is seen beyond an end once in 5e8 times

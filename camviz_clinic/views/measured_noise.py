@@ -13,10 +13,10 @@ from camviz.draw.flow import rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import LINEAR
-from camviz.sensors.trust import Figure
 from camviz.views.base import View
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import LINEAR
+from camviz_clinic.measuring.noise.trust import Figure
 
 _WIDTH, _HEIGHT = 390, 212
 _LAYOUT = rows((296, {"photon transfer": 480, "response": 480}), (296, {"signal to noise": 480, "darkness": 480}))

@@ -14,9 +14,9 @@ from camviz.draw.flow import rows
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed
-from camviz.optics import SlantedEdge
 from camviz.scenes import to_display
 from camviz.views.base import View
+from camviz_clinic.measuring.sharpness import SlantedEdge
 
 _WORDS = {
     "mtf50_cycles_per_pixel": ("MTF50", "{:.3f} cycles/pixel"),

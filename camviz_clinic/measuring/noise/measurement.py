@@ -13,13 +13,14 @@ from math import nan, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.sensors.checks import Checks
-from camviz.sensors.estimates import Estimates, threshold
-from camviz.sensors.hidden import QUANTISED, ROUNDING
-from camviz.sensors.readings import Readings
-from camviz.sensors.statistics import straight_line
-from camviz.sensors.transfer import Transfer
-from camviz.sensors.trust import Figure, judged
+from camviz.sensors.correction import NoiseModel
+from camviz_clinic.measuring.noise.checks import Checks
+from camviz_clinic.measuring.noise.estimates import Estimates, threshold
+from camviz_clinic.measuring.noise.hidden import QUANTISED, ROUNDING
+from camviz_clinic.measuring.noise.readings import Readings
+from camviz_clinic.measuring.noise.statistics import straight_line
+from camviz_clinic.measuring.noise.transfer import Transfer
+from camviz_clinic.measuring.noise.trust import Figure, judged
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,7 @@ class Measurement(Readings):
 
     Frames of a simulated sensor give its gain and efficiency back:
 
+    >>> from camviz.sensors import Sensor
     >>> sensor, rng = Sensor(quantum_efficiency=0.5, gain_dn_per_e=0.4), np.random.default_rng(0)
     >>> frames = lambda photons: [sensor.expose(np.full((99, 99), photons), 0.01, 20, rng).dn for _ in range(2)]
     >>> found = Measurement(tuple(Level.of(0.01, frames(n), frames(0), n) for n in range(2000, 20000, 2000)))
@@ -166,6 +168,16 @@ class Measurement(Readings):
     def dynamic_range(self) -> float:
         """μ_p.sat / μ_p.min, which is μ_e.sat / μ_e.min."""
         return self.full_well_e / self.threshold_e
+
+    def noise_model(self) -> NoiseModel:
+        """The noise of one pixel as these frames tell it; noise that they cannot tell is taken as 0.
+
+        Returns: NoiseModel, which says what averaging, dark frames and flat fields leave.
+        """
+        saturation = self.levels[self.peak].bright.mean if self.saturated else np.inf
+        patterns = np.nan_to_num([self.prnu, self.dsnu_e]).tolist()
+        noise = self.dark_noise_dn / self.gain_dn_per_e
+        return NoiseModel(self.gain_dn_per_e, noise, self.levels[0].dark.mean, saturation, *patterns)
 
     # Patterns that stay -----------------------------------------------------------------------------------------------
 

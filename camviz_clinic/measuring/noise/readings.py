@@ -13,7 +13,7 @@ from math import hypot, nan, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.sensors.statistics import Pair, Stack, pair
+from camviz_clinic.measuring.noise.statistics import Pair, Stack, pair
 
 Array = NDArray[np.float64]
 

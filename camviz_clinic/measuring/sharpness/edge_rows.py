@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from camviz.lenses.base import Array
-from camviz.optics.edge_profile import Profile
-from camviz.optics.edge_sides import Sides
+from camviz_clinic.measuring.sharpness.edge_profile import Profile
+from camviz_clinic.measuring.sharpness.edge_sides import Sides
 
 FINEST = 0.25  # pixels between the knots of the profile that rows are held against
 OUTLIER = 4.0  # standard deviations: rows further off do not move the line

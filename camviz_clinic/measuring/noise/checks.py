@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from camviz.sensors.estimate import CERTAIN, PROMISE, Estimate, combined, of
-from camviz.sensors.hidden import QUANTISED
-from camviz.sensors.neighbours import BY_CHANCE, LAGS, Shading
-from camviz.sensors.readings import SURELY
-from camviz.sensors.scale import CLIPPED
-from camviz.sensors.statistics import Pair
-from camviz.sensors.transfer import Transfer, ratio
+from camviz_clinic.measuring.noise.estimate import CERTAIN, PROMISE, Estimate, combined, of
+from camviz_clinic.measuring.noise.hidden import QUANTISED
+from camviz_clinic.measuring.noise.neighbours import BY_CHANCE, LAGS, Shading
+from camviz_clinic.measuring.noise.readings import SURELY
+from camviz_clinic.measuring.noise.scale import CLIPPED
+from camviz_clinic.measuring.noise.statistics import Pair
+from camviz_clinic.measuring.noise.transfer import Transfer, ratio
 
 Array = NDArray[np.float64]
 

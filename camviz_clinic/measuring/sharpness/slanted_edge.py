@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array
-from camviz.optics.edge_error import EdgeError
-from camviz.optics.edge_line import normal_angle, rough_edge
-from camviz.optics.edge_profile import Profile
-from camviz.optics.edge_refusal import LEAST_RISES, refuse_what_spoils
-from camviz.optics.edge_rows import row_shifts, straight
-from camviz.optics.edge_sides import Sides, Strip
+from camviz_clinic.measuring.sharpness.edge_error import EdgeError
+from camviz_clinic.measuring.sharpness.edge_line import normal_angle, rough_edge
+from camviz_clinic.measuring.sharpness.edge_profile import Profile
+from camviz_clinic.measuring.sharpness.edge_refusal import LEAST_RISES, refuse_what_spoils
+from camviz_clinic.measuring.sharpness.edge_rows import row_shifts, straight
+from camviz_clinic.measuring.sharpness.edge_sides import Sides, Strip
 
 OVERSAMPLING = 8  # strips a pixel
 RISES = 2.5  # times the distance from 10 to 90 % of the edge: what counts as the edge, on either side

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
-from camviz.sensors.statistics import Pair, Stack, pair, stack
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.measuring.noise.statistics import Pair, Stack, pair, stack
 
 Frame = NDArray[Any]
 
@@ -39,7 +39,7 @@ class RecordingError(ValueError):
     >>> from pathlib import Path
     >>> read_recording(Path("nowhere"))
     Traceback (most recent call last):
-    camviz.sensors.recording.RecordingError: nowhere: there is no such folder or descriptor file.
+    camviz_clinic.measuring.noise.recording.RecordingError: nowhere: there is no such folder or descriptor file.
     """
 
 
@@ -69,7 +69,7 @@ class Recording:
 
     >>> from math import nan
     >>> from pathlib import Path
-    >>> from camviz.sensors.recording import Shot
+    >>> from camviz_clinic.measuring.noise.recording import Shot
     >>> shot = Shot(exposure_s=0.01, photons=nan, frames=(Path("bright_10_0.png"), Path("bright_10_1.png")))
     >>> Recording(Path("."), pairs=(shot,)).with_photons_per_ms(200).pairs[0].photons
     2000.0
@@ -148,6 +148,7 @@ def measure(recording: Recording) -> Measurement:
     >>> from pathlib import Path
     >>> import cv2
     >>> from itertools import product
+    >>> from camviz.sensors import Sensor
     >>> sensor, rng, folder = Sensor(gain_dn_per_e=0.4), np.random.default_rng(0), Path("one_to_eight_ms")
     >>> folder.mkdir()
     >>> for ms, number, (kind, photons) in product(range(1, 9), (0, 1), (("bright", 1500), ("dark", 0))):

@@ -17,13 +17,13 @@ from math import hypot, inf, isfinite, nan, sqrt
 
 import numpy as np
 
-from camviz.sensors.checks import Checks
-from camviz.sensors.estimate import CERTAIN, PROMISE, UNKNOWN, Estimate, combined, of
-from camviz.sensors.hidden import QUANTISED, ROUNDING
-from camviz.sensors.readings import Readings
-from camviz.sensors.scale import CLIPPED
-from camviz.sensors.statistics import Part, parts_of_difference
-from camviz.sensors.transfer import Transfer, ratio
+from camviz_clinic.measuring.noise.checks import Checks
+from camviz_clinic.measuring.noise.estimate import CERTAIN, PROMISE, UNKNOWN, Estimate, combined, of
+from camviz_clinic.measuring.noise.hidden import QUANTISED, ROUNDING
+from camviz_clinic.measuring.noise.readings import Readings
+from camviz_clinic.measuring.noise.scale import CLIPPED
+from camviz_clinic.measuring.noise.statistics import Part, parts_of_difference
+from camviz_clinic.measuring.noise.transfer import Transfer, ratio
 
 PATTERNS_ALIKE = 0.01  # of PRNU
 

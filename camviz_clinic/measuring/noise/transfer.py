@@ -1,8 +1,7 @@
 """The photon transfer of a measurement: signal and noise of every level as estimates, and the straight lines' slopes.
 
 Every estimate has its standard error by chance, and bounds for what rounding and clipping may hide. Whether the model
-holds to which the lines belong, `camviz.sensors.checks` asks. Sections are those of EMVA Standard 1288, release 4.0
-linear.
+holds to which the lines belong, `checks` asks. Sections are those of EMVA Standard 1288, release 4.0 linear.
 """
 
 from __future__ import annotations
@@ -15,11 +14,11 @@ from math import hypot, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.sensors.estimate import PROMISE, UNKNOWN, Estimate, combined, of
-from camviz.sensors.hidden import QUANTISED
-from camviz.sensors.readings import Readings
-from camviz.sensors.scale import CLIPPED, Scale
-from camviz.sensors.statistics import Pair, Stack
+from camviz_clinic.measuring.noise.estimate import PROMISE, UNKNOWN, Estimate, combined, of
+from camviz_clinic.measuring.noise.hidden import QUANTISED
+from camviz_clinic.measuring.noise.readings import Readings
+from camviz_clinic.measuring.noise.scale import CLIPPED, Scale
+from camviz_clinic.measuring.noise.statistics import Pair, Stack
 
 Array = NDArray[np.float64]
 
