@@ -162,7 +162,7 @@ def test_a_calibration_format_is_one_file(tmp_path):
     assert made.text("c.toy") == "toy 640 480 500.0 321.25 239.5\n"
     assert "Toy (camera.toy), one camera" in made.run("-m", "camviz", "convert", "--help")
     assert "Toy" in made.run("-m", "camviz", "show", "--help")
-    made.run("docs/formats.py")
+    made.run("tools/docs/formats.py")
     assert "| `toy` | Toy: camera.toy | pinhole | one line |" in made.text("docs/formats.md")
     assert held(made, "tests/test_formats_contract.py", "toy") > 2
 

@@ -20,7 +20,7 @@ from camviz_school.record import Axis, Budget, BudgetError, Recording, Widget, r
 from camviz_school.record.packing import Images, Pack
 from camviz_school.record.panes import Explored
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tools/benchmarks"))
 
 from smallest import Smallest
 

@@ -23,7 +23,7 @@ from camviz_clinic.checks.virtual import healthy, healthy_pair
 
 PAGE = Path(__file__).parents[2] / "docs" / "clinic.md"
 TABLES = "<!-- The tables below are counted by: python -m camviz_clinic.checks.statistics -->"
-SCOREBOARD = "\n## Scoreboard\n"  # below the tables; written by hand and by benchmarks/field.py
+SCOREBOARD = "\n## Scoreboard\n"  # below the tables; written by hand and by tools/benchmarks/field.py
 HEALTHY, REPEATS = 120, 12
 SEED = 20_000
 RATED = ("fault", "warning")  # a note is a fact about a lens, not an alarm
@@ -228,7 +228,7 @@ principal point: in the cameras below 13 px of it (median; 6 to 27) are a change
 rows. Pictures cropped to the calibration's own size look like a moved principal point, binned ones like resized ones.
 
 Of 198 virtual deployments none that was healthy failed, and none that was off by 1 px or more passed. They have noise
-of 0.05 to 0.3 px, 0.3 to 2 megapixels and 15 to 40 new views (`python benchmarks/deployments.py`):
+of 0.05 to 0.3 px, 0.3 to 2 megapixels and 15 to 40 new views (`python tools/benchmarks/deployments.py`):
 
 | deployment | pass | warn | inconclusive | fail |
 |---|---|---|---|---|
@@ -376,7 +376,7 @@ square, so that no camera needs to be known. The board is the one whose layout h
 The first four are the finding `wrong-board`, the others `baseline-scale`, `corner-order` and `interpolated-corners`.
 A chessboard has no wrong order of its sides. Whether its views are turned does not matter to one camera alone.
 
-These are rendered by `python benchmarks/doctor.py`. Pictures have 480 to 720 pixels along the longer side and noise of
+`python tools/benchmarks/doctor.py` renders these. Pictures have 480 to 720 pixels along the longer side and noise of
 1 to 8 grey levels. The boards have 4×3 to 10×6 inner corners, and lenses barrel distortion up to k1 = -0.4. Healthy
 sets are ChArUco boards, whole and in part, chessboards, AprilGrids, grids of circles, and pairs.
 
@@ -412,7 +412,7 @@ against cameras of every view's own, a nested analysis of variance with the same
 orders or halves of the same views by lot, and at most one of these may differ more. That holds however the views
 scatter. Without an order, halves must be two pixels apart both ways. Of 180 virtual changes in an order that noise
 alone would name, these tests lose 3. Of 31 sets with another camera's views mixed in at random they lose 12 (`python
-benchmarks/halves.py`).
+tools/benchmarks/halves.py`).
 
 What a real healthy set looks like is measured on OpenCV's photographs of a global shutter, 13 views by each of two
 cameras, two finders and three models. Free velocities explain 0.5 to 0.6 of the noise there, by chance once in 10⁴⁰.
