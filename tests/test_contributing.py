@@ -186,6 +186,6 @@ print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]
     (made.root / "camera.yaml").write_text(json.dumps(ros))
     said = made.run("-m", "camviz", "inspect", "camera.yaml", "--json", status=1)
     assert "skewed-pixels" in [each["id"] for each in json.loads(said)["findings"]]
-    made.run("-m", "camviz_clinic.checks.statistics", "--page")
+    made.run("tools/docs/clinic.py", "--page")
     assert "### `skewed-pixels`" in made.text("docs/clinic.md")
     assert held(made, "tests/test_faults.py", "promised and skew or healthy_camera or every_finding") >= 8
