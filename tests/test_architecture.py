@@ -157,3 +157,13 @@ def test_the_lessons_material_is_read_by_the_course_alone() -> None:
     """No module of the package imports a lesson's own: they are loaded by `camviz_school.course.material`."""
     named = [name for name, path in MODULES.items() if "lessons.material" in path.read_text(encoding="utf-8")]
     assert named == []
+
+
+def test_no_class_name_has_two_meanings() -> None:
+    """A reader who has met a class knows it wherever its name stands."""
+    places: dict[str, list[str]] = {}
+    for module, path in MODULES.items():
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(module)
+    assert {name: where for name, where in places.items() if len(where) > 1} == {}

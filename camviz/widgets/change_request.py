@@ -15,7 +15,7 @@ _KEYS = ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "+", "-")
 
 
 @dataclass(frozen=True)
-class Wish:
+class ChangeRequest:
     """In this order: the first state if `reset`, `values` set, handles dragged by (x, y, dx, dy), keys pressed.
 
     `units` says how many picture units make a CSS pixel in the tile of a name.
@@ -29,8 +29,8 @@ class Wish:
     units: Mapping[str, float]
 
     @classmethod
-    def of(cls, message: object) -> Wish:
-        """The wish in a message; ValueError says in a sentence what a message has."""
+    def of(cls, message: object) -> ChangeRequest:
+        """The request in a message; ValueError says in a sentence what a message has."""
         if not isinstance(message, Mapping):
             raise ValueError(f"a message must be a dict, got {short(message)}")
         values, units = message.get("values") or {}, message.get("units") or {}

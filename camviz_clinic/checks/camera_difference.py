@@ -18,7 +18,7 @@ GRID = (60, 40)
 
 
 @dataclass(frozen=True)
-class Apart:
+class CameraDifference:
     """The difference of far points in pixels, after the rotation of `turn_deg` that makes the two agree best.
 
     `median` and `most` (95 %) are over the image, `border` is the median along its border. `sigmas` is 95 % of the
@@ -46,12 +46,12 @@ class Apart:
         )
 
 
-def differences(evidence: Evidence) -> list[Apart]:
+def differences(evidence: Evidence) -> list[CameraDifference]:
     """By camera, for pictures of one size; made once."""
     return evidence.once(("differences",), lambda: list(_differences(evidence)))
 
 
-def _differences(evidence: Evidence) -> Iterator[Apart]:
+def _differences(evidence: Evidence) -> Iterator[CameraDifference]:
     names = dict(zip(evidence.calibration.cameras, evidence.compare.cameras if evidence.compare else (), strict=False))
     for name, camera, other in evidence.counterparts():
         assert evidence.compare is not None
@@ -77,7 +77,7 @@ def _differences(evidence: Evidence) -> Iterator[Apart]:
         seen = [
             np.isfinite(each.lens.unproject(each.intrinsics.from_pixels(found.uv))[..., 0]) for each in (camera, other)
         ]
-        yield Apart(
+        yield CameraDifference(
             name, float(np.nanmedian(length)), float(np.nanpercentile(length, 95)), float(np.nanmedian(length[edge])),
             sigmas, found.turn_deg, float(np.mean(seen[0] != seen[1])),
         )  # fmt: skip

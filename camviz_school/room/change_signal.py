@@ -11,22 +11,22 @@ MOST_WAITING = 2000
 AT_ONCE, PAUSE_S = 10, 0.03
 
 
-class Bell:
-    """Rings when something has changed. A page that has seen `state` waits until there is another one."""
+class ChangeSignal:
+    """Answers pages when something has changed. One that has seen `state` waits until there is another."""
 
     def __init__(self) -> None:
         self._start = secrets.token_hex(4)  # of this run: a page that saw an earlier run is told at once
-        self._rung = 0
+        self._count = 0
         self._waiting: set[asyncio.Future[None]] = set()
 
     @property
     def state(self) -> str:
-        """Changes with every ring."""
-        return f"{self._start}-{self._rung}"
+        """Changes with every notice."""
+        return f"{self._start}-{self._count}"
 
-    def ring(self) -> None:
+    def notify(self) -> None:
         """Answer everyone who waits: some at a time, so that a vote that comes meanwhile is not kept waiting."""
-        self._rung += 1
+        self._count += 1
         waiting, self._waiting = list(self._waiting), set()
         for start in range(0, len(waiting), AT_ONCE):
             asyncio.get_running_loop().call_later(start / AT_ONCE * PAUSE_S, _answer, waiting[start : start + AT_ONCE])

@@ -31,7 +31,7 @@ from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandle
 from camviz_school.course.answers import Answer, write_marked
 from camviz_school.room import shown
 from camviz_school.room.address import is_named_safely, qr_svg
-from camviz_school.room.bell import Bell
+from camviz_school.room.change_signal import ChangeSignal
 from camviz_school.room.limits import MOST_BODY, MOST_HEADERS, Allowance, Limits
 from camviz_school.room.site import Site
 from camviz_school.room.store import Room, RoomError
@@ -58,13 +58,13 @@ class House:
     limits: Limits = field(default_factory=Limits)
     behind_proxy: bool = False
     site: Site | None = None
-    asked: Bell = field(default_factory=Bell)
-    counted: Bell = field(default_factory=Bell)
+    asked: ChangeSignal = field(default_factory=ChangeSignal)
+    counted: ChangeSignal = field(default_factory=ChangeSignal)
 
     def changed(self) -> None:
         """The teacher has done something: tell everyone."""
-        self.asked.ring()
-        self.counted.ring()
+        self.asked.notify()
+        self.counted.notify()
 
     def to_student(self, number: int) -> shown.Shown:
         """What one student's pages show, with the address of the page to `read` where there is a site."""
@@ -192,7 +192,7 @@ class Joins(Asked):
                 for allowance, who in guesses:
                     allowance.takes(who)
             raise
-        self.house.counted.ring()
+        self.house.counted.notify()
         self.finish({"token": token, "word": room.word, "ends": room.ends})
 
     def delete(self) -> None:
@@ -235,17 +235,17 @@ class Rooms(Asked):
         self.finish(told)
 
 
-class Votes(Asked):
+class VoteHandler(Asked):
     """A student's choice. The answer comes when it is in the file's log."""
 
     def post(self) -> None:
         number, told = self.student(), self.told()
         self.house.room.vote(number, told.get("question"), told.get("round"), told.get("choice"))
-        self.house.counted.ring()
+        self.house.counted.notify()
         self.finish({"counted": True, **self.house.to_student(number)})
 
 
-class Deeds(Asked):
+class TeacherHandler(Asked):
     """What the teacher does."""
 
     def post(self) -> None:
@@ -349,8 +349,8 @@ def application(house: House, prefix: str = "/", more: Iterable[Any] = ()) -> Ap
         (r"api/join", Joins, served),
         (r"api/state", States, served),
         (r"api/room", Rooms, served),
-        (r"api/vote", Votes, served),
-        (r"api/do", Deeds, served),
+        (r"api/vote", VoteHandler, served),
+        (r"api/do", TeacherHandler, served),
         (r"api/(answers|counts)\.csv", Tables, served),
         (r"static/(.*)", Files, {**served, "path": str(pages)}),
         (r"site/(.*)", Sites, served),

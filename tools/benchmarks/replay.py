@@ -28,7 +28,7 @@ from laboratory import chromium  # noqa: E402
 from smallest import Smallest  # noqa: E402
 
 from camviz.widgets import explore  # noqa: E402
-from camviz_school.record import Axis, Budget, BudgetError, Recording, Widget, record, write_player  # noqa: E402
+from camviz_school.record import Axis, Budget, BudgetError, RecordedPane, Widget, record, write_player  # noqa: E402
 
 LOOKED = 3  # times that each pane is timed; the table has the median
 
@@ -83,7 +83,7 @@ def report_of_all(folder: Path, budget: Budget) -> str:
 
 def report_of_speed(folder: Path, changes: int) -> str:
     """The table of slider to changed pixels."""
-    panes: list[tuple[str, list, Recording]] = []
+    panes: list[tuple[str, list, RecordedPane]] = []
     dot = Widget(Smallest(), (Axis.slider("x", 0.0, 100.0, 0.1, 0.0),), "A dot")
     panes.append(("the smallest widget", ["x", 0.0, 100.0], record(dot, folder)))
     for view, (name, low, high, step) in SLIDERS.items():

@@ -2,7 +2,7 @@
 
 The linear model knows pixels whose noise is their own, photons' noise that rises with the signal along a straight line,
 a signal that rises with the light along one, an offset that stays, and even light. Frames show where that is not so. A
-`Finding` names the figures that it spoils, with the reason; what moves K or R by less than `PROMISE` spoils none.
+`ModelViolation` names the figures that it spoils, and why; what moves K or R by less than `PROMISE` spoils none.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LINEARITY = frozenset({"linearity_error", "linearity_error_min", "linearity_erro
 
 
 @dataclass(frozen=True)
-class Finding:
+class ModelViolation:
     """What is not as the model has it: the figures that it touches, why, and whether it spoils them or widens them."""
 
     names: frozenset[str]
@@ -69,7 +69,7 @@ class Checks:
         self.transfer, self.found = transfer, transfer.found
 
     @cached_property
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[ModelViolation]:
         """All of them, those first that spoil most."""
         made = (self._shared, self._early, self._noise_bent, self._uneven, self._response_bent, self._dark_shared)
         found = [one() for one in made]
@@ -105,22 +105,22 @@ class Checks:
         each = [(1 / len(pairs), (one, None)) for one in pairs]
         return _correlated(each, float(np.mean([one.within for one in pairs])))
 
-    def _shared(self) -> Finding | None:
+    def _shared(self) -> ModelViolation | None:
         if self.shared_share <= PROMISE:
             return None
         why = (
             f"neighbouring pixels share their noise (correlations of {self.shared_share:.2g} in all), "
             "as after smoothing, binning or scaling"
         )
-        return Finding(BY_GAIN | PRNU, why)
+        return ModelViolation(BY_GAIN | PRNU, why)
 
-    def _dark_shared(self) -> Finding | None:
+    def _dark_shared(self) -> ModelViolation | None:
         if self.shared_in_the_dark < SMOOTHED:
             return None
         why = (
             f"neighbouring pixels share their noise in the dark (correlations of {self.shared_in_the_dark:.2g} in all)"
         )
-        return Finding(NOISE_IN_THE_DARK, why)
+        return ModelViolation(NOISE_IN_THE_DARK, why)
 
     # A straight line of photon transfer -------------------------------------------------------------------------------
 
@@ -154,7 +154,7 @@ class Checks:
     def _without_flicker(self, seen: Pair) -> float:
         return seen.within if self.found.noisy_lines else seen.variance
 
-    def _noise_bent(self) -> Finding | None:
+    def _noise_bent(self) -> ModelViolation | None:
         off = self.noise_bend.slope - 1
         if not self.noise_bend.found or abs(off) <= PROMISE:
             return None
@@ -163,18 +163,18 @@ class Checks:
             "off): the response is bent, or the gain changes with the signal"
         )
         names = BY_GAIN if self._lights_tell else BY_GAIN | PRNU
-        return Finding(names, why)
+        return ModelViolation(names, why)
 
-    def _early(self) -> Finding | None:
+    def _early(self) -> ModelViolation | None:
         if not self.found.peaks_early:
             return None
         share = float(self.found.signal[self.found.peak] / self.found.signal.max())
         if self.transfer.bright[self.found.peak].value < 1.5 * float(np.max(self.found.dark_variance)):
-            return Finding(
+            return ModelViolation(
                 SATURATION, "the noise hardly rises with the signal, so that its peak does not tell saturation"
             )
         why = f"the noise is largest at {share:.0%} of the largest signal and falls from there: the response is bent"
-        return Finding(BY_GAIN if self._lights_tell else BY_GAIN | PRNU, why)
+        return ModelViolation(BY_GAIN if self._lights_tell else BY_GAIN | PRNU, why)
 
     # A straight response ----------------------------------------------------------------------------------------------
 
@@ -211,14 +211,14 @@ class Checks:
         response = float(np.sum(x * y) / np.sum(x * x)) - 1
         return gain, response, float(np.min(slope * x / np.where(y > 0, y, np.nan))) - 1 if (y > 0).all() else -1.0
 
-    def _response_bent(self) -> Finding | None:
+    def _response_bent(self) -> ModelViolation | None:
         if not self.response_bend.found or max(abs(one) for one in self.response_off) <= PROMISE:
             return None
         names = BY_PHOTONS | (frozenset() if self._noise_straight else BY_GAIN | PRNU)
         light = self.transfer.light[self.transfer.used]
         change = 2 * self.response_bend.curve * float(np.ptp(light))
         why = f"the signal does not rise with the light along a straight line: its slope falls by {change:.0%}"
-        return Finding(names, why)
+        return ModelViolation(names, why)
 
     @property
     def _noise_straight(self) -> bool:
@@ -245,14 +245,14 @@ class Checks:
         chosen = [i for i in range(len(self.found.levels)) if i < self.found.top and self.found.signal[i] > 0]
         return _restless([(self.found.levels[i].bright, float(self.found.signal[i]), self.wander) for i in chosen])
 
-    def _flickers(self) -> Finding | None:
+    def _flickers(self) -> ModelViolation | None:
         if not (self.flicker or self.wander):
             return None
         if self.flicker:
             why = f"the light flickers by {self.flicker:.2%} from frame to frame"
         else:
             why = f"the offset changes by {self.wander:.2g} DN from frame to frame"
-        return Finding(BY_PHOTONS | LINEARITY | {"dark_current_e_per_s"}, why, spoils=False)
+        return ModelViolation(BY_PHOTONS | LINEARITY | {"dark_current_e_per_s"}, why, spoils=False)
 
     @cached_property
     def dark_current_of_noise(self) -> Estimate | None:
@@ -273,7 +273,7 @@ class Checks:
         moved = self.wander / sqrt(2) * sqrt(float(weights @ weights))
         return of(ratio, Estimate(slope.value, hypot(slope.error, moved), slope.low, slope.high), t.fitted_gain)
 
-    def _drifts(self) -> Finding | None:
+    def _drifts(self) -> ModelViolation | None:
         noise = self.dark_current_of_noise
         if not noise or not isfinite(noise.value):
             return None
@@ -284,12 +284,12 @@ class Checks:
                 f"the dark frames brighten as {means.value:.3g} e⁻/s would make them, but their noise grows as of "
                 f"{noise.value:.3g} e⁻/s: the offset drifts, or the camera takes its dark level off"
             )
-            return Finding(names, why)
+            return ModelViolation(names, why)
         if noise.bounds[1] - noise.bounds[0] > 2 * CONFIRMED * abs(means.value):
             why = (
                 "the noise of the dark frames is not known well enough to tell dark current from an offset that drifts"
             )
-            return Finding(names, why)
+            return ModelViolation(names, why)
         return None
 
     # Even light -------------------------------------------------------------------------------------------------------
@@ -321,12 +321,12 @@ class Checks:
         low, high = shading.extremes()
         return (low / signal, high / signal) if signal > 0 else (0.0, 0.0)
 
-    def _uneven(self) -> Finding | None:
+    def _uneven(self) -> ModelViolation | None:
         if sum(self.shaded) == 0:
             return None
         low, high = self.shaded_ends
         why = f"light or response changes smoothly across the picture, by {high - low:.1%}: even light was asked for"
-        return Finding(PRNU | SATURATION, why, spoils=False)
+        return ModelViolation(PRNU | SATURATION, why, spoils=False)
 
 
 def _correlated(each: Sequence[tuple[float, tuple[Pair, Pair | None]]], variance: float) -> float:

@@ -44,7 +44,7 @@ class RecordingError(ValueError):
 
 
 @dataclass(frozen=True)
-class Shot:
+class ExposureFrames:
     """The files of one light: exposure, photons per pixel (0 in the dark, NaN where unknown), frames in order."""
 
     exposure_s: float
@@ -69,16 +69,16 @@ class Recording:
 
     >>> from math import nan
     >>> from pathlib import Path
-    >>> from camviz_clinic.measuring.noise.recording import Shot
-    >>> shot = Shot(exposure_s=0.01, photons=nan, frames=(Path("bright_10_0.png"), Path("bright_10_1.png")))
+    >>> from camviz_clinic.measuring.noise.recording import ExposureFrames
+    >>> shot = ExposureFrames(exposure_s=0.01, photons=nan, frames=(Path("bright_10_0.png"), Path("bright_10_1.png")))
     >>> Recording(Path("."), pairs=(shot,)).with_photons_per_ms(200).pairs[0].photons
     2000.0
     """
 
     source: Path
-    pairs: tuple[Shot, ...]
-    bright_stack: Shot | None = None
-    dark_stack: Shot | None = None
+    pairs: tuple[ExposureFrames, ...]
+    bright_stack: ExposureFrames | None = None
+    dark_stack: ExposureFrames | None = None
     release: float = 4.0  # of the standard that the data were taken for
     size: tuple[int, int] | None = field(default=None)  # width, height, where it was said
 
@@ -91,7 +91,7 @@ class Recording:
         Returns: Its dark shots stay dark.
         """
 
-        def lit(shot: Shot) -> Shot:
+        def lit(shot: ExposureFrames) -> ExposureFrames:
             return shot if shot.dark else replace(shot, photons=photons_per_ms * shot.exposure_s * 1000)
 
         stack = self.bright_stack and lit(self.bright_stack)
@@ -157,7 +157,7 @@ def measure(recording: Recording) -> Measurement:
     >>> round(measure(read_recording(folder)).gain_dn_per_e, 1)
     0.4
     """
-    reader = _Reader(recording.size)
+    reader = _FrameReader(recording.size)
     darks = {shot.exposure_s: _pair(shot, reader) for shot in recording.pairs if shot.dark}
     levels = []
     for shot in recording.pairs:
@@ -194,7 +194,9 @@ def _named(folder: Path, paths: list[Path]) -> Recording:
                 f"cover the lens and take {other}_{exposure_ms:g}_0.png and {other}_{exposure_ms:g}_1.png."
             )
     shots = [
-        Shot(exposure_ms / 1000, 0.0 if kind == "dark" else nan, tuple(path for _, path in sorted(frames.items())))
+        ExposureFrames(
+            exposure_ms / 1000, 0.0 if kind == "dark" else nan, tuple(path for _, path in sorted(frames.items()))
+        )
         for (kind, exposure_ms), frames in sorted(found.items())
     ]
     if all(shot.dark for shot in shots):
@@ -221,7 +223,7 @@ def _refuse_partnerless(folder: Path, kind: str, exposure_ms: float, frames: dic
         )
 
 
-def _sorted_out(source: Path, shots: list[Shot]) -> Recording:
+def _sorted_out(source: Path, shots: list[ExposureFrames]) -> Recording:
     """A shot's first two frames are its pair; the longest bright one, and the dark one of its time, are the stacks."""
     pairs = tuple(replace(shot, frames=shot.frames[:2]) for shot in shots)
     long = {(shot.exposure_s, shot.dark): shot for shot in shots if len(shot.frames) > 2}
@@ -248,7 +250,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _described(path: Path) -> Recording:
-    shots: list[Shot] = []
+    shots: list[ExposureFrames] = []
     release, size = 4.0, None
     for number, (letter, *words) in _lines(path):
         try:
@@ -257,7 +259,7 @@ def _described(path: Path) -> Recording:
             elif letter == "n":
                 size = (int(words[1]), int(words[2]))
             elif letter in ("b", "d"):
-                shots.append(Shot(_exposure_s(words[0]), 0.0 if letter == "d" else _number(words[1]), ()))
+                shots.append(ExposureFrames(_exposure_s(words[0]), 0.0 if letter == "d" else _number(words[1]), ()))
             elif letter == "i":
                 shots[-1] = replace(
                     shots[-1], frames=(*shots[-1].frames, path.parent / words[0].replace("\\", "/").strip())
@@ -271,7 +273,7 @@ def _described(path: Path) -> Recording:
     return _of_descriptor(path, shots, release, size)
 
 
-def _of_descriptor(path: Path, shots: list[Shot], release: float, size: tuple[int, int] | None) -> Recording:
+def _of_descriptor(path: Path, shots: list[ExposureFrames], release: float, size: tuple[int, int] | None) -> Recording:
     for shot in shots:
         if len(shot.frames) < 2:
             kind = "dark" if shot.dark else "bright"
@@ -307,7 +309,7 @@ def _number(text: str) -> float:
 # Frames ---------------------------------------------------------------------------------------------------------------
 
 
-class _Reader:
+class _FrameReader:
     """Reads frames and holds each against the first: one size, one depth. It learns the smallest step in DN."""
 
     def __init__(self, size: tuple[int, int] | None) -> None:
@@ -371,12 +373,12 @@ def _narrowed(path: Path, frame: Frame) -> Frame:
     return frame.astype(np.uint16)
 
 
-def _pair(shot: Shot, reader: _Reader) -> Pair:
+def _pair(shot: ExposureFrames, reader: _FrameReader) -> Pair:
     first, second = map(reader, shot.frames)
     if np.array_equal(first, second) and np.mean(first == first.max()) < 0.5:  # unless it is saturated
         raise RecordingError(f"{shot.frames[1]}: is the same picture as {shot.frames[0].name}, pixel by pixel.")
     return pair(first, second)
 
 
-def _stack(shot: Shot | None, reader: _Reader) -> Stack | None:
+def _stack(shot: ExposureFrames | None, reader: _FrameReader) -> Stack | None:
     return stack(map(reader, shot.frames)) if shot else None

@@ -16,7 +16,7 @@ _THIRD = np.array([-1.0, 3.0, -3.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class EdgeProfile:
     """The cubic spline of equal steps through pixels' light at their distances from the edge, by least squares.
 
     Third differences of its coefficients are kept small, and so it bridges places at which no pixel lies, as a smooth

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from camviz.lenses.base import Array
-from camviz_clinic.measuring.sharpness.edge_profile import Profile
+from camviz_clinic.measuring.sharpness.edge_profile import EdgeProfile
 from camviz_clinic.measuring.sharpness.edge_sides import Sides
 
 FINEST = 0.25  # pixels between the knots of the profile that rows are held against
@@ -31,7 +31,7 @@ def row_shifts(sides: Sides, rise: float) -> tuple[Array, Array, Array]:
     step = max(FINEST, rise / 6)
     reach = np.ceil((1.5 * rise + 1.5) / step) * step
     v = strip.v[near]
-    profile = Profile(strip.distance[near], sides.profile[near], reach, step, np.zeros(len(v), int))
+    profile = EdgeProfile(strip.distance[near], sides.profile[near], reach, step, np.zeros(len(v), int))
     weight = np.bincount(v, profile.slope**2)
     moved = -np.bincount(v, profile.slope * profile.residual)
     left = np.bincount(v, profile.residual**2) / np.maximum(np.bincount(v), 1)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from camviz.lenses.base import Array
 from camviz_clinic.measuring.sharpness.edge_error import EdgeError
 from camviz_clinic.measuring.sharpness.edge_line import normal_angle, rough_edge
-from camviz_clinic.measuring.sharpness.edge_profile import Profile
+from camviz_clinic.measuring.sharpness.edge_profile import EdgeProfile
 from camviz_clinic.measuring.sharpness.edge_refusal import LEAST_RISES, refuse_what_spoils
 from camviz_clinic.measuring.sharpness.edge_rows import row_shifts, straight
 from camviz_clinic.measuring.sharpness.edge_sides import Sides, Strip
@@ -171,10 +171,12 @@ class SlantedEdge:
         return np.asarray((u - slope * v - intercept) * np.cos(np.arctan(slope)))
 
     @cached_property
-    def profile(self) -> Profile:
+    def profile(self) -> EdgeProfile:
         """The edge's profile, from 0 to 1: a smooth curve with knots at every eighth of a pixel."""
         strip, light, kept = self.sides.strip, self.sides.profile, self.kept
-        return Profile(strip.distance[kept], light[kept], self._reach, 1 / OVERSAMPLING, self._blocks(strip.v[kept]))
+        return EdgeProfile(
+            strip.distance[kept], light[kept], self._reach, 1 / OVERSAMPLING, self._blocks(strip.v[kept])
+        )
 
     @property
     def _reach(self) -> float:
