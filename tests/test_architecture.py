@@ -46,6 +46,14 @@ WHAT_IS_TRUE = (
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
 
+LONGEST = 400  # lines of a file that gives no reason
+
+MOVING = frozenset(
+    f"camviz.views.{name}"
+    for name in ("demosaicing", "depth_of_field", "intrinsics", "light_field", "omnidirectional", "rectification")
+) | {"camviz_clinic.views.calibration"}
+"""Views that one lesson alone uses, on their way to that lesson's material."""
+
 HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
 
 
@@ -167,3 +175,10 @@ def test_no_class_name_has_two_meanings() -> None:
             if isinstance(node, ast.ClassDef):
                 places.setdefault(node.name, []).append(module)
     assert {name: where for name, where in places.items() if len(where) > 1} == {}
+
+
+def test_a_file_is_short_or_its_first_line_says_why_not() -> None:
+    """A file of more than 400 lines has its reason, a "because", in its first line."""
+    lines = {name: path.read_text(encoding="utf-8").splitlines() for name, path in MODULES.items()}
+    long = {name: text[0] for name, text in lines.items() if len(text) > LONGEST and name not in MOVING}
+    assert [name for name, first in long.items() if " because " not in first] == []

@@ -27,9 +27,9 @@ from camviz_school.room import hub, membership, shown
 from camviz_school.room.address import is_named_safely
 from camviz_school.room.gain import gain, gains
 from camviz_school.room.limits import Allowance, Limits
-from camviz_school.room.server import answers_csv
 from camviz_school.room.site import Site
 from camviz_school.room.store import Room, RoomError
+from camviz_school.room.tables import answers_csv
 from camviz_school.widgets.question import QuestionPage, QuestionWidget
 
 ASKED = questions("05")

@@ -19,17 +19,8 @@ from camviz.sensors.readout import (
     smeared,
     transferred,
 )
-from camviz.sensors.sensor import (
-    Exposure,
-    Sensor,
-    amplify,
-    convert,
-    decibel,
-    fill,
-    leak,
-    quantise,
-    read,
-)
+from camviz.sensors.sensor import Exposure, Sensor, decibel
+from camviz.sensors.steps import amplify, convert, fill, leak, quantise, read
 
 __all__ = [
     "PUBLISHED",

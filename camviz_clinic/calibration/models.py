@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
+from camviz.distortion.limits import NEARLY_A_POLE, image_reach, weakest_denominator
 from camviz.lenses import CalibrationModel, Lens, calibration_models
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation

@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 from camviz_clinic.calibration.boards.kind import BoardKind, Drawing, Shape
 
-__all__ = ["Drawing", "Kind", "Shape", "kind_of", "kinds"]
+__all__ = ["BoardKind", "Drawing", "Shape", "kind_of", "kinds"]
 
 COMMONEST = "chessboard"
 
