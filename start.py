@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 STAMP = VENV / "camviz-setup.txt"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-READER, SITE, TESTER = (ROOT / f"requirements{what}.lock" for what in ("", "-site", "-test"))
+READER, SITE, TESTER = (ROOT / f"tools/locks/requirements{what}.lock" for what in ("", "-site", "-test"))
 WHEELS = ROOT / "wheels"  # in a bundle only: all that is installed
 MACHINES = WHEELS / "machines.txt"  # what a bundle is for: a line such as "linux-x86_64 3.12" for each
 SAMPLES = ROOT / "samples"  # in a bundle: the photographs that are otherwise fetched
@@ -51,7 +51,7 @@ def main(words):
     if special == "test":
         return run(PYTHON, *TESTS, *words[1:], cwd=ROOT)
     if special == "site":
-        return run(PYTHON, ROOT / "website/build.py", *words[1:], cwd=ROOT)
+        return run(PYTHON, ROOT / "tools/website/build.py", *words[1:], cwd=ROOT)
     return run(PYTHON, "-m", "camviz", *(words or ["lab"]))
 
 

@@ -18,6 +18,7 @@ The names below are imported when they are first used, so that `import camviz` c
 """
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -53,28 +54,39 @@ _PARTS = (
 __all__ = ["Camera", "Intrinsics", "Rig", "__version__", "explore", "look_at", *_PARTS]
 
 
+_MEASURED_EDGES = "SlantedEdge slanted_edge edge_error edge_line edge_profile edge_refusal edge_rows edge_sides"
+_MEASURED_NOISE = (
+    "Level Measurement Recording RecordingError measure read_recording checks ends estimate estimates hidden "
+    "measurement neighbours readings recording scale transfer trust"
+)
+_CALIBRATIONS = "board_pictures calibration fault_lab focal_xi_ambiguity one_board"
 _BESIDE_LESSONS = (
     "colour demosaicing depth_of_field exposure fisheye garden_field image_sensor intrinsics lens_diagram "
     "lens_elements light_field microlens_diagram mirror_drawings noise omnidirectional pinhole readout rectification "
-    "ring rotation sharpness stereo_pair swatches"
+    f"ring rotation sharpness stereo_pair swatches {_CALIBRATIONS}"
 )
-_CALIBRATIONS = "board_pictures calibration fault_lab focal_xi_ambiguity one_board"
-_MOVED = {
-    ("camviz", "camviz_clinic"): "Calibration calibration clinic commands files inspect load meshes plots report",
-    ("camviz", "camviz_school"): "course join record room samples server teaching",
-    ("camviz.views", "camviz_school.views"): f"{_BESIDE_LESSONS} {_CALIBRATIONS}",
-    ("camviz_clinic.views", "camviz_school.views"): _CALIBRATIONS,
-}
-"""What stood elsewhere before camviz became three packages: the old place, the new one, and the names that moved."""
+_MOVED = (
+    (
+        "camviz",
+        "camviz_clinic",
+        "Calibration calibration clinic:checks commands files inspect load meshes plots report",
+    ),
+    ("camviz", "camviz_school", "course join record room samples server teaching"),
+    ("camviz.optics", "camviz_clinic.measuring.sharpness", _MEASURED_EDGES),
+    ("camviz.sensors", "camviz_clinic.measuring.noise", _MEASURED_NOISE),
+    ("camviz.views", "camviz_clinic.views", "measured_edge measured_noise"),
+    ("camviz.views", "camviz_school.views", _BESIDE_LESSONS),
+    ("camviz_clinic.views", "camviz_school.views", _CALIBRATIONS),
+)
+"""What once stood elsewhere: the old place, the new one, and the names; `old:new` where that is another one."""
 
 
 def _where(name: str) -> str:
-    """Where a full name that has moved, or what holds it, stands now; empty for every other."""
-    for (old, new), names in _MOVED.items():
-        moved = name.removeprefix(f"{old}.").partition(".")[0]
-        if name.startswith(f"{old}.") and moved in names.split():
-            renamed = {"clinic": "checks"}.get(moved, moved)
-            return f"{old}.{moved} is now {new}.{renamed}"
+    """Where a full name that has moved, such as "camviz.load", stands now; empty for every other."""
+    for old, new, names in _MOVED:
+        for before, _, after in (each.partition(":") for each in names.split()):
+            if name == f"{old}.{before}":
+                return f"{name} is now {new}.{after or before}"
     return ""
 
 
@@ -88,6 +100,15 @@ class _Moved:
 
 
 sys.meta_path.append(_Moved)
+
+
+def _answering(part: str) -> Callable[[str], Any]:
+    """The `__getattr__` of a part from which names have moved."""
+
+    def answer(name: str) -> Any:
+        raise AttributeError(_where(f"camviz.{part}.{name}") or f"module 'camviz.{part}' has no attribute {name!r}")
+
+    return answer
 
 
 def __getattr__(name: str) -> Any:

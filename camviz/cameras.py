@@ -1,4 +1,7 @@
-"""Cameras: pixels (`Intrinsics`), a lens and a pose make a `Camera`; several that hold together make a `Rig`."""
+"""Cameras, on one page because they explain each other: `Intrinsics`, a lens and a pose make a `Camera`.
+
+Several cameras that hold together make a `Rig`.
+"""
 
 from __future__ import annotations
 

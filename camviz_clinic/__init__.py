@@ -1,6 +1,7 @@
 """camviz_clinic: what is wrong with a calibration, and what to do about it. It stands on camviz.
 
     calibration   boards found in pictures, and the camera that saw them
+    measuring     how sharp a camera is, and how noisy its sensor
     files         calibrations read from what other programs write, and written for them
     checks        the findings: what an inspection looks for, and how sure it is
     views         residuals, coverage, uncertainty: a picture for each finding

@@ -24,7 +24,7 @@ from camviz.draw.solid import COLOURS
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform
 from camviz.scenes import Scene
-from camviz.scenes.surfaces import Mesh
+from camviz.scenes.mesh import Mesh
 from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.views.observations import Observations

@@ -15,15 +15,15 @@ import camviz.views
 import camviz_clinic.views
 import camviz_school.views
 from camviz.draw.picture import Picture
-from camviz.optics import SlantedEdge
 from camviz.sensors import Sensor
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
 from camviz.views.base import View
-from camviz.views.measured_edge import MeasuredEdgeView
-from camviz.views.measured_noise import MeasuredNoiseView
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.measuring.sharpness import SlantedEdge
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.catalogue import VIEWS, Case
+from camviz_clinic.views.measured_edge import MeasuredEdgeView
+from camviz_clinic.views.measured_noise import MeasuredNoiseView
 
 SHARED = (
     *("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras"),

@@ -15,6 +15,7 @@ COPIED = (
     "lessons",
     "docs",
     "tests",
+    "tools",
     "README.md",
     "pyproject.toml",
     "conftest.py",

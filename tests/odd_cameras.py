@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from plain_cameras import PlainCamera, Shooting, error, truth
 
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import LINEARITY, Level
-from camviz.sensors.statistics import stack
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import LINEARITY, Level
+from camviz_clinic.measuring.noise.statistics import stack
 
 BY_GAIN = {"gain_dn_per_e", "read_noise_e", "quantum_efficiency", "full_well_e", "snr_max_db", "dynamic_range_db"} | {
     "threshold_e",

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import poisson
 
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
-from camviz.sensors.statistics import stack
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.measuring.noise.statistics import stack
 
 NORMAL = 1 / np.sqrt(2 * np.pi)
 MARGINS = {"dsnu": 0.05, "prnu": 0.05, "linearity": 0.001}  # of the figures that begin so; of the others 3 %, 0.26 dB

@@ -9,7 +9,7 @@ from camviz.draw import prose
 from camviz_school.course.answers import AnswerBook, read_answers
 from camviz_school.course.questions import predict_questions, question, quiz_questions
 from camviz_school.widgets import quiz
-from camviz_school.widgets.question import QuestionWidget, Sheet
+from camviz_school.widgets.question import QuestionPage, QuestionWidget
 
 STATE = (
     *("title", "lead", "cards", "summary", "looking_back", "can_start_again", "can_export", "exported", "problem"),
@@ -23,7 +23,7 @@ def book(tmp_path):
 
 
 def form(name, when, book):
-    return QuestionWidget(Sheet(quiz_questions("05", name), "…", when), book)
+    return QuestionWidget(QuestionPage(quiz_questions("05", name), "…", when), book)
 
 
 def page(widget):
@@ -92,7 +92,7 @@ def test_what_was_chosen_before_is_there_again_after_a_restart(book):
 
 
 def predict(book, name="05.far_rays"):
-    return QuestionWidget(Sheet((question(name),), "Predict"), book)
+    return QuestionWidget(QuestionPage((question(name),), "Predict"), book)
 
 
 def test_an_answered_question_is_shown_with_its_reply_and_says_that_it_is_old(book):

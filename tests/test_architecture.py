@@ -25,7 +25,7 @@ LAYERS = {
         ("widgets",),
     ),
     "camviz_clinic": (
-        ("calibration",),
+        ("calibration", "measuring"),
         ("files",),
         ("checks",),
         ("views",),
@@ -45,9 +45,11 @@ LAYERS = {
 WHAT_IS_TRUE = (
     *("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics"),
     *("optics", "panoramas", "poses", "scenes", "sensors", "twoview"),
-    *("calibration", "checks", "files", "samples"),
+    *("calibration", "checks", "files", "measuring", "samples"),
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
+
+LONGEST = 400  # lines of a file that gives no reason
 
 HEAVY = ("matplotlib", "ipywidgets", "pyvista", "vtkmodules", "anywidget", "IPython")
 
@@ -240,3 +242,20 @@ def test_a_module_is_found_beside_its_lesson_without_server_room_or_quiz() -> No
         *(f"camviz_school.{one}" for one in ("course", "course.material", "views")),
     }
     assert "numpy" not in loaded.split()
+
+
+def test_no_class_name_has_two_meanings() -> None:
+    """A reader who has met a class knows it wherever its name stands."""
+    places: dict[str, list[str]] = {}
+    for module, path in MODULES.items():
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(module)
+    assert {name: where for name, where in places.items() if len(where) > 1} == {}
+
+
+def test_a_file_is_short_or_its_first_line_says_why_not() -> None:
+    """A file of more than 400 lines has its reason, a "because", in its first line."""
+    lines = {name: path.read_text(encoding="utf-8").splitlines() for name, path in MODULES.items()}
+    long = {name: text[0] for name, text in lines.items() if len(text) > LONGEST}
+    assert [name for name, first in long.items() if " because " not in first] == []

@@ -23,7 +23,7 @@ from camviz_clinic.files import CalibrationError
 from camviz_clinic.files.output import as_json, json_text
 from camviz_school.course.working_copy import MANIFEST, lay_out
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools/benchmarks"))
 import attack
 import hostile
 

@@ -61,16 +61,16 @@ def checkout(tmp_path, monkeypatch):
     pip looks for wheels in the folder `links` and nowhere else.
     """
     root, links = tmp_path / "checkout", tmp_path / "links"
-    for folder in (root / "camviz", root / "lessons", links):
+    for folder in (root / "camviz", root / "lessons", root / "tools/locks", links):
         folder.mkdir(parents=True)
-    for name in ("start.py", "LICENSE", "LICENSE-lessons"):
+    for name in ("start.py", "LICENSE", "lessons/LICENSE"):
         shutil.copyfile(ROOT / name, root / name)
     (root / "pyproject.toml").write_text(PROJECT)
     (root / "camviz" / "__main__.py").write_text(PROGRAM)
     (root / "lessons" / "05_distortion.ipynb").write_text("a lesson")
     lock = f"lantern==1.0 \\\n    --hash=sha256:{tiny_wheel(links)}\n"
     elsewhere = f"absent==1.0 ; sys_platform == 'plan9' \\\n    --hash=sha256:{'0' * 64}"
-    (root / "requirements.lock").write_text(lock + elsewhere)
+    (root / "tools/locks/requirements.lock").write_text(lock + elsewhere)
     (tmp_path / "photograph.jpg").write_text("a photograph")
     monkeypatch.setattr(packing, "sample", lambda name: tmp_path / "photograph.jpg")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
@@ -110,9 +110,10 @@ def test_a_bundle_installs_and_starts_with_no_network(checkout, tmp_path):
         packed.extractall(tmp_path / "student")
     (unpacked,) = (tmp_path / "student").iterdir()
     assert {path.name for path in unpacked.iterdir()} == {
-        *("README.txt", "start.py", "requirements.lock", "LICENSE", "LICENSE-lessons"),
+        *("README.txt", "start.py", "tools", "LICENSE"),
         *("wheels", "camviz-lessons", "site", "samples"),
     }
+    assert "CC BY 4.0" in (unpacked / "camviz-lessons" / "LICENSE").read_text()
     assert (unpacked / "camviz-lessons" / "05_distortion.ipynb").read_text() == "a lesson"
     result = started(unpacked, "lab", "--lesson", "05")
     assert result.returncode == 0, result.stderr
@@ -217,7 +218,7 @@ def test_a_machine_that_no_bundle_is_made_for_is_named(capsys, room, monkeypatch
 
 def test_the_lock_is_read_as_another_machine_reads_it():
     """The markers of the real lock, by what each package is for."""
-    entries = re.split(r"\n(?=\S)", (ROOT / "requirements.lock").read_text())
+    entries = re.split(r"\n(?=\S)", (ROOT / "tools/locks/requirements.lock").read_text())
 
     def names(platform, release):
         return {one.split("==")[0] for one in wanted(entries, PLATFORMS[platform], release)}

@@ -52,7 +52,7 @@ COMMAND = """
 import sys
 from camviz_clinic.commands.command import main
 sys.argv[1:] = ["calibrate", *sys.argv[1:] * 400, "--board", "9x6", "--square-mm", "25", "--workers", "2"]
-from camviz_clinic.commands.calibrate import Bar
+from camviz_clinic.commands.pictures import Bar
 Bar.__call__ = lambda self, done, count: print(done, file=sys.stderr, flush=True)
 import pathlib
 import camviz_clinic.commands.calibrate as calibrate

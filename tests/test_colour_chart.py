@@ -11,7 +11,7 @@ from raw_charts import raw_chart
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour import balance, charts, spectra
-from camviz.colour.developing import Shot
+from camviz.colour.developing import CameraInLight
 from camviz.scenes import Rectangle, Scene, Texture, render, textured_scene
 from camviz.scenes.light import to_display
 from camviz.scenes.photographs import photograph
@@ -66,7 +66,7 @@ def test_a_chart_beside_a_chessboard_is_found_in_a_photograph_of_the_garden():
     chart = Rectangle((-0.3, -0.25, 1.6), (0.84, 0.0, 0.2), (0.0, 0.57, 0.05), colours)
     garden = textured_scene()
     camera = Camera(Intrinsics.from_fov(900, 600, 60))
-    bulb = Shot("Nikon D5100", spectra.planckian(2850))
+    bulb = CameraInLight("Nikon D5100", spectra.planckian(2850))
     picture = to_display(0.9 * render(Scene([*garden.surfaces, chart], garden.sky), camera) @ bulb.raw_from_srgb.T)
     found = charts.find_chart(picture)
     first = camera.project(chart.corner + (0.5 / 6 * chart.across + 0.5 / 4 * chart.down))

@@ -162,7 +162,7 @@ def test_a_calibration_format_is_one_file(tmp_path):
     assert made.text("c.toy") == "toy 640 480 500.0 321.25 239.5\n"
     assert "Toy (camera.toy), one camera" in made.run("-m", "camviz", "convert", "--help")
     assert "Toy" in made.run("-m", "camviz", "show", "--help")
-    made.run("docs/formats.py")
+    made.run("tools/docs/formats.py")
     assert "| `toy` | Toy: camera.toy | pinhole | one line |" in made.text("docs/formats.md")
     assert held(made, "tests/test_formats_contract.py", "toy") > 2
 
@@ -186,6 +186,6 @@ print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]
     (made.root / "camera.yaml").write_text(json.dumps(ros))
     said = made.run("-m", "camviz", "inspect", "camera.yaml", "--json", status=1)
     assert "skewed-pixels" in [each["id"] for each in json.loads(said)["findings"]]
-    made.run("-m", "camviz_clinic.checks.statistics", "--page")
+    made.run("tools/docs/clinic.py", "--page")
     assert "### `skewed-pixels`" in made.text("docs/clinic.md")
     assert held(made, "tests/test_faults.py", "promised and skew or healthy_camera or every_finding") >= 8

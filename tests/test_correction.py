@@ -19,8 +19,8 @@ from camviz.sensors.correction import (
     stabilised,
     unstabilised,
 )
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
 
 SENSOR = Sensor(
     quantum_efficiency=0.5,
@@ -174,7 +174,7 @@ def test_the_model_of_a_measured_sensor_is_that_of_its_parameters():
     for t in np.linspace(0.04, 1, 15):
         shots = [[frame[:50, :100] for frame in shoot(e, 2, rng, t)] for e in (14_000 * t, 0.0)]
         levels.append(Level.of(t, *shots))
-    found = NoiseModel.measured(Measurement(tuple(levels)))
+    found = Measurement(tuple(levels)).noise_model()
     assert found.gain_dn_per_e == pytest.approx(0.3, rel=0.05)
     assert found.dark_noise_e == pytest.approx(NoiseModel.of(SENSOR).dark_noise_e, rel=0.08)
     assert found.black_dn == pytest.approx(NoiseModel.of(SENSOR).black_dn, abs=0.8)

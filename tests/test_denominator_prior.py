@@ -9,7 +9,7 @@ from boards import BOARD, CAMERA, board_poses, noisy, truth
 import camviz
 import camviz_clinic
 from camviz.cameras import Camera, Intrinsics
-from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
+from camviz.distortion.limits import NEARLY_A_POLE, image_reach, weakest_denominator
 from camviz.lenses import BrownConrady
 from camviz_clinic.calibration import calibrate, calibrate_pair, detect
 from camviz_clinic.calibration.adjustment import Adjustment

@@ -21,7 +21,7 @@ def text(path: str) -> str:
 
 
 def values() -> dict:
-    return yaml.safe_load(text("deploy/kubernetes/values.yaml"))
+    return yaml.safe_load(text("tools/deploy/kubernetes/values.yaml"))
 
 
 def configured(path: str) -> Config:
@@ -52,7 +52,7 @@ def test_the_chart_knows_every_value_and_takes_its_type() -> None:
 
 
 def test_both_recipes_start_the_same_server_with_the_same_environment() -> None:
-    config = asked(configured("deploy/jupyterhub_config.py"), "Spawner")
+    config = asked(configured("tools/deploy/jupyterhub_config.py"), "Spawner")
     chart = values()["singleuser"]
     assert set(chart["cmd"][1:]) == {each for each in config["args"] if "no_activity" not in each}
     assert {name: word for name, word in chart["extraEnv"].items() if name != "CAMVIZ_KERNEL_MB"} == config[
@@ -62,10 +62,10 @@ def test_both_recipes_start_the_same_server_with_the_same_environment() -> None:
 
 def test_a_kernel_at_its_limit_and_its_server_fit_into_a_students_container() -> None:
     memory, environment = values()["singleuser"]["memory"], values()["singleuser"]["extraEnv"]
-    assert f'"CAMVIZ_KERNEL_MB", "{environment["CAMVIZ_KERNEL_MB"]}"' in text("deploy/ipython_config.py")
+    assert f'"CAMVIZ_KERNEL_MB", "{environment["CAMVIZ_KERNEL_MB"]}"' in text("tools/deploy/ipython_config.py")
     assert int(environment["CAMVIZ_KERNEL_MB"]) < megabytes(memory["limit"])
     assert megabytes(memory["guarantee"]) < megabytes(memory["limit"])
-    assert f"limits.memory {memory['limit']}" in text("deploy/README.md")
+    assert f"limits.memory {memory['limit']}" in text("tools/deploy/README.md")
 
 
 def test_what_is_guaranteed_is_what_was_measured_and_at_most_half_more() -> None:
@@ -84,7 +84,7 @@ def test_the_hub_knows_every_trait_that_the_recipe_names() -> None:
     from jupyterhub.app import JupyterHub
     from jupyterhub.spawner import Spawner
 
-    config = configured("deploy/jupyterhub_config.py")
+    config = configured("tools/deploy/jupyterhub_config.py")
     kinds: dict[str, type[Configurable]] = {"JupyterHub": JupyterHub, "Spawner": Spawner}
     assert {
         section: sorted(set(config[section]) - set(kinds[section].class_trait_names(config=True))) for section in config
@@ -99,7 +99,7 @@ def test_the_servers_know_every_option_that_they_are_started_with() -> None:
     from jupyter_server.services.kernels.kernelmanager import MappingKernelManager
 
     kinds = {"ServerApp": ServerApp, "MappingKernelManager": MappingKernelManager}
-    options = re.findall(r"--(\w+)\.(\w+)=", text("deploy/jupyterhub_config.py"))
+    options = re.findall(r"--(\w+)\.(\w+)=", text("tools/deploy/jupyterhub_config.py"))
     assert len(options) == 5
     assert [name for kind, name in options if name not in kinds[kind].class_trait_names(config=True)] == []
 
@@ -110,7 +110,7 @@ def test_a_kernel_beyond_its_limit_gets_a_memory_error_and_lives(monkeypatch: py
     monkeypatch.setattr(resource, "setrlimit", lambda kind, both: asked_for.append((kind, both)))
     monkeypatch.setenv("CAMVIZ_KERNEL_MB", "900")
     monkeypatch.delenv("VIRTUAL_ENV", raising=False)  # IPython warns where another one than this Python's is active
-    (line,) = configured("deploy/ipython_config.py").InteractiveShellApp.exec_lines
+    (line,) = configured("tools/deploy/ipython_config.py").InteractiveShellApp.exec_lines
     shell = InteractiveShell.instance()
     before = set(shell.user_ns)
     assert shell.run_cell(line).success
@@ -119,18 +119,18 @@ def test_a_kernel_beyond_its_limit_gets_a_memory_error_and_lives(monkeypatch: py
 
 
 def test_the_image_is_the_readers_with_the_charts_hub_and_the_kernels_limit() -> None:
-    steps = text("deploy/Dockerfile")
+    steps = text("tools/deploy/hub.Dockerfile")
     assert steps.split("\n")[3].startswith("FROM camviz") or "\nFROM camviz\n" in steps
-    assert "docker build -t camviz ." in text("Dockerfile")
+    assert "docker build -t camviz -f tools/deploy/Dockerfile ." in text("tools/deploy/Dockerfile")
     hub = re.search(r"jupyterhub==([\d.]+)\.\*", steps)[1]
-    assert f"JupyterHub {hub})" in text("deploy/kubernetes/values.yaml").partition("\n\n")[0]
-    assert "COPY deploy/ipython_config.py" in steps
+    assert f"JupyterHub {hub})" in text("tools/deploy/kubernetes/values.yaml").partition("\n\n")[0]
+    assert "COPY tools/deploy/ipython_config.py" in steps
     assert "USER reader" in steps.partition("FROM")[2]
     assert values()["singleuser"]["storage"]["homeMountPath"] == "/home/reader"
 
 
 def test_the_link_for_students_pulls_this_repository_and_opens_a_lesson_of_it() -> None:
-    links = re.findall(r"https://hub\.example\.org/hub/user-redirect/git-pull\S+", text("deploy/README.md"))
+    links = re.findall(r"https://hub\.example\.org/hub/user-redirect/git-pull\S+", text("tools/deploy/README.md"))
     assert links
     for link in links:
         asks = parse_qs(urlsplit(link).query, strict_parsing=True)

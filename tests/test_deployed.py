@@ -369,8 +369,8 @@ def test_two_shared_views_do_not_judge_a_pair(stereo):
 
 
 def test_a_share_of_the_benchmark_is_judged_rightly(monkeypatch):
-    """benchmarks/deployments.py judges 198; these are every 24th."""
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    """tools/benchmarks/deployments.py judges 198; these are every 24th."""
+    monkeypatch.syspath_prepend(ROOT / "tools/benchmarks")
     found = list(import_module("deployments").deployments(1 / 24))
     assert {each.kind for each in found} == {"healthy", "knocked", "refocused", "resized", "thin"}
     assert [each for each in found if each.kind == "healthy" and each.check.verdict == "fail"] == []

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from camviz.sensors import Sensor, decibel
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
-from camviz.sensors.recording import measure, read_recording
-from camviz.sensors.statistics import frame_variance, pair, stack
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.measuring.noise.recording import measure, read_recording
+from camviz_clinic.measuring.noise.statistics import frame_variance, pair, stack
 
 HEIGHT, WIDTH = 480, 640
 LEVELS = 50

@@ -1,6 +1,6 @@
 """The model of EMVA 1288 is tested before a figure is told: what breaks it withholds what it spoils, and says why.
 
-The cameras are those of `odd_cameras`. Every test draws with a fixed seed; benchmarks/emva.py asks many of each.
+The cameras are those of `odd_cameras`. Every test draws with a fixed seed; tools/benchmarks/emva.py asks many of each.
 """
 
 import re
@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from odd_cameras import BY_GAIN, ODD, ORDINARY, PRNU, Kind, against, asked, faults, frames, ordinary, shooting
 
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.neighbours import LAGS, Shading, shared_by_neighbours
-from camviz.sensors.statistics import pair, stack
-from camviz.sensors.trust import judged
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.neighbours import LAGS, Shading, shared_by_neighbours
+from camviz_clinic.measuring.noise.statistics import pair, stack
+from camviz_clinic.measuring.noise.trust import judged
 
 SIZE = (64, 96)
 REASONS = {

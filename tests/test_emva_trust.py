@@ -1,7 +1,7 @@
 """A figure of `camviz noise` is near the truth or withheld: where rounding, a clipped black level and rows hide it.
 
 The cameras are plain NumPy, photon by photon (`plain_cameras`). Every test draws with a fixed seed; "false failure" is
-how often a correct measurement would fail it if the seed were drawn anew. benchmarks/emva.py asks hundreds of cameras.
+how often a correct measurement would fail it if the seed were drawn anew. tools/benchmarks/emva.py asks hundreds.
 """
 
 from dataclasses import replace
@@ -10,12 +10,18 @@ import numpy as np
 import pytest
 from plain_cameras import PlainCamera, Shooting, error, measured, pattern, random_camera, random_shooting, truth
 
-from camviz.sensors.estimate import Estimate, combined, of
-from camviz.sensors.estimates import threshold
-from camviz.sensors.hidden import before_rounding, clipped_bias, clipped_variance, missed_beyond, rounding_bias
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
-from camviz.sensors.statistics import pair, stack
+from camviz_clinic.measuring.noise.estimate import Estimate, combined, of
+from camviz_clinic.measuring.noise.estimates import threshold
+from camviz_clinic.measuring.noise.hidden import (
+    before_rounding,
+    clipped_bias,
+    clipped_variance,
+    missed_beyond,
+    rounding_bias,
+)
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.measuring.noise.statistics import pair, stack
 
 SIZE = (120, 160)
 

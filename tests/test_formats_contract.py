@@ -18,7 +18,7 @@ from camviz_clinic.files.models import same_camera
 from camviz_clinic.files.registry import written
 
 PAGE = Path(__file__).parents[1] / "docs" / "formats.md"
-renewed = run_path(str(PAGE.with_suffix(".py")))["renewed"]
+renewed = run_path(str(PAGE.parents[1] / "tools/docs/formats.py"))["renewed"]
 SIZE = (640, 480)
 IMU = RigidTransform.from_components([0.05, 0.02, -0.01], Rotation.from_rotvec([-0.2, 0.1, 1.4]))
 CAMERA = Camera(Intrinsics(*SIZE, 500.0, 500.0, 321.25, 239.5), Perspective())

@@ -6,6 +6,8 @@ import pytest
 from camviz import Camera, Intrinsics, colour, lightfields, mosaics, optics, scenes, sensors, twoview
 from camviz.panoramas import cubemap_camera
 from camviz.poses import RigidTransform
+from camviz_clinic.measuring.noise import Level, read_recording
+from camviz_clinic.measuring.sharpness import SlantedEdge
 
 LEFT = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
 RIGHT = LEFT.at(RigidTransform.from_translation([0.1, 0, 0]))
@@ -80,12 +82,12 @@ OTHERS = [
     ),
     (lambda: optics.pinhole_kernel(0, 0.3, 100), "pitch_mm must be a length above 0 mm, got 0"),
     (lambda: optics.pinhole_kernel(0.1, 0, 100), "diameter_mm must be a length above 0 mm, got 0"),
-    (lambda: optics.SlantedEdge.of([[0, 1], [0, 1]]), "image must be at least 16 × 16 pixels, got 2 × 2"),
+    (lambda: SlantedEdge.of([[0, 1], [0, 1]]), "image must be at least 16 × 16 pixels, got 2 × 2"),
     (lambda: scenes.Texture.plain((1, 1)), r"rgb must have shape \(\.\.\., 3\), got \(2,\)"),
     (lambda: scenes.Wireframe((np.zeros(3),), ("point",)), r"each of lines must have shape \(n, 3\), got \(3,\)"),
 ]
 SENSORS = [
-    (lambda: sensors.Level.of(0.1, [[[1, 2]]], [[[1, 2]]] * 2), "bright must be two frames, got 1"),
+    (lambda: Level.of(0.1, [[[1, 2]]], [[[1, 2]]] * 2), "bright must be two frames, got 1"),
     (lambda: sensors.average([]), "frames must be one or more of one size, got none"),
     (
         lambda: sensors.less_dark([[1, 2, 3]], [[1, 2]]),
@@ -97,7 +99,7 @@ SENSORS = [
     ),
     (lambda: sensors.bloomed([[1]], -1), "full_well_e must be above 0 electrons, got -1"),
     (lambda: sensors.gliding(LEFT, (1, 2)), r"velocity_m_per_s must have shape \(\.\.\., 3\), got \(2,\)"),
-    (lambda: sensors.read_recording("nowhere"), r"nowhere: there is no such folder or descriptor file\."),
+    (lambda: read_recording("nowhere"), r"nowhere: there is no such folder or descriptor file\."),
 ]
 TWO_VIEWS = [
     (lambda: twoview.epipolar_lines(np.eye(2), [1, 2]), r"F must have shape \(3, 3\), got \(2, 2\)"),

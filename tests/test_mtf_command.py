@@ -9,9 +9,9 @@ import pytest
 from commandline import main, refused, run
 from test_slanted_edge import photograph, true_mtf, true_mtf50
 
-from camviz.optics import SlantedEdge
 from camviz.scenes import to_encoded
-from camviz.views.measured_edge import MeasuredEdgeView
+from camviz_clinic.measuring.sharpness import SlantedEdge
+from camviz_clinic.views.measured_edge import MeasuredEdgeView
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """What spoils a slanted edge: told by a wider standard error, taken out, or refused in one sentence.
 
 Edges as in test_slanted_edge.py, whose MTF50 is known, each with one trouble at a time. What is printed lies within 3
-standard errors and 3 % of the truth; benchmarks/mtf_troubles.py holds thousands of edges to the same.
+standard errors and 3 % of the truth; tools/benchmarks/mtf_troubles.py holds thousands of edges to the same.
 """
 
 import re
@@ -15,12 +15,12 @@ import pytest
 from commandline import refused
 from test_slanted_edge import photograph, second_antiderivative, true_mtf50
 
-from camviz.optics.edge_refusal import MOST_ANGLE_DEG, MOST_CLIPPED
-from camviz.optics.slanted_edge import SlantedEdge
 from camviz.scenes import to_encoded
 from camviz_clinic.commands.mtf import ends_of_scale, figures, linear_light
+from camviz_clinic.measuring.sharpness.edge_refusal import MOST_ANGLE_DEG, MOST_CLIPPED
+from camviz_clinic.measuring.sharpness.slanted_edge import SlantedEdge
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tools/benchmarks"))
 
 from mtf_troubles import kinds, measure
 

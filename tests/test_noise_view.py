@@ -10,9 +10,9 @@ import pytest
 
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
-from camviz.views.measured_noise import MeasuredNoiseView
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.views.measured_noise import MeasuredNoiseView
 from camviz_school.views.noise import LEVELS, PhotonTransferView
 
 QUIET = {"read_noise_e": 0.0, "prnu": 0.0, "dsnu_e": 0.0, "dark_current": 0.0}

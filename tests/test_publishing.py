@@ -64,7 +64,7 @@ def test_the_citation_has_what_its_format_asks_for() -> None:
 
 
 def test_the_recipe_for_conda_has_the_dependencies_of_the_package() -> None:
-    recipe = shown("recipe/recipe.yaml")
+    recipe = shown("tools/recipe/recipe.yaml")
     names = {"opencv-contrib-python-headless": "py-opencv", "PyYAML": "pyyaml"}
     wanted = {f"python {PROJECT['requires-python']}"}
     for each in map(Requirement, PROJECT["dependencies"]):
@@ -76,8 +76,9 @@ def test_the_recipe_for_conda_has_the_dependencies_of_the_package() -> None:
 
 
 def test_the_container_takes_the_readers_lock_and_starts_the_lessons() -> None:
-    steps = text("Dockerfile")
+    steps = text("tools/deploy/Dockerfile")
     assert "pip install --no-cache-dir --require-hashes -r requirements.lock" in steps
+    assert "COPY tools/locks/requirements.lock ." in steps
     assert "--no-deps --no-build-isolation --editable ." in steps
     for library in text("binder/apt.txt").split():
         assert f" {library} " in steps
@@ -111,7 +112,7 @@ def test_a_form_for_issues_has_what_github_asks_for(path: Path) -> None:
 @pytest.mark.parametrize("name", PHOTOGRAPHS)
 def test_every_photograph_is_credited_with_its_licence(name: str) -> None:
     what, licence = photograph_credit(name).removesuffix(". From scikit-image's data folder.").rsplit("; ", 1)
-    (row,) = (line for line in text("CREDITS.md").splitlines() if line.startswith(f"| `{name}` |"))
+    (row,) = (line for line in text("lessons/CREDITS.md").splitlines() if line.startswith(f"| `{name}` |"))
     assert what in row
     assert row.endswith(f"| {licence} |")
 
@@ -122,7 +123,7 @@ def test_the_map_of_the_earth_is_credited_where_it_is_named_and_where_it_is_seen
         pytest.skip(credit.sentence)
     assert "Solar System Scope, CC BY 4.0" in credit.sentence
     assert credit.sentence in text("lessons/10_omnidirectional.ipynb")
-    (row,) = (line for line in text("CREDITS.md").splitlines() if "2k_earth_daymap.jpg" in line)
+    (row,) = (line for line in text("lessons/CREDITS.md").splitlines() if "2k_earth_daymap.jpg" in line)
     assert row.endswith("| CC BY 4.0 |")
     assert "Solar System Scope" in row
 

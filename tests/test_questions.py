@@ -8,7 +8,7 @@ import pytest
 from camviz.draw import prose
 from camviz_school.course.material import material
 from camviz_school.course.questions import Question, parse, predict_questions, question, questions, quiz_questions
-from camviz_school.widgets.question import QuestionWidget, Sheet, ask, quiz, score
+from camviz_school.widgets.question import QuestionPage, QuestionWidget, ask, quiz, score
 
 LESSONS = sorted(path.parent.name for path in material().glob("*/questions.toml"))
 ALL = [one for lesson in LESSONS for one in questions(lesson).values()]
@@ -31,7 +31,7 @@ misconception = "the sky is a ceiling"
 
 @pytest.fixture
 def widget():
-    return QuestionWidget(Sheet(quiz_questions("05"), "Exit quiz"))
+    return QuestionWidget(QuestionPage(quiz_questions("05"), "Exit quiz"))
 
 
 def page(widget):
@@ -207,7 +207,7 @@ def test_a_message_that_makes_no_sense_is_shown_in_the_pane_and_raised(widget, m
 
 def test_without_a_kernel_questions_are_a_page_with_folded_replies():
     sheet = ask("05.far_rays")
-    assert isinstance(sheet, Sheet)
+    assert isinstance(sheet, QuestionPage)
     html = sheet._repr_html_()
     assert html.count("<details>") == html.count("<summary>") == len(question("05.far_rays").choices)
     assert "(a)" in repr(sheet)
@@ -228,7 +228,7 @@ def test_in_a_kernel_the_widget_is_shown_and_the_page_beside_it(monkeypatch):
     answers = [one.choices[one.answer].reply.split(".")[0] for one in quiz_questions("05")]
     assert not any(prose.to_plain(answer) in kept["text/html"] for answer in answers)
     monkeypatch.setenv("CAMVIZ_STATIC", "1")
-    assert isinstance(quiz("05"), Sheet)
+    assert isinstance(quiz("05"), QuestionPage)
 
 
 def test_a_lesson_without_a_quiz_says_so(monkeypatch):

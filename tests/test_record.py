@@ -15,12 +15,12 @@ import traitlets
 from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import View, choice, slider, switch
 from camviz.widgets import explore
-from camviz_school.record import Axis, Budget, BudgetError, Recording, Widget, record
+from camviz_school.record import Axis, Budget, BudgetError, RecordedPane, Widget, record
 from camviz_school.record.packing import Images, Pack
 from camviz_school.record.panes import Explored
 from camviz_school.views.readout import ReadoutView
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tools/benchmarks"))
 
 from smallest import Smallest
 
@@ -48,7 +48,7 @@ class Toy(View):
         return self.but(size=min(max(self.size + dx / 30, 0.0), 10.0))
 
 
-def content(made: Recording) -> dict[str, Any]:
+def content(made: RecordedPane) -> dict[str, Any]:
     """What the pack holds."""
     text = (made.folder / made.pack).read_text(encoding="utf-8")
     return json.loads(re.fullmatch(r'camvizRecorded\("[^"]+",(.*)\);\n', text, re.DOTALL)[1])
@@ -73,7 +73,7 @@ def unpacked(value: Any, pieces: list[str], unit: float) -> Any:
     return {name: unpacked(one, pieces, unit) for name, one in value.items()}
 
 
-def states(made: Recording, unit: float = 1.0) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+def states(made: RecordedPane, unit: float = 1.0) -> list[tuple[dict[str, Any], dict[str, Any]]]:
     """Each recorded position, as its values, and its frame."""
     held = content(made)
     first = {axis["name"]: axis["first"] for axis in held["axes"]}

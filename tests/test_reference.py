@@ -31,7 +31,7 @@ matplotlib.use("agg")
 
 ROOT = Path(camviz.__file__).parents[1]
 PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
-sys.path.insert(0, str(ROOT / "website"))
+sys.path.insert(0, str(ROOT / "tools/website"))
 
 import docstrings  # noqa: E402
 
@@ -331,7 +331,7 @@ def test_every_public_name_is_documented(part):
 
 
 def test_contributing_shows_a_docstring_as_it_is():
-    shown = re.search(r'```python\ndef project.*?"""(.*?)"""', (ROOT / "CONTRIBUTING.md").read_text(), re.DOTALL)
+    shown = re.search(r'```python\ndef project.*?"""(.*?)"""', (ROOT / "docs/CONTRIBUTING.md").read_text(), re.DOTALL)
     assert shown
     assert inspect.cleandoc(shown[1]) == inspect.getdoc(camviz.Camera.project)
 

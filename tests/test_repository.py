@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from fnmatch import fnmatch
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
@@ -61,7 +62,7 @@ def test_the_first_floors_modules_are_had_from_the_package_itself() -> None:
 
 @pytest.mark.parametrize("name", LOCKS)
 def test_the_lock_pins_every_dependency_with_hashes_and_names_no_host(name: str) -> None:
-    lock = (ROOT / name).read_text()
+    lock = (ROOT / "tools/locks" / name).read_text()
     assert "://" not in lock
     assert not re.search(r"^\s*-[a-z-]", lock.replace("--hash=", ""), flags=re.MULTILINE)
     entries = re.split(r"\n(?=\S)", lock.strip())
@@ -72,7 +73,10 @@ def test_the_lock_covers_every_dependency_that_the_package_declares() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     declared = chain(project["dependencies"], *project["optional-dependencies"].values())
     names = {re.match(r"[\w.-]+", one)[0].lower().replace("_", "-") for one in declared} - {"camviz"}  # type: ignore[index]
-    locks = (set(re.findall(r"^([\w.-]+)==", (ROOT / name).read_text(), flags=re.MULTILINE)) for name in LOCKS)
+    locks = (
+        set(re.findall(r"^([\w.-]+)==", (ROOT / "tools/locks" / name).read_text(), flags=re.MULTILINE))
+        for name in LOCKS
+    )
     reader, site, tester = locks
     assert names <= reader | site | tester
     assert {"jupyterlab", "vtk", "hatchling", "editables"} <= reader
@@ -101,9 +105,12 @@ def test_ci_names_every_action_by_its_commit() -> None:
     assert [each for each in used if not re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", each)] == []
 
 
-@pytest.mark.parametrize(
-    "page", sorted(p.relative_to(ROOT).as_posix() for p in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+PAGES = chain.from_iterable(
+    map(ROOT.glob, ("*.md", ".github/*.md", "docs/**/*.md", "lessons/*.md", "tools/deploy/*.md"))
 )
+
+
+@pytest.mark.parametrize("page", sorted(path.relative_to(ROOT).as_posix() for path in PAGES))
 def test_links_and_pictures_of_a_page_lead_to_files_that_exist(page: str) -> None:
     text = re.sub(r"```.*?```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
     targets = [first or second for first, second in LINK.findall(text)]
@@ -159,3 +166,11 @@ def test_the_version_is_the_same_everywhere() -> None:
     cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), flags=re.MULTILINE)
     assert cited
     assert cited[1] == project["version"] == python("import camviz; print(camviz.__version__)").strip()
+
+
+def test_the_top_level_is_small() -> None:
+    """What a newcomer sees first: the three packages, the lessons, and little beside them."""
+    made = [line.rstrip("/") for line in (ROOT / ".gitignore").read_text().splitlines()]
+    names = sorted(path.name for path in ROOT.iterdir() if not path.name.startswith("."))
+    shown = [name for name in names if not any(fnmatch(name, pattern) for pattern in made)]
+    assert len(shown) <= 14, shown

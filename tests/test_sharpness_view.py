@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camviz.optics import SlantedEdge
+from camviz_clinic.measuring.sharpness import SlantedEdge
 from camviz_school.views.sharpness import FIELD_UM, SharpnessView
 
 BASE = SharpnessView(f_number=4.0, defocus_um=10.0)

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.special import j1, ndtr
 
-from camviz.optics.slanted_edge import SlantedEdge
+from camviz_clinic.measuring.sharpness.slanted_edge import SlantedEdge
 
 ANGLES_DEG = (2, 3, 5, 7, 10, 12, 15)
 BLURS = [

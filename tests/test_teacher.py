@@ -68,7 +68,7 @@ def test_a_key_says_which_votes_to_expect_and_that_nobody_counted_them():
     key = edition.key_markdown(questions.question("05.far_rays"), plan.expected("05.far_rays"))
     assert [int(share) for share in re.findall(r"(\d+) % expected", key)] == list(plan.expected("05.far_rays").split)
     assert "The expected votes are a guess" in key
-    counted = plans.Votes("far_rays", (40, 40, 10, 10), "Crouch and Mazur 2001, page 972")
+    counted = plans.ExpectedVotes("far_rays", (40, 40, 10, 10), "Crouch and Mazur 2001, page 972")
     key = edition.key_markdown(questions.question("05.far_rays"), counted)
     assert "from Crouch and Mazur 2001" in key
     assert "guess" not in key

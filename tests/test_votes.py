@@ -27,10 +27,10 @@ from camviz_school.room import hub, membership, shown
 from camviz_school.room.address import is_named_safely
 from camviz_school.room.gain import gain, gains
 from camviz_school.room.limits import Allowance, Limits
-from camviz_school.room.server import answers_csv
 from camviz_school.room.site import Site
 from camviz_school.room.store import Room, RoomError
-from camviz_school.widgets.question import QuestionWidget, Sheet
+from camviz_school.room.tables import answers_csv
+from camviz_school.widgets.question import QuestionPage, QuestionWidget
 
 ASKED = questions("05")
 FIRST, SECOND = "05.grid", "05.far_rays"
@@ -693,7 +693,7 @@ async def until(true, seconds=120):
 def asking(tmp_path, monkeypatch):
     """An `ask` of a notebook, by a user who can join rooms."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return QuestionWidget(Sheet((question(FIRST),), "Predict"))
+    return QuestionWidget(QuestionPage((question(FIRST),), "Predict"))
 
 
 def test_without_a_room_a_question_is_as_before(asking):

@@ -16,7 +16,7 @@ from docutils.core import publish_doctree
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "website"))
+sys.path.insert(0, str(ROOT / "tools/website"))
 
 import clips  # noqa: E402
 import docstrings  # noqa: E402

@@ -16,7 +16,7 @@ from camviz.scenes.light import to_encoded, to_linear
 
 
 @dataclass(frozen=True, eq=False)
-class Shot:
+class CameraInLight:
     """A camera, one of `camviz.colour.spectra.CAMERAS`, in a light of relative power (81,).
 
     Exposure is such that a perfect white gives green 1.
@@ -65,9 +65,9 @@ class Shot:
         return fit_matrix(self.raw_chart * neutral(self.white), truth, (np.ones(3), SRGB_FROM_XYZ @ WHITE))
 
 
-def in_daylight(camera: str) -> Shot:
+def in_daylight(camera: str) -> CameraInLight:
     """The camera in D65, where cameras are calibrated."""
-    return Shot(camera, illuminant("D65"))
+    return CameraInLight(camera, illuminant("D65"))
 
 
 def xyz_from_raw(camera: str) -> Array:

@@ -15,7 +15,7 @@ from camviz.draw.wire import Viewport, draw_wire
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.scenes import Scene, wireframe_scene
-from camviz.scenes.surfaces import Mesh
+from camviz.scenes.mesh import Mesh
 
 __all__ = [
     "Dots", "Face", "Item", "Label", "Line", "OrbitCamera", "TexturedMesh", "axes_triad", "camera_body",

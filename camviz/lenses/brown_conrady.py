@@ -1,4 +1,7 @@
-"""The polynomial that most calibrations hold: radial, tangential, rational, thin prism and tilt, as OpenCV has them."""
+"""The polynomial that most calibrations hold, long because its inverse and its folds need every one of its terms.
+
+Radial, tangential, rational, thin prism and tilt, as OpenCV has them.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -53,7 +53,7 @@ class ModifiedBrownConrady(Lens):
     @cached_property
     def polynomial(self) -> BrownConrady:
         """What bends ideal points."""
-        return _Polynomial(self.k1, self.k2, self.p1, self.p2, self.k3)
+        return _ModifiedPolynomial(self.k1, self.k2, self.p1, self.p2, self.k3)
 
     @property
     def is_distorted(self) -> bool:
@@ -81,7 +81,7 @@ class ModifiedBrownConrady(Lens):
 
 
 @dataclass(frozen=True)
-class _Polynomial(BrownConrady):
+class _ModifiedPolynomial(BrownConrady):
     """Brown-Conrady's with other tangential terms."""
 
     def _polynomial(self, x: Array, y: Array) -> tuple[Array, Array]:

@@ -58,7 +58,9 @@ class ThinPrismFisheye(Lens):
     @cached_property
     def polynomial(self) -> BrownConrady:
         """What bends the image of the equidistant lens."""
-        return _Polynomial(self.k1, self.k2, self.p1, self.p2, self.k3, s1=self.sx1, s3=self.sy1, eighth=self.k4)
+        return _ThinPrismPolynomial(
+            self.k1, self.k2, self.p1, self.p2, self.k3, s1=self.sx1, s3=self.sy1, eighth=self.k4
+        )
 
     @property
     def can_fold(self) -> bool:
@@ -81,7 +83,7 @@ class ThinPrismFisheye(Lens):
 
 
 @dataclass(frozen=True)
-class _Polynomial(BrownConrady):
+class _ThinPrismPolynomial(BrownConrady):
     """Brown-Conrady's with another radial term: `eighth` r⁸."""
 
     eighth: float = 0.0

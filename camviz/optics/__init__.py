@@ -1,5 +1,6 @@
 """Optics of pinholes, thin lenses and lenses of real elements. Millimetres, nanometres, seconds."""
 
+from camviz import _answering
 from camviz.optics.elements import COOKE_TRIPLET, TELEPHOTO, Prescription, free_space, ideal_lens, refraction
 from camviz.optics.modulation import (
     cutoff_per_mm,
@@ -27,7 +28,6 @@ from camviz.optics.pinhole import (
     pinhole_spread,
     sunny_exposure,
 )
-from camviz.optics.slanted_edge import SlantedEdge
 from camviz.optics.thin_lens import (
     airy_radius_um,
     circle_of_confusion_mm,
@@ -50,7 +50,6 @@ __all__ = [
     "TELEPHOTO",
     "YOUNG",
     "Prescription",
-    "SlantedEdge",
     "airy_radius_um",
     "best_hole_mm",
     "circle_of_confusion_mm",
@@ -82,3 +81,5 @@ __all__ = [
     "unvignetted_share",
     "working_f_number",
 ]
+
+__getattr__ = _answering("optics")

@@ -17,8 +17,9 @@ from camviz.lenses.base import Array, as_points
 from camviz.scenes.batched import Indices, Traced, batched
 from camviz.scenes.intersection import Hit
 from camviz.scenes.light import to_display
+from camviz.scenes.mesh import Mesh
 from camviz.scenes.rays import SIDE, TILE, Bounds, Floats, Rays
-from camviz.scenes.surfaces import Mesh, Rectangle, Surface, on_sphere
+from camviz.scenes.surfaces import Rectangle, Surface, on_sphere
 from camviz.scenes.texture import LIGHT, Texture
 from camviz.scenes.wireframe import Wireframe
 

@@ -12,45 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.lenses.base import Array, unit
 from camviz.scenes.intersection import FAR, HALF, Hit, intersect_circle, intersect_plane, intersect_square, texels
-from camviz.scenes.light import sunlight, to_display, to_linear
+from camviz.scenes.light import sunlight
+from camviz.scenes.mesh import Mesh, lattice
 from camviz.scenes.rays import Ball, Floats, turned
 from camviz.scenes.texture import Texture
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """A surface as quadrilaterals, for a solid renderer.
-
-    Attributes:
-        name: What it belongs to.
-        vertices: (n, 3), in metres.
-        quads: (m, 4), indices of vertices.
-        uv: (n, 2), places of the vertices on the texture's picture, as shares of it: u to the right and v upwards.
-        texture: What lies on it.
-        shade: The light that it receives, 1 for full light.
-
-    >>> wall = Rectangle((0, 0, 2), (1, 0, 0), (0, 1, 0), Texture.plain((1, 0, 0))).mesh()
-    >>> wall.vertices.shape, wall.quads.tolist(), wall.rgb
-    ((4, 3), [[0, 1, 2, 3]], (255, 0, 0))
-    """
-
-    name: str
-    vertices: Array
-    quads: NDArray[np.intp]
-    uv: Array
-    texture: Texture
-    shade: float = 1.0
-
-    @property
-    def picture(self) -> NDArray[np.uint8]:
-        """sRGB bytes (height, width, 3) of the shaded texture, for a renderer with textures."""
-        return to_display(to_linear(np.arange(256) / 255) * self.shade)[self.texture.photograph]
-
-    @property
-    def rgb(self) -> tuple[int, int, int]:
-        """The mean of the picture, 0 … 255, for a renderer without textures."""
-        red, green, blue = to_display(self.texture.mean * self.shade).tolist()
-        return red, green, blue
 
 
 class Surface(Protocol):
@@ -278,7 +243,7 @@ class Sphere(Surface):
         return tuple(self.centre + circle[:, axes] for axes in ([0, 1, 2], [0, 2, 1], [2, 1, 0]))
 
     def mesh(self) -> Mesh:
-        s, r, uv, quads = _lattice(32, 16)
+        s, r, uv, quads = lattice(32, 16)
         longitude, latitude = 2 * np.pi * (s - 0.5), np.pi * r
         ring = np.sin(latitude)
         normals = np.stack([ring * np.sin(longitude), -np.cos(latitude), -ring * np.cos(longitude)], axis=-1)
@@ -350,7 +315,7 @@ class Column(Surface):
         return (self.foot + rim, self._top + rim, *sides)
 
     def mesh(self) -> Mesh:
-        s, r, uv, quads = _lattice(24, 1)
+        s, r, uv, quads = lattice(24, 1)
         longitude = 2 * np.pi * (s - 0.5)
         offset = [self.radius * np.sin(longitude), self.height * r, -self.radius * np.cos(longitude)]
         return _mesh(self.name, self._top + np.stack(offset, axis=-1), quads, uv, self.texture)
@@ -422,14 +387,6 @@ def _in_frame(local_from_world: Array, point: Array, origins: Array, directions:
     """Origins and directions of rays in a frame at `point`."""
     start = turned(local_from_world, origins - point[:, None]).astype(np.float32)
     return start, turned(local_from_world.astype(np.float32), directions)
-
-
-def _lattice(columns: int, rows: int) -> tuple[Array, Array, Array, NDArray[np.intp]]:
-    """s, r, uv and the quads of a rectangular net, for a surface wound around an axis."""
-    r, s = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, columns + 1), indexing="ij")
-    index = np.arange(r.size).reshape(r.shape)
-    quads = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
-    return s.ravel(), r.ravel(), np.stack([s.ravel(), 1 - r.ravel()], axis=-1), quads
 
 
 def _mesh(name: str, vertices: Array, quads: NDArray[np.intp], uv: Array, texture: Texture, shade: float = 1.0) -> Mesh:

@@ -1,14 +1,13 @@
 """Image sensors: what turns light into numbers, after EMVA Standard 1288, release 4.0 (linear)."""
 
+from camviz import _answering
 from camviz.sensors.correction import NoiseModel, average, flattened, less_dark, merged, smoothed
 from camviz.sensors.counting import poisson
 from camviz.sensors.dark import band_gap_ev, dark_current_ratio, doubling_temperature_k
 from camviz.sensors.digital_camera import DigitalCamera, Shot
 from camviz.sensors.efficiency import EfficiencyCurve
 from camviz.sensors.fixed_pattern import FixedPattern
-from camviz.sensors.measurement import Measurement
 from camviz.sensors.published import PUBLISHED, SHUTTERS, MeasuredShutter, PublishedSensor
-from camviz.sensors.readings import Level
 from camviz.sensors.readout import (
     CcdRegister,
     bloomed,
@@ -20,18 +19,8 @@ from camviz.sensors.readout import (
     smeared,
     transferred,
 )
-from camviz.sensors.recording import Recording, RecordingError, measure, read_recording
-from camviz.sensors.sensor import (
-    Exposure,
-    Sensor,
-    amplify,
-    convert,
-    decibel,
-    fill,
-    leak,
-    quantise,
-    read,
-)
+from camviz.sensors.sensor import Exposure, Sensor, decibel
+from camviz.sensors.steps import amplify, convert, fill, leak, quantise, read
 
 __all__ = [
     "PUBLISHED",
@@ -41,13 +30,9 @@ __all__ = [
     "EfficiencyCurve",
     "Exposure",
     "FixedPattern",
-    "Level",
     "MeasuredShutter",
-    "Measurement",
     "NoiseModel",
     "PublishedSensor",
-    "Recording",
-    "RecordingError",
     "Sensor",
     "Shot",
     "amplify",
@@ -64,12 +49,10 @@ __all__ = [
     "gliding",
     "leak",
     "less_dark",
-    "measure",
     "merged",
     "poisson",
     "quantise",
     "read",
-    "read_recording",
     "rolling_picture",
     "rolling_rays",
     "row_times",
@@ -77,3 +60,5 @@ __all__ = [
     "smoothed",
     "transferred",
 ]
+
+__getattr__ = _answering("sensors")

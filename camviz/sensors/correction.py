@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.sensors.measurement import Measurement
 from camviz.sensors.sensor import Sensor
 
 Array = NDArray[np.float64]
@@ -74,20 +73,6 @@ class NoiseModel:
         top = sensor.saturation_e - 5 * np.sqrt(sensor.saturation_e + noise**2)
         saturation = black + sensor.gain_dn_per_e * top
         return cls(sensor.gain_dn_per_e, float(noise), black, float(saturation), sensor.prnu, sensor.dsnu_e)
-
-    @classmethod
-    def measured(cls, found: Measurement) -> NoiseModel:
-        """The model that a measurement found; noise that it could not measure is taken as 0.
-
-        Args:
-            found: Of dark and bright frames.
-
-        Returns: NoiseModel of one pixel.
-        """
-        saturation = found.levels[found.peak].bright.mean if found.saturated else np.inf
-        patterns = np.nan_to_num([found.prnu, found.dsnu_e]).tolist()
-        noise = found.dark_noise_dn / found.gain_dn_per_e
-        return cls(found.gain_dn_per_e, noise, found.levels[0].dark.mean, saturation, *patterns)
 
     def electrons(self, dn: ArrayLike) -> Array:
         """The electrons that digital numbers stand for.

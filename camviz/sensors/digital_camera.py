@@ -17,7 +17,8 @@ from camviz.mosaics import BAYER, Pattern, demosaic, mosaic
 from camviz.scenes.light import to_display
 from camviz.scenes.scene import Scene, render
 from camviz.sensors.counting import Floats
-from camviz.sensors.sensor import Exposure, Sensor, Words
+from camviz.sensors.sensor import Exposure, Sensor
+from camviz.sensors.steps import Words
 
 PLANCK_J_S, LIGHT_M_PER_S = 6.62607015e-34, 299792458.0
 LUMENS_PER_WATT = 683.0  # at 555 nm: the definition of the lumen

@@ -1,4 +1,4 @@
-"""The distortion visualizer: one lens seen as picture, displacement field, radial curve and bent frustum.
+"""The distortion visualizer, in one file because its panels draw one state: picture, field, curve and frustum.
 
 A reader's own function can bend a picture beside the right one.
 """

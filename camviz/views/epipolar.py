@@ -1,4 +1,4 @@
-"""The epipolar visualizer: one point, two cameras, and the line on which the second picture must show it.
+"""The epipolar visualizer, in one file because its panels draw one state: a point, two cameras, and its line.
 
 A reader's own F can draw its line beside the right one.
 """

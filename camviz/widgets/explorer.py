@@ -17,9 +17,9 @@ from IPython import get_ipython
 
 from camviz.draw.picture import page_style
 from camviz.views.base import Control, View
+from camviz.widgets.change_request import ChangeRequest, number_of
 from camviz.widgets.memory import give_back_after_cells, keep_between_pictures
 from camviz.widgets.still import StillWidget, stills_for_boxes
-from camviz.widgets.wish import Wish, number_of
 
 _HERE = files("camviz.widgets")
 _CAPTION = (
@@ -52,7 +52,7 @@ class Explorer(StillWidget):
     A number outside a control's range is held at its end, as the slider holds it; `set` goes beyond. What cannot be
     drawn is refused, and the last good state stays.
 
-    The browser asks for one picture at a time and always for its newest wish, so a slow picture never builds a queue.
+    The browser asks for one picture at a time and always for its newest request, so that no queue builds up.
     What it asks for is checked: numbers are held within their ranges, whatever moves them. An error in drawing is shown
     in words above the last good picture. A button makes words twice as large for the back row; CAMVIZ_SCALE (1 to 3)
     does so from the start.
@@ -219,24 +219,24 @@ class Explorer(StillWidget):
 
     def _receive(self, _widget: object, message: object, _buffers: object) -> None:
         try:
-            wish = Wish.of(message)
-            self._show(self._wished(wish), draft=wish.draft, answers=number_of(message))
+            request = ChangeRequest.of(message)
+            self._show(self._requested(request), draft=request.draft, answers=number_of(message))
         # The widget's edge: whatever a view raises belongs in front of the reader, and nobody above would show it.
         except Exception as error:
             self._tell(error, answers=number_of(message))
 
-    def _wished(self, wish: Wish) -> View:
-        self._units |= wish.units
-        view = self._first if wish.reset else self.view
-        if wish.values:
-            view = view.but(**{name: self._wished_value(name, value) for name, value in wish.values.items()})
-        for drag in wish.drags:
+    def _requested(self, request: ChangeRequest) -> View:
+        self._units |= request.units
+        view = self._first if request.reset else self.view
+        if request.values:
+            view = view.but(**{name: self._requested_value(name, value) for name, value in request.values.items()})
+        for drag in request.drags:
             view = self._within(view.dragged(*drag), view)
-        for key in wish.keys:
+        for key in request.keys:
             view = self._within(view.pressed(*key), view)
         return view
 
-    def _wished_value(self, name: str, value: Any) -> Any:
+    def _requested_value(self, name: str, value: Any) -> Any:
         """The value, held within its control's range; where the control began it may return to, even from outside."""
         held = self._held(name, value)
         first = getattr(self._first, name)

@@ -7,7 +7,7 @@ from math import inf, log
 
 import numpy as np
 
-from camviz.distortion import NEARLY_A_POLE
+from camviz.distortion.limits import NEARLY_A_POLE
 from camviz.lenses import Lens
 from camviz.lenses.base import Array
 

@@ -19,7 +19,7 @@ from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.boards.charuco import charuco_dictionary
 from camviz_clinic.calibration.chessboards import LEAST_SIDE
 from camviz_clinic.calibration.finding import check_finder, find_corners, look
-from camviz_clinic.calibration.processes import Crew, processors, signals_put_off
+from camviz_clinic.calibration.processes import WorkerPool, processors, signals_put_off
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.calibration.wrong_board import another_board, part_of_a_larger
 
@@ -283,16 +283,16 @@ def _in_processes(
     """
     waiting = enumerate(paths)
     busy: dict[Any, tuple[int | None, float]] = {}  # the picture's place and when its time is over, by pipe
-    with signals_put_off() as hear, Crew(board, finder) as crew:
+    with signals_put_off() as hear, WorkerPool(board, finder) as pool:
         try:
-            busy |= {crew.another(): (None, inf) for _ in range(min(workers, len(paths)))}
+            busy |= {pool.another(): (None, inf) for _ in range(min(workers, len(paths)))}
             while busy:
                 hear()
                 for pipe, (place, end) in list(busy.items()):
                     if place is not None and monotonic() > end and not pipe.poll():
                         del busy[pipe]
-                        crew.dismiss(pipe)
-                        busy[crew.another()] = None, inf
+                        pool.dismiss(pipe)
+                        busy[pool.another()] = None, inf
                         yield place, (None, None, f"the search for the board did not end within {seconds:g} s")
                 ready: list[Any] = wait(list(busy), timeout=LISTEN)
                 for pipe in ready:

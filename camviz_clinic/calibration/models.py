@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.distortion import NEARLY_A_POLE, image_reach, weakest_denominator
+from camviz.distortion.limits import NEARLY_A_POLE, image_reach, weakest_denominator
 from camviz.lenses import CalibrationModel, Lens, calibration_models
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
@@ -54,7 +54,7 @@ Solution = tuple[Camera, RigidTransform]  # the poses are cam_from_board, one fo
 
 
 @dataclass(frozen=True)
-class Model:
+class CameraModel:
     """A camera model: its lens, the intrinsic parameters that are solved for, and who solves.
 
     `solve(views, fixed)` need not hold every parameter in `fixed`. A `regularised` model is solved under a prior.
@@ -196,7 +196,7 @@ SOLVERS = {
 }
 
 
-def _model(lens: type[Any], declared: CalibrationModel) -> Model:
+def _model(lens: type[Any], declared: CalibrationModel) -> CameraModel:
     """The model that a lens declares."""
 
     def solve(views: Views, fixed: tuple[str, ...]) -> Solution:
@@ -205,7 +205,7 @@ def _model(lens: type[Any], declared: CalibrationModel) -> Model:
         flags = getattr(cv2, declared.flags) if declared.flags else 0
         return SOLVERS[declared.solver](lens, flags, views, fixed)
 
-    return Model(declared.title, (*PIXELS, *declared.parameters.split()), declared.regularised, solve)
+    return CameraModel(declared.title, (*PIXELS, *declared.parameters.split()), declared.regularised, solve)
 
 
 MODELS = {name: _model(lens, declared) for name, (lens, declared) in calibration_models().items()}

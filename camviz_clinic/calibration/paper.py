@@ -21,7 +21,7 @@ POINTS = 72 / 25.4  # per millimetre
 
 
 @dataclass(frozen=True)
-class Sheet:
+class PrintedBoard:
     """A board on a sheet of paper; all lengths in millimetres, x to the right and y up from the sheet's lower left.
 
     The board lies flat on the sheet with its first row of corners on top. Raises ValueError where it does not fit.
@@ -98,7 +98,7 @@ def black_discs(board: Board) -> Array:
     return np.asarray(1000 * (kind_of(board).drawn(board).discs - [left, top, 0]))
 
 
-def fitted(board: Board, paper: str = "a4") -> Sheet:
+def fitted(board: Board, paper: str = "a4") -> PrintedBoard:
     """The board on a paper of PAPERS, or of a size such as "500x400-mm", whichever way round it fits.
 
     Raises ValueError saying what would fit.
@@ -108,7 +108,7 @@ def fitted(board: Board, paper: str = "a4") -> Sheet:
     ways = [(short, long), (long, short)] if wide <= high else [(long, short), (short, long)]
     for width, height in ways:
         if wide + 2 * MARGIN <= width + 1e-9 and high + MARGIN + STRIP <= height + 1e-9:
-            return Sheet(board, width, height)
+            return PrintedBoard(board, width, height)
     kind = kind_of(board)
     room = max(min((width - 2 * MARGIN) / wide, (height - MARGIN - STRIP) / high) for width, height in ways)
     largest = floor(10 * 1000 * kind.size(board) * room + 1e-9) / 10
@@ -136,7 +136,7 @@ def _up(length: float) -> int:
     return int(np.ceil(length - 1e-9))
 
 
-def pdf(sheet: Sheet) -> bytes:
+def pdf(sheet: PrintedBoard) -> bytes:
     """The sheet as a PDF of one page (PDF 1.7, ISO 32000-1), whose viewers are asked not to scale it."""
     lines = [f"{POINTS:.9f} 0 0 {POINTS:.9f} 0 0 cm", "0 g"]
     for rectangles in (sheet.black(), sheet.ruler()):

@@ -17,7 +17,7 @@ from camviz_clinic.calibration.boards import Shape
 from camviz_clinic.calibration.finding import look_on_request
 
 
-class Crew:
+class WorkerPool:
     """Processes that look for boards, each known by the pipe to it; all are gone when the block is left."""
 
     def __init__(self, board: Shape, finder: str) -> None:

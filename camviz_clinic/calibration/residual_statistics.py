@@ -43,7 +43,7 @@ def robust_z(residuals: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class RadialProfile:
     """Mean residuals in rings around a centre: `radius` (n,), `radial` outwards and `tangential` (clockwise on screen).
 
     With `deviation`, the standard deviation (n,) that noise gives both means, and the number of corners in each ring.
@@ -56,7 +56,7 @@ class Profile:
     count: np.ndarray
 
 
-def radial_profile(residuals: ArrayLike, uv: ArrayLike, centre: ArrayLike, rings: int = 8) -> Profile:
+def radial_profile(residuals: ArrayLike, uv: ArrayLike, centre: ArrayLike, rings: int = 8) -> RadialProfile:
     """The profile of residuals (..., 2) of corners at pixels uv (..., 2), in rings of equally many corners each."""
     residuals, uv = as_points(residuals, 2, "residuals").reshape(-1, 2), as_points(uv, 2, "uv").reshape(-1, 2)
     known = np.isfinite(residuals).all(-1) & np.isfinite(uv).all(-1)
@@ -69,7 +69,7 @@ def radial_profile(residuals: ArrayLike, uv: ArrayLike, centre: ArrayLike, rings
     count = np.array([len(part) for part in parts])
     sigma = robust_sigma(residuals) if len(residuals) else np.nan
     means = [np.array([values[part].mean() for part in parts]) for values in (radius, radial, tangential)]
-    return Profile(means[0], means[1], means[2], sigma / np.sqrt(count), count)
+    return RadialProfile(means[0], means[1], means[2], sigma / np.sqrt(count), count)
 
 
 def direction_profile(residuals: ArrayLike, sectors: int = 12) -> np.ndarray:

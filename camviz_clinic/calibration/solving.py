@@ -15,7 +15,7 @@ from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.jacobian import with_parameters
-from camviz_clinic.calibration.models import MODELS, Model, Views, poses_from_rays
+from camviz_clinic.calibration.models import MODELS, CameraModel, Views, poses_from_rays
 from camviz_clinic.calibration.outliers import Masks, outliers, sentences
 from camviz_clinic.calibration.regularisation import regularised, with_priors
 from camviz_clinic.calibration.types import Board, Calibration, Mask
@@ -130,7 +130,7 @@ def calibrate_pair(
     return _calibration(pair, shared, tuple(skipped), stopped)
 
 
-def _model(name: str, fixed: Sequence[str]) -> tuple[Model, tuple[str, ...]]:
+def _model(name: str, fixed: Sequence[str]) -> tuple[CameraModel, tuple[str, ...]]:
     """The model and the parameters that are to be estimated."""
     if name not in MODELS:
         raise ValueError(f"model must be one of {', '.join(MODELS)}, got {name!r}")
@@ -145,7 +145,7 @@ def _model(name: str, fixed: Sequence[str]) -> tuple[Model, tuple[str, ...]]:
 
 
 def _alone(
-    name: str, detections: Detections, board: Board, kind: Model, estimated: tuple[str, ...], robust: bool
+    name: str, detections: Detections, board: Board, kind: CameraModel, estimated: tuple[str, ...], robust: bool
 ) -> Adjustment:
     """One camera, solved for by OpenCV and adjusted."""
     corners = detections.corners
@@ -169,7 +169,7 @@ def _alone(
 
 
 def _solved(
-    detections: Detections, board: Board, kind: Model, fixed: tuple[str, ...], aside: Mask
+    detections: Detections, board: Board, kind: CameraModel, fixed: tuple[str, ...], aside: Mask
 ) -> tuple[Camera, RigidTransform]:
     """OpenCV's solution from the corners in use; the pose of a view that is set aside comes from all its corners."""
     there = seen(detections.corners)

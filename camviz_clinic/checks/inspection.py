@@ -13,7 +13,7 @@ from camviz.cameras import Camera
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks import words
-from camviz_clinic.checks.apart import Apart, differences
+from camviz_clinic.checks.camera_difference import CameraDifference, differences
 from camviz_clinic.checks.causes import by_causes
 from camviz_clinic.checks.doctor import Shown
 from camviz_clinic.checks.evidence import Evidence, NotChecked
@@ -57,7 +57,7 @@ class Inspection:
     skipped: tuple[tuple[str, str], ...] = ()
     compare: Calibration | None = field(default=None, repr=False)
     source: Path | None = None
-    differences: tuple[Apart, ...] = ()
+    differences: tuple[CameraDifference, ...] = ()
     at: float | None = None
     ignored: tuple[Finding, ...] = ()
     made: tuple[Finding, ...] = field(default=(), repr=False)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import glob
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -34,6 +32,7 @@ from camviz_clinic.commands.common import (
 from camviz_clinic.commands.corners import add_corners, corners_of
 from camviz_clinic.commands.gate import EPILOG as GATE
 from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
+from camviz_clinic.commands.pictures import Bar, pictures
 
 if TYPE_CHECKING:
     from camviz_clinic.calibration import CannotCalibrate
@@ -75,7 +74,6 @@ exit status:
 """
 MOST_WORDS = 1000
 FINDERS = ("auto", "sectors", "classic")
-PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
 
 
 def add(commands: Any) -> None:
@@ -272,28 +270,6 @@ def _page(inspection: Inspection, folders: Mapping[str, Path], page: Path) -> No
     write_whole(page, lambda path: write_report(inspection, path, images=folders))
 
 
-def pictures(words: Sequence[str]) -> list[Path]:
-    """The files that words name: themselves, those of a folder, or those of a pattern; each once, in natural order."""
-    found: dict[Path, None] = {}
-    for word in words:
-        if "\0" in word:
-            raise Refusal(f"{word!r} is not a file name.")
-        path = Path(word)
-        if path.is_dir():
-            paths = sorted((each for each in path.iterdir() if PICTURES.fullmatch(each.suffix)), key=_natural)
-            if not paths:
-                raise Refusal(f"{path}: there are no pictures in this folder.")
-        elif path.exists():
-            paths = [path]
-        else:
-            paths = sorted(map(Path, glob.glob(word)), key=_natural)
-            if not paths:
-                what = "no picture fits this pattern" if glob.has_magic(word) else "there is no such picture or folder"
-                raise Refusal(f"{word}: {what}.")
-        found |= dict.fromkeys(paths)
-    return list(found)
-
-
 def report(calibration: Calibration) -> list[str]:
     """What came out, in sentences."""
     said = [f"{picture}: skipped, {why}." for picture, why in calibration.skipped]
@@ -377,11 +353,6 @@ def _how(options: argparse.Namespace) -> dict[str, Any]:
     return {"fixed": tuple(re.findall(r"[^,\s]+", options.fix)), "robust": not options.keep_outliers}
 
 
-def _natural(path: Path) -> tuple[Any, ...]:
-    """left2 before left10."""
-    return tuple(int(part) if part.isdigit() else part for part in re.split(r"([0-9]+)", path.name.lower()))
-
-
 def _remark(text: str) -> str:
     words = " ".join(text.split())
     if len(words) > MOST_WORDS:
@@ -393,24 +364,3 @@ def _count(text: str) -> int:
     if not re.fullmatch("[0-9]{1,3}", text) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a number of processes from 1 to 999, got {text!r}")
     return int(text)
-
-
-class Bar:
-    """A bar on stderr, where that is a terminal, that grows with the pictures and goes when all is done."""
-
-    WIDTH = 30
-
-    def __enter__(self) -> Bar:
-        self.shown = sys.stderr.isatty()
-        return self
-
-    def __call__(self, done: int, count: int) -> None:
-        if self.shown:
-            full = self.WIDTH * done // count
-            bar = "█" * full + "░" * (self.WIDTH - full)
-            line = f"\r{bar} {done} of {count} pictures".encode(sys.stderr.encoding, "replace")
-            print(line.decode(sys.stderr.encoding), end="", file=sys.stderr, flush=True)
-
-    def __exit__(self, *_: object) -> None:
-        if self.shown:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)

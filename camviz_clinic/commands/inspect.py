@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz_clinic.commands.boards import add_board, given_board
-from camviz_clinic.commands.calibrate import PICTURES, Bar, add_baseline, add_seconds, pictures
+from camviz_clinic.commands.calibrate import add_baseline, add_seconds
 from camviz_clinic.commands.common import (
     FOUND,
     OK,
@@ -28,6 +28,7 @@ from camviz_clinic.commands.common import (
 from camviz_clinic.commands.corners import add_corners, corners_of
 from camviz_clinic.commands.gate import EPILOG as GATE
 from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
+from camviz_clinic.commands.pictures import PICTURES, Bar, pictures
 from camviz_clinic.commands.terminal import say, tell, tell_json
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from camviz_clinic.commands.terminal import tell, tell_json
 if TYPE_CHECKING:
     import numpy as np
 
-    from camviz.optics import SlantedEdge
+    from camviz_clinic.measuring.sharpness import SlantedEdge
 
 MTF = """\
 Measures how sharp a camera is from a photograph of one straight edge between dark and bright, leaning by about 5
@@ -74,7 +74,7 @@ def part(text: str) -> tuple[int, int, int, int]:
 
 def mtf(options: argparse.Namespace) -> int:
     """Measure, write the page whole or not at all, and only then print."""
-    from camviz.optics import SlantedEdge
+    from camviz_clinic.measuring.sharpness import SlantedEdge
 
     if options.report:
         refuse_output(options.report, "page", options.photo)
@@ -177,7 +177,7 @@ def as_json(edge: SlantedEdge) -> str:
 
 def as_text(edge: SlantedEdge, photo: Path, taken_as: str) -> str:
     """The figures in words."""
-    from camviz.views.measured_edge import written
+    from camviz_clinic.views.measured_edge import written
 
     rows, columns = edge.image.shape
     head = f"{photo}: an edge of {columns} × {rows} pixels, {taken_as}."
@@ -187,7 +187,7 @@ def as_text(edge: SlantedEdge, photo: Path, taken_as: str) -> str:
 def page(edge: SlantedEdge, name: str, taken_as: str) -> str:
     """The measurement as one page of HTML that needs no network: the figures, then the curves."""
     from camviz.draw.page import document, figure
-    from camviz.views.measured_edge import MeasuredEdgeView, written
+    from camviz_clinic.views.measured_edge import MeasuredEdgeView, written
 
     rows = "".join(
         f"<tr><th>{escape(words)}</th><td>{escape(value)}</td></tr>" for words, value in written(figures(edge)).items()

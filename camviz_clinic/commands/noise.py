@@ -12,8 +12,8 @@ from camviz_clinic.commands.common import OK, Refusal, add_command, add_megapixe
 from camviz_clinic.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
-    from camviz.sensors.measurement import Measurement
-    from camviz.sensors.recording import Recording
+    from camviz_clinic.measuring.noise.measurement import Measurement
+    from camviz_clinic.measuring.noise.recording import Recording
 
 NOISE = """\
 Measures a sensor from its frames, by EMVA Standard 1288 (release 4.0, linear): gain, read noise, quantum efficiency,
@@ -62,7 +62,7 @@ def noise(options: argparse.Namespace) -> int:
         raise Refusal(f"{str(options.folder)!r} is not the name of a folder.")
     if options.report:
         refuse_output(options.report, "page", options.folder)
-    from camviz.sensors.recording import RecordingError, measure, read_recording
+    from camviz_clinic.measuring.noise.recording import RecordingError, measure, read_recording
 
     try:
         recording = read_recording(options.folder)
@@ -120,7 +120,7 @@ def as_text(found: Measurement, recording: Recording) -> str:
 
 def rows(found: Measurement) -> list[tuple[str, str, str]]:
     """Each figure's words, its value or bounds, and why it is withheld; the patterns' parts where there are stacks."""
-    from camviz.views.measured_noise import FIGURES, PARTS, told
+    from camviz_clinic.views.measured_noise import FIGURES, PARTS, told
 
     shown = FIGURES | PARTS if found.bright and found.dark else FIGURES
     judged = found.judged
@@ -153,7 +153,7 @@ def remarks(found: Measurement) -> list[str]:
 def page(found: Measurement, recording: Recording) -> str:
     """The measurement as one page of HTML that needs no network: the figures, then the curves."""
     from camviz.draw.page import document, figure
-    from camviz.views.measured_noise import MeasuredNoiseView
+    from camviz_clinic.views.measured_noise import MeasuredNoiseView
 
     table = "".join(
         f"<tr><th>{escape(words)}</th><td>{escape(value)}</td><td>{escape(why)}</td></tr>"

@@ -60,7 +60,7 @@ def parse(content: bytes) -> dict[str, Any]:
     if len(content) < _HEADER or content[126:128] not in (b"IM", b"MI"):
         raise CalibrationError("expected a .mat file of level 5, its header is broken")
     order = "<" if content[126:128] == b"IM" else ">"
-    reader = _Reader(order)
+    reader = _ElementReader(order)
     variables: dict[str, Any] = {}
     for kind, data in reader.elements(content[_HEADER:]):
         if kind == _COMPRESSED:
@@ -72,7 +72,7 @@ def parse(content: bytes) -> dict[str, Any]:
 
 
 @dataclass
-class _Reader:
+class _ElementReader:
     """Reads elements in the file's byte order, and counts what it makes of them."""
 
     order: str

@@ -38,7 +38,7 @@ EXTRAS = {"": "missing", "lab": "warn"}  # what it means that a package of this 
 
 
 @dataclass(frozen=True)
-class Finding:
+class ReportLine:
     """One line of the report. `remedy` is empty when all is well."""
 
     name: str
@@ -47,13 +47,13 @@ class Finding:
     remedy: str = ""
 
 
-def examine() -> list[Finding]:
+def examine() -> list[ReportLine]:
     """Everything, in the order of the report. Takes some seconds where OpenGL is tried."""
     packages = [package(requirement, extra) for extra, requirement in requirements()]
     return [python(), *packages, opencv(), *widgets(), promptness(), renderer(), opengl(), memory(), samples()]
 
 
-def as_text(findings: list[Finding]) -> str:
+def as_text(findings: list[ReportLine]) -> str:
     """A report for people: one line for each finding, with the remedy under it."""
     width = max(len(finding.name) for finding in findings)
     lines = []
@@ -64,13 +64,13 @@ def as_text(findings: list[Finding]) -> str:
     return "\n".join([*lines, "", _summary(findings)])
 
 
-def as_json(findings: list[Finding]) -> str:
+def as_json(findings: list[ReportLine]) -> str:
     """A report for programs."""
     good = all(finding.status != "missing" for finding in findings)
     return json.dumps({"ok": good, "findings": [asdict(finding) for finding in findings]}, indent=2, allow_nan=False)
 
 
-def _summary(findings: list[Finding]) -> str:
+def _summary(findings: list[ReportLine]) -> str:
     missing = sum(finding.status == "missing" for finding in findings)
     warned = sum(finding.status == "warn" for finding in findings)
     if missing:
@@ -78,12 +78,12 @@ def _summary(findings: list[Finding]) -> str:
     return f"Everything needed is here; {warned} could be better." if warned else "Everything is here."
 
 
-def python() -> Finding:
+def python() -> ReportLine:
     """The interpreter."""
     version = ".".join(map(str, sys.version_info[:3]))
     if sys.version_info >= OLDEST_PYTHON:
-        return Finding("Python", "ok", version)
-    return Finding("Python", "missing", version, f"install Python {'.'.join(map(str, OLDEST_PYTHON))} or newer")
+        return ReportLine("Python", "ok", version)
+    return ReportLine("Python", "missing", version, f"install Python {'.'.join(map(str, OLDEST_PYTHON))} or newer")
 
 
 def requirements() -> list[tuple[str, Requirement]]:
@@ -102,7 +102,7 @@ def _belongs(requirement: Requirement, extra: str) -> bool:
     return requirement.marker.evaluate({"extra": extra}) and not (extra and requirement.marker.evaluate({"extra": ""}))
 
 
-def package(requirement: Requirement, extra: str = "") -> Finding:
+def package(requirement: Requirement, extra: str = "") -> ReportLine:
     """Whether a required package is here, in a version that is in range."""
     absent: Status = "warn" if EXTRAS[extra] == "warn" else "missing"
     remedy = f"pip install '{requirement.name}{requirement.specifier}'"
@@ -110,14 +110,14 @@ def package(requirement: Requirement, extra: str = "") -> Finding:
         version = metadata.version(requirement.name)
     except metadata.PackageNotFoundError:
         if requirement.name.startswith("opencv") and find_spec("cv2"):
-            return Finding(requirement.name, "warn", "another OpenCV is installed in its place", remedy)
-        return Finding(requirement.name, absent, "not installed", remedy)
+            return ReportLine(requirement.name, "warn", "another OpenCV is installed in its place", remedy)
+        return ReportLine(requirement.name, absent, "not installed", remedy)
     if requirement.specifier.contains(version, prereleases=True):
-        return Finding(requirement.name, "ok", version)
-    return Finding(requirement.name, absent, f"{version}, needs {requirement.specifier}", remedy)
+        return ReportLine(requirement.name, "ok", version)
+    return ReportLine(requirement.name, absent, f"{version}, needs {requirement.specifier}", remedy)
 
 
-def opencv() -> Finding:
+def opencv() -> ReportLine:
     """Whether OpenCV has the functions that camviz calls: of several wheels side by side, the last one's files stay."""
     wheels = sorted(
         {each.metadata["Name"].lower() for each in metadata.distributions() if each.metadata["Name"]} & OPENCV_WHEELS
@@ -127,22 +127,22 @@ def opencv() -> Finding:
     remedy = f"pip uninstall --yes {' '.join(wheels)}, then pip install --no-deps {OPENCV}"
     if tried.returncode:
         why = (tried.stderr.strip().splitlines() or ["it ended at once"])[-1]
-        return Finding("OpenCV's functions", "missing", f"{why} (installed: {', '.join(wheels) or 'none'})", remedy)
+        return ReportLine("OpenCV's functions", "missing", f"{why} (installed: {', '.join(wheels) or 'none'})", remedy)
     if len(wheels) > 1:
-        return Finding("OpenCV's functions", "warn", f"{', '.join(wheels)} overwrite each other's files", remedy)
-    return Finding("OpenCV's functions", "ok", "omnidir, ximgproc, aruco, fisheye and mcc answer")
+        return ReportLine("OpenCV's functions", "warn", f"{', '.join(wheels)} overwrite each other's files", remedy)
+    return ReportLine("OpenCV's functions", "ok", "omnidir, ximgproc, aruco, fisheye and mcc answer")
 
 
-def promptness() -> Finding:
+def promptness() -> ReportLine:
     """How a Jupyter server that `camviz lab` does not start sends a slider's pictures without delay."""
-    return Finding(
+    return ReportLine(
         "Jupyter server",
         "ok",
         f"`camviz lab` is prompt; others after `jupyter server extension enable {server.__name__}`",
     )
 
 
-def widgets() -> Iterator[Finding]:
+def widgets() -> Iterator[ReportLine]:
     """Whether JupyterLab will find the browser's half of the widgets."""
     try:
         from jupyter_core.paths import jupyter_path
@@ -167,43 +167,43 @@ def _disabled() -> set[str]:
     return {name for name in disabled if not isinstance(disabled, dict) or disabled[name]}
 
 
-def _widget(extension: str, distribution: str, folders: list[str], disabled: bool) -> Finding:
+def _widget(extension: str, distribution: str, folders: list[str], disabled: bool) -> ReportLine:
     name = f"widgets: {extension}"
     if disabled:
-        return Finding(name, "warn", "disabled in JupyterLab", f"jupyter labextension enable {extension}")
+        return ReportLine(name, "warn", "disabled in JupyterLab", f"jupyter labextension enable {extension}")
     if any((Path(folder) / extension / "package.json").is_file() for folder in folders):
-        return Finding(name, "ok", "JupyterLab finds it")
+        return ReportLine(name, "ok", "JupyterLab finds it")
     remedy = f"pip install --force-reinstall {distribution}, into the environment that JupyterLab runs from"
-    return Finding(name, "warn", "JupyterLab does not find it", remedy)
+    return ReportLine(name, "warn", "JupyterLab does not find it", remedy)
 
 
-def renderer() -> Finding:
+def renderer() -> ReportLine:
     """What CAMVIZ_RENDERER asks for."""
     asked = os.environ.get("CAMVIZ_RENDERER")
     if asked in (None, "", "solid", "wire"):
-        return Finding("CAMVIZ_RENDERER", "ok", asked or "not set: solid where OpenGL works, wireframe elsewhere")
-    return Finding("CAMVIZ_RENDERER", "warn", f"{asked!r} is no renderer", "set it to solid or wire, or not at all")
+        return ReportLine("CAMVIZ_RENDERER", "ok", asked or "not set: solid where OpenGL works, wireframe elsewhere")
+    return ReportLine("CAMVIZ_RENDERER", "warn", f"{asked!r} is no renderer", "set it to solid or wire, or not at all")
 
 
-def opengl() -> Finding:
+def opengl() -> ReportLine:
     """Whether solid 3D can be drawn, tried in another process: without the right libraries the attempt is fatal."""
     from camviz.draw.opengl import opengl_works
 
     works, answer = opengl_works()
     if works:
-        return Finding("OpenGL", "ok", f"draws solid 3D ({answer})")
-    return Finding("OpenGL", "warn", "3D is drawn as wireframes", answer)
+        return ReportLine("OpenGL", "ok", f"draws solid 3D ({answer})")
+    return ReportLine("OpenGL", "warn", "3D is drawn as wireframes", answer)
 
 
-def memory() -> Finding:
+def memory() -> ReportLine:
     """Whether there is room for JupyterLab and a lesson."""
     free = _free_memory()
     if free is None:
-        return Finding("memory", "ok", "this system does not say")
+        return ReportLine("memory", "ok", "this system does not say")
     detail = f"{free / 1e9:.1f} GB free"
     if free >= ENOUGH_MEMORY:
-        return Finding("memory", "ok", detail)
-    return Finding(
+        return ReportLine("memory", "ok", detail)
+    return ReportLine(
         "memory", "warn", detail, "close other programs, or set CAMVIZ_RENDERER=wire: it takes 150 MB a lesson"
     )
 
@@ -219,20 +219,22 @@ def _free_memory() -> int | None:
     return None
 
 
-def samples() -> Finding:
+def samples() -> ReportLine:
     """Whether the chessboard photographs are here or can be fetched."""
     from camviz_school.samples import BASE_URL, REGISTRY, SampleUnavailable, local_sample
 
     try:
         here = sum(local_sample(name) is not None for name in REGISTRY)
     except SampleUnavailable as problem:
-        return Finding("sample data", "warn", str(problem), "point CAMVIZ_SAMPLES to the published files, or unset it")
+        return ReportLine(
+            "sample data", "warn", str(problem), "point CAMVIZ_SAMPLES to the published files, or unset it"
+        )
     if here == len(REGISTRY):
-        return Finding("sample data", "ok", f"all {here} files are on this machine")
+        return ReportLine("sample data", "ok", f"all {here} files are on this machine")
     if _reachable(BASE_URL + "left01.jpg"):
-        return Finding("sample data", "ok", f"{here} of {len(REGISTRY)} files here, the rest within reach")
+        return ReportLine("sample data", "ok", f"{here} of {len(REGISTRY)} files here, the rest within reach")
     detail = f"{here} of {len(REGISTRY)} files here, the network is out of reach: the virtual camera's pictures serve"
-    return Finding("sample data", "warn", detail, "connect once, or let CAMVIZ_SAMPLES name a folder that has them")
+    return ReportLine("sample data", "warn", detail, "connect once, or let CAMVIZ_SAMPLES name a folder that has them")
 
 
 def _reachable(url: str) -> bool:

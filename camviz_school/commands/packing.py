@@ -56,18 +56,20 @@ def write_bundle(
     What is fetched lies beside the target until the zip is written. Raises BundleError where that cannot be done.
     """
     start = _starter(root)
+    lock = start.READER.relative_to(start.ROOT)
     machines = [f"{platform} {python}" for platform in platforms for python in pythons]
     with TemporaryDirectory(dir=target.parent, prefix=".camviz-") as made:
         folder = Path(made) / f"camviz-{camviz.__version__}"
         wheels = folder / start.WHEELS.name
         wheels.mkdir(parents=True)
         for machine in machines:
-            _download(start.entries(root / start.READER.name), machine, wheels, say)
+            _download(start.entries(root / lock), machine, wheels, say)
         _pip(
             ["wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", str(wheels), str(root)], "camviz's own wheel"
         )
         (wheels / start.MACHINES.name).write_text("\n".join(machines) + "\n")
-        for name in (start.READER.name, "start.py", "LICENSE", "LICENSE-lessons"):
+        (folder / lock).parent.mkdir(parents=True)
+        for name in (lock, "start.py", "LICENSE"):
             shutil.copyfile(root / name, folder / name)
         lay_out(root / "lessons", folder / "camviz-lessons", camviz.__version__)
         _samples(folder / start.SAMPLES.name, say)

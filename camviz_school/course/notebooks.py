@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from camviz_school.course.checks import Verdict
+from camviz_school.course.verdict import Verdict
 
 Notebook = Any
 Cell = Any

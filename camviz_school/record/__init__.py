@@ -37,6 +37,6 @@ which must be started afresh ("spawn"): a fork would share the OpenGL of solid p
 
 from camviz_school.record.axes import Axis
 from camviz_school.record.panes import Pane, Widget
-from camviz_school.record.recording import Budget, BudgetError, Recording, record, write_player
+from camviz_school.record.recording import Budget, BudgetError, RecordedPane, record, write_player
 
-__all__ = ["Axis", "Budget", "BudgetError", "Pane", "Recording", "Widget", "record", "write_player"]
+__all__ = ["Axis", "Budget", "BudgetError", "Pane", "RecordedPane", "Widget", "record", "write_player"]

@@ -66,7 +66,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class PositionGrid:
     """Positions in every combination of some axes; the others stay at their first value."""
 
     axes: tuple[Axis, ...]
@@ -79,7 +79,7 @@ class Sheet:
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordedPane:
     """A recorded pane: its files in a folder, what it holds, what it cost, and how it stands on a page.
 
     Attributes:
@@ -94,7 +94,7 @@ class Recording:
         controls: Of the pane, for which `html` keeps room.
 
     >>> from pathlib import Path
-    >>> Recording("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, None).html("dots/")[:63]
+    >>> RecordedPane("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, None).html("dots/")[:63]
     '<div class="camviz-recorded" data-recording="dots/d.js" data-po'
     """
 
@@ -128,7 +128,7 @@ class Recording:
         )
 
 
-def record(widget: Explorer | Pane, folder: str | Path, *, budget: Budget | None = None) -> Recording:
+def record(widget: Explorer | Pane, folder: str | Path, *, budget: Budget | None = None) -> RecordedPane:
     """Record a widget into a folder of files named by their content; see `camviz_school.record` for the page.
 
     Every slider is drawn at up to `budget.slider` positions with all else at its first value, every choice and switch
@@ -184,7 +184,7 @@ class _Recorder:
         self._scripts = {self._source: source}
         self._says = ""
 
-    def recording(self) -> Recording:
+    def recording(self) -> RecordedPane:
         """The finest of SHARES that holds the budget."""
         kept = self._within(SHARES[-1])
         if kept is None:
@@ -198,7 +198,7 @@ class _Recorder:
                     return self._written(finer)
         return self._written(kept)
 
-    def _within(self, share: float) -> Recording | None:
+    def _within(self, share: float) -> RecordedPane | None:
         """The recording with that share of the positions; None where it breaks the budget, which `_says` why."""
         sheets = self._sheets(share)
         states = self._states(sheets)
@@ -215,29 +215,29 @@ class _Recorder:
         counts = {sheet.axes[0].name: len(sheet.values[0]) for sheet in sheets if len(sheet.axes) == 1}
         names = (pack, self._source, *images)
         still, controls = self._pane.still(), len(self._pane.traits.get("controls", ()))
-        return Recording(self._pane.title, self._folder, pack, names, len(states), counts, size, still, controls)
+        return RecordedPane(self._pane.title, self._folder, pack, names, len(states), counts, size, still, controls)
 
-    def _written(self, kept: Recording) -> Recording:
+    def _written(self, kept: RecordedPane) -> RecordedPane:
         """The recording, its files written."""
         for name in kept.files[:2]:
             (self._folder / name).write_bytes(self._scripts[name])
         self._images.write(kept.files[2:], self._folder)
         return kept
 
-    def _sheets(self, share: float) -> list[Sheet]:
+    def _sheets(self, share: float) -> list[PositionGrid]:
         """Each axis alone, and those that belong together."""
         alone = [((axis,), False) for axis in self._pane.axes]
         joint = tuple(axis for axis in self._pane.axes if axis.name in self._pane.together)
         wanted = [*alone, (joint, True)] if len(joint) > 1 else alone
         return [
-            Sheet(axes, tuple(axis.thinned(self._budget.count(axis, share, together=many)) for axis in axes))
+            PositionGrid(axes, tuple(axis.thinned(self._budget.count(axis, share, together=many)) for axis in axes))
             for axes, many in wanted
-        ] or [Sheet((), ())]
+        ] or [PositionGrid((), ())]
 
     def _key(self, values: Values) -> tuple[Any, ...]:
         return tuple(values.get(axis.name, axis.first) for axis in self._pane.axes)
 
-    def _states(self, sheets: list[Sheet]) -> dict[tuple[Any, ...], Values]:
+    def _states(self, sheets: list[PositionGrid]) -> dict[tuple[Any, ...], Values]:
         """Every state of the sheets once, the first one first."""
         first: dict[str, Any] = {axis.name: axis.first for axis in self._pane.axes}
         states: dict[tuple[Any, ...], Values] = {self._key(first): first}
@@ -250,7 +250,7 @@ class _Recorder:
         frame: dict[str, Any] = self._images.stored(self._pane.frame(values))
         return frame
 
-    def _packed(self, sheets: list[Sheet]) -> tuple[str, bytes, list[str]]:
+    def _packed(self, sheets: list[PositionGrid]) -> tuple[str, bytes, list[str]]:
         """The pack's name and content, and the names of its photographs."""
         pack, numbers = Pack(), dict[str, int]()  # of frames, by what is in them: those that are alike are kept once
         first = {axis.name: axis.first for axis in self._pane.axes}

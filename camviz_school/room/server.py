@@ -10,8 +10,6 @@ Nothing that a student sends is ever shown: a vote is the number of a choice tha
 from __future__ import annotations
 
 import asyncio
-import csv
-import io
 import json
 import secrets
 import socket
@@ -28,13 +26,13 @@ from tornado.ioloop import PeriodicCallback
 from tornado.iostream import StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandler
 
-from camviz_school.course.answers import Answer, write_marked
 from camviz_school.room import shown
 from camviz_school.room.address import is_named_safely, qr_svg
-from camviz_school.room.bell import Bell
+from camviz_school.room.change_signal import ChangeSignal
 from camviz_school.room.limits import MOST_BODY, MOST_HEADERS, Allowance, Limits
 from camviz_school.room.site import Site
 from camviz_school.room.store import Room, RoomError
+from camviz_school.room.tables import answers_csv, counts_csv
 
 PAGES = {"": "phone.html", "teacher": "teacher.html", "projector": "projector.html"}
 _OWN = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
@@ -58,13 +56,13 @@ class House:
     limits: Limits = field(default_factory=Limits)
     behind_proxy: bool = False
     site: Site | None = None
-    asked: Bell = field(default_factory=Bell)
-    counted: Bell = field(default_factory=Bell)
+    asked: ChangeSignal = field(default_factory=ChangeSignal)
+    counted: ChangeSignal = field(default_factory=ChangeSignal)
 
     def changed(self) -> None:
         """The teacher has done something: tell everyone."""
-        self.asked.ring()
-        self.counted.ring()
+        self.asked.notify()
+        self.counted.notify()
 
     def to_student(self, number: int) -> shown.Shown:
         """What one student's pages show, with the address of the page to `read` where there is a site."""
@@ -192,7 +190,7 @@ class Joins(Asked):
                 for allowance, who in guesses:
                     allowance.takes(who)
             raise
-        self.house.counted.ring()
+        self.house.counted.notify()
         self.finish({"token": token, "word": room.word, "ends": room.ends})
 
     def delete(self) -> None:
@@ -235,17 +233,17 @@ class Rooms(Asked):
         self.finish(told)
 
 
-class Votes(Asked):
+class VoteHandler(Asked):
     """A student's choice. The answer comes when it is in the file's log."""
 
     def post(self) -> None:
         number, told = self.student(), self.told()
         self.house.room.vote(number, told.get("question"), told.get("round"), told.get("choice"))
-        self.house.counted.ring()
+        self.house.counted.notify()
         self.finish({"counted": True, **self.house.to_student(number)})
 
 
-class Deeds(Asked):
+class TeacherHandler(Asked):
     """What the teacher does."""
 
     def post(self) -> None:
@@ -349,8 +347,8 @@ def application(house: House, prefix: str = "/", more: Iterable[Any] = ()) -> Ap
         (r"api/join", Joins, served),
         (r"api/state", States, served),
         (r"api/room", Rooms, served),
-        (r"api/vote", Votes, served),
-        (r"api/do", Deeds, served),
+        (r"api/vote", VoteHandler, served),
+        (r"api/do", TeacherHandler, served),
         (r"api/(answers|counts)\.csv", Tables, served),
         (r"static/(.*)", Files, {**served, "path": str(pages)}),
         (r"site/(.*)", Sites, served),
@@ -380,22 +378,3 @@ def listen(app: Application, house: House, host: str, port: int) -> HTTPServer:
     PeriodicCallback(house.end_in_time, 60_000).start()
     house.end_in_time()
     return server
-
-
-def answers_csv(answers: Iterable[Answer]) -> str:
-    """Votes as a file that `camviz_school.course.learning.class_scores` reads; `attempt` is the round."""
-    text = io.StringIO()
-    write_marked(text, answers)
-    return text.getvalue()
-
-
-def counts_csv(room: Room) -> str:
-    """How many chose what, a line for each choice of each closed vote."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["question", "round", "choice", "votes", "correct", "misconception"])
-    for name, question in room.questions.items():
-        for number in [each for each in room.rounds(name) if not room.is_open(name, each)]:
-            for (letter, choice), votes in zip(question.lettered, room.counts(name, number), strict=True):
-                table.writerow([name, number, letter, votes, int(choice.correct), choice.misconception])
-    return text.getvalue()

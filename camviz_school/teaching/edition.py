@@ -16,7 +16,7 @@ from camviz_school.course.saved_outputs import tidied
 from camviz_school.teaching import parts, plans
 from camviz_school.teaching.deck import planned_slides
 from camviz_school.teaching.numbering import Numbering
-from camviz_school.teaching.plans import Plan, Step, Votes
+from camviz_school.teaching.plans import ExpectedVotes, Plan, Step
 
 Say = Callable[[str], None]
 
@@ -213,7 +213,7 @@ def _keys(cell: Cell, plan: Plan | None) -> list[Cell]:
     return [_cell(text, f"key-{cell.id}", "key")]
 
 
-def key_markdown(question: Question, votes: Votes | None) -> str:
+def key_markdown(question: Question, votes: ExpectedVotes | None) -> str:
     """The right choice, then for each choice its expected share, the thought behind it and the reply to it."""
     name = question.name.partition(".")[2]
     letter, right = question.lettered[question.answer]

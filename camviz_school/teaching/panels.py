@@ -31,7 +31,7 @@ _SIZE = re.compile(r'<svg\b[^>]*?\bwidth="(?P<width>[\d.]+)"[^>]*?\bheight="(?P<
 
 
 @dataclass(frozen=True)
-class Panel:
+class SavedImage:
     """One image among a cell's saved outputs: a data address, and what it says to someone who cannot see it."""
 
     source: str
@@ -83,18 +83,18 @@ class Panel:
         return f'<img alt="{self.description}" style="{sizes}" src="{source}">'
 
 
-def panels(cell: Cell) -> list[Panel]:
+def panels(cell: Cell) -> list[SavedImage]:
     """All images among a code cell's saved outputs, in their order."""
     outputs = cell.get("outputs", []) if cell.cell_type == "code" else []
     pages = ["".join(output.get("data", {}).get("text/html", "")) for output in outputs]
-    return [Panel(found["source"], found["alt"]) for page in pages for found in _IMAGE.finditer(page)]
+    return [SavedImage(found["source"], found["alt"]) for page in pages for found in _IMAGE.finditer(page)]
 
 
 @dataclass(frozen=True)
 class Page:
     """Rows of panels at one scale."""
 
-    rows: tuple[tuple[Panel, ...], ...]
+    rows: tuple[tuple[SavedImage, ...], ...]
     scale: float
 
     @property
@@ -104,7 +104,7 @@ class Page:
         return f"<div class='panels'>{''.join(f'<div>{row}</div>' for row in rows)}</div>"
 
 
-def pages(shown: Sequence[Panel], heading: str, together: Sequence[str] = ()) -> list[Page]:
+def pages(shown: Sequence[SavedImage], heading: str, together: Sequence[str] = ()) -> list[Page]:
     """Panels on as few pages as keep every word legible, each page as large as it fits below `heading`, which is HTML.
 
     They keep their order, except that the panels named in `together`, if any, have the first page for themselves,
@@ -119,7 +119,7 @@ def pages(shown: Sequence[Panel], heading: str, together: Sequence[str] = ()) ->
     return _filled(shown, height)
 
 
-def _filled(shown: Sequence[Panel], height: float) -> list[Page]:
+def _filled(shown: Sequence[SavedImage], height: float) -> list[Page]:
     for count in range(1, len(shown) + 1):
         made = [[_page(part, height) for part in parts] for parts in _divisions(shown, count)]
         fitting = [one for one in made if all(map(_legible, one))]
@@ -128,20 +128,20 @@ def _filled(shown: Sequence[Panel], height: float) -> list[Page]:
     return []
 
 
-def _page(shown: Sequence[Panel], height: float) -> Page:
+def _page(shown: Sequence[SavedImage], height: float) -> Page:
     """The rows in which panels are largest; of several, the fewest and the shortest."""
     divided = [rows for count in range(1, len(shown) + 1) for rows in _divisions(shown, count)]
     pages = [Page(tuple(map(tuple, rows)), _scale(rows, height)) for rows in divided]
     return max(pages, key=lambda one: (round(one.scale, 3), -len(one.rows), -max(map(_width, one.rows))))
 
 
-def _scale(rows: Sequence[Sequence[Panel]], height: float) -> float:
+def _scale(rows: Sequence[Sequence[SavedImage]], height: float) -> float:
     across = min((WIDTH - GAP * (len(row) - 1)) / _width(row) for row in rows)
     down = (height - GAP * (len(rows) - 1)) / sum(max(one.size[1] for one in row) for row in rows)
     return min(across, down, LARGEST)
 
 
-def _width(row: Sequence[Panel]) -> float:
+def _width(row: Sequence[SavedImage]) -> float:
     return sum(panel.size[0] for panel in row)
 
 
@@ -149,7 +149,7 @@ def _legible(page: Page) -> bool:
     return all(page.scale >= panel.least for row in page.rows for panel in row)
 
 
-def _divisions(shown: Sequence[Panel], count: int) -> Iterator[list[Sequence[Panel]]]:
+def _divisions(shown: Sequence[SavedImage], count: int) -> Iterator[list[Sequence[SavedImage]]]:
     """All ways to divide a sequence into so many parts without changing its order."""
     for cuts in combinations(range(1, len(shown)), count - 1):
         yield [shown[a:b] for a, b in pairwise((0, *cuts, len(shown)))]

@@ -97,7 +97,7 @@ class Notice:
 
 
 @dataclass(frozen=True)
-class Votes:
+class ExpectedVotes:
     """How a class is expected to vote at first: percent for each choice of a predict question, and says who."""
 
     question: str
@@ -125,7 +125,7 @@ class Plan:
     network: str
     machine: str
     steps: tuple[Step, ...]
-    votes: tuple[Votes, ...] = ()
+    votes: tuple[ExpectedVotes, ...] = ()
     notice: tuple[Notice, ...] = ()
 
     def __post_init__(self) -> None:
@@ -141,7 +141,7 @@ class Plan:
             if names.count(name) > 1:
                 raise ValueError(f"plan of lesson {self.lesson}: votes for question {name} are given twice")
 
-    def expected(self, question: str) -> Votes | None:
+    def expected(self, question: str) -> ExpectedVotes | None:
         """The votes expected for the question "LESSON.ID", where the plan has any."""
         return next((one for one in self.votes if f"{self.lesson}.{one.question}" == question), None)
 
@@ -180,7 +180,9 @@ def parse(lesson: str, toml: str) -> Plan:
     where = f"plan of lesson {lesson}"
     table = shaped(table_of(toml, where), _KEYS, where, {"votes", "notice"})
     steps = tuple(_made(Step, one, f"{where}, step {i}") for i, one in enumerate(table["step"], start=1))
-    votes = tuple(_made(Votes, one, f"{where}, votes {i}") for i, one in enumerate(table.get("votes", []), start=1))
+    votes = tuple(
+        _made(ExpectedVotes, one, f"{where}, votes {i}") for i, one in enumerate(table.get("votes", []), start=1)
+    )
     told = [one if isinstance(one, dict) else {"text": one} for one in table.get("notice", [])]
     notice = tuple(_noticed(one, f"{where}, notice {i}") for i, one in enumerate(told, start=1))
     return Plan(lesson, table["bring"], table["network"], table["machine"], steps, votes, notice)
@@ -230,7 +232,7 @@ def section_names(notebook: notebooks.Notebook) -> set[str]:
 
 
 def _made(kind: type, table: Mapping[str, Any], where: str) -> Any:
-    """A Step or Votes from its table, its lists as tuples; whatever is wrong says where."""
+    """A Step or ExpectedVotes from its table, its lists as tuples; whatever is wrong says where."""
     types = {"tuple[int, int]": list, "tuple[int, ...]": list, "str": str}
     shaped(table, {one.name: types[str(one.type)] for one in fields(kind)}, where)
     try:

@@ -51,7 +51,7 @@ def plan_page(notebook: Notebook, numbering: Numbering) -> str:
     return _page(notebook, "plan", body)
 
 
-def question_key(question: Question, votes: plans.Votes | None = None) -> str:
+def question_key(question: Question, votes: plans.ExpectedVotes | None = None) -> str:
     """A question with, for each choice, whether it is right, how many are expected to choose it, and the reply."""
     rows = ""
     for number, (letter, choice) in enumerate(question.lettered):

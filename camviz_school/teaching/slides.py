@@ -16,7 +16,7 @@ from camviz.draw import prose
 from camviz_school.course.notebooks import Cell, Notebook, exercise_of
 from camviz_school.course.questions import Question
 from camviz_school.teaching import markup, panels, parts
-from camviz_school.teaching.panels import Panel
+from camviz_school.teaching.panels import SavedImage
 from camviz_school.teaching.plans import Notice
 
 MOST_WORDS, HEADING_WORDS, LEAST_WORDS = 40, 18, 5
@@ -150,7 +150,7 @@ def _of_code(cell: Cell, place: _Place, following: list[Cell]) -> Iterator[Slide
         yield _exercise(cell, place)
 
 
-def _picture(cell: Cell, shown: list[Panel], place: _Place, following: list[Cell]) -> Iterator[Slide]:
+def _picture(cell: Cell, shown: list[SavedImage], place: _Place, following: list[Cell]) -> Iterator[Slide]:
     noticed = place.notice.pop(0) if place.notice else None
     heading = prose.inline(noticed.text.rstrip(".")) if noticed else _to_notice(place, following)
     at = place.of_picture(cell)

@@ -21,7 +21,7 @@ MOST_FAILURES = 3
 
 
 @dataclass(frozen=True)
-class News:
+class VoteStatus:
     """How it went, in one line: whether the reply has to wait, and whether to choose again."""
 
     said: str
@@ -34,7 +34,7 @@ class Ballot:
 
     def __init__(self, question: str, changed: Callable[[], None]) -> None:
         self.question = question
-        self.news = News("", waiting=False)
+        self.news = VoteStatus("", waiting=False)
         self._changed = changed
         self._casts = 0
 
@@ -43,9 +43,9 @@ class Ballot:
         room = membership()
         self._casts += 1
         if room is None:
-            self.news = News("", waiting=False)
+            self.news = VoteStatus("", waiting=False)
             return
-        self.news = News(f"Sending your vote to the room {room.word} …", waiting=True)
+        self.news = VoteStatus(f"Sending your vote to the room {room.word} …", waiting=True)
         Thread(target=self._send, args=(asyncio.get_running_loop(), self._casts, room, choice), daemon=True).start()
 
     def _send(self, loop: asyncio.AbstractEventLoop, cast: int, room: Membership, choice: int) -> None:
@@ -55,34 +55,40 @@ class Ballot:
                 return
             loop.call_soon_threadsafe(self._hear, cast, news)
 
-    def _hear(self, cast: int, news: News) -> None:
+    def _hear(self, cast: int, news: VoteStatus) -> None:
         if cast == self._casts and news != self.news:
             self.news = news
             self._changed()
 
 
-def told(room: Membership, question: str, choice: int) -> Iterator[News]:
+def told(room: Membership, question: str, choice: int) -> Iterator[VoteStatus]:
     """Vote in a room, and hear what becomes of it: the last news is that the reply may be shown, or to choose again."""
     name = f"the room {room.word}"
     try:
         asked = _asked(room.state(), question)
         if not asked or not asked["open"]:
-            yield News(f"There is no vote on this question in {name} now; your answer is kept here.", waiting=False)
+            yield VoteStatus(
+                f"There is no vote on this question in {name} now; your answer is kept here.", waiting=False
+            )
             return
         voted = asked["open"]
         room.vote(question, voted, choice)
         which = "first" if voted == 1 else "second"
-        yield News(f"Your {which} vote is counted in {name}. The reply comes when the teacher shows it.", waiting=True)
+        yield VoteStatus(
+            f"Your {which} vote is counted in {name}. The reply comes when the teacher shows it.", waiting=True
+        )
         yield from _what_follows(room, question, voted)
     except RefusedError as refused:
         if refused.status in OVER:
             forget()
-        yield News(f"Not counted in {name}: {refused} Your answer is kept here.", waiting=False)
+        yield VoteStatus(f"Not counted in {name}: {refused} Your answer is kept here.", waiting=False)
     except NotReachedError:
-        yield News(f"Not counted: {name} is not reached. Your answer is kept here; the lesson goes on.", waiting=False)
+        yield VoteStatus(
+            f"Not counted: {name} is not reached. Your answer is kept here; the lesson goes on.", waiting=False
+        )
 
 
-def _what_follows(room: Membership, question: str, voted: int) -> Iterator[News]:
+def _what_follows(room: Membership, question: str, voted: int) -> Iterator[VoteStatus]:
     seen, failures = "", 0
     while True:
         try:
@@ -90,24 +96,26 @@ def _what_follows(room: Membership, question: str, voted: int) -> Iterator[News]
         except RefusedError as refused:
             if refused.status in OVER:
                 forget()
-                yield News(f"The room {room.word} has ended.", waiting=False)
+                yield VoteStatus(f"The room {room.word} has ended.", waiting=False)
                 return
             time.sleep(PAUSE_S)  # too fast: its own sentence says so, and nobody needs to read it
             continue
         except NotReachedError:
             failures += 1
             if failures == MOST_FAILURES:
-                yield News(f"The room {room.word} is not reached any more. Your vote was counted.", waiting=False)
+                yield VoteStatus(f"The room {room.word} is not reached any more. Your vote was counted.", waiting=False)
                 return
             time.sleep(PAUSE_S)
             continue
         seen, failures = state["state"], 0
         asked = _asked(state, question)
         if asked and asked["open"] == 2 and voted == 1:
-            yield News(f"The second vote is open in the room {room.word}: choose again.", waiting=False, again=True)
+            yield VoteStatus(
+                f"The second vote is open in the room {room.word}: choose again.", waiting=False, again=True
+            )
             return
         if not asked or asked["revealed"] or asked.get("kept"):
-            yield News(f"Voted in the room {room.word}.", waiting=False)
+            yield VoteStatus(f"Voted in the room {room.word}.", waiting=False)
             return
 
 

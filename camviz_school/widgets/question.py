@@ -33,7 +33,7 @@ KEPT = "Kept. The answers come with the quiz at the end."
 
 
 @dataclass(frozen=True)
-class Sheet:
+class QuestionPage:
     """Questions as a page: each choice can be opened to see its reply.
 
     `when` is "before" or "after" a lesson, or "during" it for a predict question. What is asked before has no replies.
@@ -94,7 +94,7 @@ class QuestionWidget(StillWidget):
     problem = traitlets.Unicode().tag(sync=True)
     room = traitlets.Unicode().tag(sync=True)
 
-    def __init__(self, sheet: Sheet, book: AnswerBook | None = None) -> None:
+    def __init__(self, sheet: QuestionPage, book: AnswerBook | None = None) -> None:
         self.sheet = sheet
         self.book = book
         self.tries: tuple[Tries, ...] = ((),) * len(sheet.questions)
@@ -209,7 +209,7 @@ class QuestionWidget(StillWidget):
             raise
 
 
-def ask(name: str) -> QuestionWidget | Sheet:
+def ask(name: str) -> QuestionWidget | QuestionPage:
     """A question to be answered before going on.
 
     Args:
@@ -221,10 +221,10 @@ def ask(name: str) -> QuestionWidget | Sheet:
     >>> print(str(ask("05.far_rays")).splitlines()[0])
     Predict
     """
-    return _shown(Sheet((question(name),), "Predict"))
+    return _shown(QuestionPage((question(name),), "Predict"))
 
 
-def quiz(lesson: str, form: str = "B", when: str = "") -> QuestionWidget | Sheet:
+def quiz(lesson: str, form: str = "B", when: str = "") -> QuestionWidget | QuestionPage:
     """A form of a lesson's quiz: A before it, without replies, B after it, with replies and a score.
 
     Args:
@@ -244,7 +244,7 @@ def quiz(lesson: str, form: str = "B", when: str = "") -> QuestionWidget | Sheet
     if not questions:
         raise ValueError(f"lesson {lesson!r} has no quiz" if form == "B" else f"the quiz of {lesson!r} has no {form!r}")
     when = when or ("before" if form == "A" else "after")
-    return _shown(Sheet(questions, "What do you think now?" if when == "before" else "Exit quiz", when))
+    return _shown(QuestionPage(questions, "What do you think now?" if when == "before" else "Exit quiz", when))
 
 
 def score(questions: tuple[Question, ...], tries: tuple[Tries, ...]) -> str:
@@ -267,7 +267,7 @@ def looking_back(book: AnswerBook, lesson: str) -> str:
     return f"<details><summary>{summary}</summary>{''.join(_then(*pair) for pair in chosen)}</details>"
 
 
-def _shown(sheet: Sheet) -> QuestionWidget | Sheet:
+def _shown(sheet: QuestionPage) -> QuestionWidget | QuestionPage:
     return QuestionWidget(sheet, AnswerBook(Path.cwd())) if _live() else sheet
 
 

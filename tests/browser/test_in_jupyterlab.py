@@ -130,7 +130,7 @@ def test_handles_follow_the_pointer(lesson) -> None:
 
 @pytest.mark.parametrize("width", [375, 1440])
 def test_every_word_can_be_read_on_a_telephone_and_on_a_desk(lesson, window, width) -> None:
-    """At least 12 CSS pixels, whole, and over no other word; `benchmarks/readable.py` looks at widths between."""
+    """At least 12 CSS pixels, whole, and over no other word; `tools/benchmarks/readable.py` looks at widths between."""
     assert lesson.unreadable(width) == []
 
 

@@ -11,7 +11,7 @@ from axe_playwright_python.base import AXE_SCRIPT
 from laboratory import ROOT, new_page
 from playwright.sync_api import Browser, ElementHandle, Page
 
-sys.path.append(str(ROOT / "benchmarks"))
+sys.path.append(str(ROOT / "tools/benchmarks"))
 
 from smallest import Smallest
 

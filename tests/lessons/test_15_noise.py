@@ -8,9 +8,9 @@ from scipy.constants import physical_constants
 
 from camviz.scenes import to_display
 from camviz.sensors.correction import NoiseModel, merged
-from camviz.sensors.measurement import Measurement
-from camviz.sensors.readings import Level
-from camviz.sensors.statistics import pair
+from camviz_clinic.measuring.noise.measurement import Measurement
+from camviz_clinic.measuring.noise.readings import Level
+from camviz_clinic.measuring.noise.statistics import pair
 from camviz_school.course import notebooks
 from camviz_school.course.material import module
 from camviz_school.views.noise import PhotonTransferView

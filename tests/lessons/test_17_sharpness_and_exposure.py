@@ -7,8 +7,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import j1
 
-from camviz.optics import SlantedEdge
 from camviz.scenes import to_linear
+from camviz_clinic.measuring.sharpness import SlantedEdge
 from camviz_school.views.exposure import ExposureView
 from camviz_school.views.sharpness import SharpnessView
 

@@ -13,15 +13,15 @@ from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
 
-from camviz_clinic.calibration.boards.kind import Drawing, Kind, Shape
+from camviz_clinic.calibration.boards.kind import BoardKind, Drawing, Shape
 
-__all__ = ["Drawing", "Kind", "Shape", "kind_of", "kinds"]
+__all__ = ["BoardKind", "Drawing", "Shape", "kind_of", "kinds"]
 
 COMMONEST = "chessboard"
 
 
 @cache
-def kinds() -> Mapping[str, Kind]:
+def kinds() -> Mapping[str, BoardKind]:
     """The kinds by name, the chessboard first and the others in alphabetical order.
 
     Returns: One for each module of this package that has a KIND.
@@ -30,12 +30,12 @@ def kinds() -> Mapping[str, Kind]:
     ['chessboard', 'aprilgrid', 'asymmetric-circles', 'charuco', 'circles']
     """
     modules = [import_module(f"{__name__}.{each.name}") for each in iter_modules(__path__)]
-    found = [module.KIND for module in modules if isinstance(getattr(module, "KIND", None), Kind)]
+    found = [module.KIND for module in modules if isinstance(getattr(module, "KIND", None), BoardKind)]
     ordered = sorted(found, key=lambda kind: (kind.name != COMMONEST, kind.name))
     return MappingProxyType({kind.name: kind for kind in ordered})
 
 
-def kind_of(board: Shape) -> Kind:
+def kind_of(board: Shape) -> BoardKind:
     """The kind of a board.
 
     Args:

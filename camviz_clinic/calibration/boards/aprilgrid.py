@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from camviz_clinic.calibration.boards.kind import Area, Array, Drawing, Gray, Kind, Shape, cells, millimetres
+from camviz_clinic.calibration.boards.kind import Area, Array, BoardKind, Drawing, Gray, Shape, cells, millimetres
 
 FAMILY = "DICT_APRILTAG_36h11"
 TAGS = 587  # in that family
@@ -177,7 +177,7 @@ def options(shape: Shape) -> str:
     return f"--kind aprilgrid --board {across}x{up} --square-mm {millimetres(shape.marker_size)} --spacing {ratio:g}"
 
 
-KIND = Kind(
+KIND = BoardKind(
     name="aprilgrid",
     title="AprilGrid",
     counts="tags",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from camviz_clinic.calibration.boards import circles
-from camviz_clinic.calibration.boards.kind import Area, Array, Drawing, Gray, Kind, Shape, side
+from camviz_clinic.calibration.boards.kind import Area, Array, BoardKind, Drawing, Gray, Shape, side
 
 DIAMETER = 0.7  # of `square_size`, where the board does not say: half the distance of two neighbours, √2 square_size
 
@@ -38,7 +38,7 @@ def says(shape: Shape) -> str:
     return f"asymmetric grid of {shape.columns}×{shape.rows} circles"
 
 
-KIND = Kind(
+KIND = BoardKind(
     name="asymmetric-circles",
     title="Asymmetric circle grid",
     counts="circles",

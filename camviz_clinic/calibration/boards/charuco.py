@@ -9,9 +9,9 @@ import numpy as np
 
 from camviz_clinic.calibration.boards.kind import (
     Array,
+    BoardKind,
     Drawing,
     Gray,
-    Kind,
     Shape,
     area_of_squares,
     cells,
@@ -142,7 +142,7 @@ def printed(shape: Shape) -> str:
     return " --legacy" * shape.legacy + first + border
 
 
-KIND = Kind(
+KIND = BoardKind(
     name="charuco",
     title="ChArUco board",
     counts="inner corners",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from camviz_clinic.calibration.boards.kind import (
     Array,
+    BoardKind,
     Gray,
-    Kind,
     Shape,
     area_of_squares,
     millimetres,
@@ -39,7 +39,7 @@ def options(shape: Shape) -> str:
     return f"--board {shape.columns}x{shape.rows} --square-mm {millimetres(shape.square_size)}"
 
 
-KIND = Kind(
+KIND = BoardKind(
     name="chessboard",
     title="Chessboard",
     counts="inner corners",

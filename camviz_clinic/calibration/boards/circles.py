@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from camviz_clinic.calibration.boards.kind import Area, Array, Drawing, Gray, Kind, Shape, millimetres, regular, side
+from camviz_clinic.calibration.boards.kind import (
+    Area,
+    Array,
+    BoardKind,
+    Drawing,
+    Gray,
+    Shape,
+    millimetres,
+    regular,
+    side,
+)
 
 DIAMETER = 0.5  # of the distance between two centres, where the board does not say
 
@@ -64,7 +74,7 @@ def options(shape: Shape) -> str:
     )
 
 
-KIND = Kind(
+KIND = BoardKind(
     name="circles",
     title="Circle grid",
     counts="circles",

@@ -66,7 +66,7 @@ class Drawing:
 
 
 @dataclass(frozen=True)
-class Kind:
+class BoardKind:
     """A kind of board: where its points are, what of it is black, and how it is found and described.
 
     The functions take a `Shape`. People count a board by what `counts` says and measure what `sized` says.

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from camviz.distortion import image_corner_radius
 from camviz.lenses import BrownConrady
-from camviz_clinic.checks.apart import differences
+from camviz_clinic.checks.camera_difference import differences
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, healthy

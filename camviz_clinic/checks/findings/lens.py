@@ -12,7 +12,6 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import (
-    NEARLY_A_POLE,
     ideal_image_radius,
     image_corner_radius,
     image_reach,
@@ -20,6 +19,7 @@ from camviz.distortion import (
     valid_region,
     weakest_denominator,
 )
+from camviz.distortion.limits import NEARLY_A_POLE
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, Lens, on_plane
 from camviz_clinic.calibration.adjustment import Adjustment

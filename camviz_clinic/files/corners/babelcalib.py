@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camviz_clinic.calibration.types import CalibrationError
-from camviz_clinic.files.corners.format import CornerFile, CornerFormat, Corners, Given, Sheet
+from camviz_clinic.files.corners.format import CornerCollector, CornerFile, CornerFormat, Corners, Given
 from camviz_clinic.files.trees import shown
 
 KEYS = ("filename", "width", "height", "num_corners", "encoding")
@@ -98,9 +98,9 @@ def _two_that_differ(sizes: list[tuple[object, tuple[int, int]]]) -> tuple[tuple
     return sizes[0], next(each for each in sizes if each[1] != sizes[0][1])
 
 
-def _read_picture(file: CornerFile, planes: dict[int, Plane], several: bool) -> tuple[Sheet, tuple[int, int]]:
+def _read_picture(file: CornerFile, planes: dict[int, Plane], several: bool) -> tuple[CornerCollector, tuple[int, int]]:
     """The corners of one .orpc, each plane under a name of its own where there are several; and the picture's size."""
-    sheet, lines = Sheet(file), list(file.lines)
+    sheet, lines = CornerCollector(file), list(file.lines)
     values = {key: line.split(":", 1)[1].strip() for key, (_, line) in zip(KEYS, lines, strict=False)}
     numbered = {key: number for key, (number, _) in zip(KEYS, lines, strict=False)}
     width, height = (sheet.count(numbered[key], values[key], key, LARGEST_SIDE) for key in ("width", "height"))
@@ -145,7 +145,7 @@ def _planes(files: Sequence[CornerFile]) -> dict[int, Plane]:
         raise CalibrationError(f"{files[1].path}: expected one .dsc, {files[0].path} is another")
     planes: dict[int, Plane] = {}
     for file in files:
-        sheet, lines, at = Sheet(file), list(file.lines), 0
+        sheet, lines, at = CornerCollector(file), list(file.lines), 0
         while at < len(lines):
             number, plane, at = _read_plane(sheet, lines, at)
             if number in planes:
@@ -154,7 +154,7 @@ def _planes(files: Sequence[CornerFile]) -> dict[int, Plane]:
     return planes
 
 
-def _read_plane(sheet: Sheet, lines: list[tuple[int, str]], at: int) -> tuple[int, Plane, int]:
+def _read_plane(sheet: CornerCollector, lines: list[tuple[int, str]], at: int) -> tuple[int, Plane, int]:
     """The board whose header stands at a line, its number, and where the next one begins.
 
     A header has the board's number, its squares by rows and columns (no columns: a board of triangles) and the side of
@@ -193,7 +193,7 @@ def _read_plane(sheet: Sheet, lines: list[tuple[int, str]], at: int) -> tuple[in
     return number, Plane(places, (width, height), side * MILLIMETRES), at + 2 + count
 
 
-def _corner(sheet: Sheet, line: int, text: str) -> list[float]:
+def _corner(sheet: CornerCollector, line: int, text: str) -> list[float]:
     """Column, row from below, X, Y and Z of a corner."""
     words = text.split(",")
     if len(words) != 6:

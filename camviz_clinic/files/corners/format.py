@@ -163,7 +163,7 @@ class CornerFormat:
 
 
 @dataclass(eq=False)
-class Sheet:
+class CornerCollector:
     """Collects corners while files are read; every complaint names the file and the line."""
 
     file: CornerFile

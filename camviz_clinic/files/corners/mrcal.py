@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from camviz_clinic.calibration.types import CalibrationError
-from camviz_clinic.files.corners.format import CornerFile, CornerFormat, Corners, Given, Sheet
+from camviz_clinic.files.corners.format import CornerCollector, CornerFile, CornerFormat, Corners, Given
 from camviz_clinic.files.trees import shown
 
 LEGEND = ("filename", "x", "y")
@@ -22,7 +22,7 @@ def read(files: Sequence[CornerFile], given: Given) -> Corners:
     (file,) = files
     board = given.board()
     count, weight = board.columns * board.rows, (_legend(file)[3:] or ("level",))[0]
-    sheet, found, done, reduced = Sheet(file), dict[str, int](), "", 0
+    sheet, found, done, reduced = CornerCollector(file), dict[str, int](), "", 0
     for line, text in file.lines:
         if text.startswith("#"):
             continue
@@ -52,7 +52,7 @@ def read(files: Sequence[CornerFile], given: Given) -> Corners:
 
 
 def _refuse_incomplete(
-    sheet: Sheet, found: dict[str, int], name: str, line: int, count: int, columns: int, rows: int
+    sheet: CornerCollector, found: dict[str, int], name: str, line: int, count: int, columns: int, rows: int
 ) -> None:
     """A picture has as many lines as the board has corners, or one without coordinates."""
     if name and found[name] != count and not (found[name] == 1 and not sheet.seen[name]):

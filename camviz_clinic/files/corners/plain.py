@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from camviz_clinic.calibration.types import Board, CalibrationError
-from camviz_clinic.files.corners.format import CornerFile, CornerFormat, Corners, Given, Sheet
+from camviz_clinic.files.corners.format import CornerCollector, CornerFile, CornerFormat, Corners, Given
 from camviz_clinic.files.trees import shown
 
 BY_PLACE, BY_INDEX, BY_POINT = ("row", "column"), ("index",), ("x", "y", "z")
@@ -29,7 +29,7 @@ def is_table(file: CornerFile) -> bool:
 def read(files: Sequence[CornerFile], given: Given) -> Corners:
     """All pictures of one camera; a corner without a line, or without u and v, was not seen."""
     (file,) = files
-    sheet, names = Sheet(file), _names(file)
+    sheet, names = CornerCollector(file), _names(file)
     keys = tuple(name for name in names if name not in ("image", "u", "v"))
     if sorted(keys) not in (sorted(BY_PLACE), sorted(BY_INDEX), sorted(BY_POINT)) or len(set(names)) < len(names):
         raise sheet.complaint(1, f"expected one of the headers {' or '.join(HEADERS)}, got {shown(','.join(names))}")
@@ -60,7 +60,7 @@ def _names(file: CornerFile) -> tuple[str, ...]:
     return tuple(word.strip().lower() for word in file.head[0].split(",")) if file.head else ()
 
 
-def _rows(sheet: Sheet, names: tuple[str, ...]) -> list[Row]:
+def _rows(sheet: CornerCollector, names: tuple[str, ...]) -> list[Row]:
     """The lines below the header with their numbers, each by the header's names."""
     rows: list[Row] = []
     reader = csv.reader(io.StringIO(sheet.file.text.replace("\0", "")), skipinitialspace=True)
@@ -83,7 +83,7 @@ def _shape(places: Sequence[tuple[int, int]]) -> tuple[int, int]:
     return int(columns), int(rows)
 
 
-def _of_points(sheet: Sheet, rows: list[Row], given: Given) -> tuple[Board, list[tuple[int, int]]]:
+def _of_points(sheet: CornerCollector, rows: list[Row], given: Given) -> tuple[Board, list[tuple[int, int]]]:
     """The board whose corners lie at X along a row and Y across, and the (row, column) of every line.
 
     X, Y and Z are in metres, or in any unit where the side of a square is given.

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from camviz.colour import balance, spectra
-from camviz.colour.developing import Shot, developed, errors, in_daylight, xyz_from_raw
+from camviz.colour.developing import CameraInLight, developed, errors, in_daylight, xyz_from_raw
 from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
 from camviz.draw import plot, svg
@@ -116,9 +116,9 @@ class ColourView(View):
         return 100 * power / power.max()
 
     @cached_property
-    def shot(self) -> Shot:
+    def shot(self) -> CameraInLight:
         """The camera in the light."""
-        return Shot(self.camera, self.power)
+        return CameraInLight(self.camera, self.power)
 
     @cached_property
     def gains(self) -> np.ndarray:

@@ -22,7 +22,6 @@ from camviz.draw.readout import listed, readout, seconds
 from camviz.scenes import render, textured_scene, to_display
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
-from camviz.sensors.statistics import slope_through_origin
 from camviz.views import garden
 from camviz.views.base import View, slider, step_of, switch
 from camviz.views.yours import tried
@@ -159,7 +158,8 @@ class PhotonTransferView(View):
         """
         top = int(np.argmax(noise))
         used = (signal <= 0.7 * signal[top]) & (np.arange(len(signal)) <= top)
-        slope = slope_through_origin(signal[used], self.frames * (noise**2 - dark**2)[used])
+        x, y = signal[used], self.frames * (noise**2 - dark**2)[used]
+        slope = float(x @ y / (x @ x)) if x.any() else 0.0  # of the least-squares line y = K x
         return slope if slope > 0 and noise[top] > 0.5 else float("nan")
 
     def numbers(self, pixels: int = 3000) -> dict[str, str]:
