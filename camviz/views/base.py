@@ -18,15 +18,13 @@ from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Item, draw_space
-from camviz.views.yours import is_unwritten, tried
+from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 
 Function = Callable[..., Any]
 """What a reader writes."""
 Drawn = tuple[str, dict[str, bytes]]
 """A part of a picture, and the photographs that it needs."""
 ORBIT_HANDLES = ("eye", "orbit")
-YOURS_HERE = "yours appears here"
-"""What stands over the right picture, greyed, where a reader's own will be."""
 
 
 @dataclass(frozen=True)

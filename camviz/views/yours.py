@@ -12,6 +12,7 @@ from copy import deepcopy
 from io import StringIO
 from typing import Any
 
+import cv2
 import numpy as np
 
 from camviz.draw import prose
@@ -19,6 +20,9 @@ from camviz.views.calls import as_arrays, attribute, contained, explain, stopped
 from camviz.views.patience import Patience, TimeIsUp
 
 Function = Callable[..., Any]
+
+YOURS_HERE = "yours appears here"
+"""What stands over the right picture, greyed, where a reader's own will be."""
 
 MID_GREY = 128
 """What an empty picture of bytes is filled with."""
@@ -57,6 +61,20 @@ def _say(function: Function, problem: str) -> None:
         print(problem)
     if is_unwritten(problem):
         _missed.add(_name_of(function))
+
+
+def faded(picture: np.ndarray) -> np.ndarray:
+    """A right picture (height, width, 3), uint8, greyed and with the words "yours appears here": whose place it keeps.
+
+    >>> faded(np.full((60, 240, 3), 40, np.uint8))[0, 0]
+    array([180, 180, 180], dtype=uint8)
+    """
+    grey = cv2.cvtColor(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB)
+    made = np.asarray(cv2.addWeighted(grey, 0.35, np.full_like(grey, 255), 0.65, 0), dtype=np.uint8)
+    size, thick = picture.shape[1] / 480, max(1, round(picture.shape[1] / 240))
+    (width, height), _ = cv2.getTextSize(YOURS_HERE, cv2.FONT_HERSHEY_SIMPLEX, size, thick)
+    at = (picture.shape[1] - width) // 2, (picture.shape[0] + height) // 2
+    return np.asarray(cv2.putText(made, YOURS_HERE, at, cv2.FONT_HERSHEY_SIMPLEX, size, (28, 35, 48), thick, cv2.LINE_AA))
 
 
 def was_missed(function: Function) -> bool:

@@ -19,7 +19,7 @@ from typing import Any
 
 from camviz_school.course import questions, reading
 from camviz_school.course.exercises import exercises
-from camviz_school.course.notebooks import exercise_of
+from camviz_school.course.notebooks import exercise_of, solution_code
 
 Notebook = Any
 Cell = Any
@@ -52,8 +52,12 @@ MINUTES_AN_EXIT_QUESTION = 1.5
 MINUTES_A_QUESTION = 3
 """In a lesson that is reckoned as a whole: predictions, exit questions and patients alike."""
 
-MINUTES_AN_EXERCISE = 8
-"""Three to twelve lines to be written, two tries, and a look at the picture they make."""
+MINUTES_AN_EXERCISE, MINUTES_A_LINE = 5, 1
+"""To understand the task, to try twice and to look at the picture that comes of it; and for each line of the solution
+below its docstring, which a reader writes, or reads to find the bug."""
+
+MINUTES_ANY_EXERCISE = 8
+"""In a lesson that is reckoned as a whole."""
 
 STEP = 5
 """Minutes are said to so many."""
@@ -130,6 +134,7 @@ def reckoned(cells: Iterable[Cell]) -> float:
         + MINUTES_A_SYMBOL * len(_INLINE.findall(_DISPLAYED.sub(" ", text)))
         + MINUTES_A_CONTROL * sum(len(names) or CONTROLS_OF_ALL for names in controls(cells))
         + MINUTES_AN_EXERCISE * len(stubs(cells))
+        + MINUTES_A_LINE * written_lines(cells)
         + sum(_of_questions(*one) for one in asked)
     )
 
@@ -150,6 +155,16 @@ def given_lines(cells: Iterable[Cell]) -> int:
 def stubs(cells: Iterable[Cell]) -> list[str]:
     """The exercises that some cells set, by name."""
     return [exercise_of(cell) for cell in cells if "stub" in cell.metadata.get("tags", [])]
+
+
+def written_lines(cells: Iterable[Cell]) -> int:
+    """Lines of the exercises' solutions: without what each stub has already, its first line and its docstring."""
+    bodies = []
+    for cell in cells:
+        if "solution" in cell.metadata.get("tags", []):
+            (function,) = (one for one in ast.parse(solution_code(cell)).body if isinstance(one, ast.FunctionDef))
+            bodies.append(function.body[ast.get_docstring(function) is not None :])
+    return sum((body[-1].end_lineno or 0) - body[0].lineno + 1 for body in bodies)
 
 
 def controls(cells: Iterable[Cell]) -> list[list[str]]:
@@ -178,7 +193,7 @@ def whole(notebook: Notebook, number: str) -> int:
     first = len(questions.quiz_questions(number, "A"))
     asked = MINUTES_A_FIRST_THOUGHT * first
     asked += MINUTES_A_QUESTION * (len(questions.questions(number)) - first + patients)
-    return said(read / WORDS_A_MINUTE + asked + MINUTES_AN_EXERCISE * len(exercises(number)))
+    return said(read / WORDS_A_MINUTE + asked + MINUTES_ANY_EXERCISE * len(exercises(number)))
 
 
 def _of_questions(kind: str, number: str, form: str) -> float:

@@ -42,7 +42,7 @@ def main_line_of(cells: Iterable[Any]) -> list[Passage]:
     """As `main_line`, of some cells, numbered from the first of them."""
     kept = []
     for number, cell in enumerate(cells):
-        aside = {"solution", "glossary"} & set(cell.metadata.get("tags", []))
+        aside = {"solution", "glossary", "about"} & set(cell.metadata.get("tags", []))
         if cell.cell_type == "markdown" and not aside and "Further reading" not in cell.source.split("\n")[0]:
             kept.append(Passage(number, _FOLDED.sub("\n\n", cell.source)))
     return kept
