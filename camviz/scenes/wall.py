@@ -30,8 +30,8 @@ def wall_scene() -> Scene:
 
     A camera that sees 90° across sees the wall from border to border, and the coping above it:
 
-    >>> wall_scene().trace((0, 0, 0), np.array([0, -0.505, 1]) / np.hypot(0.505, 1))[1].round(1)
-    np.float32(2.7)
+    >>> wall_scene().trace((0, 0, 0), np.array([0, -0.52, 1]) / np.hypot(0.52, 1))[1].round(1)
+    np.float32(2.6)
     """
     lawn = Ground(FLOOR + 0.005, baked("lawn", repeat=True), tile=3.2)
     terrace = Rectangle(np.array([-6.0, FLOOR, WALL]), np.array([12.0, 0, 0]), np.array([0, 0, -5.0]), baked("terrace"))
