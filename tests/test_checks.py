@@ -8,8 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camviz.views.distortion import DistortionView
+from camviz.views.yours import attempt
+from camviz.widgets import explore
 from camviz_school.course.checks import SHAPES, Exercise, judge
-from camviz_school.course.exercises import Tutor, exercise, exercises
+from camviz_school.course.exercises import LOOK, RUN_AGAIN, Tutor, exercise, exercises
 from camviz_school.course.trials import Trial
 
 ALL = [one for lesson in range(17) for one in exercises(f"{lesson:02d}").values()]
@@ -515,3 +518,25 @@ def test_an_exercise_of_yes_and_no_does_not_speak_of_digits():
     yes = Exercise("00.yes", lambda x: x > 0, lambda rng: [(rng.normal(),) for _ in range(4)], "abc", "-")
     assert "must be True or False" in verdict(None, of=yes).message
     assert "right to about 9 digits" in verdict(None).message
+
+
+def test_a_right_answer_draws_the_views_that_waited_for_it_and_says_where_to_look(capsys):
+    """A wrong one draws nothing: the view goes on waiting."""
+    check, right = Tutor(np.random.default_rng(0)), exercise("05.distort").reference
+
+    def distort(xy, k1, k2, k3): ...
+
+    def turned(xy, k1, k2, k3):
+        return right(xy, -k1, -k2, -k3)
+
+    turned.__name__ = "distort"
+
+    view = explore(DistortionView(panels="picture yours", yours=distort))
+    attempt(distort, np.zeros(2), 0.0, 0.0, 0.0, like=np.zeros(2))
+    assert "yours appears here" in view.frame["html"]
+    assert not check("05.distort", turned)
+    assert "yours appears here" in view.frame["html"]
+    assert check("05.distort", right).message.endswith(LOOK + RUN_AGAIN)
+    assert "Bent by your function" in view.frame["html"]
+    assert view.view.yours is right
+    assert check("05.distort", right).message == exercise("05.distort").praise  # nothing waits any more

@@ -9,18 +9,18 @@ import pytest
 
 from camviz_school.course.colab import INSTALL, badge, prepared
 from camviz_school.course.lesson_rules import complaints
-from camviz_school.course.notebooks import read
+from camviz_school.course.notebooks import read, tagged
 
 LESSONS = sorted((Path(__file__).parent.parent / "lessons").glob("*.ipynb"))
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_every_lesson_is_prepared_and_its_cell_is_folded_above_the_setup(path):
+def test_every_lesson_is_prepared_and_its_cell_is_folded_above_all_other_code(path):
     lesson = read(path)
-    assert badge(path.name) in lesson.cells[0].source
+    assert badge(path.name) in "".join(cell.source for cell in (lesson.cells[0], *tagged(lesson, "about")))
     (cell,) = (cell for cell in lesson.cells if "colab" in cell.metadata.get("tags", []))
     assert cell.metadata["jupyter"]["source_hidden"]
-    assert "setup" in lesson.cells[lesson.cells.index(cell) + 1].metadata["tags"]
+    assert next(one for one in lesson.cells if one.cell_type == "code") is cell
     assert prepared(lesson, path.name) == lesson
 
 
@@ -28,7 +28,8 @@ def test_a_lesson_is_prepared_once():
     lesson = read(LESSONS[5])
     bare = deepcopy(lesson)
     bare.cells = [cell for cell in bare.cells if cell.source != INSTALL]
-    bare.cells[0].source = bare.cells[0].source.replace(f"\n{badge(LESSONS[5].name)}", "")
+    (about,) = tagged(bare, "about")
+    about.source = about.source.replace(f"\n{badge(LESSONS[5].name)}", "")
     made = prepared(bare, LESSONS[5].name)
     assert made == lesson | {"cells": made.cells}
     assert [cell.source for cell in made.cells] == [cell.source for cell in lesson.cells]

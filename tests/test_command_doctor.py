@@ -49,7 +49,7 @@ def test_missing_samples_are_a_warning_not_a_fault(tmp_path, monkeypatch):
 
 
 def test_the_report_is_the_same_for_people_and_programs(monkeypatch, capsys):
-    findings = [doctor.python(), doctor.Finding("rope", "missing", "none", "buy one")]
+    findings = [doctor.python(), doctor.ReportLine("rope", "missing", "none", "buy one")]
     monkeypatch.setattr(doctor, "examine", lambda: findings)
     assert main(["doctor"]) == 3
     assert "→ buy one" in capsys.readouterr().out

@@ -7,8 +7,10 @@ import pytest
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.scenes import render, textured_scene, to_display
+from camviz.scenes.wall import LAMP, wall_scene
 from camviz.views import garden
 from camviz.views.distortion import DistortionView, _grid_lines
+from camviz.views.written_lens import straightened
 
 
 def test_the_fold_of_a_plain_barrel_is_named_where_it_is():
@@ -127,3 +129,127 @@ def test_a_pole_is_named_where_a_rational_lens_has_one():
     assert DistortionView(k1=0.0, k2=0.0, k4=-0.25).numbers()["fold"] == "none; pole 2.0000"
     assert DistortionView(k1=0.0, k2=0.0, k4=-1.0).numbers()["corner moves"] == "beyond the pole"
     assert DistortionView(k1=-0.3, k2=0.0, k4=0.0).numbers()["corner moves"] == "folded away"
+
+
+# One panel first, and what the reader opens ------------------------------------------------------------------------
+
+
+def tiles(view):
+    return [tile.name for tile in view.figure(draft=True).tiles]
+
+
+def test_a_picture_alone_has_neither_grid_nor_numbers_until_they_are_opened():
+    alone = DistortionView(panels="picture")
+    assert tiles(alone) == ["the picture"]
+    assert alone.figure(draft=True).body.count("stroke:#f2c94c") == 0
+    assert alone.with_panels({"grid": True}).figure(draft=True).body.count("stroke:#f2c94c") == 1
+    assert tiles(alone.with_panels({"grid": True})) == ["the picture"]
+    assert tiles(alone.with_panels({"curve": True, "numbers": True})) == ["the picture", "radial curve", "numbers"]
+
+
+def test_a_new_view_has_all_that_can_be_opened_but_one():
+    assert DistortionView().opened == ("grid", "curve", "field", "rays", "numbers")
+
+
+@pytest.mark.parametrize("panels", ["", "grid", "numbers grid", "picture attic", "picture yours curve field rays"])
+def test_panels_are_one_to_four_and_known(panels):
+    with pytest.raises(ValueError, match="panels must be one to 4 of picture, yours, curve, field, rays"):
+        DistortionView(panels=panels)
+
+
+def test_the_coping_of_the_wall_runs_along_the_upper_border_from_side_to_side():
+    """Its lower edge is half a focal length above the axis; the border of the 16:9 picture at 9/16."""
+    across = np.linspace(-1, 1, 41)
+
+    def light(height):
+        rays = np.stack([across, np.full(41, -height), np.ones(41)], axis=-1)
+        return wall_scene().trace((0, 0, 0), rays / np.linalg.norm(rays, axis=-1, keepdims=True))[0]
+
+    assert np.ptp(light(0.505), axis=0).max() < 0.01  # plain stone, from one side to the other
+    assert np.ptp(light(0.495), axis=0).max() > 0.05  # bricks
+    assert DistortionView.by_the_wall().intrinsics.from_pixels((0, -0.5))[1] == pytest.approx(-9 / 16)
+
+
+def test_beyond_the_fold_one_recognises_the_lamp_a_second_time():
+    """r - 0.5 r³ has one value at the lamp and, farther out on the same line, at a second root within the picture."""
+    view = DistortionView.by_the_wall(k1=-0.5, show="undistorted", hide_fold=False)
+    lamp = np.array(LAMP[:2]) / LAMP[2]
+    r = np.hypot(*lamp)
+    again = max(np.roots([-0.5, 0, 1, -(r - 0.5 * r**3)]).real)
+    assert r < 1 / np.sqrt(1.5) < again
+    picture, K = view.image(draft=False), view.intrinsics.within(garden.FINE)
+    for where in (lamp, lamp / r * again):
+        u, v = K.to_pixels(where).round().astype(int)
+        assert picture[v, u].min() > 190  # its glass is nearly white, and nothing else of the wall is
+    u, v = K.to_pixels(lamp / r * (again - 0.25)).round().astype(int)
+    assert picture[v, u].min() < 150
+    hidden = view.but(hide_fold=True).image(draft=False)
+    u, v = K.to_pixels(lamp / r * again).round().astype(int)
+    assert hidden[v, u].max() < 60
+
+
+# The reader's own function -------------------------------------------------------------------------------------------
+
+
+def polynomial(xy, k1, k2, k3):
+    r2 = np.sum(xy**2, axis=-1, keepdims=True)
+    return xy * (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3)
+
+
+@pytest.mark.parametrize("show", ["distorted", "undistorted"])
+@pytest.mark.parametrize("place", ["garden", "wall", "photograph"])
+def test_a_right_function_makes_the_camera_s_picture_in_each_mode(show, place):
+    state = {"k1": -0.28, "k2": 0.07, "k3": 0.02, "show": show, "panels": "picture yours", "yours": polynomial}
+    if place == "photograph":
+        noise = np.random.default_rng(3).integers(0, 255, (24, 32, 3)).astype(np.uint8)
+        state["photograph"] = cv2.resize(noise, (640, 480), interpolation=cv2.INTER_CUBIC)
+    view = DistortionView.by_the_wall(**state) if place == "wall" else DistortionView(**state)
+    shown = view.figure().photographs
+    camera, yours = (cv2.imdecode(np.frombuffer(shown[name], np.uint8), 1) for name in ("camera", "yours"))
+    assert cv2.PSNR(camera, yours) > 40
+
+
+def test_the_inverse_of_a_function_ends_at_its_fold():
+    """r - 0.3 r³ turns back at 1.054, where it is 0.703: farther out nothing lands, and no farther root counts."""
+    fold = 1 / np.sqrt(0.9)
+    r = np.array([0.1, 0.6, 1.0])
+    landed = r - 0.3 * r**3
+    xy = np.stack([np.append(landed, 0.71), np.zeros(4)], axis=-1)
+
+    def bend(points):
+        return polynomial(points, -0.3, 0.0, 0.0)
+
+    np.testing.assert_allclose(straightened(bend, xy)[:3, 0], r, atol=1e-3)
+    assert np.isnan(straightened(bend, xy)[3]).all()
+    beyond = np.full((4, 2), [1.4, 0.0])
+    assert not (straightened(bend, xy, beyond)[:, 0] > fold).any()
+
+
+def test_an_unwritten_function_leaves_the_right_picture_greyed_and_a_faulty_one_its_error():
+    def unwritten(xy, k1, k2, k3): ...
+
+    def faulty(xy, k1, k2, k3):
+        return xy[7, 7, 7, 7]
+
+    view = DistortionView(panels="picture yours", yours=unwritten)
+    figure = view.figure(draft=True)
+    assert "yours appears here" in figure.body
+    assert 'class="awaited"' in figure.body
+    assert figure.photographs["yours"] == figure.photographs["camera"]
+    figure = view.but(yours=faulty).figure(draft=True)
+    assert "yours appears here" not in figure.body
+    assert "IndexError" in figure.body
+    assert list(figure.photographs) == ["camera"]
+
+
+def test_a_wrong_function_bends_a_given_photograph_otherwise_in_each_mode():
+    stripes = np.repeat(np.repeat(np.arange(32) % 2 * 255, 20)[None, :, None], 480, axis=0).repeat(3, axis=2)
+
+    def turned(xy, k1, k2, k3):
+        return polynomial(xy, -k1, -k2, -k3)
+
+    for show in ("distorted", "undistorted"):
+        state = {"show": show, "panels": "picture yours", "photograph": stripes.astype(np.uint8)}
+        shown = DistortionView(k1=-0.2, k2=0.0, yours=turned, **state).figure(draft=True).photographs
+        camera, yours = (cv2.imdecode(np.frombuffer(shown[name], np.uint8), 1) for name in ("camera", "yours"))
+        assert cv2.PSNR(camera, yours) < 15

@@ -16,8 +16,10 @@ from traitlets import TraitError, link
 from camviz.draw.picture import Picture
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.frustum import FrustumView
+from camviz.views.light_field import LightFieldView
 from camviz.widgets import Explorer, explore
 from camviz.widgets.still import _show_box
+from camviz.widgets.waiting import hand_out
 
 
 @dataclass(frozen=True)
@@ -436,3 +438,109 @@ def test_the_scale_of_words_is_asked_for_and_checked(monkeypatch):
         monkeypatch.setenv("CAMVIZ_SCALE", wrong)
         with pytest.raises(ValueError, match=f"CAMVIZ_SCALE must be a number from 1 to 3, got '{wrong}'"):
             explore(FrustumView())
+
+
+# Panels that the reader opens -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Shelf(Toy):
+    """A view of a picture, beside which a curve and numbers can be opened."""
+
+    openable = {"curve": "radial curve", "numbers": "numbers"}  # noqa: RUF012
+    panels: str = "picture"
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        if self.size > 5:
+            raise ValueError("size must be at most 5")
+        return Picture.whole(self.panels, 10, 10, "Shelf", self.panels)
+
+
+def test_a_panel_is_opened_and_closed_from_the_page_and_stays_open_when_the_controls_are_reset():
+    explorer = explore(Shelf(), "size")
+    assert explorer.panels == [{"name": "curve", "words": "radial curve"}, {"name": "numbers", "words": "numbers"}]
+    assert explorer.opened == []
+    assert wish(explorer, panels={"numbers": True}, values={"size": 3.0})["described"] == "picture numbers"
+    assert explorer.opened == ["numbers"]
+    wish(explorer, reset=True)
+    assert (explorer.view.size, explorer.opened) == (1.0, ["numbers"])
+    wish(explorer, panels={"curve": True})
+    assert explorer.view.panels == "picture numbers curve"
+    assert explorer.opened == ["curve", "numbers"]
+    wish(explorer, panels={"numbers": False, "curve": True})
+    assert explorer.view.panels == "picture curve"
+
+
+def test_what_is_open_at_first_has_no_button_and_a_view_that_declares_nothing_has_none():
+    assert [one["name"] for one in explore(Shelf(panels="picture curve")).panels] == ["numbers"]
+    assert explore(Toy()).panels == explore(Toy()).opened == []
+
+
+def test_an_unknown_panel_is_refused_and_a_panel_that_cannot_be_drawn_stays_closed():
+    explorer = explore(Shelf())
+    assert (
+        "a panel to open must be one of 'curve', 'numbers', got 'attic'"
+        in (wish(explorer, panels={"attic": True})["error"])
+    )
+    wish(explorer, panels={"curve": True}, values={"size": 9.0})
+    assert explorer.opened == []
+
+
+@pytest.mark.parametrize("panels", [["curve"], {"curve": 1}, {3: True}, {f"{i}": True for i in range(201)}])
+def test_panels_that_no_page_sends_are_refused_in_words(panels):
+    assert "panels must be a dict of at most 200 names" in wish(explore(Shelf()), panels=panels)["error"]
+
+
+# A function that is written anew ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Drawn(Toy):
+    """A view that shows what a reader's function makes of its size."""
+
+    yours: object = None
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        made = self.yours(self.size)
+        if made is None:
+            return Picture.whole("", 10, 10, "Drawn", "waits")
+        if made > 50:
+            raise ValueError("size must be smaller")
+        return Picture.whole("", 10, 10, "Drawn", f"{made:g}")
+
+
+def double(size): ...
+
+
+def written(factor):
+    def double(size):
+        return factor * size
+
+    return double
+
+
+def test_a_view_is_drawn_with_a_function_that_is_written_after_it_was_made():
+    """In the state in which the reader left it; Reset keeps the function; functions of other names are not its own."""
+    waiting, other = explore(Drawn(yours=double)).set(size=3.0), explore(Drawn(yours=written(5)))
+    assert waiting.frame["described"] == "waits"
+    before = hand_out(lambda size: 9 * size)
+    assert (before, waiting.frame["described"]) == (0, "waits")
+    assert hand_out(right := written(2)) == 2
+    assert (waiting.frame["described"], other.frame["described"]) == ("6", "2")
+    assert wish(waiting, reset=True)["described"] == "2"
+    assert hand_out(right) == 0
+
+
+def test_a_function_that_cannot_be_drawn_leaves_the_picture_as_it_was():
+    waiting = explore(Drawn(yours=double))
+    assert hand_out(written(1000)) == 0
+    assert waiting.frame["described"] == "waits"
+    assert waiting.view.yours is double
+
+
+def test_every_view_can_be_reset_whatever_its_fields_are_called():
+    """Two views have a field of the word `opening`, an aperture's."""
+    for view in (LightFieldView(), FrustumView()):
+        explorer = explore(view)
+        assert wish(explorer, reset=True)["error"] == ""
+        assert explorer.opened == []

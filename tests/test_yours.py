@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camviz.views.yours import MID_GREY, attempt, attempt_each, tried
+from camviz.views.yours import MID_GREY, attempt, attempt_each, tried, was_missed
 
 WANTED = np.zeros((2, 3))
 
@@ -57,6 +57,21 @@ def test_what_gives_no_answer_leaves_its_place_empty_and_says_so_once(capsys, fu
     printed = capsys.readouterr().out
     assert sentence in printed
     assert printed.count("\n") == 1
+
+
+def test_a_plot_that_was_drawn_before_its_function_was_written_is_remembered_until_asked_for(capsys):
+    def later(x): ...
+
+    def faulty(x):
+        return x[5]
+
+    attempt(later, np.zeros(3), like=np.zeros(3))
+    attempt(faulty, np.zeros(3), like=np.zeros(3))
+    assert was_missed(later)
+    assert not was_missed(later)
+    assert not was_missed(faulty)
+    attempt_each(later, [1.0], like=np.zeros(1))
+    assert was_missed(later)
 
 
 def test_a_tuple_is_answered_by_a_tuple():

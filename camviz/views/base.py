@@ -18,7 +18,7 @@ from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Item, draw_space
-from camviz.views.yours import tried
+from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 
 Function = Callable[..., Any]
 """What a reader writes."""
@@ -80,11 +80,14 @@ def switch(default: bool, *, label: str = "", help: str = "") -> Any:
 class View:
     """Base of all views. A subclass is a frozen dataclass of state whose `figure` draws that state.
 
-    Where it can draw several sets of panels, its field `panels` names one of its `layouts`.
+    Where it can draw several sets of panels, its field `panels` names one of its `layouts`. Where each panel may come
+    and go by itself, `panels` names those that are drawn, and `openable` those for which an explorer has a button.
     """
 
     title: ClassVar[str] = ""
     layouts: ClassVar[Iterable[str]] = ()
+    openable: ClassVar[Mapping[str, str]] = {}
+    """Panels that a reader opens and closes: their names in `panels`, and the words on their buttons."""
 
     def __post_init__(self) -> None:
         for name, control in self.controls().items():
@@ -135,6 +138,23 @@ class View:
     def _has(self, panel: str) -> bool:
         """Whether the panel of that name is drawn."""
         return panel in self._panels.split()
+
+    @property
+    def opened(self) -> tuple[str, ...]:
+        """Which of its `openable` panels are drawn, in the order in which `openable` has them."""
+        return tuple(name for name in self.openable if self._has(name))
+
+    def with_panels(self, opened: Mapping[str, bool]) -> Self:
+        """The view with panels opened (True) or closed (False), by their names; those opened come last.
+
+        Raises ValueError for a panel that is not openable.
+        """
+        for name in opened:
+            one_of("a panel to open", name, self.openable)
+        now = self._panels.split()
+        kept = [name for name in now if opened.get(name, True)]
+        kept += [name for name, wanted in opened.items() if wanted and name not in now]
+        return self if kept == now else self.but(panels=" ".join(kept))
 
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed."""
@@ -231,8 +251,15 @@ def answered(function: Function | None, arguments: tuple[Any, ...], like: Any) -
     return tried(function, arguments, like)
 
 
-def without(panel: Panel, problem: str, title: str, at: tuple[float, float] = (12, 26)) -> str:
-    """The panel with the sentence that says why it is empty."""
+def without(panel: Panel, problem: str, title: str, at: tuple[float, float] = (12, 26), right: str = "") -> str:
+    """The panel with the sentence that says why it is empty.
+
+    Where the reader has written nothing yet and `right` is what a right function would show there, the panel shows that
+    greyed, and says whose place it is.
+    """
+    if right and is_unwritten(problem):
+        words = svg.text((panel.width / 2, panel.height / 2), YOURS_HERE, "title halo middle")
+        return panel.show(svg.group(right, class_="awaited") + words, title=title)
     return panel.show(svg.paragraph(at, problem, panel.width - 2 * at[0]), title=title)
 
 

@@ -5,7 +5,7 @@ A reader's own function can bend a picture beside the right one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import atan, atan2, cos, degrees, hypot, inf, isfinite, pi, sin, tan
@@ -28,8 +28,11 @@ from camviz.lenses import BrownConrady, Lens
 from camviz.lenses.base import on_plane, unit
 from camviz.poses import RigidTransform
 from camviz.scenes import snapshot, textured_scene
+from camviz.scenes.wall import wall_scene
 from camviz.views import garden
-from camviz.views.base import Drawn, OrbitView, answered, choice, slider, switch, without
+from camviz.views.base import Drawn, OrbitView, answered, choice, one_of, slider, switch, without
+from camviz.views.written_lens import WrittenLens
+from camviz.views.yours import is_unwritten
 
 _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
@@ -38,16 +41,24 @@ _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
 _BRIGHT = "stroke:#f2c94c"  # on a photograph, in every theme
 _TILES = {  # of the panels
     "picture": "the picture",
-    "field": "displacements",
     "yours": "with your function",
     "curve": "radial curve",
+    "field": "displacements",
     "rays": "rays in space",
+    "numbers": "numbers",
 }
-_ROWS: dict[int, tuple[tuple[float, tuple[float, ...]], ...]] = {  # heights and widths by how many panels there are
-    1: ((480, (620, 340)),),
-    2: ((320, (380, 380, 200)),),
-    4: ((320, (380, 380, 200)), (270, (560, 400))),
+_GRID = "grid"  # a panel that is no tile: lines over the pictures
+_NUMBERS = "numbers"
+_MOST = 4  # panels beside the numbers
+_ALONE, _MOST_ACROSS = 330, 620  # units of height and width of a panel that stands alone
+_LEAST = 240  # units of height: a curve needs them, and numbers do
+# Of the first row, by how many panels stand there and whether the numbers do: its height at most and their widths.
+_FIRST: dict[tuple[int, bool], tuple[float, tuple[float, ...]]] = {
+    (1, True): (480, (700, 260)),
+    (2, False): (390, (480, 480)),
+    (2, True): (320, (380, 380, 200)),
 }
+_SECOND: dict[int, tuple[float, tuple[float, ...]]] = {1: (270, (960,)), 2: (270, (560, 400))}
 
 
 @dataclass(frozen=True)
@@ -55,12 +66,18 @@ class DistortionView(OrbitView):
     """What a lens does to straight lines, and where its model stops being one.
 
     The coefficients are those of Brown and Conrady in OpenCV's order; with `lens` set, that lens is shown instead.
-    With `photograph` (height, width, 3) uint8 the camera's picture is that photograph, else it is the virtual scene.
-    `panels` names what is drawn: one, two or four of picture, field, yours, curve and rays. `yours` is a reader's
-    function of (xy, k1, k2, k3), ideal points (..., 2) to distorted ones, in focal lengths; what it does is orange.
+    With `photograph` (height, width, 3) uint8 the camera's picture is that photograph, else it is a virtual scene: the
+    garden, or at the `place` "wall" a wall of it from near (`by_the_wall`). `panels` names what is drawn: up to four of
+    picture, yours, curve, field and rays, and beside them the grid over the pictures and the numbers. `yours` is a
+    reader's function of (xy, k1, k2, k3), ideal points (..., 2) to distorted ones, in focal lengths; what it does is
+    orange.
     """
 
     title: ClassVar[str] = "Lens distortion"
+    openable: ClassVar[Mapping[str, str]] = {
+        _GRID: "grid",
+        **{name: _TILES[name] for name in ("curve", "field", "rays", _NUMBERS)},
+    }
 
     k1: float = slider(-0.28, **_RADIAL, help="radial, r²: below zero is barrel, above zero is pincushion")
     k2: float = slider(0.07, **_RADIAL, help="radial, r⁴")
@@ -76,7 +93,8 @@ class DistortionView(OrbitView):
     s4: float = slider(0.0, **_SIDE, help="thin prism: r⁴ in y")
     show: str = choice("distorted", "undistorted", help="the camera's picture, or that picture straightened")
     hide_fold: bool = switch(True, label="hide what folds", help="leave out what the model maps twice")
-    panels: str = "picture field curve rays"
+    panels: str = "picture grid field numbers curve rays"
+    place: str = "garden"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 90))
     lens: Lens | None = None
@@ -85,9 +103,21 @@ class DistortionView(OrbitView):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        wanted = self.panels.split()
-        if len(wanted) not in _ROWS or not set(wanted) <= set(_TILES):
-            raise ValueError(f"panels must be one, two or four of picture, field, yours, curve, rays, got {wanted}")
+        one_of("place", self.place, ("garden", "wall"))
+        if not set(self.panels.split()) <= {*_TILES, _GRID} or not 1 <= len(self._beside_the_numbers) <= _MOST:
+            raise ValueError(
+                f"panels must be one to {_MOST} of picture, yours, curve, field, rays, and grid or numbers beside "
+                f"them, got {self.panels!r}"
+            )
+
+    @classmethod
+    def by_the_wall(cls, **state: Any) -> DistortionView:
+        """One picture of a wall from near, its coping along the upper border, by a camera that sees 90° across.
+
+        All coefficients are 0 at first, and nothing but the picture is open; `state` are fields of the view.
+        """
+        first: dict[str, Any] = {"k1": 0.0, "k2": 0.0, "panels": "picture", "place": "wall"}
+        return cls(**{**first, "intrinsics": Intrinsics.from_fov(640, 360, 90), **state})
 
     @classmethod
     def of(cls, camera: Camera, photograph: np.ndarray | None = None) -> DistortionView:
@@ -128,7 +158,7 @@ class DistortionView(OrbitView):
     def _told(self) -> dict[str, str]:
         """The figures that the panels speak of: the fold's only where the curve or the rays show it."""
         figures = self.numbers()
-        if {"curve", "rays"} & set(self.panels.split()):
+        if self._has("curve") or self._has("rays"):
             return figures
         return {name: figures[name] for name in ("image corner", "corner moves")}
 
@@ -171,29 +201,41 @@ class DistortionView(OrbitView):
         return f"{self._name()}: {figures}. Picture shown {self.show}."
 
     def figure(self, *, draft: bool = False) -> Picture:
-        names = self.panels.split()
         draw = {
             "picture": self._picture_panel,
             "field": self._field_panel,
             "yours": self._your_panel,
             "curve": self._curve_with_axes,
             "rays": self._frustum_panel,
+            _NUMBERS: self._numbers_column,
         }
-        layout = self._layout(names)
+        layout = self._layout()
         parts, photographs = dict[str, str](), dict[str, bytes]()
-        for name in names:
+        for name in (*self._beside_the_numbers, *([_NUMBERS] if self._has(_NUMBERS) else [])):
             tile = _TILES[name]
             parts[tile], attached = draw[name](layout[tile], draft=draft)
             photographs |= attached
-        parts["numbers"] = self._numbers_column(layout["numbers"], names)
         return self.tiled(layout, {tile: parts[tile] for tile in layout}, photographs)
 
-    def _layout(self, panels: list[str]) -> dict[str, Cell]:
+    @property
+    def _beside_the_numbers(self) -> list[str]:
+        return [name for name in self.panels.split() if name not in (_GRID, _NUMBERS)]
+
+    def _layout(self) -> dict[str, Cell]:
         """The first two panels beside the numbers, and the others below them."""
-        names = [_TILES[name] for name in panels]
-        order = iter([*names[:2], "numbers", *names[2:]])
-        found = rows(*((height, {next(order): width for width in widths}) for height, widths in _ROWS[len(panels)]))
-        return shortened(found, numbers=320)
+        names = [_TILES[name] for name in self._beside_the_numbers]
+        first, below = names[:2], names[2:]
+        aspect = self.intrinsics.width / self.intrinsics.height
+        if len(first) == 1 and not self._has(_NUMBERS):  # as wide as its picture: a telephone shows all of it
+            return rows((_ALONE, {first[0]: min(_MOST_ACROSS, round(aspect * (_ALONE - 44) + 20))}))
+        height, widths = _FIRST[len(first), self._has(_NUMBERS)]
+        height = min(height, max(_LEAST, round(widths[0] / aspect + 35)))
+        columns = [*first, _NUMBERS][: len(widths)]
+        found = [(height, dict(zip(columns, widths, strict=True)))]
+        if below:
+            height, widths = _SECOND[len(below)]
+            found.append((height, dict(zip(below, widths, strict=True))))
+        return shortened(rows(*found), numbers=320)
 
     def _name(self) -> str:
         if self.lens:
@@ -219,6 +261,8 @@ class DistortionView(OrbitView):
 
     def _taken(self, camera: Camera, draft: bool) -> np.ndarray:
         """What the camera takes: the given photograph in its size, or a picture of the virtual scene."""
+        if self.photograph is None and self.place == "wall":
+            return snapshot(wall_scene(), camera)
         if self.photograph is None:
             return garden.glimpse(camera) if draft else snapshot(textured_scene(), camera)
         size = (camera.intrinsics.width, camera.intrinsics.height)
@@ -240,10 +284,15 @@ class DistortionView(OrbitView):
         panel = self._image_panel("picture", cell)
         straight = _grid_lines(self.intrinsics, _SAMPLES[draft])
         lines = self._bend(straight) if self.show == "distorted" else straight
-        drawn = svg.path(panel.place(self.intrinsics.to_pixels(lines)), "thin", style=_BRIGHT)
+        drawn = self._over(panel, lines, "thin", style=_BRIGHT)
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
-        shown = self._photograph(panel, "camera") + drawn + self._fold_circle(panel, bent=self.show == "distorted")
+        fold = self._fold_circle(panel, bent=self.show == "distorted") if self._has(_GRID) else ""
+        shown = self._photograph(panel, "camera") + drawn + fold
         return panel.show(shown, title=title), {"camera": jpeg(self.image(draft=draft))}
+
+    def _over(self, panel: Panel, lines: np.ndarray, kind: str, **style: Any) -> str:
+        """The lines of the grid over a picture, where the grid is open."""
+        return svg.path(panel.place(self.intrinsics.to_pixels(lines)), kind, **style) if self._has(_GRID) else ""
 
     def _image_panel(self, name: str, cell: Cell) -> Panel:
         return image_in(cell, name, self.intrinsics.width, self.intrinsics.height)
@@ -258,22 +307,32 @@ class DistortionView(OrbitView):
         return answered(self.yours, (xy, self.k1, self.k2, self.k3), xy)
 
     def _your_panel(self, cell: Cell, *, draft: bool) -> Drawn:
-        """The same picture by the reader's function: its grid over the photograph, or the photograph straightened."""
+        """The same picture, bent or straightened by the reader's function."""
         panel = self._image_panel("yours", cell)
-        lines, problem = self._your_bend(_grid_lines(self.intrinsics, _SAMPLES[draft]))
+        straight, pictured = _grid_lines(self.intrinsics, _SAMPLES[draft]), self._photograph(panel, "yours")
+        bent, problem = self._your_bend(straight)
         if problem:
-            return without(panel, problem, "With your function"), {}
-        straight = self.show == "undistorted"
-        right = _grid_lines(self.intrinsics, _SAMPLES[draft])
-        drawn = svg.path(panel.place(self.intrinsics.to_pixels(right if straight else lines)), "orange thin")
-        title = "Straightened by your function" if straight else "The same, the grid bent by your function"
-        return panel.show(self._photograph(panel, "yours") + drawn, title=title), {"yours": self._your_picture(draft)}
+            awaited = {"yours": jpeg(self.image(draft=draft))} if is_unwritten(problem) else {}
+            return without(panel, problem, "With your function", right=pictured), awaited
+        drawn = self._over(panel, straight if self.show == "undistorted" else bent, "orange thin")
+        title = "Straightened by your function" if self.show == "undistorted" else "Bent by your function"
+        return panel.show(pictured + drawn, title=title), {"yours": jpeg(self._your_picture(draft))}
 
-    def _your_picture(self, draft: bool) -> bytes:
-        if self.show == "distorted":
-            return jpeg(self.image(draft=draft))
-        small = self._small_camera(draft)
-        return jpeg(self._fetched(self._taken(small, draft), small, lambda xy: self._your_bend(xy)[0]))
+    @property
+    def _your_lens(self) -> WrittenLens:
+        return WrittenLens(lambda xy: self._your_bend(xy)[0], self.camera.lens)
+
+    def _your_picture(self, draft: bool) -> np.ndarray:
+        """What a camera takes whose lens is the reader's function, or the camera's picture straightened by it.
+
+        A given photograph is bent as the lens bent it: straightened by the lens, it is bent again by the function.
+        """
+        small, written = self._small_camera(draft), self._your_lens
+        if self.show == "undistorted":
+            return self._fetched(self._taken(small, draft), small, written.bend)
+        if self.photograph is None:
+            return self._taken(Camera(small.intrinsics, written), draft)
+        return self._fetched(self._taken(small, draft), small, lambda xy: self._bend(written.straightened(xy)))
 
     def _fold_circle(self, panel: Panel, *, bent: bool) -> str:
         """Where the radial curve turns back, among ideal points or, `bent`, where the lens puts them."""
@@ -399,17 +458,17 @@ class DistortionView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers_column(self, cell: Cell, panels: list[str]) -> str:
+    def _numbers_column(self, cell: Cell, *, draft: bool) -> Drawn:
         """The coefficients and key figures: all of them beside four panels, else those that the panels speak of."""
         coefficients = self._coefficients()  # the lens's own, where one is given
-        if len(panels) < 4:
+        if len(self._beside_the_numbers) < _MOST:
             coefficients = {name: value for name, value in coefficients.items() if value or name == "k1"}
         (x, y), half = cell[:2], (len(coefficients) + 1) // 2
         drawn = [svg.text((x + 10, y + 26), "This lens", "title")]
         for i, (name, value) in enumerate(coefficients.items()):
             at = (x + 10 + 96 * (i // half), y + 50 + 18 * (i % half))
             drawn.append(svg.text(at, true_minus(f"{name} {value:+.4f}"), "number" if value else "number fill-muted"))
-        return "".join(drawn) + readout(self._told(), (x + 10, y + 64 + 18 * half), (0, 36), (0, 16))
+        return "".join(drawn) + readout(self._told(), (x + 10, y + 64 + 18 * half), (0, 36), (0, 16)), {}
 
 
 def _grid_lines(intrinsics: Intrinsics, samples: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from copy import deepcopy
 from io import StringIO
 from typing import Any
 
+import cv2
 import numpy as np
 
 from camviz.draw import prose
@@ -20,8 +21,16 @@ from camviz.views.patience import Patience, TimeIsUp
 
 Function = Callable[..., Any]
 
+YOURS_HERE = "yours appears here"
+"""What stands over the right picture, greyed, where a reader's own will be."""
+
 MID_GREY = 128
 """What an empty picture of bytes is filled with."""
+
+_NOT_YET = ("is not written yet", "returns nothing yet")
+
+_missed: set[str] = set()
+"""Names of functions without which a plot was drawn."""
 
 _stopped: dict[int, tuple[Function, str]] = {}
 """Functions that did not return, by their id, and the sentence: the next draft would otherwise wait for them again."""
@@ -42,9 +51,43 @@ def attempt(function: Function, *arguments: Any, like: Any) -> Any:
     array([nan, nan])
     """
     answer, problem = tried(function, arguments, like)
+    _say(function, problem)
+    return answer
+
+
+def _say(function: Function, problem: str) -> None:
+    """Print what is wrong, and remember whose plot is drawn without it because it is not written yet."""
     if problem:
         print(problem)
-    return answer
+    if is_unwritten(problem):
+        _missed.add(_name_of(function))
+
+
+def faded(picture: np.ndarray) -> np.ndarray:
+    """A right picture (height, width, 3), uint8, greyed and with the words "yours appears here": whose place it keeps.
+
+    >>> faded(np.full((60, 240, 3), 40, np.uint8))[0, 0]
+    array([180, 180, 180], dtype=uint8)
+    """
+    grey = cv2.cvtColor(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB)
+    made = np.asarray(cv2.addWeighted(grey, 0.35, np.full_like(grey, 255), 0.65, 0), dtype=np.uint8)
+    size, thick = picture.shape[1] / 480, max(1, round(picture.shape[1] / 240))
+    (width, height), _ = cv2.getTextSize(YOURS_HERE, cv2.FONT_HERSHEY_SIMPLEX, size, thick)
+    at = (picture.shape[1] - width) // 2, (picture.shape[0] + height) // 2
+    return np.asarray(
+        cv2.putText(made, YOURS_HERE, at, cv2.FONT_HERSHEY_SIMPLEX, size, (28, 35, 48), thick, cv2.LINE_AA)
+    )
+
+
+def was_missed(function: Function) -> bool:
+    """Whether a plot was drawn without the function of this name, as it was not written yet; forgotten when asked."""
+    missed = _name_of(function) in _missed
+    _missed.discard(_name_of(function))
+    return missed
+
+
+def _name_of(function: Function) -> str:
+    return str(attribute(function, "__name__") or "your function")
 
 
 def attempt_each(function: Function, *arguments: Any, like: Any) -> Any:
@@ -57,8 +100,7 @@ def attempt_each(function: Function, *arguments: Any, like: Any) -> Any:
     with Patience() as patience:
         answers = [tried(function, tuple(given), np.asarray(one), patience) for *given, one in cases]
     problems = [problem for _, problem in answers if problem]
-    if problems:
-        print(problems[0])
+    _say(function, problems[0] if problems else "")
     return np.stack([answer for answer, _ in answers])
 
 
@@ -76,12 +118,21 @@ def tried(
     return parts if isinstance(like, tuple) else parts[0], problem
 
 
+def is_unwritten(problem: str) -> bool:
+    """Whether a sentence of `tried` says that the reader has not begun: there is nothing wrong, and nothing yet.
+
+    >>> is_unwritten("`distort` returns nothing yet, so its part of the picture stays empty.")
+    True
+    """
+    return any(f" {words}, " in problem for words in _NOT_YET)
+
+
 def _answers(
     function: Function, arguments: tuple[Any, ...], wanted: tuple[Any, ...], patience: Patience
 ) -> tuple[tuple[np.ndarray, ...], str]:
     """Arrays of float in the shapes wanted, all NaN where there is a problem."""
     empty = tuple(np.full(np.shape(one), np.nan) for one in wanted)
-    name = f"`{attribute(function, '__name__') or 'your function'}`"
+    name = f"`{_name_of(function)}`"
     left_out = "so its part of the picture stays empty."
     if id(function) in _stopped:
         return empty, _stopped[id(function)][1]
@@ -93,11 +144,11 @@ def _answers(
         _stopped[id(function)] = function, f"{stopped(name, stop)[:-1]}, {left_out} {again}"
         return empty, _stopped[id(function)][1]
     except NotImplementedError:
-        return empty, f"{name} is not written yet, {left_out}"
+        return empty, f"{name} {_NOT_YET[0]}, {left_out}"
     except BaseException as error:
         return empty, f"{name} gives no answer, {left_out} {prose.to_plain(explain(error, function))}"
     if parts is None:
-        return empty, f"{name} returns nothing yet, {left_out}"
+        return empty, f"{name} {_NOT_YET[1]}, {left_out}"
     shapes, right = [part.shape for part in parts], [one.shape for one in empty]
     if shapes != right:
         return empty, f"{name} answers in shape {_listed(shapes)}, where {_listed(right)} is wanted, {left_out}"

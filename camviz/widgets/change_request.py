@@ -16,7 +16,9 @@ _KEYS = ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "+", "-")
 
 @dataclass(frozen=True)
 class ChangeRequest:
-    """In this order: the first state if `reset`, `values` set, handles dragged by (x, y, dx, dy), keys pressed.
+    """In this order: the first state if `reset`, `values` set, `panels` opened or closed, drags, keys pressed.
+
+    A drag is (handle, x, y, dx, dy).
 
     `units` says how many picture units make a CSS pixel in the tile of a name.
     """
@@ -24,6 +26,7 @@ class ChangeRequest:
     draft: bool
     reset: bool
     values: Mapping[str, Any]
+    panels: Mapping[str, bool]
     drags: tuple[tuple[str, float, float, float, float], ...]
     keys: tuple[tuple[str, str], ...]
     units: Mapping[str, float]
@@ -34,15 +37,18 @@ class ChangeRequest:
         if not isinstance(message, Mapping):
             raise ValueError(f"a message must be a dict, got {short(message)}")
         values, units = message.get("values") or {}, message.get("units") or {}
+        panels = message.get("panels") or {}
         if not isinstance(values, Mapping) or len(values) > _MOST:
             raise ValueError(f"values must be a dict of at most {_MOST} controls, got {short(values)}")
+        if not isinstance(panels, Mapping) or len(panels) > _MOST or not all(map(_is_switch, panels.items())):
+            raise ValueError(f"panels must be a dict of at most {_MOST} names and true or false, got {short(panels)}")
         if not isinstance(units, Mapping) or len(units) > _MOST or not all(map(_is_unit, units.values())):
             raise ValueError(
                 f"units must be a dict of at most {_MOST} numbers from 1 to {_LARGEST}, got {short(units)}"
             )
         drags = tuple(_drag(one) for one in _listed(message, "drags"))
         keys = tuple(_key(one) for one in _listed(message, "keys"))
-        return cls(bool(message.get("draft")), bool(message.get("reset")), values, drags, keys, units)
+        return cls(bool(message.get("draft")), bool(message.get("reset")), values, panels, drags, keys, units)
 
 
 def number_of(message: object) -> int:
@@ -68,6 +74,10 @@ def _key(key: Any) -> tuple[str, str]:
     if isinstance(key, list) and len(key) == 2 and _is_handle(key[0]) and key[1] in _KEYS:
         return (key[0], key[1])
     raise ValueError(f"a key must be a handle and one of {', '.join(_KEYS)}, got {short(key)}")
+
+
+def _is_switch(panel: tuple[Any, Any]) -> bool:
+    return _is_handle(panel[0]) and isinstance(panel[1], bool)
 
 
 def _is_handle(name: Any) -> bool:

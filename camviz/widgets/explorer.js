@@ -21,8 +21,8 @@ const GONE = {
 function render({ model, el }) {
   const root = build(`<div class="camviz-explorer" role="group" data-busy="false" data-rendered="0">
     <div class="camviz-controls" role="group"></div><div class="camviz-error" role="alert" hidden></div><div class="camviz-picture"></div>
-    <div class="camviz-said" role="status"></div></div>`);
-  const [controls, error, picture, said] = root.children;
+    <div class="camviz-more" role="group" aria-label="more panels"></div><div class="camviz-said" role="status"></div></div>`);
+  const [controls, error, picture, more, said] = root.children;
   const name = nameApart(model.get("_title"));
   root.setAttribute("aria-label", name);
   controls.setAttribute("aria-label", `Controls of ${name}`);
@@ -43,6 +43,7 @@ function render({ model, el }) {
   reset.addEventListener("click", () => ask({ reset: true }, false));
   controls.append(foot);
   showHelp(controls, help);
+  const showOpened = opening(more, model, ask);
   const stopScaling = presentation(large, model.get("_scale"), () => tellUnits(picture, told, ask));
 
   const showValues = () => {
@@ -75,14 +76,16 @@ function render({ model, el }) {
     ask.stop();
     say(words);
     root.dataset.live = "false";
-    controls.inert = true;
+    controls.inert = more.inert = true;
   });
   keepKeys(root);
   const stopSticking = stick(root, controls);
   model.on("change:values", showValues);
+  model.on("change:opened", showOpened);
   model.on("change:frame", showFrame);
   model.on("change:frame", tell);
   showValues();
+  showOpened();
   showFrame();
   return () => {
     watcher.disconnect();
@@ -92,8 +95,29 @@ function render({ model, el }) {
     stopWatching();
     ask.stop();
     model.off("change:values", showValues);
+    model.off("change:opened", showOpened);
     model.off("change:frame", showFrame);
     model.off("change:frame", tell);
+  };
+}
+
+// Below the picture a button for each panel that is not there at first: it opens the panel, and closes it again. A page
+// without a kernel has the first panels only, and no buttons.
+function opening(more, model, ask) {
+  const buttons = (model.get("panels") ?? []).map(({ name, words }) => {
+    const button = build(`<button type="button"></button>`);
+    button.dataset.opens = name;
+    button.addEventListener("click", () => ask({ panels: { [name]: button.getAttribute("aria-pressed") === "false" } }, false));
+    return { name, words, button };
+  });
+  more.append(...buttons.map(({ button }) => button));
+  more.hidden = !buttons.length;
+  return () => {
+    for (const { name, words, button } of buttons) {
+      const open = model.get("opened").includes(name);
+      button.setAttribute("aria-pressed", String(open));
+      button.textContent = `${open ? "−" : "+"} ${words}`;
+    }
   };
 }
 
@@ -176,11 +200,12 @@ function asker(model, root, late) {
     clearTimeout(settle);
     settle = null;
     if (part.reset) wish = null;
-    wish ??= { values: {}, drags: [], keys: [], units: {}, draft };
+    wish ??= { values: {}, panels: {}, drags: [], keys: [], units: {}, draft };
     wish.draft = draft;
     wish.reset ||= part.reset;
     Object.assign(wish.units, part.units);
     Object.assign(wish.values, part.values);
+    Object.assign(wish.panels, part.panels);
     for (const [handle, x, y, dx, dy] of part.drags ?? []) {
       const last = wish.drags.at(-1);
       if (last && last[0] === handle) wish.drags[wish.drags.length - 1] = [handle, x, y, last[3] + dx, last[4] + dy];

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from importlib.resources import files
 from math import nan
@@ -20,6 +20,7 @@ from camviz.views.base import Control, View
 from camviz.widgets.change_request import ChangeRequest, number_of
 from camviz.widgets.memory import give_back_after_cells, keep_between_pictures
 from camviz.widgets.still import StillWidget, stills_for_boxes
+from camviz.widgets.waiting import wait
 
 _HERE = files("camviz.widgets")
 _CAPTION = (
@@ -54,8 +55,9 @@ class Explorer(StillWidget):
 
     The browser asks for one picture at a time and always for its newest request, so that no queue builds up.
     What it asks for is checked: numbers are held within their ranges, whatever moves them. An error in drawing is shown
-    in words above the last good picture. A button makes words twice as large for the back row; CAMVIZ_SCALE (1 to 3)
-    does so from the start.
+    in words above the last good picture. Buttons below the picture open the view's further panels, where it has any;
+    `panels` names them, and `opened` those that are open. A button makes words twice as large for the back row;
+    CAMVIZ_SCALE (1 to 3) does so from the start.
 
     Args:
         view: The state to begin with.
@@ -75,6 +77,8 @@ class Explorer(StillWidget):
     _css = page_style() + (_HERE / "explorer.css").read_text(encoding="utf-8")
 
     controls: traitlets.List[Any] = traitlets.List(read_only=True).tag(sync=True)
+    panels: traitlets.List[Any] = traitlets.List(read_only=True).tag(sync=True)
+    opened: traitlets.List[Any] = traitlets.List(read_only=True).tag(sync=True)
     frame: traitlets.Dict[Any, Any] = traitlets.Dict(read_only=True).tag(sync=True)
     _title = traitlets.Unicode().tag(sync=True)
     _scale = traitlets.Float().tag(sync=True)
@@ -92,12 +96,15 @@ class Explorer(StillWidget):
         self.add_traits(**{trait: ViewTrait().tag(sync=True) for trait in self._control_of})
         described = [{"name": name, **vars(one), "first": getattr(view, name)} for name, one in controls.items()]
         self.set_trait("controls", described)
+        more = [name for name in view.openable if name not in view.opened]
+        self.set_trait("panels", [{"name": name, "words": view.openable[name]} for name in more])
         self._show(view, draft=False)
         super().__init__()
         self.on_msg(self._receive)
         self.observe(lambda _: self.keep_soon(), "view")
         keep_between_pictures()
         give_back_after_cells(self)
+        wait(self)
         stills_for_boxes()
 
     def set(self, **changes: Any) -> Explorer:
@@ -188,7 +195,25 @@ class Explorer(StillWidget):
         with self.hold_sync(), self.hold_trait_notifications():
             for trait, value in followed.items():
                 getattr(type(self), trait).follow(self, value)
+            self.set_trait("opened", list(view.opened))
             self.set_trait("frame", frame)
+
+    def take(self, function: Callable[..., Any]) -> bool:
+        """Draw with the function that a reader has written anew.
+
+        Args:
+            function: Takes the place of the function of the same name that the view was given.
+
+        Returns: Whether the view has one, and it is another.
+        """
+        name = getattr(function, "__name__", "")
+        held = {one: value for one, value in self.state.items() if callable(value)}
+        theirs = [one for one, value in held.items() if name and getattr(value, "__name__", "") == name]
+        changes = {one: function for one in theirs if held[one] is not function}
+        if changes:
+            self._first = self._first.but(**changes)
+            self._show(self.view.but(**changes), draft=False)
+        return bool(changes)
 
     def forget(self) -> None:
         """Free what the first and the present view have worked out; a hand's next picture is of another view."""
@@ -227,14 +252,19 @@ class Explorer(StillWidget):
 
     def _requested(self, request: ChangeRequest) -> View:
         self._units |= request.units
-        view = self._first if request.reset else self.view
+        view = self._first.with_panels(self._as_now()) if request.reset else self.view
         if request.values:
             view = view.but(**{name: self._requested_value(name, value) for name, value in request.values.items()})
+        view = view.with_panels(request.panels)
         for drag in request.drags:
             view = self._within(view.dragged(*drag), view)
         for key in request.keys:
             view = self._within(view.pressed(*key), view)
         return view
+
+    def _as_now(self) -> dict[str, bool]:
+        """Which panels are open: a reset leaves those to the reader who opened them."""
+        return {name: name in self.view.opened for name in self.view.openable}
 
     def _requested_value(self, name: str, value: Any) -> Any:
         """The value, held within its control's range; where the control began it may return to, even from outside."""

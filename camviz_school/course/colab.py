@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import deepcopy
 
-from camviz_school.course.notebooks import Notebook, tagged
+from camviz_school.course.notebooks import Cell, Notebook, tagged
 
 INSTALL = """\
 # On Google Colab this cell installs camviz; anywhere else it does nothing.
@@ -43,22 +43,28 @@ def opens(file_name: str) -> str:
 
 
 def prepared(notebook: Notebook, file_name: str) -> Notebook:
-    """A copy with the badge beside Binder's and the cell above the setup cell; the same where it has both.
+    """A copy with the badge beside Binder's and the cell above all other code; the same where it has both.
 
     Raises ValueError where the lesson has no badge of Binder's or no cell tagged setup.
     """
     import nbformat
 
     made = deepcopy(notebook)
-    if badge(file_name) not in made.cells[0].source:
-        binder = next((line for line in made.cells[0].source.split("\n") if "mybinder.org" in line), None)
+    told = _with_badges(made)
+    if badge(file_name) not in told.source:
+        binder = next((line for line in told.source.split("\n") if "mybinder.org" in line), None)
         if binder is None:
             raise ValueError(f"{file_name}: expected Binder's badge in the first cell, there is none")
-        made.cells[0].source = made.cells[0].source.replace(binder, f"{binder}\n{badge(file_name)}")
+        told.source = told.source.replace(binder, f"{binder}\n{badge(file_name)}")
     if not tagged(made, "colab"):
-        places = [number for number, cell in enumerate(made.cells) if "setup" in cell.metadata.get("tags", [])]
-        if not places:
+        places = [number for number, cell in enumerate(made.cells) if cell.cell_type == "code"]
+        if not tagged(made, "setup"):
             raise ValueError(f"{file_name}: expected a cell tagged setup, there is none")
         cell = nbformat.v4.new_code_cell(INSTALL, id="colab", metadata=deepcopy(_FOLDED) | {"tags": ["colab"]})
         made.cells.insert(places[0], cell)
     return made
+
+
+def _with_badges(notebook: Notebook) -> Cell:
+    """The cell that says what a lesson is about, where it has one below its first view; else its first cell."""
+    return next(iter(tagged(notebook, "about")), notebook.cells[0])

@@ -9,20 +9,26 @@ check.hint("05.distort")
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from camviz.views.yours import was_missed
 from camviz_school.course.checks import Exercise, Verdict, hint, judge
 from camviz_school.course.material import material, module
 from camviz_school.course.plots import tell_plots
+
+LOOK = " Look at the picture below: your function draws it now."
+RUN_AGAIN = " Run the cell of the plot below again: it waited for your function."
+"""Said after praise where a view, and where a plot waited for the function."""
 
 
 class Tutor:
     """Checks exercises for one notebook and remembers how often each was tried, so that its hints grow stronger.
 
-    It is what every lesson begins with: from then on the notebook's plots are shown with words
-    (camviz_school.course.plots).
+    A right function is given at once to the views that were made before it was (camviz.widgets.waiting). It is what
+    every lesson begins with: from then on the notebook's plots are shown with words (camviz_school.course.plots).
     """
 
     def __init__(self, rng: np.random.Generator | None = None) -> None:
@@ -36,7 +42,16 @@ class Tutor:
         verdict = judge(exercise(name), function, self._rng, tries)
         if verdict.hint:
             self._tries[name] = tries
-        return verdict
+        return self._handed_out(verdict, function) if verdict.correct else verdict
+
+    @staticmethod
+    def _handed_out(verdict: Verdict, function: Any) -> Verdict:
+        """The verdict on a right function, once the views that wait for it are drawn with it: it says where to look."""
+        from camviz.widgets.waiting import hand_out  # the widgets take a second to load, and a notebook has them
+
+        look = LOOK if hand_out(function) else ""
+        again = RUN_AGAIN if was_missed(function) else ""
+        return replace(verdict, message=f"{verdict.message}{look}{again}")
 
     def hint(self, name: str) -> Verdict:
         """The next of the exercise's three hints, without a try."""

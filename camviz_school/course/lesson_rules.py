@@ -6,8 +6,9 @@ import ast
 import re
 from typing import Any
 
-from camviz_school.course import catalogue, colab, glossary, notebooks, questions, reading
+from camviz_school.course import catalogue, colab, core_rules, glossary, notebooks, questions, reading
 from camviz_school.course.exercises import exercises
+from camviz_school.course.minutes import is_layered, minutes
 
 Notebook = Any
 
@@ -24,34 +25,12 @@ check = Tutor()"""
 LONGEST_CELL = 30
 """Lines of code a reader can take in at once."""
 
-WORDS_A_MINUTE, MINUTES_A_QUESTION, MINUTES_AN_EXERCISE = 200, 3, 8
-MINUTES_A_FIRST_THOUGHT = 1
-"""For a question of form A: it is read and answered, and there is no reply to read or to argue with."""
-
 MOST_DRAWING = 8
 """Lines that plot, in one cell: what a reader would write, and not more than shows the result."""
 
 _DRAWING = re.compile(r"\b(?:plt|ax|axes|figure|plotter)\b[.\[]|^for \w+, .* in zip\(axes")
-_WORD = re.compile(r"[^\W\d_]+(?:[’'][^\W\d_]+)?")
-_NOT_READ = re.compile(r"\]\([^)]*\)|\$\$.*?\$\$|\$[^$\n]*\$", re.DOTALL)  # addresses; formulas
-_PATIENT = re.compile(r"ward\[\d+\]")
 _LINK = re.compile(r"00_start_here\.ipynb#([^)\s]+)\)")
 _HEADER = ("minutes", "prerequisites", "what you'll do", "what you'll learn", "what you'll need", "mybinder.org")
-
-
-def minutes(notebook: Notebook, number: str) -> int:
-    """About how long a student alone needs, to five minutes: words, questions (a patient is one) and exercises."""
-    text = "\n".join(
-        cell.source
-        for cell in notebook.cells
-        if cell.cell_type == "markdown" and not {"glossary", "solution"} & set(cell.metadata.get("tags", []))
-    )
-    words = len(_WORD.findall(_NOT_READ.sub(" ", text)))
-    patients = sum(bool(_PATIENT.fullmatch(cell.source)) for cell in notebook.cells)
-    first = len(questions.quiz_questions(number, "A"))
-    asked = MINUTES_A_FIRST_THOUGHT * first
-    asked += MINUTES_A_QUESTION * (len(questions.questions(number)) - first + patients)
-    return 5 * round((words / WORDS_A_MINUTE + asked + MINUTES_AN_EXERCISE * len(exercises(number))) / 5)
 
 
 def complaints(notebook: Notebook, file_name: str) -> list[str]:
@@ -67,18 +46,19 @@ def complaints(notebook: Notebook, file_name: str) -> list[str]:
     if number != "00":
         found += [*_questions(notebook, number), *_exercises(notebook, number), *_ending(notebook)]
         found += [*_own_functions(notebook), *_reads_well(notebook, number)]
-    return found
+    return [*found, *core_rules.complaints(notebook, number)] if is_layered(notebook) else found
 
 
 def _header(notebook: Notebook, number: str) -> list[str]:
     first = notebook.cells[0]
     if first.cell_type != "markdown" or not first.source.startswith("# "):
         return ["the first cell must be the header: Markdown that begins with # and the title"]
-    text = first.source.replace("’", "'").lower()
+    told = [first, *notebooks.tagged(notebook, "about")]
+    text = "\n".join(cell.source for cell in told).replace("’", "'").lower()
     wanted = ("?", *_HEADER) if number != "00" else _HEADER[:1]
     found = [f"the header does not mention {word!r}" for word in wanted if word not in text]
     needed = minutes(notebook, number)
-    if f"about {needed} minutes" not in text:
+    if f"about {needed} minutes" not in first.source.lower():
         found.append(f"the header must say how long the lesson takes, About {needed} minutes")
     return found
 
@@ -99,6 +79,8 @@ def _setup(notebook: Notebook) -> list[str]:
             return [f"the cell tagged colab must be the same as everywhere:\n{colab.INSTALL}"]
     code = [cell for cell in notebook.cells if cell.cell_type == "code" and cell.source != colab.INSTALL]
     setup = notebooks.tagged(notebook, "setup")
+    if is_layered(notebook):  # its first view stands above the setup cell
+        code = code[1:]
     if len(setup) != 1 or not code or code[0] is not setup[0]:
         return [f"the first code cell, and no other, must be tagged setup; {len(setup)} are"]
     return [] if setup[0].source == SETUP else [f"setup must be the same as everywhere:\n{SETUP}"]
@@ -138,7 +120,7 @@ def _questions(notebook: Notebook, number: str) -> list[str]:
     if quizzes.count(f'"{number}"') != 1:
         found.append(f'the lesson must end with one quiz("{number}"), has {quizzes}')
     sources = [cell.source for cell in notebook.cells]
-    if questions.quiz_questions(number, "A"):
+    if questions.quiz_questions(number, "A") and not is_layered(notebook):
         found += _first_thoughts(sources, number)
     recap = next((i for i, source in enumerate(sources) if _heading("Recap", source)), len(sources))
     if any(source.startswith("quiz(") for source in sources[recap:]):
@@ -162,7 +144,7 @@ def _exercises(notebook: Notebook, number: str) -> list[str]:
     known = exercises(number)
     found = [f"{name} is no exercise of lesson {number}" for name in stubs if name not in known]
     found += [f"the exercise {name} has no stub" for name in known if name not in stubs]
-    if not 3 <= len(stubs) <= 5:
+    if not is_layered(notebook) and not 3 <= len(stubs) <= 5:
         found.append(f"three to five exercises are wanted, there are {len(stubs)}")
     if not any(known[name].bug for name in stubs if name in known):
         found.append("one exercise should be to find a bug")

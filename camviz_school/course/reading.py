@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,9 +35,14 @@ class Passage:
 
 def main_line(notebook: Notebook) -> list[Passage]:
     """What every reader reads: the Markdown cells without folded boxes, solutions, glossary and further reading."""
+    return main_line_of(notebook.cells)
+
+
+def main_line_of(cells: Iterable[Any]) -> list[Passage]:
+    """As `main_line`, of some cells, numbered from the first of them."""
     kept = []
-    for number, cell in enumerate(notebook.cells):
-        aside = {"solution", "glossary"} & set(cell.metadata.get("tags", []))
+    for number, cell in enumerate(cells):
+        aside = {"solution", "glossary", "about"} & set(cell.metadata.get("tags", []))
         if cell.cell_type == "markdown" and not aside and "Further reading" not in cell.source.split("\n")[0]:
             kept.append(Passage(number, _FOLDED.sub("\n\n", cell.source)))
     return kept

@@ -17,7 +17,7 @@ from camviz.draw import prose
 from camviz.draw.page import document
 from camviz_school.course import questions
 from camviz_school.course.catalogue import described
-from camviz_school.course.notebooks import Notebook
+from camviz_school.course.notebooks import Notebook, tagged
 from camviz_school.course.questions import Question
 from camviz_school.teaching import markup, panels, parts, plans
 from camviz_school.teaching.edition import place
@@ -34,7 +34,7 @@ def one_page(notebook: Notebook, numbering: Numbering, file: str) -> str:
     """The page of a lesson with a plan and numbered slides; `file` is the notebook's name."""
     plan = numbering.plan
     told = described(notebook, file)
-    learned = _learned(notebook.cells[0].source)
+    learned = _learned("\n".join(one.source for one in (notebook.cells[0], *tagged(notebook, "about"))))
     goal = f"<p><b>They learn</b> {markup.inline(learned)}.</p>" if learned else ""
     left = f"<h2>On the projector</h2>{_shown(notebook, plan)}<h2>Ready before the class</h2>{_ready(plan)}"
     right = f"<h2>Two votes, and what students get wrong</h2>{_votes(plan)}"

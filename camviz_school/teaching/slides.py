@@ -102,7 +102,7 @@ def slides(notebook: Notebook, notice: Sequence[Notice] = (), *, solved: bool = 
         tags = set(cell.metadata.get("tags", []))
         if cell.cell_type == "code":
             found += (_placed(one, place) for one in _of_code(cell, place, notebook.cells[number + 1 :]))
-        elif number and not tags & {"solution", "glossary"}:
+        elif number and not tags & {"solution", "glossary", "about"}:
             for block in markup.blocks(cell.source):
                 found += (_placed(one, place) for one in _of_block(block, place))
     return list(_pointing(found))

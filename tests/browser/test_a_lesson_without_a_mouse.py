@@ -27,7 +27,7 @@ FOCUSED = """root => {
   const outlined = outlineStyle !== "none" && parseFloat(outlineWidth) >= 2;
   return outlined ? Number(one.dataset.stop) : `no outline: ${one.outerHTML}`;
 }"""
-LAST = "Lens distortion, 6"  # the one that has every kind of control
+LAST = "Lens distortion, 8"  # the one that has every kind of control
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,12 @@ PAGE = ROOT / "docs/house.md"
 SECTIONS = re.compile(r"^\s*(Args|Returns|Raises|Source|Attributes|Yields):", re.MULTILINE)
 FIRST_READING = (
     *("README.md", "camviz/__init__.py", "camviz/cameras.py", "camviz/lenses/perspective.py", "camviz/lenses/base.py"),
-    *("camviz/lenses/brown_conrady.py", "camviz/distortion.py", "camviz/twoview/epipolar.py", "camviz/views/base.py"),
+    *(
+        "camviz/lenses/brown_conrady.py",
+        "camviz/distortion/__init__.py",
+        "camviz/twoview/epipolar.py",
+        "camviz/views/base.py",
+    ),
     "camviz/views/frustum.py",
 )
 LOADED = """
