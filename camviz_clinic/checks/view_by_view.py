@@ -7,7 +7,7 @@ noise of corners.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -36,10 +36,7 @@ class ViewByView:
     @classmethod
     def of(cls, solved: Adjustment) -> ViewByView:
         """The views of an adjustment at its least sum of squares."""
-        free = replace(solved, priors={})
-        normals = [free.only([view]).normal_equations for view in np.flatnonzero(solved.posed)]
-        gradients = [one.shared_gradient - np.einsum("vms,vm->s", one.pose_response, one.gradients) for one in normals]
-        return cls(solved, np.array([one.information for one in normals]), np.array(gradients))
+        return cls(solved, solved.by_view.information, solved.by_view.gradient)
 
     @cached_property
     def _apart(self) -> tuple[float, int]:
