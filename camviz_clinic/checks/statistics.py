@@ -23,7 +23,7 @@ from camviz_clinic.checks.virtual import healthy, healthy_pair
 
 PAGE = Path(__file__).parents[2] / "docs" / "clinic.md"
 TABLES = "<!-- The tables below are counted by: python -m camviz_clinic.checks.statistics -->"
-SCOREBOARD = "\n## Scoreboard\n"  # below the tables; written by hand and by benchmarks/field.py
+BELOW = "\n## Standard deviations\n"  # the tables; by hand, and by benchmarks/intervals.py and field.py
 HEALTHY, REPEATS = 120, 12
 SEED = 20_000
 RATED = ("fault", "warning")  # a note is a fact about a lens, not an alarm
@@ -124,10 +124,10 @@ def page(tables: str) -> str:
     return f"{HEAD}\n{entries}\n\n{MIDDLE}\n{TABLES}\n\n{tables}"
 
 
-def scoreboard(tables: str) -> str:
+def below(tables: str) -> str:
     """What stands below the counted tables, which counting anew leaves as it is."""
-    _, heading, below = tables.partition(SCOREBOARD)
-    return heading + below
+    _, heading, rest = tables.partition(BELOW)
+    return heading + rest
 
 
 def _entry(kind: Kind) -> str:
@@ -185,12 +185,12 @@ of these, each with its `file`.
 - **The file.** Its date is the calibration's, where the file says it, else that of the file on this disk. Pictures used
   of those given: one that was skipped, or whose corners were all set aside, was not used. Below it stands what the
   calibration holds for.
-- **The numbers, each ± one standard deviation.** From the covariance in the file, or else from its corners. The RMS is
-  over the corners used. The uncertainty is that of the pixel at which a far point is seen, at the centre of the image
-  and in its worst corner. It is the corners' noise alone: a lens that the model cannot describe is off by more.
+- **The numbers, each ± one standard deviation.** From the covariance in the file, or else from its corners, by
+  [the scatter of the views](#standard-deviations). The RMS is over the corners used. The uncertainty is that of the
+  pixel at which a far point is seen, at the centre of the image and in its worst corner. What is wrong alike in all views is not in it, such as a bent board.
 - **What it is worth.** How well the direction to a far point is known, in degrees. With `--at 2m` the error of a place
   at that distance. Of a pair the depth error at 1, 2, 5 and 10 m, where matches are to ±0.25 px, and the calibration's
-  own part of it. One standard deviation each, from the corners' noise alone.
+  own part of it. One standard deviation each.
 - **Notes.** How many corners were set aside, and in which pictures.
 
 Each bar of "Residuals, view by view" is as high as the RMS written on it: blue over the corners used, pale red with
@@ -400,7 +400,7 @@ MIDDLE = """\
 
 Where the theory of least squares gives the chance of a false alarm, the threshold is that chance. It is one in a
 million for every F- and χ²-test: `model-too-simple`, `board-warp`, `split-disagreement`, `rolling-shutter` and
-`views-differ`. It is one in ten thousand for a whole set of views with few corners (`outlier-view`).
+`views-differ`. It is also one of the two limits of `views-disagree`. It is one in ten thousand for a whole set of views with few corners (`outlier-view`).
 
 The chance holds for independent Gaussian noise, and real corners are neither. In a large set, every small error of a
 real lens is also beyond chance. So each threshold has a least effect beside it, which decides in practice. Rules about
@@ -428,7 +428,7 @@ def main() -> None:
     """Write docs/clinic.md."""
     tables = PAGE.read_text(encoding="utf-8").split(TABLES)[1].lstrip()
     if "--page" not in sys.argv:
-        tables = count_all(lambda line: print(line, flush=True)) + scoreboard(tables)
+        tables = count_all(lambda line: print(line, flush=True)) + below(tables)
     PAGE.write_text(page(tables), encoding="utf-8")
 
 

@@ -58,6 +58,16 @@ class ViewByView:
             return 1.0
         return max(1.0, (gain / more) / (max(self.solved.sum_of_squares - gain, np.finfo(float).tiny) / left))
 
+    @property
+    def chance_of_scatter(self) -> float:
+        """How often the noise of independent corners gives views that differ so: the F-test of `scatter`."""
+        gain, more = self._apart
+        left = self.solved.measurements - self.solved.unknowns - more
+        if more < 1 or left < 1:
+            return 1.0
+        noise = max(self.solved.sum_of_squares - gain, np.finfo(float).tiny) / left
+        return float(fdtrc(more, left, gain / more / noise))
+
     def chance(self, first: Mask) -> float:
         """How often views that differ by chance, as much as these do within the two parts, differ so between them.
 
