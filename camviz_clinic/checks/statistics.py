@@ -187,7 +187,8 @@ of these, each with its `file`.
   calibration holds for.
 - **The numbers, each ± one standard deviation.** From the covariance in the file, or else from its corners, by
   [the scatter of the views](#standard-deviations). The RMS is over the corners used. The uncertainty is that of the
-  pixel at which a far point is seen, at the centre of the image and in its worst corner. What is wrong alike in all views is not in it, such as a bent board.
+  pixel at which a far point is seen, at the centre of the image and in its worst corner. What is wrong alike in all
+  views is not in it, such as a bent board.
 - **What it is worth.** How well the direction to a far point is known, in degrees. With `--at 2m` the error of a place
   at that distance. Of a pair the depth error at 1, 2, 5 and 10 m, where matches are to ±0.25 px, and the calibration's
   own part of it. One standard deviation each.
@@ -400,7 +401,8 @@ MIDDLE = """\
 
 Where the theory of least squares gives the chance of a false alarm, the threshold is that chance. It is one in a
 million for every F- and χ²-test: `model-too-simple`, `board-warp`, `split-disagreement`, `rolling-shutter` and
-`views-differ`. It is also one of the two limits of `views-disagree`. It is one in ten thousand for a whole set of views with few corners (`outlier-view`).
+`views-differ`. It is also one of the two limits of `views-disagree`. It is one in ten thousand for a whole set of views
+with few corners (`outlier-view`).
 
 The chance holds for independent Gaussian noise, and real corners are neither. In a large set, every small error of a
 real lens is also beyond chance. So each threshold has a least effect beside it, which decides in practice. Rules about
