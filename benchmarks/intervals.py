@@ -96,8 +96,9 @@ print(json.dumps([model.intrinsics()[1].tolist(), (sigma * np.linalg.norm(by_cor
 def mrcal_python() -> str | None:
     """A Python that has mrcal, where there is one beside mrcal's own command."""
     python = shutil.which("python3", path="/usr/bin")
-    known = python and shutil.which("mrcal-calibrate-cameras")
-    return python if known and not subprocess.run([python, "-c", "import mrcal"], check=False).returncode else None
+    if python is None or not shutil.which("mrcal-calibrate-cameras"):
+        return None
+    return None if subprocess.run([python, "-c", "import mrcal"], check=False).returncode else python
 
 
 def by_mrcal(views: Detections, board: Board, model: str) -> dict[str, Told]:
