@@ -86,8 +86,11 @@ def test_a_parameter_at_the_end_of_its_range_has_a_slope_too() -> None:
 
 @pytest.mark.parametrize("problem", ["solved", "pair"])
 def test_covariances_are_those_of_the_dense_inverse(problem, request) -> None:
-    """σ² (JᵀJ)⁻¹, of all parameters at once and J taken by differences, holds the blocks that the arrowhead gives."""
-    adjustment = request.getfixturevalue(problem)
+    """σ² (JᵀJ)⁻¹, of all parameters at once and J taken by differences, holds the blocks that the arrowhead gives.
+
+    So it is for independent corners. A pose follows what the scatter of the views adds to the shared parameters.
+    """
+    adjustment = request.getfixturevalue(problem).by_corners
     J, residuals = dense(adjustment)
     shared = len(adjustment.parameters)
     sigma2 = residuals @ residuals / (J.shape[0] - J.shape[1])
@@ -145,8 +148,8 @@ def test_optimum_and_deviations_are_opencvs() -> None:
     theirs = np.concatenate([K[[0, 1, 0, 1], [0, 1, 2, 2]], D.ravel()[:5]])
     assert ours.rms == pytest.approx(rms, rel=1e-6)  # OpenCV takes the board in float32
     assert np.abs((ours.intrinsics("camera") - theirs) / deviations[:9, 0]).max() < 1e-3
-    # OpenCV's σ is over N - k as well.
-    assert np.allclose(np.sqrt(np.diag(ours.covariance)), deviations[:9, 0], rtol=1e-5)
+    # OpenCV's σ is over N - k as well, and by the noise of corners.
+    assert np.allclose(np.sqrt(np.diag(ours.corner_covariance)), deviations[:9, 0], rtol=1e-5)
     assert np.allclose(ours.first_from_board.translation, np.reshape(tvecs, (-1, 3)), atol=1e-6)
 
 

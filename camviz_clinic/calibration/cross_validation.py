@@ -56,7 +56,7 @@ def halves(
     counts = [int(adjustment.posed[part].sum()) for part in (mask, ~mask)]
     if min(counts) < FEWEST_VIEWS:
         raise ValueError(f"each half must have at least {FEWEST_VIEWS} views, got {counts[0]} and {counts[1]}")
-    one, other = (adjustment.only(part).refined() for part in (mask, ~mask))
+    one, other = (adjustment.only(part).refined().by_corners for part in (mask, ~mask))
     uv = pixel_grid(one.cameras[name].intrinsics, grid)
     deviations = [mean_deviation(projection_covariance(part, uv, distance, name)) for part in (one, other)]
     apart = difference(

@@ -49,8 +49,9 @@ def next_board_poses(
     `candidates` are poses cam_from_board; by default tilts, sizes and places in the picture of camera `camera` (the
     first) that show it the whole board. The pixels are by default a grid over the picture. Every camera of a rig adds
     what it would see. Foretold from the present solution, without detecting or solving anything: one view more says
-    A - B C⁻¹ Bᵀ of the shared parameters (`Arrowhead`), its own pose being free. The boards that the pixel's point
-    stays with are those there are already, so that before and after the same thing is measured.
+    A - B C⁻¹ Bᵀ of the shared parameters (`Arrowhead`), its own pose being free. It is taken to differ from the others
+    as these do: the scatter of the views is the same multiple of the corners' noise as before. The boards
+    that the pixel's point stays with are those there are already, so that before and after the same thing is measured.
     """
     name = next(iter(adjustment.cameras)) if camera is None else camera
     seen_by = adjustment.cameras[name]
@@ -63,9 +64,10 @@ def next_board_poses(
     jacobian = projection_jacobian(adjustment, pixels, distance, name)
     jacobian = jacobian[np.isfinite(jacobian).all(axis=(1, 2))]
     before = _mean_uncertainty(jacobian, adjustment.mean_twist_covariance)
+    more = before / _mean_uncertainty(jacobian, adjustment.by_corners.mean_twist_covariance)
     changed = _with_one_more(adjustment, seen_by.world_from_cam * candidates)
     tilts = tilt_deg(candidates, adjustment.board)
-    after = [_mean_uncertainty(jacobian, covariance) for covariance in changed]
+    after = [more * _mean_uncertainty(jacobian, covariance) for covariance in changed]
     return tuple(Candidate(candidates[i], float(tilts[i]), before, after[i]) for i in np.argsort(after))
 
 
@@ -134,12 +136,12 @@ def outline(board: Board) -> Array:
 
 
 def _with_one_more(adjustment: Adjustment, first_from_board: RigidTransform) -> Iterator[Array]:
-    """`mean_twist_covariance`, (s + 6, s + 6), with each of the boards added to the views there are, one at a time."""
+    """`by_corners.mean_twist_covariance`, (s + 6, s + 6), with one more view, each of the boards in turn."""
     normal = adjustment.normal_equations
     shared, border, blocks = _seen_at(adjustment, first_from_board)
     gained = shared - border @ inverse(blocks) @ np.swapaxes(border, 1, 2)
     for covariance in inverse(normal.information + gained):
-        yield adjustment.joined_with_mean_twist(covariance)
+        yield adjustment.joined_with_mean_twist(adjustment.sigma**2 * covariance)
 
 
 def _seen_at(adjustment: Adjustment, first_from_board: RigidTransform) -> tuple[Array, Array, Array]:

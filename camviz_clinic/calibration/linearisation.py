@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from camviz.cameras import transform
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.arrowhead import Arrowhead
+from camviz_clinic.calibration.clustered import FEWEST_VIEWS, ByView
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz_clinic.calibration.problem import POSE, Problem
 from camviz_clinic.calibration.types import Board
@@ -18,6 +20,9 @@ from camviz_clinic.calibration.types import Board
 @dataclass(frozen=True, eq=False)
 class Linearisation(Problem):
     """The problem near its own cameras and poses, where a pixel is a linear function of the parameters.
+
+    `covariance` is by the scatter of the views (`ByView`), and so is all that follows from it, unless the problem has
+    `independent_corners`. What the noise of corners alone would give is `corner_covariance`.
 
     The covariances of poses are those of their twists. A prior counts in them as what it is, a measurement that nobody
     made: they are Bayes' for a lens drawn from it, σ² (JᵀJ + PᵀP)⁻¹ with P of the prior's rows, which is the scatter of
@@ -94,9 +99,40 @@ class Linearisation(Problem):
         }
 
     @cached_property
-    def covariance(self) -> Array:
-        """σ² (JᵀJ)⁻¹ of the shared `parameters`, (s, s), the poses being free to follow."""
+    def corner_covariance(self) -> Array:
+        """σ² (JᵀJ)⁻¹ of the shared `parameters`, (s, s), the poses being free to follow: by the noise of corners alone.
+
+        It is what programs print, and too small where the corners of a view are not independent: see `covariance`.
+        """
         return self.sigma**2 * self.normal_equations.covariance
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the shared `parameters`, (s, s), by the scatter of the views; of fewer than three, `corner_covariance`."""
+        if self.independent_corners or self.posed.sum() < FEWEST_VIEWS or not np.isfinite(self.sigma):
+            return self.corner_covariance
+        return self.by_view.covariance(self.sigma)
+
+    @cached_property
+    def by_corners(self) -> Self:
+        """The same problem, whose covariances are those of the corners' noise alone."""
+        return replace(self, independent_corners=True)
+
+    @cached_property
+    def by_view(self) -> ByView:
+        """What every view that has a say asks of the shared parameters, and what priors do."""
+        normal, s = self.normal_equations, len(self.parameters)
+        own, along = np.zeros((int(self.posed.sum()), s, s)), np.zeros((int(self.posed.sum()), s))
+        for name in self.cameras:
+            by_shared, _, residuals = self._measured(name)
+            own += np.swapaxes(by_shared, 1, 2) @ by_shared
+            along += np.einsum("vns,vn->vs", by_shared, residuals)
+        information = own - normal.border @ normal.pose_response
+        gradient = along - np.einsum("vms,vm->vs", normal.pose_response, normal.gradients)
+        assumed, pull = np.zeros((s, s)), np.zeros(s)
+        for rows, expected in self._assumed.values():
+            assumed, pull = assumed + rows.T @ rows, pull + rows.T @ expected
+        return ByView(information, gradient, assumed, pull)
 
     def intrinsics_covariance(self, name: str) -> Array:
         """Of the `estimated` intrinsics of camera `name`, (n, n)."""
@@ -105,37 +141,40 @@ class Linearisation(Problem):
 
     @cached_property
     def pose_covariance(self) -> Array:
-        """Of every view's twist, (views, 6, 6), radians and metres; NaN for a view without a say."""
+        """Of every view's twist, (views, 6, 6), radians and metres; NaN for a view without a say.
+
+        A pose follows the shared parameters, and has the noise of its own corners.
+        """
         normal = self.normal_equations
         covariance = np.full((self.views, len(POSE), len(POSE)), np.nan)
-        follows = normal.pose_response @ normal.covariance @ np.swapaxes(normal.pose_response, 1, 2)
-        covariance[self.posed] = self.sigma**2 * (normal.block_inverses + follows)
+        follows = normal.pose_response @ self.covariance @ np.swapaxes(normal.pose_response, 1, 2)
+        covariance[self.posed] = self.sigma**2 * normal.block_inverses + follows
         return covariance
 
     @cached_property
     def cross_covariance(self) -> Array:
         """Between every view's twist and the shared parameters, (views, 6, s); NaN for a view without a say."""
-        normal = self.normal_equations
         covariance = np.full((self.views, len(POSE), len(self.parameters)), np.nan)
-        covariance[self.posed] = -(self.sigma**2) * normal.pose_response @ normal.covariance
+        covariance[self.posed] = -self.normal_equations.pose_response @ self.covariance
         return covariance
 
     @cached_property
     def mean_twist_covariance(self) -> Array:
         """Of the shared parameters and the mean of all views' twists together, (s + 6, s + 6)."""
-        return self.joined_with_mean_twist(self.normal_equations.covariance)
+        return self.joined_with_mean_twist(self.covariance)
 
     def joined_with_mean_twist(self, shared: Array) -> Array:
-        """`mean_twist_covariance` if the shared parameters had the covariance `shared` (s, s) for σ = 1.
+        """`mean_twist_covariance` if the shared parameters had the covariance `shared` (s, s).
 
-        With Wᵢ and Cᵢ of `Arrowhead`, a twist is -Wᵢ δ and noise of covariance Cᵢ⁻¹ that is its own. The mean of n:
-        -W̄ δ, and noise of covariance Σ Cᵢ⁻¹/n².
+        With Wᵢ and Cᵢ of `Arrowhead`, a twist is -Wᵢ δ and noise of covariance σ² Cᵢ⁻¹ that is its own. The mean of n:
+        -W̄ δ, and noise of covariance σ² Σ Cᵢ⁻¹/n².
         """
         normal = self.normal_equations
         follow = np.concatenate([np.eye(len(self.parameters)), -normal.pose_response.mean(axis=0)])
         covariance = follow @ shared @ follow.T
-        covariance[-len(POSE) :, -len(POSE) :] += normal.block_inverses.mean(axis=0) / len(normal.block_inverses)
-        return self.sigma**2 * covariance
+        own = normal.block_inverses.mean(axis=0) / len(normal.block_inverses)
+        covariance[-len(POSE) :, -len(POSE) :] += self.sigma**2 * own
+        return np.asarray(covariance)
 
 
 def sagittas(board: Board) -> Array:

@@ -1,6 +1,6 @@
-"""The uncertainty of a projected pixel: the noise of corners propagated through the calibration.
+"""The uncertainty of a projected pixel: the scatter of the views propagated through the calibration.
 
-The lens is taken to be as the model says: of a wrong model the uncertainty is too small.
+What is wrong in the same way in every view, such as a bent board, does not scatter, and is not in it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ def projection_covariance(
     The point is `distance` metres along the pixel's ray. It keeps its place relative to the boards, which is all that
     two solutions have in common. Every board gives it another place, of which the camera sees the mean
     (mrcal's recipe, mrcal.secretsauce.net/uncertainty.html). With the camera's own frame held fixed instead, a shift of
-    its principal point would count as an error, though the camera need only be turned to make up for it.
+    its principal point would count as an error, though the camera need only be turned to make up for it. mrcal's
+    own numbers are by the noise of corners alone: those of `adjustment.by_corners`.
     """
     jacobian = projection_jacobian(adjustment, uv, distance, camera)
     return jacobian @ adjustment.mean_twist_covariance @ np.swapaxes(jacobian, -1, -2)

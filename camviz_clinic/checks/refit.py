@@ -112,7 +112,7 @@ class Refit:
     @property
     def covariance(self) -> Array:
         """Of the parameters that were solved anew (n, n), by the scatter from view to view."""
-        return self.scatter * self.free.intrinsics_covariance(self.name)
+        return self.scatter * self.free.by_corners.intrinsics_covariance(self.name)
 
     @cached_property
     def shifts(self) -> Array:

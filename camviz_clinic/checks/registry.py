@@ -19,7 +19,15 @@ from camviz_clinic.checks.virtual import SetUp, single
 
 SEVERITIES = ("fault", "warning", "note")  # the worst first
 WRONG_NUMBERS = (
-    *("models-differ", "views-differ", "outlier-view", "outlier-line", "corners-set-aside", "pose-absorbs-error"),
+    *(
+        "models-differ",
+        "views-differ",
+        "views-disagree",
+        "outlier-view",
+        "outlier-line",
+        "corners-set-aside",
+        "pose-absorbs-error",
+    ),
     *("model-too-simple", "split-disagreement", "fold", "near-pole", "inverse-not-converged"),
 )
 """What may follow where a file's numbers are not those of its camera."""

@@ -62,7 +62,7 @@ class RigRefit:
     def covariance(self) -> Array:
         """Of the right camera's twist (6, 6), by the scatter from view to view."""
         place = self.free.place_of("right")
-        return ViewByView.of(self.free).scatter * self.free.covariance[place, place]
+        return ViewByView.of(self.free).scatter * self.free.corner_covariance[place, place]
 
     @cached_property
     def distance(self) -> float:

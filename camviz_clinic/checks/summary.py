@@ -21,7 +21,7 @@ GOOD = 1.0  # pixels: where the largest expected error is below this, no more pi
 UNKNOWN = "not in the file"
 MOST_CAMERAS = 4
 RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
-LEGEND = "± is one standard deviation; uncertainty: of the pixel where a far point is seen, by corner noise alone."
+LEGEND = "± is one standard deviation, by the scatter of the views; uncertainty: of the pixel of a far point."
 
 
 @dataclass(frozen=True, eq=False)

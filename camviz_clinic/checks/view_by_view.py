@@ -7,7 +7,7 @@ noise of corners.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -36,10 +36,7 @@ class ViewByView:
     @classmethod
     def of(cls, solved: Adjustment) -> ViewByView:
         """The views of an adjustment at its least sum of squares."""
-        free = replace(solved, priors={})
-        normals = [free.only([view]).normal_equations for view in np.flatnonzero(solved.posed)]
-        gradients = [one.shared_gradient - np.einsum("vms,vm->s", one.pose_response, one.gradients) for one in normals]
-        return cls(solved, np.array([one.information for one in normals]), np.array(gradients))
+        return cls(solved, solved.by_view.information, solved.by_view.gradient)
 
     @cached_property
     def _apart(self) -> tuple[float, int]:
@@ -60,6 +57,16 @@ class ViewByView:
         if more < 1 or left < 1:
             return 1.0
         return max(1.0, (gain / more) / (max(self.solved.sum_of_squares - gain, np.finfo(float).tiny) / left))
+
+    @property
+    def chance_of_scatter(self) -> float:
+        """How often the noise of independent corners gives views that differ so: the F-test of `scatter`."""
+        gain, more = self._apart
+        left = self.solved.measurements - self.solved.unknowns - more
+        if more < 1 or left < 1:
+            return 1.0
+        noise = max(self.solved.sum_of_squares - gain, np.finfo(float).tiny) / left
+        return float(fdtrc(more, left, gain / more / noise))
 
     def chance(self, first: Mask) -> float:
         """How often views that differ by chance, as much as these do within the two parts, differ so between them.

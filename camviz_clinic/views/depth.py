@@ -97,7 +97,7 @@ class DepthErrorView(View):
             "cameras "
             "moves a point the farther, the farther it is.\n \n"
             f"Matching: Z² σ / (f B), with the baseline B = {self.baseline:.4g} m.\n \n"
-            "Calibration: what the noise of the corners leaves open in both cameras and in how they stand. It is "
+            "Calibration: what the scatter of the views leaves open in both cameras and in how they stand. It is "
             "the same "
             "for all points of a picture, so averaging does not lessen it. Model error is left out."
         )

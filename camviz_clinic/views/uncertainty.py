@@ -25,8 +25,8 @@ from camviz_clinic.views.observations import Missing
 
 DISTANCES = {"infinity": inf, "30 m": 30.0, "10 m": 10.0, "3 m": 3.0, "1 m": 1.0, "0.5 m": 0.5, "0.3 m": 0.3}
 LEFT_OUT = (
-    "This is the noise of the corners carried through the solution. It leaves out model error: a lens that the model "
-    "cannot describe is off by more than the map says, and cross-validation and the residuals show that."
+    "This is the scatter of the views carried through the solution. It leaves out what is wrong alike in all views: a "
+    "bent board, or a lens that the model cannot describe. Cross-validation and the residuals show that."
 )
 _LAYOUT = rows((470, {"uncertainty": 680, "numbers": 280}))
 _RANGE_LAYOUT = rows((380, {"range": 695, "in words": 265}))
@@ -244,9 +244,7 @@ def determined(adjustment: Adjustment) -> Adjustment:
     """The adjustment, if its corners determine its parameters and their noise. Raises Missing if not."""
     if not np.isfinite(adjustment.sigma):
         n, k = adjustment.measurements, adjustment.unknowns
-        raise Missing(
-            f"The calibration has {n} measurements for {k} unknowns: too few to tell the noise of the corners."
-        )
+        raise Missing(f"The calibration has {n} measurements for {k} unknowns: too few to tell how far they scatter.")
     try:
         known = bool(np.isfinite(adjustment.mean_twist_covariance).all())
     except np.linalg.LinAlgError:

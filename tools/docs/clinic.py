@@ -19,7 +19,7 @@ from camviz_clinic.checks.virtual import healthy, healthy_pair
 PAGE = Path(__file__).parents[2] / "docs" / "clinic.md"
 TEMPLATE = Path(__file__).with_name("clinic.template.md")
 TABLES = "<!-- The tables below are counted by: python tools/docs/clinic.py -->"
-SCOREBOARD = "\n## Scoreboard\n"  # below the tables; written by hand and by tools/benchmarks/field.py
+BELOW = "\n## Standard deviations\n"  # below the tables; by hand, and by tools/benchmarks/intervals.py and field.py
 
 
 def count_all(progress: Callable[[str], object] = print) -> str:
@@ -83,7 +83,7 @@ def page(tables: str) -> str:
 
 def scoreboard(tables: str) -> str:
     """What stands below the counted tables, which counting anew leaves as it is."""
-    _, heading, below = tables.partition(SCOREBOARD)
+    _, heading, below = tables.partition(BELOW)
     return heading + below
 
 

@@ -33,7 +33,8 @@ LATER = ("set aside", STOPPED_SHORT)  # what a solution says in the same notes, 
     "file's corners fit the reading that was taken.",
     explains=(
         *("fold", "near-pole", "inverse-not-converged", "outlier-view", "outlier-line", "pose-absorbs-error"),
-        *("corners-set-aside", "model-too-simple", "split-disagreement", "views-differ", "models-differ"),
+        *("corners-set-aside", "model-too-simple", "split-disagreement", "views-differ", "views-disagree"),
+        *("models-differ",),
     ),
 )
 def assumed_coefficients(evidence: Evidence) -> Iterator[Finding]:

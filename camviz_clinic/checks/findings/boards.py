@@ -173,7 +173,7 @@ def all_parallel(rng: Rng, strength: float) -> Evidence:
     remedy="Solve again with tilted boards at varied distances and a still camera. "
     "Trust held-out corners rather than the error of the fit.",
     threshold="The errors are twice as large as noise makes them, in the median of the views.",
-    explains=("views-differ", "outlier-view", "outlier-line", "corners-set-aside"),
+    explains=("views-differ", "views-disagree", "outlier-view", "outlier-line", "corners-set-aside"),
 )
 def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
     """The check fits each view's pose to one half of its corners and tries it on the other half."""

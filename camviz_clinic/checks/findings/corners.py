@@ -31,6 +31,7 @@ NEIGHBOUR = "a line of the board that was taken for its neighbour"
     remedy="Look at that picture. Take it again or leave it out, and solve again.",
     threshold="A view has three times the median error of all views. "
     "Or a corner is ten standard deviations and more than 1.5 px off.",
+    explains=("views-disagree",),
 )
 def outlier_view(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the errors of the views, and those of the single corners."""
@@ -119,7 +120,7 @@ def blurred_view(rng: Rng, corners: Array, shape: tuple[int, int], strength: flo
     causes=(NEIGHBOUR, "a board half hidden or cut off by the border", "blur or glare along that line"),
     remedy="Detect that picture's corners again, or leave the view out, and solve again.",
     threshold="At least half of a line's corners are off by eight standard deviations and by more than 1.5 px.",
-    explains=("outlier-view",),
+    explains=("outlier-view", "views-disagree"),
 )
 def outlier_line(evidence: Evidence) -> Iterator[Finding]:
     """The check compares every row and column of every view with a pose fitted to the rest of that view."""

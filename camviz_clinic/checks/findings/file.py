@@ -121,6 +121,7 @@ def mislabelled(rng: Rng, strength: float) -> Evidence:
     explains=(
         "models-differ",
         "views-differ",
+        "views-disagree",
         "rolling-shutter",
         "outlier-view",
         "outlier-line",

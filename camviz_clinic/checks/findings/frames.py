@@ -179,7 +179,15 @@ def in_opengl(rng: Rng, strength: float) -> Evidence:
     causes=("corners of one camera that run the other way round: a symmetric board has two orders",),
     remedy="Use a board without symmetry (one side odd, the other even), or ChArUco. Turn the order of those views.",
     threshold="A view is more than 45° from the rest, and agrees with them once its order is turned.",
-    explains=("views-differ", "outlier-view", "outlier-line", "corners-set-aside", "baseline-scale", "rectified-black"),
+    explains=(
+        "views-differ",
+        "views-disagree",
+        "outlier-view",
+        "outlier-line",
+        "corners-set-aside",
+        "baseline-scale",
+        "rectified-black",
+    ),
 )
 def corner_order(evidence: Evidence) -> Iterator[Finding]:
     """The check finds the pair's relative pose from every view, from the corners of each camera alone."""

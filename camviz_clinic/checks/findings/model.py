@@ -45,6 +45,7 @@ STANDARD_ERRORS = 5.0
     "noise and 0.1 px (RMS), and somewhere reaches three standard deviations of the corners.",
     explains=(
         "views-differ",
+        "views-disagree",
         "rolling-shutter",
         "outlier-view",
         "outlier-line",
@@ -112,6 +113,7 @@ def lens_too_rich(rng: Rng, strength: float) -> Evidence:
     "and it is at least half a percent of the board's longer side.",
     explains=(
         "views-differ",
+        "views-disagree",
         "outlier-view",
         "outlier-line",
         "corners-set-aside",
@@ -165,7 +167,14 @@ def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     threshold="The focal length changes by 0.3 %, or the cameras differ by at least a pixel (median over the image). "
     "Noise would show it in one set of a million, and so would views that scatter as these do in one of a "
     "thousand. Of 500 halves by lot at most one differs more clearly. Or both partings differ by two pixels.",
-    explains=("views-differ", "outlier-view", "outlier-line", "corners-set-aside", "pose-absorbs-error"),
+    explains=(
+        "views-differ",
+        "views-disagree",
+        "outlier-view",
+        "outlier-line",
+        "corners-set-aside",
+        "pose-absorbs-error",
+    ),
 )
 def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
     """The check solves for a focal length that changes evenly over the views. It also compares the cameras from the

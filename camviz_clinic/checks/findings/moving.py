@@ -108,6 +108,7 @@ def _squares_beside(residuals: Array, columns: Array, freedom: int) -> tuple[flo
     threshold="The velocities explain at least 0.7 of the noise, by chance in one set of a million. "
     "Columns and both diagonals leave at least 3 % more of the squares than rows do.",
     explains=(
+        "views-disagree",
         "model-too-simple",
         "outlier-view",
         "outlier-line",
@@ -163,6 +164,7 @@ def rolled(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     remedy="Fix the board to a stiff plate, and take the pictures from a tripod with more light.",
     threshold="Six free velocities for every view explain at least 0.7 of the noise, by chance in one set of a "
     "million, but rows do not tell it clearly better than other directions. From half a pixel on it is a warning.",
+    explains=("views-disagree",),
 )
 def views_differ(evidence: Evidence) -> Iterator[Finding]:
     """The check takes the best of the four directions of `rolling-shutter`."""

@@ -164,7 +164,9 @@ class BoardPictures(View):
         poses = RigidTransform.concatenate([board_pose(H, K) for H in self.homographies])
         camera = Camera(Intrinsics.from_matrix(K, self.width, self.height), BrownConrady())
         corners = {"camera": self.corners[self.used]}
-        return Adjustment(self.board, {"camera": camera}, corners, poses, {"camera": FREE[self.free]})
+        virtual = self.seen is None
+        estimated = {"camera": FREE[self.free]}
+        return Adjustment(self.board, {"camera": camera}, corners, poses, estimated, independent_corners=virtual)
 
     def _sensible(self, K: Array) -> bool:
         (fx, _, cx), (_, fy, cy) = K[:2]
@@ -184,7 +186,11 @@ class BoardPictures(View):
 
     @cached_property
     def estimates(self) -> dict[str, tuple[float, float]]:
-        """Value and standard deviation of every intrinsic by name; those that are held have no deviation."""
+        """Value and standard deviation of every intrinsic by name; those that are held have no deviation.
+
+        That of a virtual camera is by the noise of its corners, which is all that they are off by. That of a real one
+        is by the scatter of its views.
+        """
         if self.adjustment is None or self.camera is None:
             return {}
         sigmas = dict(zip(FREE[self.free], np.sqrt(np.diag(self.adjustment.covariance)).tolist(), strict=True))
