@@ -23,7 +23,7 @@ LAYERS = {
     ),
     "camviz_clinic": (
         ("calibration",),
-        ("files",),
+        ("files", "rigs"),
         ("checks",),
         ("views",),
         ("meshes", "plots", "report"),
@@ -42,7 +42,7 @@ LAYERS = {
 WHAT_IS_TRUE = (
     *("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics"),
     *("optics", "panoramas", "poses", "scenes", "sensors", "twoview"),
-    *("calibration", "checks", "files", "samples"),
+    *("calibration", "checks", "files", "rigs", "samples"),
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
 
