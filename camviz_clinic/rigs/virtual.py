@@ -96,6 +96,7 @@ def rig(
     shared: float = 0.5,
     fisheye: tuple[int, ...] = (),
     step_deg: float = 25.0,
+    size: tuple[int, int] = SIZE,
 ) -> VirtualRig:
     """Cameras 1.2 m around the middle of a room that look inwards, and boards held up to each of them.
 
@@ -106,10 +107,11 @@ def rig(
         shared: Share of a camera's frames that all who can see the board do see; of the others it has them alone.
         fisheye: Which of the cameras, by number, have a fisheye (Kannala-Brandt) in place of a lens of 60°.
         step_deg: Angle between neighbours, seen from the middle of the room.
+        size: Width and height of the pictures, in pixels.
 
     Returns: VirtualRig with cameras "cam0", "cam1" …; neighbours share three frames at least.
     """
-    placed = [_camera(rng, number in fisheye, radians(step_deg) * number) for number in range(cameras)]
+    placed = [_camera(rng, number in fisheye, radians(step_deg) * number, size) for number in range(cameras)]
     together = min(max(FEWEST_SHARED, round(shared * frames)), frames)
     poses: list[RigidTransform] = []
     masks: list[list[bool]] = []
@@ -182,15 +184,15 @@ def inside(camera: Camera, pixels: Array) -> Mask:
     return np.asarray(np.all((pixels > MARGIN) & (pixels < high), axis=-1))
 
 
-def _camera(rng: np.random.Generator, fisheye: bool, angle: float) -> Camera:
+def _camera(rng: np.random.Generator, fisheye: bool, angle: float, size: tuple[int, int] = SIZE) -> Camera:
     """One of ordinary numbers, everything off by a little, that looks at the middle from an angle."""
     place = 1.2 * np.array([np.sin(angle), 0.0, -np.cos(angle)]) + rng.normal(0, 0.03, 3)
     pose = look_at(place, rng.normal(0, 0.03, 3))
     k1, k2 = rng.uniform(-0.2, 0.02), rng.uniform(0.01, 0.04)
     lens = KannalaBrandt(*rng.normal(0, (0.02, 0.004, 0.001, 0.0))) if fisheye else BrownConrady(k1, k2, 3e-4, -2e-4)
-    grid = Intrinsics.from_fov(*SIZE, rng.uniform(58, 64))
-    f = grid.fx if not fisheye else 0.38 * SIZE[0]
-    off = rng.uniform(-0.01, 0.01, 2) * SIZE[0]
+    grid = Intrinsics.from_fov(*size, rng.uniform(58, 64))
+    f = grid.fx if not fisheye else 0.38 * size[0]
+    off = rng.uniform(-0.01, 0.01, 2) * size[0]
     grid = replace(grid, fx=f, fy=f * rng.normal(1, 0.001), cx=grid.cx + off[0], cy=grid.cy + off[1])
     return Camera(grid, lens, pose)
 
