@@ -16,6 +16,7 @@ from camviz_clinic.calibration.arrowhead import inverse
 from camviz_clinic.calibration.types import Mask
 
 Indices = NDArray[np.intp]
+MOST = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ def listed(names: Sequence[str]) -> str:
 def _link(first: Adjustment, second: Adjustment, one: str, other: str, frames: Indices) -> Link:
     poses = [each.first_from_board[frames] for each in (first, second)]
     by_frame = poses[0] * poses[1].inv()
-    middle = by_frame[_middlemost(by_frame, poses[1].translation)]
+    middle = by_frame[middlemost(by_frame, poses[1].translation)]
     twist = adjoint(middle)
     spread = [each.pose_covariance[frames] for each in (first, second)]
     information = inverse(spread[0] + twist @ spread[1] @ twist.T).sum(axis=0)
@@ -161,8 +162,11 @@ def _link(first: Adjustment, second: Adjustment, one: str, other: str, frames: I
     return Link(one, other, frames, by_frame, middle, float(np.sqrt(variance)))
 
 
-def _middlemost(poses: RigidTransform, points: Array) -> int:
+def middlemost(poses: RigidTransform, points: Array) -> int:
     """The pose that puts points (n, 3) before the camera at the smallest sum of distances from where the others do."""
+    if len(poses) > MOST:  # every few of them, for each is compared with each
+        some = np.linspace(0, len(poses) - 1, MOST).astype(int)
+        return int(some[middlemost(poses[some], points)])
     every = max(1, len(points) // 20)
     placed = np.einsum("nij,pj->npi", poses.rotation.as_matrix(), points[::every]) + poses.translation[:, None]
     turned = poses.rotation.as_matrix().reshape(len(poses), -1)

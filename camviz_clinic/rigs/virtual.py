@@ -163,6 +163,22 @@ def film(rng: np.random.Generator, cameras: int = 3, *, frames: int = 60, fishey
     return VirtualRig(by_name, BOARD, poses, seen)
 
 
+def shown(truth: VirtualRig, world_from_board: RigidTransform) -> VirtualRig:
+    """The same cameras before a board at other poses; each sees it where it is inside its image.
+
+    Args:
+        truth: The rig.
+        world_from_board: One pose for each frame.
+
+    Returns: VirtualRig.
+    """
+    points = moved(world_from_board, truth.board.corners)
+    seen = {
+        name: np.asarray(inside(camera, camera.project(points)).all(axis=1)) for name, camera in truth.cameras.items()
+    }
+    return replace(truth, world_from_board=world_from_board, seen=seen)
+
+
 def delayed(poses: RigidTransform, frames: float) -> RigidTransform:
     """Where a board was so many frames ago, in between on a straight way; the ends stay where they are."""
     last = len(poses) - 1
