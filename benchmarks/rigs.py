@@ -3,6 +3,7 @@
     python benchmarks/rigs.py            20 rigs of every kind, as Markdown tables
     python benchmarks/rigs.py N WORD     N rigs of the kinds with that word in their name
     python benchmarks/rigs.py --large    8 cameras and 200 frames: seconds and megabytes
+    python benchmarks/rigs.py --faults N what is named in N rigs with each fault, and in N healthy ones
 
 "within 3 ±" counts the six numbers of every two cameras' relative pose. OpenCV's `calibrateMultiview` (from 5.0 on) has
 the same corners in the same run; it says no ±. "worst" is the largest error of a relative position, in millimetres.
@@ -13,7 +14,8 @@ from __future__ import annotations
 import resource
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import cv2
 import numpy as np
@@ -23,6 +25,9 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import CannotCalibrate, Detections
 from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.checks.evidence import Evidence, NotChecked
+from camviz_clinic.checks.findings import rig as checks
+from camviz_clinic.checks.registry import Fault, Finding, Kind
 from camviz_clinic.rigs import calibrate_rig, relative_pose, rig_of, virtual
 from camviz_clinic.rigs.virtual import VirtualRig
 
@@ -36,6 +41,7 @@ KINDS: dict[str, tuple[int, int, float, tuple[int, ...]]] = {  # cameras, frames
     "8 cameras, 20 % shared": (8, 12, 0.2, ()),
     "8 cameras, two fisheyes": (8, 12, 0.5, (2, 5)),
 }
+RIG_KINDS = [each for each in vars(checks).values() if isinstance(each, Kind)]
 Placed = dict[str, RigidTransform]  # first_from_cam
 
 
@@ -149,8 +155,51 @@ def large() -> None:
     print(f"8 cameras, {len(truth.world_from_board)} frames, {views} views: {seconds:.1f} s, {peak:.0f} MB")
 
 
+def faults(count: int) -> None:
+    """How often each fault is named, and alone, and how often anything is in healthy rigs."""
+    every = [each for each in vars(checks).values() if isinstance(each, Fault)]
+    rows = [fault_row(each.name, each.finding, partial(each.inject, strength=each.promised), count) for each in every]
+    rows.append(fault_row("healthy rigs", "", healthy, count))
+    rows.append(fault_row("healthy films", "", healthy_film, count))
+    print(table(["rigs", "named", "others named", "refused"], rows))
+
+
+def healthy(rng: np.random.Generator) -> Evidence:
+    truth = virtual.rig(rng, 3, frames=10, shared=0.5)
+    return Evidence(calibrate_rig(truth.observed(rng), truth.board))
+
+
+def healthy_film(rng: np.random.Generator) -> Evidence:
+    truth = virtual.film(rng, 3, frames=24)
+    return Evidence(calibrate_rig(truth.observed(rng), truth.board))
+
+
+def fault_row(name: str, meant: str, make: Callable[[np.random.Generator], Evidence], count: int) -> list[str]:
+    named, others, refused = 0, 0, 0
+    for seed in range(count):
+        try:
+            evidence = make(np.random.default_rng(SEED + seed))
+            ids = {each.id for kind in RIG_KINDS for each in found_by(kind, evidence)}
+        except CannotCalibrate:
+            refused += 1
+            continue
+        named += meant in ids
+        others += bool(ids - {meant})
+    return [name, f"{named} of {count}", str(others), str(refused)]
+
+
+def found_by(kind: Kind, evidence: Evidence) -> list[Finding]:
+    try:
+        return list(kind.check(evidence))
+    except NotChecked:
+        return []
+
+
 def main() -> None:
     words = sys.argv[1:]
+    if "--faults" in words:
+        faults(int(words[1]) if words[1:] else 50)
+        return
     if "--large" in words:
         large()
         return

@@ -19,7 +19,7 @@ from camviz_clinic.calibration.detection import CannotCalibrate, Detections, see
 from camviz_clinic.calibration.pairing import last_number
 from camviz_clinic.calibration.problem import moved
 from camviz_clinic.calibration.solving import MODELS, calibrate
-from camviz_clinic.calibration.types import Board, Calibration
+from camviz_clinic.calibration.types import Board, Calibration, Mask
 from camviz_clinic.rigs.graph import Indices, middlemost
 from camviz_clinic.rigs.start import MOST_ALONE, board_poses, varied
 
@@ -119,7 +119,7 @@ def _posed(board: Board, camera: Camera, corners: Array) -> Adjustment:
     return start.refined(only_poses=True, settled=1e-6)
 
 
-def frame_numbers(pictures: Mapping[str, Sequence[str]], there: Mapping[str, Array], rows: int) -> Array:
+def frame_numbers(pictures: Mapping[str, Sequence[str]], there: Mapping[str, Mask], rows: int) -> Indices:
     """The frames' numbers (rows,), by the last numbers in their pictures' names, else their places."""
     numbers = []
     for row in range(rows):
@@ -131,7 +131,7 @@ def frame_numbers(pictures: Mapping[str, Sequence[str]], there: Mapping[str, Arr
     return counted if (np.diff(counted) > 0).all() and counted[-1] < 2**31 else np.arange(rows)
 
 
-def delays(alone: Mapping[str, Adjustment], numbers: Array) -> dict[str, Delay]:
+def delays(alone: Mapping[str, Adjustment], numbers: Indices) -> dict[str, Delay]:
     """Cameras that lag behind the rest, by a delay that takes their contradictions away.
 
     Args:
@@ -185,7 +185,7 @@ def _moved(found: Sequence[tuple[Jump, int]]) -> Jump:
     return sorted((each for each, _ in found), key=lambda each: each.row)[len(found) // 2]
 
 
-def _delay(one: Adjustment, other: Adjustment, numbers: Array) -> Delay | None:
+def _delay(one: Adjustment, other: Adjustment, numbers: Indices) -> Delay | None:
     """By how many frames the other lags behind the one, where that explains their contradictions."""
     if not PLAIN < _error_late(one, other, numbers, 0) < np.inf:
         return None
@@ -198,7 +198,7 @@ def _delay(one: Adjustment, other: Adjustment, numbers: Array) -> Delay | None:
     return Delay(best, without, errors[best])
 
 
-def _error_late(one: Adjustment, other: Adjustment, numbers: Array, frames: float) -> float:
+def _error_late(one: Adjustment, other: Adjustment, numbers: Indices, frames: float) -> float:
     """The median error in pixels of the one's corners where the other lags so many frames; infinite where too few."""
     row = {int(number): place for place, number in enumerate(numbers) if other.posed[place]}
     here, before, after = [], [], []

@@ -15,7 +15,7 @@ from camviz_clinic.calibration.types import Calibration, Mask
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.rigs import calibrate_rig, virtual
-from camviz_clinic.rigs.graph import islands, parted
+from camviz_clinic.rigs.graph import Indices, islands, parted
 from camviz_clinic.rigs.series import by_themselves, delays, frame_numbers, jumps
 from camviz_clinic.rigs.virtual import VirtualRig
 
@@ -83,7 +83,7 @@ def two_groups(rng: Rng, strength: float) -> Evidence:
     return Evidence(replace(solved, detections=apart))
 
 
-def _rows(truth: VirtualRig) -> Array:
+def _rows(truth: VirtualRig) -> Indices:
     """The frames that any camera sees: the rows of a calibration of this rig."""
     return np.flatnonzero(np.any([np.isfinite(truth.corners(name)).all(axis=(1, 2)) for name in truth.cameras], axis=0))
 
