@@ -80,11 +80,11 @@ def position_errors(truth: VirtualRig, placed: Placed) -> Array:
 def by_opencv(truth: VirtualRig, found: dict[str, Detections], models: dict[str, str]) -> Placed | None:
     """The same corners in cv2.calibrateMultiview; None where it raises or gives no numbers."""
     frames = sorted({place for each in found.values() for place in each.places})
-    corners = np.float32(truth.board.corners)
+    corners = truth.board.corners.astype(np.float32)
     nothing = np.full((1, len(corners), 2), -1, np.float32)
     images, mask = [], np.zeros((len(found), len(frames)), np.uint8)
     for number, each in enumerate(found.values()):
-        at = dict(zip(each.places, np.float32(each.corners)[:, None], strict=True))
+        at = dict(zip(each.places, each.corners.astype(np.float32)[:, None], strict=True))
         images.append([at.get(frame, nothing) for frame in frames])
         mask[number] = [frame in at for frame in frames]
     sizes = [(each.width, each.height) for each in found.values()]
@@ -158,10 +158,10 @@ def large() -> None:
 def faults(count: int) -> None:
     """How often each fault is named, and alone, and how often anything is in healthy rigs."""
     every = [each for each in vars(checks).values() if isinstance(each, Fault)]
-    rows = [fault_row(each.name, each.finding, partial(each.inject, strength=each.promised), count) for each in every]
-    rows.append(fault_row("healthy rigs", "", healthy, count))
-    rows.append(fault_row("healthy films", "", healthy_film, count))
-    print(table(["rigs", "named", "others named", "refused"], rows))
+    print(table(["rigs", "named", "others named", "refused"], []), end="")
+    kinds = [(each.name, each.finding, partial(each.inject, strength=each.promised)) for each in every]
+    for kind in (*kinds, ("healthy rigs", "", healthy), ("healthy films", "", healthy_film)):
+        print(f"| {' | '.join(fault_row(*kind, count))} |", flush=True)
 
 
 def healthy(rng: np.random.Generator) -> Evidence:
