@@ -8,10 +8,10 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz_clinic.calibration import CannotCalibrate, Detections
-from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.adjustment import Adjustment, twisted
 from camviz_clinic.rigs import calibrate_rig, in_frames, relative_pose, rig_of, synchronised, virtual
 from camviz_clinic.rigs.adjustment import RigAdjustment
-from camviz_clinic.rigs.graph import islands, parted
+from camviz_clinic.rigs.graph import adjoint, islands, parted
 from camviz_clinic.rigs.rejection import deviation, limit
 
 
@@ -134,6 +134,16 @@ class _Plain(RigAdjustment):
 
 def _by_corner_noise(rig):
     return _Plain(**{name: getattr(rig, name) for name in RigAdjustment.__dataclass_fields__})
+
+
+def test_a_small_motion_is_carried_from_one_frame_to_the_other():
+    """T exp(ξ) T⁻¹ = exp(Ad ξ) to first order: by SciPy's transforms, for a motion of 1e-6."""
+    pose = RigidTransform.from_components([0.3, -0.2, 0.9], Rotation.from_rotvec([0.2, -0.5, 0.1]))
+    for direction in np.eye(6):
+        small = twisted(RigidTransform.identity(), 1e-6 * direction)
+        carried = (pose * small * pose.inv()).as_matrix()
+        expected = twisted(RigidTransform.identity(), 1e-6 * adjoint(pose) @ direction).as_matrix()
+        np.testing.assert_allclose(carried, expected, atol=1e-11)
 
 
 def test_one_frame_in_common_has_the_deviation_of_its_corners():
