@@ -11,7 +11,7 @@ from camviz_clinic.calibration import CannotCalibrate, Detections
 from camviz_clinic.calibration.adjustment import Adjustment, twisted
 from camviz_clinic.rigs import calibrate_rig, in_frames, relative_pose, rig_of, synchronised, virtual
 from camviz_clinic.rigs.adjustment import RigAdjustment
-from camviz_clinic.rigs.graph import adjoint, islands, parted
+from camviz_clinic.rigs.graph import Link, adjoint, chained, islands, parted
 from camviz_clinic.rigs.rejection import deviation, limit
 
 
@@ -144,6 +144,26 @@ def test_a_small_motion_is_carried_from_one_frame_to_the_other():
         carried = (pose * small * pose.inv()).as_matrix()
         expected = twisted(RigidTransform.identity(), 1e-6 * adjoint(pose) @ direction).as_matrix()
         np.testing.assert_allclose(carried, expected, atol=1e-11)
+
+
+def test_a_chain_takes_the_links_that_place_it_best():
+    """From a to c by way of b, whose two links of 1 mm together are better than the direct one of 2 mm."""
+    turned = Rotation.from_rotvec([0, 0.5, 0])
+    ab, bc = (RigidTransform.from_components([x, 0, 0], turned) for x in (1, 2))
+    wrong = RigidTransform.from_translation([9, 9, 9])
+
+    def link(one, other, pose, deviation):
+        return Link(one, other, np.arange(3), pose, pose, deviation)
+
+    links = {
+        ("a", "b"): link("a", "b", ab, 0.001),
+        ("b", "c"): link("b", "c", bc, 0.001),
+        ("a", "c"): link("a", "c", wrong, 0.002),
+    }
+    placed = chained(["a", "b", "c"], links)
+    np.testing.assert_allclose(placed["c"].as_matrix(), ab.as_matrix() @ bc.as_matrix(), atol=1e-12)
+    links["a", "c"] = link("a", "c", wrong, 0.0014)  # less than √2 mm
+    assert chained(["a", "b", "c"], links)["c"].translation.tolist() == [9, 9, 9]
 
 
 def test_one_frame_in_common_has_the_deviation_of_its_corners():
