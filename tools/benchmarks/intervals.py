@@ -1,8 +1,8 @@
 """How often a ± holds: 95 % intervals of intrinsics against other views of the same camera, and against the truth.
 
-    CAMVIZ_FIELD=~/field python tools/benchmarks/intervals.py               all sets that are there, as two Markdown tables
-    CAMVIZ_FIELD=~/field python tools/benchmarks/intervals.py NAME …        these sets of field.toml
-    CAMVIZ_FIELD=~/field python tools/benchmarks/intervals.py --page        and writes the tables into docs/clinic.md
+    python tools/benchmarks/intervals.py               all sets that are there, as two Markdown tables
+    python tools/benchmarks/intervals.py NAME …        these sets of field.toml
+    python tools/benchmarks/intervals.py --page        and writes the tables into docs/clinic.md
     python tools/benchmarks/intervals.py --virtual                          the virtual sets alone
     … --few                                                           fewer halves and sets, for a look
 
