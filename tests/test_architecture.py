@@ -25,7 +25,7 @@ LAYERS = {
         ("calibration",),
         ("files",),
         ("checks",),
-        ("views",),
+        ("handeye", "views"),
         ("meshes", "plots", "report"),
         ("commands",),
     ),
@@ -42,7 +42,7 @@ LAYERS = {
 WHAT_IS_TRUE = (
     *("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics"),
     *("optics", "panoramas", "poses", "scenes", "sensors", "twoview"),
-    *("calibration", "checks", "files", "samples"),
+    *("calibration", "checks", "files", "handeye", "samples"),
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
 
