@@ -168,8 +168,8 @@ def test_a_direction_is_unknown_below_one_degree_about_every_second_axis(wobble,
     found = solved(cell(np.random.default_rng(11), 8, robot_deg=0.01))
     turning = Turning(np.array([20.0, wobble, 0.1]), np.eye(3))
     motions = replace(found.motions)
-    object.__setattr__(motions, "turning", turning)
-    there = replace(found, motions=motions)
+    motions.__dict__["turning"] = turning
+    there = replace(found, adjusted=replace(found.adjusted, motions=motions))
     assert len(there.unknown_directions) == unknown
     assert there.known.tolist() == [not unknown, True, True]
 

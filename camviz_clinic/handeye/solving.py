@@ -36,15 +36,9 @@ class HandEye:
 
     Attributes:
         eye_to_hand: Whether the camera stands still and the board is on the hand.
-        mount_from_cam: X, in metres.
-        other_from_board: Z, in metres.
-        covariance: (12, 12), of the twists of X and of Z, each (ω, τ) in the frame it leads to, in radians and metres.
-            It is clustered by pose: the jackknife that leaves out one pose at a time.
-        motions: The poses that were used.
+        adjusted: The solution over the poses that were used.
         used: (poses,) of bool, true for a pose that does not contradict the others.
         displacements: (poses,), metres by which each pose's board is off, turns counted at the board's distance.
-        noise: The sizes of the errors of corners and robot; None where no corners were given.
-        rms_px: The RMS of the corners' residuals over both coordinates; NaN where no corners were given.
 
     >>> from camviz_clinic.handeye.virtual import cell
     >>> true = cell(np.random.default_rng(2), poses=12)
@@ -54,14 +48,45 @@ class HandEye:
     """
 
     eye_to_hand: bool
-    mount_from_cam: RigidTransform
-    other_from_board: RigidTransform
-    covariance: Array
-    motions: Motions
+    adjusted: Adjusted
     used: Mask
     displacements: Array
-    noise: Noise | None
-    rms_px: float
+
+    @property
+    def mount_from_cam(self) -> RigidTransform:
+        """X, in metres."""
+        return self.adjusted.X
+
+    @property
+    def other_from_board(self) -> RigidTransform:
+        """Z, in metres."""
+        return self.adjusted.Z
+
+    @property
+    def covariance(self) -> Array:
+        """Of the twists of X and of Z, clustered by pose: the jackknife that leaves out one pose at a time.
+
+        Returns: (12, 12), each twist (ω, τ) in the frame it leads to, in radians and metres.
+        """
+        return self.adjusted.covariance
+
+    @property
+    def motions(self) -> Motions:
+        """The poses that were used."""
+        return self.adjusted.motions
+
+    @property
+    def noise(self) -> Noise | None:
+        """The sizes of the errors of corners and robot; None where no corners were given."""
+        return self.adjusted.noise
+
+    @property
+    def rms_px(self) -> float:
+        """The RMS length in pixels of the corners' residuals, by the robot's poses as told; NaN without corners."""
+        measured = self.adjusted.measured
+        if not isinstance(measured, Pixels):
+            return float("nan")
+        return float(np.sqrt(np.sum(self.adjusted.residuals**2) / np.isfinite(measured.pixels).all(axis=-1).sum()))
 
     @property
     def x_name(self) -> str:
@@ -82,10 +107,12 @@ class HandEye:
 
     @property
     def unknown_directions(self) -> Array:
-        """The directions (n, 3) of X's translation that the motions do not tell, as unit vectors in the mount's frame.
+        """The directions of X's translation that the motions do not tell.
 
         Aᵢⱼ X = X Bᵢⱼ has X's translation only in (R_A - 1) t_X, so that t_X along the one axis of all turns is free. If
         nothing turned, all three directions are.
+
+        Returns: (n, 3), unit vectors in the mount's frame.
         """
         turning, least = self.motions.turning, max(UNKNOWN_DEG, NOISE_TURNS * self.turn_noise_deg)
         if turning.deg[0] < least:
@@ -94,22 +121,34 @@ class HandEye:
 
     @property
     def known(self) -> Mask:
-        """Which coordinates (3,) of X's translation the motions tell: those that no unknown direction leans to."""
+        """Which coordinates of X's translation the motions tell: those that no unknown direction leans to.
+
+        Returns: (3,) of bool, true for one that is told.
+        """
         return np.asarray((np.abs(self.unknown_directions) < 0.1).all(axis=0))
 
     @property
     def translation_sigma(self) -> Array:
-        """One standard deviation (3,) in metres of X's translation."""
+        """One standard deviation of X's translation.
+
+        Returns: (3,), metres.
+        """
         return self._sigma(self.mount_from_cam, slice(0, 6))[1]
 
     @property
     def rotation_sigma(self) -> Array:
-        """One standard deviation (3,) in radians of X's rotation about the mount's axes."""
+        """One standard deviation of X's rotation about the mount's axes.
+
+        Returns: (3,), radians.
+        """
         return self._sigma(self.mount_from_cam, slice(0, 6))[0]
 
     @property
     def board_translation_sigma(self) -> Array:
-        """One standard deviation (3,) in metres of Z's translation."""
+        """One standard deviation of Z's translation.
+
+        Returns: (3,), metres.
+        """
         return self._sigma(self.other_from_board, slice(6, 12))[1]
 
     @property
@@ -212,18 +251,15 @@ def _result(first: Adjusted, eye_to_hand: bool, pixels: Pixels | None) -> HandEy
     few = stray.mean() <= MOST_STRAY and (~stray).sum() >= FEWEST
     used: Mask = np.asarray(~stray if few else np.ones(len(stray), bool))
     best = replace(first, motions=first.motions.only(used), measured=first.measured.only(used), weights=None)
-    best, rms = best.refined(), np.nan
+    best = best.refined()
     if pixels is not None:
         best = replace(best, measured=pixels.only(used))
         if not np.isfinite(best.cost):
             raise PoseError("by the robot's poses some corners would lie where the camera has no image")
         side = slice(6, 12) if eye_to_hand else slice(0, 6)
         best = best.with_noise_learnt(corner_noise(pixels.only(used), best.motions.cam_from_board), side)
-        rms = float(np.sqrt(np.sum(best.residuals**2) / np.isfinite(pixels.pixels[used]).all(axis=-1).sum()))
     everywhere = replace(best, motions=first.motions, measured=first.measured, noise=None)
-    return HandEye(
-        eye_to_hand, best.X, best.Z, best.covariance, best.motions, used, everywhere.displacements, best.noise, rms
-    )
+    return HandEye(eye_to_hand, best, used, everywhere.displacements)
 
 
 def strays(displacements: Array, at_least: float = STRAY) -> Sequence[int]:

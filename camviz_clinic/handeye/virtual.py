@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +15,9 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Board
+from camviz_clinic.handeye.diagnosis import Case
+from camviz_clinic.handeye.pose_table import RobotPoses
+from camviz_clinic.handeye.turn_forms import other_readings, rotations
 
 Rng = np.random.Generator
 CAMERA = Camera(Intrinsics(1280, 960, 1150, 1151, 642, 477), BrownConrady(-0.18, 0.05))
@@ -153,3 +157,104 @@ def scaled(healthy: Cell, factor: float) -> Cell:
     """A cell whose robot's lengths are read in another unit."""
     poses = healthy.base_from_hand
     return healthy.told(RigidTransform.from_components(factor * poses.translation, poses.rotation))
+
+
+def healthy(rng: Rng) -> Cell:
+    """A cell of either arrangement with 8 to 25 poses, whose robot is good to 0.05 to 1 mm; some do not stop."""
+    to_hand = bool(rng.integers(2))
+    if rng.random() < 0.2:
+        return moving(rng, int(rng.integers(25, 40)), 0.0, to_hand)
+    size = 10 ** rng.uniform(-1.3, 0)
+    poses = int(rng.integers(8, 26))
+    return cell(rng, poses, to_hand, robot_mm=size, robot_deg=0.1 * size, noise_px=rng.uniform(0.1, 0.4))
+
+
+def _stopping(rng: Rng) -> Cell:
+    """A healthy cell of 12 to 20 poses, good to 0.2 mm."""
+    return cell(rng, int(rng.integers(12, 21)), bool(rng.integers(2)))
+
+
+def _case(healthy: Cell, poses: RobotPoses | None = None, board: Board | None = None) -> Case:
+    told = poses or RobotPoses(healthy.base_from_hand, times=healthy.times)
+    return Case(told, healthy.pixels, healthy.camera, board or healthy.board, healthy.eye_to_hand)
+
+
+def _reordered(rng: Rng) -> Case:
+    """Reversed, sorted as words, in no order, or two poses exchanged."""
+    well = _stopping(rng)
+    count = len(well.base_from_hand)
+    exchanged = np.arange(count)
+    i, j = rng.choice(count, 2, replace=False)
+    exchanged[[i, j]] = j, i
+    words = np.array(sorted(range(count), key=lambda each: str(each + 1)))
+    orders = (np.arange(count)[::-1], words, rng.permutation(count), exchanged)
+    return _case(well.told(well.base_from_hand[orders[rng.integers(4)]]))
+
+
+def _shifted(rng: Rng) -> Case:
+    """The first one to three poses, or pictures, are missing."""
+    well, shift = _stopping(rng), int(rng.integers(1, 4))
+    if rng.integers(2):
+        return _case(replace(well, base_from_hand=well.base_from_hand[shift:], pixels=well.pixels[:-shift]))
+    return _case(replace(well, base_from_hand=well.base_from_hand[:-shift], pixels=well.pixels[shift:]))
+
+
+def _misread(rng: Rng) -> Case:
+    """Quaternions in the other order, or Euler angles about other axes."""
+    well = _stopping(rng)
+    form, read = (("wxyz", "xyzw"), ("euler-ZYX", "euler-xyz"), ("rotvec", "euler-xyz"))[rng.integers(3)]
+    turns, place = well.base_from_hand.rotation, well.base_from_hand.translation
+    if form == "wxyz":
+        numbers = turns.as_quat()[:, [3, 0, 1, 2]]
+    else:
+        numbers = turns.as_rotvec() if form == "rotvec" else turns.as_euler("ZYX")
+
+    def posed(rotation: Rotation) -> RigidTransform:
+        return RigidTransform.from_components(place, rotation)
+
+    others = {asked: posed(other) for asked, other in other_readings(read, numbers, degrees=False)}
+    return _case(well, RobotPoses(posed(rotations(read, numbers, degrees=False)), others=others))
+
+
+def _inverted(rng: Rng) -> Case:
+    """hand_from_base in place of base_from_hand."""
+    well = _stopping(rng)
+    return _case(well.told(well.base_from_hand.inv()))
+
+
+def _one_axis(rng: Rng) -> Case:
+    """The hand turned about one axis, and by 0.2° about the others."""
+    return _case(cell(rng, eye_to_hand=bool(rng.integers(2)), turns=about_one_axis(rng, 15, 0.2)))
+
+
+def _little_turning(rng: Rng) -> Case:
+    """The hand turned by 2° to 6° (RMS) about every axis."""
+    turns = Rotation.from_rotvec(rng.normal(0, rng.uniform(2, 6), (15, 3)), degrees=True)
+    return _case(cell(rng, eye_to_hand=bool(rng.integers(2)), turns=turns))
+
+
+def _squares(rng: Rng) -> Case:
+    """The board's squares are 2 to 5 % longer or shorter than told."""
+    well = _stopping(rng)
+    factor = 1 + rng.uniform(0.02, 0.05) * rng.choice([-1, 1])
+    return _case(well, board=replace(well.board, square_size=factor * well.board.square_size))
+
+
+FAULTS: Mapping[str, Callable[[Rng], Case]] = {
+    "wrong-unit": lambda rng: _case(scaled(_stopping(rng), float(rng.choice([0.001, 1000])))),
+    "poses-inverted": _inverted,
+    "poses-shifted": _shifted,
+    "poses-reordered": _reordered,
+    "poses-misread": _misread,
+    "time-offset": lambda rng: _case(moving(rng, 40, rng.uniform(0.04, 0.16) * rng.choice([-1, 1]))),
+    "one-axis": _one_axis,
+    "little-turning": _little_turning,
+    "stray-pose": lambda rng: _case(strayed(rng, _stopping(rng), rng.uniform(10, 40), rng.uniform(1, 5))[0]),
+    "scale-differs": _squares,
+}
+"""By finding, a random case that must lead to it."""
+
+
+def healthy_case(rng: Rng) -> Case:
+    """A random case in which nothing is wrong."""
+    return _case(healthy(rng))
