@@ -6,10 +6,10 @@ import pytest
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye import PoseError, hand_eye, hand_eye_from_corners
-from camviz_clinic.handeye.adjusting import Adjusted, Pixels
+from camviz_clinic.handeye.adjusting import STRAY, Adjusted, Pixels, far_off
 from camviz_clinic.handeye.linear import park
 from camviz_clinic.handeye.motion import Motions, Turning
-from camviz_clinic.handeye.solving import STRAY, corner_noise, strays
+from camviz_clinic.handeye.solving import corner_noise
 from camviz_clinic.handeye.virtual import about_one_axis, cell, strayed
 
 BOTH = pytest.mark.parametrize("eye_to_hand", [False, True], ids=["eye in hand", "eye to hand"])
@@ -136,8 +136,8 @@ def test_one_pose_that_does_not_belong_is_set_aside_and_the_rest_is_solved():
 
 def test_a_pose_is_set_aside_from_five_times_the_median_on():
     assert STRAY == 5
-    assert strays(np.array([2.0, 2.0, 2.0, 10.0])) == [3]
-    assert strays(np.array([2.0, 2.0, 2.0, 9.99])) == []
+    assert far_off(np.array([2.0, 2.0, 2.0, 10.0])) == [3]
+    assert far_off(np.array([2.0, 2.0, 2.0, 9.99])) == []
 
 
 def test_a_picture_without_the_board_takes_its_pose_with_it():

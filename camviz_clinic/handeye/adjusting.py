@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol, Self
@@ -19,6 +20,7 @@ from camviz_clinic.handeye.motion import Mask, Motions
 MOST_STEPS = 60
 SETTLED = 1e-12  # of the sum of squares, what a step must still promise to take off
 UNKNOWNS = 12
+STRAY = 5.0  # times the median displacement: of six Gaussian errors of one size a pose reaches 2.5 once in 100,000
 ROUNDS = 40
 LEARNT = 1e-3  # of the robot's errors: a smaller change ends the rounds
 
@@ -293,3 +295,15 @@ def robust(motions: Motions, X: RigidTransform, Z: RigidTransform, rounds: int =
         weights = (1 + (here.displacements / scale) ** 2) ** -2.0
         here = replace(here, weights=weights).refined()
     return here
+
+
+def far_off(displacements: Array, at_least: float = STRAY) -> Sequence[int]:
+    """The poses that are off by `at_least` times the median or more, the worst first.
+
+    >>> far_off(np.array([1.0, 1.2, 5.0, 0.8, 1.0]))
+    [2]
+    >>> far_off(np.array([1.0, 1.2, 4.9, 0.8, 1.0]))
+    []
+    """
+    limit = at_least * float(np.median(displacements))
+    return [int(i) for i in np.argsort(-displacements) if displacements[i] >= limit > 0]

@@ -16,11 +16,12 @@ from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.registry import SEVERITIES, Finding
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye import mends
+from camviz_clinic.handeye.adjusting import far_off
 from camviz_clinic.handeye.delay import Delay, delay
 from camviz_clinic.handeye.mends import FEWEST_TRIED, UNITS, Indices, Tried, exchanged
 from camviz_clinic.handeye.motion import FEWEST, Turning
 from camviz_clinic.handeye.pose_table import RobotPoses
-from camviz_clinic.handeye.solving import HandEye, hand_eye_from_corners, strays
+from camviz_clinic.handeye.solving import HandEye, hand_eye_from_corners
 from camviz_clinic.handeye.turn_forms import PoseError
 
 LITTLE_DEG = 10.0  # turned less about every second axis, X's translation is known badly
@@ -172,7 +173,7 @@ class Case:
 
     def _stray(self) -> Iterator[Finding]:
         adjusted = self.readings[0].adjusted
-        stray = np.array(strays(adjusted.displacements), dtype=np.intp)
+        stray = np.array(far_off(adjusted.displacements), dtype=np.intp)
         if not len(stray):
             return
         order = exchanged(adjusted, np.sort(stray))

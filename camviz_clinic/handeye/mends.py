@@ -11,12 +11,12 @@ from scipy.optimize import linear_sum_assignment
 
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz_clinic.handeye.adjusting import Adjusted, robust
+from camviz_clinic.handeye.adjusting import Adjusted, far_off, robust
 from camviz_clinic.handeye.linear import start
 from camviz_clinic.handeye.motion import Motions, angles
 
 MUCH_BETTER = 3.0  # times: what another reading must take off the poses' errors
-ALIKE = 1.1  # times the least error: of readings so near to it the simplest is named
+ALIKE = 1.1  # times the least error: of readings so near to it the one that fits most poses is named
 FEWEST_TRIED = 6  # poses: fewer can be fitted by a wrong reading
 NEARER = 2.0  # times: by what the angles must agree better for an order or a form to be tried
 SHIFTS = (1, -1, 2, -2, 3, -3)
@@ -64,6 +64,11 @@ class Tried:
         return float(np.median(self.adjusted.displacements))
 
     @property
+    def strays(self) -> int:
+        """How many poses are far from the others even so: a shift by three rows fits most of 1, 10, 11, 12, 2, 3 …"""
+        return len(far_off(self.adjusted.displacements))
+
+    @property
     def as_given(self) -> bool:
         """Whether nothing is read otherwise."""
         return not self.pairing.id and self.unit == 1
@@ -100,7 +105,8 @@ def likely(
         return given, given
     readings = [tried(each, to_hand) for each in (plain, *_pairings(rows, seen, cam_from_board, others, to_hand))]
     least = min(each.error for each in readings)
-    best = next(each for each in readings if each.error <= ALIKE * least)
+    alike = [each for each in readings if each.error <= ALIKE * least]
+    best = min(alike, key=lambda each: each.strays)  # the first of equals, which is the simplest
     return given, (best if much_better(best.error, given.error) else given)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,12 +15,11 @@ from camviz_clinic.calibration.jacobian import twist_jacobian
 from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.rig import lone_poses
-from camviz_clinic.handeye.adjusting import Adjusted, Noise, Pixels, robust
+from camviz_clinic.handeye.adjusting import Adjusted, Noise, Pixels, far_off, robust
 from camviz_clinic.handeye.linear import start
 from camviz_clinic.handeye.motion import FEWEST, Mask, Motions
 from camviz_clinic.handeye.turn_forms import PoseError
 
-STRAY = 5.0  # times the median displacement: of six Gaussian errors of one size a pose reaches 2.5 once in 100,000
 MOST_STRAY = 0.2  # of the poses
 UNKNOWN_DEG = 1.0  # turned less about every second axis, a direction of X's translation is not known
 NOISE_TURNS = 3.0  # nor where the turn is less than so many times the robot's own errors
@@ -247,7 +245,7 @@ def _started(motions: Motions) -> Adjusted:
 
 def _result(first: Adjusted, eye_to_hand: bool, pixels: Pixels | None) -> HandEye:
     """The solution over the poses that do not contradict the others."""
-    stray = np.isin(np.arange(len(first.motions)), strays(first.displacements))
+    stray = np.isin(np.arange(len(first.motions)), far_off(first.displacements))
     few = stray.mean() <= MOST_STRAY and (~stray).sum() >= FEWEST
     used: Mask = np.asarray(~stray if few else np.ones(len(stray), bool))
     best = replace(first, motions=first.motions.only(used), measured=first.measured.only(used), weights=None)
@@ -260,18 +258,6 @@ def _result(first: Adjusted, eye_to_hand: bool, pixels: Pixels | None) -> HandEy
         best = best.with_noise_learnt(corner_noise(pixels.only(used), best.motions.cam_from_board), side)
     everywhere = replace(best, motions=first.motions, measured=first.measured, noise=None)
     return HandEye(eye_to_hand, best, used, everywhere.displacements)
-
-
-def strays(displacements: Array, at_least: float = STRAY) -> Sequence[int]:
-    """The poses that are off by `at_least` times the median or more, the worst first.
-
-    >>> strays(np.array([1.0, 1.2, 5.0, 0.8, 1.0]))
-    [2]
-    >>> strays(np.array([1.0, 1.2, 4.9, 0.8, 1.0]))
-    []
-    """
-    limit = at_least * float(np.median(displacements))
-    return [int(i) for i in np.argsort(-displacements) if displacements[i] >= limit > 0]
 
 
 def corner_noise(pixels: Pixels, cam_from_board: RigidTransform) -> float:
