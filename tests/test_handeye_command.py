@@ -23,7 +23,7 @@ BOARD = ("--board", "9x6", "--square-mm", "25")
 def shot(tmp_path_factory):
     """A calibration and the pictures of a cell whose camera is in the hand."""
     folder, rng = tmp_path_factory.mktemp("cell"), np.random.default_rng(5)
-    true = cell(rng, 9)
+    true = cell(rng, 9, noise_px=0)
     (folder / "shots").mkdir()
     for number, pose in enumerate(lone_poses(true.camera, true.board, true.pixels), 1):
         cv2.imwrite(str(folder / f"shots/{number:02}.png"), snapshot(true.camera, true.board, pose, rng, 3.0))

@@ -18,10 +18,12 @@ from camviz.scenes import snapshot as photograph
 from camviz.scenes import textured_scene, to_encoded
 from camviz.sensors import Sensor
 from camviz_clinic.calibration import calibrate, calibrate_pair, detect
-from camviz_clinic.calibration.types import Board
+from camviz_clinic.calibration.types import Board, Calibration
+from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.checks.snapshots import snapshot
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.files.writing import write as write_calibration
+from camviz_clinic.handeye.virtual import cell
 
 BOARD = Board(9, 6, 0.025)
 LEFT = Camera(Intrinsics(640, 480, 530, 531, 322, 238), BrownConrady(-0.2, 0.05))
@@ -75,6 +77,7 @@ def write(folder: Path) -> None:
     around = photograph(textured_scene(), equirectangular_camera(256, 128))
     cv2.imwrite(str(folder / "around.png"), around[..., ::-1])
     expose(folder / "frames", rng)
+    robot(folder)
 
 
 def shoot(folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.random.Generator) -> None:
@@ -83,6 +86,20 @@ def shoot(folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.
     alone = camera.at(RigidTransform.identity())
     for number, pose in enumerate(cam_from_board, 1):
         cv2.imwrite(str(folder / f"{number:02}.png"), snapshot(alone, BOARD, pose, rng, NOISE))
+
+
+def robot(folder: Path) -> None:
+    """hand.yaml, hand/ and poses.csv: a robot, good to 0.2 mm and 0.03°, whose hand shows its camera a board."""
+    rng = np.random.default_rng(5)
+    true = cell(rng, 10, noise_px=0)
+    (folder / "hand").mkdir()
+    for number, pose in enumerate(lone_poses(true.camera, true.board, true.pixels), 1):
+        cv2.imwrite(str(folder / f"hand/{number:02}.png"), snapshot(true.camera, true.board, pose, rng, NOISE))
+    write_calibration(Calibration({"camera": true.camera}, folder, "virtual"), folder / "hand.yaml", "opencv")
+    hand = true.base_from_hand
+    rows = np.column_stack([1000 * hand.translation, hand.rotation.as_euler("ZYX", degrees=True)])
+    lines = [f"{number:02}.png," + ",".join(f"{x:.4f}" for x in row) for number, row in enumerate(rows, 1)]
+    (folder / "poses.csv").write_text("\n".join(["picture,X,Y,Z,A,B,C", *lines]) + "\n")
 
 
 def edge() -> np.ndarray:
