@@ -13,7 +13,19 @@ from importlib.metadata import entry_points
 from types import ModuleType
 
 import camviz
-from camviz_clinic.commands import board, calibrate, check, completion, convert, inspect, mtf, noise, reproject, show
+from camviz_clinic.commands import (
+    board,
+    calibrate,
+    check,
+    completion,
+    convert,
+    handeye,
+    inspect,
+    mtf,
+    noise,
+    reproject,
+    show,
+)
 from camviz_clinic.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, did_you_mean, refuse_exhausted
 from camviz_clinic.commands.terminal import say
 
@@ -30,6 +42,8 @@ examples:
                                              calibrate a camera from pictures of it, into camera.yaml
   camviz inspect camera.yml                  say what is wrong with a calibration, and what to do
   camviz check camera.yaml new/*.jpg         say whether it still holds, by new pictures of the board
+  camviz handeye camera.yaml poses.csv new/*.jpg
+                                             find where the camera sits on a robot, and what is wrong with its poses
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
   camviz convert cam.yml model --to colmap   write the same camera for another program
@@ -45,13 +59,13 @@ A file called - is stdin, or stdout. Colour is for terminals; NO_COLOR and --col
 
 exit status:
   0    done
-  1    camviz inspect or camviz check found something, or a project's gate fails what camviz calibrate wrote
+  1    camviz inspect, check or handeye found something, or a project's gate fails what camviz calibrate wrote
   2    the command or the file it names cannot be used; one sentence on stderr says why
   3    something is missing on this machine; camviz doctor says what, and how to mend it
   4    camviz check cannot tell from these pictures
   130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
-COMMANDS = (board, calibrate, inspect, check, show, convert, reproject, noise, mtf, completion)
+COMMANDS = (board, calibrate, inspect, check, handeye, show, convert, reproject, noise, mtf, completion)
 """The clinic's own. Other packages add theirs by an entry point of the group `camviz.commands`: a tuple of modules."""
 
 

@@ -18,10 +18,12 @@ from camviz.scenes import snapshot as photograph
 from camviz.scenes import textured_scene, to_encoded
 from camviz.sensors import Sensor
 from camviz_clinic.calibration import calibrate, calibrate_pair, detect
-from camviz_clinic.calibration.types import Board
+from camviz_clinic.calibration.types import Board, Calibration
+from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.checks.snapshots import snapshot
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.files.writing import write as write_calibration
+from camviz_clinic.handeye.virtual import cell
 from camviz_clinic.rigs import virtual
 
 BOARD = Board(9, 6, 0.025)
@@ -77,6 +79,7 @@ def write(folder: Path) -> None:
     cv2.imwrite(str(folder / "around.png"), around[..., ::-1])
     expose(folder / "frames", rng)
     shoot_rig(folder / "rig")
+    robot(folder)
 
 
 def shoot(folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.random.Generator) -> None:
@@ -98,6 +101,20 @@ def shoot_rig(folder: Path) -> None:
                 camera, truth.board, camera.cam_from_world * truth.world_from_board[int(frame)], rng, NOISE
             )
             cv2.imwrite(str(folder / name / f"{frame:02}.png"), image)
+
+
+def robot(folder: Path) -> None:
+    """hand.yaml, hand/ and poses.csv: a robot, good to 0.2 mm and 0.03°, whose hand shows its camera a board."""
+    rng = np.random.default_rng(5)
+    true = cell(rng, 10, noise_px=0)
+    (folder / "hand").mkdir()
+    for number, pose in enumerate(lone_poses(true.camera, true.board, true.pixels), 1):
+        cv2.imwrite(str(folder / f"hand/{number:02}.png"), snapshot(true.camera, true.board, pose, rng, NOISE))
+    write_calibration(Calibration({"camera": true.camera}, folder, "virtual"), folder / "hand.yaml", "opencv")
+    hand = true.base_from_hand
+    rows = np.column_stack([1000 * hand.translation, hand.rotation.as_euler("ZYX", degrees=True)])
+    lines = [f"{number:02}.png," + ",".join(f"{x:.4f}" for x in row) for number, row in enumerate(rows, 1)]
+    (folder / "poses.csv").write_text("\n".join(["picture,X,Y,Z,A,B,C", *lines]) + "\n")
 
 
 def edge() -> np.ndarray:

@@ -3,10 +3,10 @@
     python tools/benchmarks/intervals.py               all sets that are there, as two Markdown tables
     python tools/benchmarks/intervals.py NAME …        these sets of field.toml
     python tools/benchmarks/intervals.py --page        and writes the tables into docs/clinic.md
-    python tools/benchmarks/intervals.py --virtual                          the virtual sets alone
-    … --few                                                           fewer halves and sets, for a look
+    python tools/benchmarks/intervals.py --virtual     the virtual sets alone
+    … --few                                            fewer halves and sets, for a look
 
-Sets of pictures are those of benchmarks/field.toml with 20 views or more, and OpenCV's left and right ones of 13. Their
+CAMVIZ_FIELD names the folder of the pictures. They are the sets of field.toml with 20 views or more, and OpenCV's left and right ones of 13. Their
 views are halved by lot, and each program calibrates both halves by itself, from the same corners. The two halves share
 no view, and the variance of their difference is the sum of both variances. So (difference) / √(σ₁² + σ₂²) is 1 in the
 RMS, within 1 in 68 % and within 1.96 in 95 % of all halves and parameters, if a σ is right. Halves do not show what is

@@ -1,0 +1,356 @@
+"""What is wrong with a robot's poses, by the pictures that belong to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from camviz.cameras import Camera
+from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
+from camviz_clinic.calibration.problem import LEAST_CORNERS
+from camviz_clinic.calibration.types import Board
+from camviz_clinic.checks.registry import SEVERITIES, Finding
+from camviz_clinic.checks.rig import lone_poses
+from camviz_clinic.handeye import mends
+from camviz_clinic.handeye.adjusting import far_off
+from camviz_clinic.handeye.delay import Delay, delay
+from camviz_clinic.handeye.mends import FEWEST_TRIED, UNITS, Indices, Tried, exchanged
+from camviz_clinic.handeye.motion import FEWEST, Turning
+from camviz_clinic.handeye.pose_table import RobotPoses
+from camviz_clinic.handeye.solving import HandEye, hand_eye_from_corners
+from camviz_clinic.handeye.turn_forms import PoseError
+
+LITTLE_DEG = 10.0  # turned less about every second axis, X's translation is known badly
+SURE = 4.0  # σ: what a scale must be away from 1
+OFF = 0.005  # and how far
+DISAGREE = 0.01  # of the distance to the board: robots and pictures are nearer than that
+MENDS = ("wrong-unit", "poses-inverted", "poses-shifted", "poses-reordered", "poses-misread")
+KINDS = (*MENDS, "time-offset", "one-axis", "little-turning", "stray-pose", "scale-differs", "robot-disagrees")
+CAUSES = {
+    "wrong-unit": ("lengths in another unit than they were read in",),
+    "poses-inverted": ("poses of the base in the hand's frame", "the other arrangement of camera and board"),
+    "poses-shifted": ("a picture or a row that is missing at the start",),
+    "poses-reordered": ("pictures sorted otherwise than the poses",),
+    "poses-misread": ("another convention of rotations than was assumed",),
+    "time-offset": ("clocks of robot and camera that differ", "a robot that moved while pictures were taken"),
+    "one-axis": ("a robot that turned its hand about one axis only",),
+    "little-turning": ("a robot that hardly turned its hand",),
+    "stray-pose": ("a robot that had not come to rest", "a slip in recording that pose"),
+    "scale-differs": ("a board whose squares are not as long as told", "a focal length that is off"),
+    "robot-disagrees": ("a board or a camera that slipped on its mount", "a wrong tool frame", "an inexact robot"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A robot's poses, row by row, and the board's corners in the picture of each row.
+
+    Args:
+        poses: As read.
+        pixels: (rows, corners, 2), pixels; NaN where a corner is not seen, all NaN where the board is not.
+        camera: The calibrated camera.
+        board: What the pictures show.
+        eye_to_hand: The camera stands still and the board is on the hand.
+        pictures: A name for each row.
+
+    Raises: PoseError where there are not as many rows as pictures, and for fewer than three with four corners or more.
+
+    >>> import numpy as np
+    >>> from camviz_clinic.handeye.virtual import cell, scaled
+    >>> true = scaled(cell(np.random.default_rng(3)), 1000)  # a robot that tells millimetres, which were read as metres
+    >>> case = Case(RobotPoses(true.base_from_hand), true.pixels, true.camera, true.board)
+    >>> [finding.id for finding in case.findings]
+    ['wrong-unit']
+    """
+
+    poses: RobotPoses
+    pixels: Array = field(repr=False)
+    camera: Camera
+    board: Board
+    eye_to_hand: bool = False
+    pictures: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.pixels) != len(self.poses.base_from_hand):
+            raise PoseError(
+                f"there must be as many poses as pictures, got {len(self.poses.base_from_hand)} and {len(self.pixels)}"
+            )
+        if len(self.seen) < FEWEST:
+            raise PoseError(f"at least {FEWEST} poses with a picture of the board are needed, got {len(self.seen)}")
+
+    @cached_property
+    def seen(self) -> Indices:
+        """The rows whose pictures show the board.
+
+        Returns: (n,), indices of rows.
+        """
+        return np.flatnonzero(np.isfinite(self.pixels).all(axis=-1).sum(axis=1) >= LEAST_CORNERS)
+
+    @cached_property
+    def cam_from_board(self) -> RigidTransform:
+        """The board in each of these pictures."""
+        return lone_poses(self.camera, self.board, self.pixels[self.seen])
+
+    @cached_property
+    def readings(self) -> tuple[Tried, Tried]:
+        """The poses as given, and the reading under which robot and pictures agree best."""
+        rows, others = self.poses.base_from_hand, self.poses.others
+        return mends.likely(rows, self.seen, self.cam_from_board, others, self.eye_to_hand)
+
+    @cached_property
+    def delay(self) -> Delay | None:
+        """The delay of the pictures against the poses; None where the table has no times that rise."""
+        if self.poses.times is None:
+            return None
+        times, rows = self.poses.times, self.poses.base_from_hand
+        return delay(times, rows, self.seen, self.cam_from_board, self.eye_to_hand)
+
+    @cached_property
+    def result(self) -> HandEye:
+        """X and Z by the poses as they were given, whatever is wrong with them.
+
+        Raises: PoseError where the poses put corners to where the camera has no image.
+        """
+        return hand_eye_from_corners(
+            self.poses.base_from_hand, self.pixels, self.camera, self.board, eye_to_hand=self.eye_to_hand
+        )
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is wrong, the worst first. Where another reading mends it, nothing but that is told."""
+        mended = tuple(self._mended())
+        found = mended or (*self._turning(), *self._stray(), *self._scale(), *self._disagreement())
+        return tuple(sorted(found, key=lambda each: SEVERITIES.index(each.severity)))
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """The findings that were looked for."""
+        return tuple(id for id in KINDS if id not in dict(self.skipped))
+
+    @property
+    def skipped(self) -> tuple[tuple[str, str], ...]:
+        """What was not looked for, and why."""
+        few = f"it takes {FEWEST_TRIED} poses or more"
+        said = [(id, few) for id in MENDS] if len(self.seen) < FEWEST_TRIED else []
+        if self.poses.times is None:
+            said.append(("time-offset", "the poses have no column `time`"))
+        elif self.delay is None:
+            said.append(("time-offset", "the times do not rise from row to row, or are too few"))
+        if self._mended_at_all:
+            ids = ("one-axis", "little-turning", "stray-pose", "scale-differs", "robot-disagrees")
+            said += [(id, "the poses must be mended first") for id in ids]
+        return tuple(said)
+
+    @property
+    def usable(self) -> bool:
+        """Whether X holds: no fault was found, or none but a direction that is not known."""
+        return all(each.severity != "fault" or each.id == "one-axis" for each in self.findings)
+
+    @property
+    def _mended_at_all(self) -> bool:
+        return any(each.id in (*MENDS, "time-offset") and each.severity == "fault" for each in self.findings)
+
+    def named(self, row: int) -> str:
+        """A row in words."""
+        return f"pose {row + 1}" + (f" ({self.pictures[row]})" if self.pictures else "")
+
+    def _mended(self) -> Iterator[Finding]:
+        given, best = self.readings
+        late = self.delay
+        if late is not None and late.sure and late.error * mends.ALIKE < best.error:
+            yield _late(late)
+        elif not best.as_given:
+            yield _reading(given, best)
+
+    def _turning(self) -> Iterator[Finding]:
+        found = turning_finding(self.result.motions.turning, self.result)
+        if found is not None:
+            yield found
+
+    def _stray(self) -> Iterator[Finding]:
+        adjusted = self.readings[0].adjusted
+        stray = np.array(far_off(adjusted.displacements), dtype=np.intp)
+        if not len(stray):
+            return
+        order = exchanged(adjusted, np.sort(stray))
+        if order is not None:
+            yield self._exchanged(self.seen[np.sort(stray)], self.seen[order])
+            return
+        kept_out = not self.result.used[self.seen[stray]].any()
+        shift, turn = adjusted.errors
+        said = [
+            f"{self.named(int(self.seen[i]))} is off by {1000 * shift[i]:.2g} mm and {np.degrees(turn[i]):.2g}°"
+            for i in stray
+        ]
+        worst = float(1000 * adjusted.displacements[stray[0]])
+        median = 1000 * float(np.median(adjusted.displacements))
+        more = f" and {len(said) - 3} more" * (len(said) > 3)
+        yield Finding(
+            "stray-pose",
+            "warning" if kept_out else "fault",
+            f"{'; '.join(said[:3])}{more}, the median is {median:.2g} mm at the board's distance."
+            + (" It was set aside." if kept_out and len(said) == 1 else " They were set aside." if kept_out else ""),
+            worst,
+            "mm",
+            causes=CAUSES["stray-pose"],
+            remedy="Record it again, with the robot at rest, or leave it out.",
+            pictures=tuple(int(i) for i in self.seen[stray]),
+        )
+
+    def _exchanged(self, stray: Indices, order: Indices) -> Finding:
+        pairs = [
+            f"the picture of {self.named(int(one))} belongs to pose {other + 1}"
+            for one, other in zip(stray, order, strict=True)
+        ]
+        return Finding(
+            "poses-reordered",
+            "fault",
+            f"Poses are exchanged: {', '.join(pairs)}.",
+            float(len(stray)),
+            "poses",
+            causes=CAUSES["poses-reordered"],
+            remedy="Name the pictures in a column `picture` of the table, or give both in the same order.",
+            pictures=tuple(int(i) for i in stray),
+        )
+
+    def _scale(self) -> Iterator[Finding]:
+        scale, sigma = scale_of(self.result)
+        if is_off(scale, sigma):
+            side = 1000 * self.board.square_size
+            yield Finding(
+                "scale-differs",
+                "warning",
+                f"The robot's motions are {scale:.4f} ± {sigma:.4f} times shorter than the board's."
+                if scale > 1
+                else f"The robot's motions are {1 / scale:.4f} ± {sigma / scale**2:.4f} times longer than the board's.",
+                scale,
+                "times",
+                causes=CAUSES["scale-differs"],
+                remedy=f"Measure the squares: with {side / scale:.2f} mm in place of {side:.2f} mm the two agree.",
+            )
+
+    def _disagreement(self) -> Iterator[Finding]:
+        given = self.readings[0]
+        lever = given.adjusted.motions.lever
+        if given.error >= DISAGREE * lever:
+            yield Finding(
+                "robot-disagrees",
+                "warning",
+                f"Robot and pictures disagree by {1000 * given.error:.2g} mm (median) at a board {lever:.2g} m away, "
+                "and no other order, unit or form of the poses mends it.",
+                1000 * given.error,
+                "mm",
+                causes=CAUSES["robot-disagrees"],
+                remedy="See that board and camera are fixed and that the poses are those of the frame you mean.",
+            )
+
+
+def turning_finding(turning: Turning, result: HandEye) -> Finding | None:
+    """Whether the mount turned too little, and what of X is then not known."""
+    unknown, second = result.unknown_directions, float(turning.deg[1])
+    name, axis = result.x_name, turning.axes[0]
+    direction = ", ".join(f"{x:.2f}" for x in axis)
+    mount = "base" if result.eye_to_hand else "hand"
+    if len(unknown) == 3:
+        return Finding(
+            "little-turning",
+            "fault",
+            f"The hand turned by {turning.deg[0]:.2g}° (RMS) at most: the translation of {name} is not known.",
+            float(turning.deg[0]),
+            "°",
+            causes=CAUSES["little-turning"],
+            remedy="Turn the hand by 30° and more, about axes in several directions.",
+        )
+    if len(unknown) == 1:
+        return Finding(
+            "one-axis",
+            "fault",
+            f"The hand turned about one axis only, ({direction}) in the {mount}'s frame: how far {name} reaches along "
+            "it is not known.",
+            second,
+            "°",
+            causes=CAUSES["one-axis"],
+            remedy="Turn the hand about a second axis too, by 30° and more; or measure that distance with a ruler.",
+        )
+    if second < LITTLE_DEG:
+        worst = 1000 * float(np.sqrt(axis @ np.asarray(_place_covariance(result)) @ axis))
+        return Finding(
+            "little-turning",
+            "warning",
+            f"The hand turned by only {second:.2g}° (RMS) about every axis but ({direction}) in the {mount}'s frame: "
+            f"how far {name} reaches along it is known to ±{worst:.2g} mm.",
+            second,
+            "°",
+            causes=CAUSES["little-turning"],
+            remedy="Turn the hand by 30° and more, about axes in several directions.",
+        )
+    return None
+
+
+def _place_covariance(result: HandEye) -> Array:
+    """Of X's translation (3, 3), in square metres."""
+    from camviz_clinic.calibration.jacobian import twist_jacobian
+
+    carried = twist_jacobian(np.asarray(result.mount_from_cam.translation))
+    return np.asarray(carried @ result.covariance[:6, :6] @ carried.T)
+
+
+def scale_of(result: HandEye) -> tuple[float, float]:
+    """The factor by which the robot's lengths would have to be multiplied, and its σ, solved for beside X and Z."""
+    from dataclasses import replace
+
+    A = result.motions.other_from_mount
+    along = np.concatenate([np.zeros((len(A), 3)), A.rotation.inv().apply(A.translation)], axis=-1)
+    there = replace(result.adjusted, also=(along,))
+    return 1 + float(there.step[12]), float(np.sqrt(there.covariance[12, 12]))
+
+
+def is_off(scale: float, sigma: float) -> bool:
+    """Whether a scale is surely not 1, and by enough to matter.
+
+    >>> is_off(1.006, 0.0014), is_off(1.006, 0.0016), is_off(1.0049, 0.0001)
+    (True, False, False)
+    """
+    return abs(scale - 1) >= max(SURE * sigma, OFF)
+
+
+def _reading(given: Tried, best: Tried) -> Finding:
+    """The finding that another reading mends."""
+    id, pairing = best.pairing.id or "wrong-unit", best.pairing
+    unit, remedy = UNITS.get(best.unit, ("", ""))
+    says = " and ".join(filter(None, [pairing.says, f"the lengths are {unit}" if unit else ""]))
+    return Finding(
+        id,
+        "fault",
+        f"Robot and pictures disagree by {_length(given.error)} (median), and by {_length(best.error)} if {says}.",
+        1000 * given.error,
+        "mm",
+        causes=CAUSES[id],
+        remedy=" ".join(filter(None, [pairing.remedy, remedy])),
+    )
+
+
+def _late(late: Delay) -> Finding:
+    when, other = ("after", "later") if late.seconds > 0 else ("before", "earlier")
+    return Finding(
+        "time-offset",
+        "fault",
+        f"The pictures were taken {1000 * abs(late.seconds):.3g} ± {1000 * late.sigma:.2g} ms {when} the times of "
+        f"their poses: with poses that much {other} robot and pictures disagree by {_length(late.error)} (median), "
+        f"now by {_length(late.without)}.",
+        1000 * late.seconds,
+        "ms",
+        causes=CAUSES["time-offset"],
+        remedy="Stop the robot for each picture; or interpolate its poses at the times of the pictures.",
+    )
+
+
+def _length(metres: float) -> str:
+    """A length with two digits or more: 117 m, 170 mm, 0.71 mm."""
+    if metres >= 1:
+        return f"{metres:.3g} m"
+    return f"{1000 * metres:.0f} mm" if metres >= 0.01 else f"{1000 * metres:.2g} mm"

@@ -1,0 +1,183 @@
+"""What is wrong with a robot's poses: every fault is named, healthy cells are left alone, and thresholds hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.handeye import PoseError, RobotPoses
+from camviz_clinic.handeye.diagnosis import DISAGREE, KINDS, LITTLE_DEG, Case, turning_finding
+from camviz_clinic.handeye.mends import FEWEST_TRIED
+from camviz_clinic.handeye.motion import Turning
+from camviz_clinic.handeye.virtual import FAULTS, about_one_axis, cell, healthy_case, moving, scaled, strayed
+
+
+def case(true, poses=None, **more):
+    told = poses or RobotPoses(true.base_from_hand)
+    return Case(told, true.pixels, true.camera, true.board, true.eye_to_hand, **more)
+
+
+def of(found, id):
+    """The one finding, which is of this id."""
+    (finding,) = found.findings
+    assert finding.id == id
+    return finding
+
+
+@pytest.mark.parametrize("id", list(FAULTS))
+def test_a_fault_is_named(id, thorough):
+    for seed in range(20 if thorough else 2):
+        found = FAULTS[id](np.random.default_rng([31, seed]))
+        assert id in [each.id for each in found.findings]
+
+
+def test_there_is_a_case_for_every_kind_but_the_one_that_has_no_mend():
+    assert set(KINDS) - set(FAULTS) == {"robot-disagrees"}
+
+
+def test_nothing_is_found_where_nothing_is_wrong(thorough):
+    for seed in range(40 if thorough else 5):
+        assert healthy_case(np.random.default_rng([32, seed])).findings == ()
+
+
+def test_a_unit_is_named_with_what_asks_for_it():
+    true = cell(np.random.default_rng(1), 10)
+    millimetres = of(case(scaled(true, 1000)), "wrong-unit")
+    assert millimetres.remedy == "Read the lengths as millimetres: --unit mm."
+    assert not case(scaled(true, 1000)).usable
+    assert of(case(scaled(true, 0.001)), "wrong-unit").remedy == "Read the lengths as metres: --unit m."
+    inches = of(case(scaled(true, 1000 / 25.4)), "wrong-unit")
+    assert "by 25.4" in inches.remedy
+
+
+def test_two_mistakes_at_once_are_named_together():
+    true = cell(np.random.default_rng(2), 10)
+    both = scaled(true, 1000).base_from_hand.inv()
+    finding = of(case(true.told(both)), "poses-inverted")
+    assert "--invert" in finding.remedy
+    assert "--unit mm" in finding.remedy
+
+
+@pytest.mark.parametrize("to_hand", [False, True])
+def test_inverted_poses_and_the_other_arrangement_are_one_equation_and_both_are_named(to_hand):
+    true = cell(np.random.default_rng(3), 10, to_hand)
+    said = of(case(replace(true, eye_to_hand=not to_hand)), "poses-inverted").remedy
+    assert "--invert" in said
+    assert ("--eye-to-hand left out" in said) == (not to_hand)
+
+
+def test_a_shift_is_named_with_its_direction():
+    true = cell(np.random.default_rng(4), 12)
+    late = replace(true, base_from_hand=true.base_from_hand[:-2], pixels=true.pixels[2:])
+    assert "the pose 2 rows further down" in of(case(late), "poses-shifted").sentence
+    early = replace(true, base_from_hand=true.base_from_hand[1:], pixels=true.pixels[:-1])
+    assert "the pose 1 row further up" in of(case(early), "poses-shifted").sentence
+
+
+def test_an_order_is_named():
+    true = cell(np.random.default_rng(5), 12)
+    assert "reversed" in of(case(true.told(true.base_from_hand[::-1])), "poses-reordered").sentence
+    as_words = sorted(range(12), key=lambda number: str(number + 1))
+    assert "as words (1, 10, 11, 2)" in of(case(true.told(true.base_from_hand[as_words])), "poses-reordered").sentence
+    swapped = np.arange(12)
+    swapped[[3, 7]] = 7, 3
+    said = of(case(true.told(true.base_from_hand[swapped])), "poses-reordered").sentence
+    assert "picture of pose 4 belongs to pose 8" in said
+    assert "picture of pose 8 belongs to pose 4" in said
+
+
+def test_quaternions_in_the_other_order_are_found_though_their_angles_agree():
+    """The angle between two quaternions is that of their four numbers in any order."""
+    true = cell(np.random.default_rng(6), 12)
+    place, q = true.base_from_hand.translation, true.base_from_hand.rotation.as_quat()
+    shuffled = Rotation.from_quat(q[:, [3, 0, 1, 2]])
+    wrong = RobotPoses(RigidTransform.from_components(place, shuffled), others={"--rotation wxyz": true.base_from_hand})
+    assert np.degrees(np.abs((shuffled[0].inv() * shuffled[1]).magnitude())) == pytest.approx(
+        np.degrees((true.base_from_hand.rotation[0].inv() * true.base_from_hand.rotation[1]).magnitude())
+    )
+    assert of(case(true, wrong), "poses-misread").remedy == "Read them with --rotation wxyz."
+
+
+def test_one_axis_is_named_with_the_direction_that_is_not_known():
+    rng = np.random.default_rng(7)
+    true = cell(rng, turns=about_one_axis(rng, 15), robot_deg=0.01)
+    found = case(true)
+    finding = of(found, "one-axis")
+    axis = found.result.motions.turning.axes[0]
+    turns = true.base_from_hand.rotation
+    moved = (turns[0].inv() * turns[1]).as_rotvec()
+    assert abs(axis @ moved / np.linalg.norm(moved)) > 0.9999
+    assert f"({', '.join(f'{x:.2f}' for x in axis)}) in the hand's frame" in finding.sentence
+    assert found.usable
+
+
+@pytest.mark.parametrize(("second", "found"), [(LITTLE_DEG - 0.01, "little-turning"), (LITTLE_DEG, None)])
+def test_ten_degrees_about_a_second_axis_are_enough(second, found):
+    finding = turning_finding(
+        Turning(np.array([25.0, second, 5.0]), np.eye(3)), case(cell(np.random.default_rng(8), 8)).result
+    )
+    assert (finding and finding.id) == found
+
+
+def test_a_robot_that_did_not_turn_leaves_the_whole_place_unknown():
+    true = cell(np.random.default_rng(9), turns=Rotation.from_rotvec(np.zeros((10, 3)) + [0.1, 0.2, 0]))
+    finding = of(case(true), "little-turning")
+    assert finding.severity == "fault"
+    assert not case(true).usable
+
+
+def test_a_stray_pose_is_named_with_its_picture_and_how_far_it_is_off():
+    rng = np.random.default_rng(10)
+    true, which = strayed(rng, cell(rng, 15), 30, 0.001)
+    found = case(true, pictures=tuple(f"{i:02}.png" for i in range(15)))
+    finding = of(found, "stray-pose")
+    assert finding.pictures == (which,)
+    assert finding.sentence.startswith(f"pose {which + 1} ({which:02}.png) is off by ")
+    assert 0.02 < float(finding.sentence.split("is off by ")[1].split(" mm")[0]) / 1000 < 0.04
+    assert finding.severity == "warning"
+    assert found.usable
+
+
+def test_a_delay_is_measured():
+    true = moving(np.random.default_rng(11), 35, 0.1)
+    finding = of(case(true, RobotPoses(true.base_from_hand, times=true.times)), "time-offset")
+    assert finding.value == pytest.approx(-100, abs=6)  # the robot's poses are those of 100 ms after each picture
+
+
+def test_squares_of_another_length_are_told_with_the_length_that_fits():
+    true = cell(np.random.default_rng(12), 15)
+    told = Case(RobotPoses(true.base_from_hand), true.pixels, true.camera, replace(true.board, square_size=0.026))
+    finding = of(told, "scale-differs")
+    assert finding.value == pytest.approx(1.04, abs=0.004)
+    fits = float(finding.remedy.split("with ")[1].split(" mm")[0])
+    assert fits == pytest.approx(25, abs=0.1)
+
+
+def test_a_robot_that_disagrees_in_no_way_that_can_be_mended_is_told_from_one_per_cent_on():
+    assert DISAGREE == 0.01
+    true = cell(np.random.default_rng(13), 15, robot_mm=15, robot_deg=1.5)
+    found = case(true)
+    assert found.readings[0].error > DISAGREE * found.readings[0].adjusted.motions.lever
+    assert "robot-disagrees" in [each.id for each in found.findings]
+
+
+def test_with_five_poses_other_readings_are_not_tried_and_it_is_said():
+    true = cell(np.random.default_rng(14), FEWEST_TRIED)
+    assert of(case(scaled(true, 1000)), "wrong-unit")
+    few = replace(true, base_from_hand=true.base_from_hand[:5], pixels=true.pixels[:5])
+    assert dict(case(few).skipped)["wrong-unit"] == "it takes 6 poses or more"
+    assert "wrong-unit" not in case(few).checked
+
+
+def test_without_times_no_offset_is_looked_for_and_it_is_said():
+    true = cell(np.random.default_rng(15), 8)
+    assert dict(case(true).skipped) == {"time-offset": "the poses have no column `time`"}
+    falling = RobotPoses(true.base_from_hand, times=-np.arange(8.0))
+    assert dict(case(true, falling).skipped) == {"time-offset": "the times do not rise from row to row, or are too few"}
+
+
+def test_as_many_poses_as_pictures_are_needed():
+    true = cell(np.random.default_rng(16), 8)
+    with pytest.raises(PoseError, match="as many poses as pictures, got 7 and 8"):
+        case(true, RobotPoses(true.base_from_hand[:7]))
