@@ -142,9 +142,9 @@ def test_a_picture_alone_has_neither_grid_nor_numbers_until_they_are_opened():
     alone = DistortionView(panels="picture")
     assert tiles(alone) == ["the picture"]
     assert alone.figure(draft=True).body.count("stroke:#f2c94c") == 0
-    assert alone.opening({"grid": True}).figure(draft=True).body.count("stroke:#f2c94c") == 1
-    assert tiles(alone.opening({"grid": True})) == ["the picture"]
-    assert tiles(alone.opening({"curve": True, "numbers": True})) == ["the picture", "radial curve", "numbers"]
+    assert alone.with_panels({"grid": True}).figure(draft=True).body.count("stroke:#f2c94c") == 1
+    assert tiles(alone.with_panels({"grid": True})) == ["the picture"]
+    assert tiles(alone.with_panels({"curve": True, "numbers": True})) == ["the picture", "radial curve", "numbers"]
 
 
 def test_a_new_view_has_all_that_can_be_opened_but_one():

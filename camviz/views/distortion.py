@@ -229,7 +229,7 @@ class DistortionView(OrbitView):
         if len(first) == 1 and not self._has(_NUMBERS):  # as wide as its picture: a telephone shows all of it
             return rows((_ALONE, {first[0]: min(_MOST_ACROSS, round(aspect * (_ALONE - 44) + 20))}))
         height, widths = _FIRST[len(first), self._has(_NUMBERS)]
-        height = min(height, max(_LEAST, round(widths[0] / aspect + 30)))
+        height = min(height, max(_LEAST, round(widths[0] / aspect + 35)))
         columns = [*first, _NUMBERS][: len(widths)]
         found = [(height, dict(zip(columns, widths, strict=True)))]
         if below:
@@ -290,7 +290,7 @@ class DistortionView(OrbitView):
         shown = self._photograph(panel, "camera") + drawn + fold
         return panel.show(shown, title=title), {"camera": jpeg(self.image(draft=draft))}
 
-    def _over(self, panel: Panel, lines: np.ndarray, kind: str, **style: str) -> str:
+    def _over(self, panel: Panel, lines: np.ndarray, kind: str, **style: Any) -> str:
         """The lines of the grid over a picture, where the grid is open."""
         return svg.path(panel.place(self.intrinsics.to_pixels(lines)), kind, **style) if self._has(_GRID) else ""
 

@@ -50,7 +50,7 @@ def bend(xy, *coefficients):
 
 def test_a_barrel_draws_corners_in_most(says):
     says("With k1 < 0 the corners are drawn in, and the picture bulges like a barrel.")
-    says("with k1 < 0 points far out are drawn in most, the corners most of all")
+    says("With k1 < 0 points far out are drawn in most, the corners most of all")
     says("and the sides of a square bow outwards")
     says("With k1 > 0 the corners are pulled out, as in a pincushion.")
     k1, r, strength, square, factor = says(
