@@ -108,11 +108,11 @@ def test_a_picture_alone_is_all_there_is_until_the_reader_opens_more():
     alone = PinholeView(panels="picture")
     assert tiles(alone) == ["picture on the wall"]
     assert alone.figure(draft=True).body.count(" ringed") == 0
-    opened = alone.opening({"box": True})
+    opened = alone.with_panels({"box": True})
     assert tiles(opened) == ["picture on the wall", "box"]
     assert opened.figure(draft=True).body.count(" ringed") == 4
-    assert tiles(opened.opening({"numbers": True}))[2:] == ["numbers", "similar triangles"]
-    assert tiles(opened.opening({"picture": False})) == ["box"]
+    assert tiles(opened.with_panels({"numbers": True}))[2:] == ["numbers", "similar triangles"]
+    assert tiles(opened.with_panels({"picture": False})) == ["box"]
 
 
 @pytest.mark.parametrize("turned", [True, False])
