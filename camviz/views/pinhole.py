@@ -221,7 +221,8 @@ class PinholeView(OrbitView):
             outlines = svg.path(panel.place(lines), "yellow")
             return panel.show(picture + outlines, title="The picture, its outlines projected")
         title = "The picture, as a display shows it" if self._upright else "On the wall, from behind"
-        return panel.show(picture + self._marks(panel), title=title, note=f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm")
+        size = f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm" if self._has("numbers") else ""
+        return panel.show(picture + self._marks(panel), title=title, note=size)
 
     def _image_panel(self, name: str, cell: Cell) -> tuple[Panel, str]:
         """A panel of the picture in a tile, and the picture in it."""
