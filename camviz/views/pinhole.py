@@ -30,7 +30,8 @@ from camviz.views.box_in_space import ENLARGED, TOWER, TOWER_M, WALL_MM, box_and
 PIXELS = 480  # across the wall: 75 µm each
 WHITE_PHOTONS = 2000  # in a pixel that is just white
 _WIDTHS = {"box": 560, "picture": 400, "yours": 400, "blur": 560}  # of the panels, where they stand alone
-_NUMBERS = {"numbers": 290, "similar triangles": 270}
+_NUMBERS: dict[str, float] = {"numbers": 290, "similar triangles": 270}
+_TILES = {"picture": "picture on the wall", "yours": "projected by you"}  # of panels that are not called as they are
 LAMP_PX = np.array([40.0, 30.0])  # where the lamp is seen, from the principal point of the upright picture
 _HOLES, _BLURS = (0.05, 2.0), (0.1, 4.0)  # the plot's range, mm
 _POINTS = {  # of the tower, from its middle, metres: what the rays start from
@@ -181,9 +182,8 @@ class PinholeView(OrbitView):
             photographs["wall"] = jpeg(upright if self._upright else upright[::-1, ::-1].copy())
         if self._has("numbers"):
             parts |= self._numbers(layout)
-        names = {"picture": "picture on the wall", "yours": "projected by you"}
-        layout, parts = ({names.get(name, name): one for name, one in part.items()} for part in (layout, parts))
-        return self.tiled(layout, parts, photographs)
+        tiles = {_TILES.get(name, name): cell for name, cell in layout.items()}
+        return self.tiled(tiles, {_TILES.get(name, name): part for name, part in parts.items()}, photographs)
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
@@ -192,7 +192,7 @@ class PinholeView(OrbitView):
         across = _WIDTHS[first[0]] if len(first) == 1 else 960
         height = 374 if set(first) == {"picture", "yours"} else 330
         found = [(height, _shared(first, across))]
-        numbers = _NUMBERS if self._has("numbers") else {}
+        numbers = _NUMBERS if self._has("numbers") else dict[str, float]()
         tall = 200 if self._has("blur") else 172 if self._has("yours") else 136
         if numbers and len(below) == 1:
             found.append((252, {**_shared(below, 400), **numbers}))
