@@ -3,6 +3,7 @@
 from copy import deepcopy
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import nbformat
 import pytest
 
@@ -111,6 +112,7 @@ def test_each_deeper_section_runs_after_the_core_without_the_others(number, monk
             tags = set(cell.metadata.get("tags", []))
             if cell.cell_type == "code" and not tags & {"check", "colab"}:
                 exec(solved[notebooks.exercise_of(cell)] if "stub" in tags else cell.source, namespace)
+                plt.close("all")  # as a notebook does after each cell
         return namespace
 
     core = run(minutes.core(lesson), {"__name__": "__main__"})

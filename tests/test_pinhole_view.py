@@ -9,7 +9,8 @@ from test_tiles import problems, unit_on_a_telephone
 
 from camviz import optics
 from camviz.scenes import to_linear
-from camviz_school.views.pinhole import PIXELS, TOWER, TOWER_M, WALL_MM, PinholeView
+from camviz_school.views.box_in_space import TOWER, TOWER_M, WALL_MM
+from camviz_school.views.pinhole import LAMP_PX, PIXELS, PinholeView
 
 ENDS = [
     (name, value)
@@ -57,7 +58,7 @@ def test_the_numbers_are_those_of_the_optics():
 
 
 def test_a_reader_who_is_to_predict_the_blur_is_shown_none():
-    quiet = PinholeView(panels="box picture")
+    quiet = PinholeView(panels="box picture numbers")
     for word in ("blur", "Airy", "shadow"):
         assert word not in quiet.description()
         assert word not in quiet.figure(draft=True).body
@@ -84,23 +85,76 @@ def test_a_reader_s_projection_draws_the_garden_where_camviz_does():
 def test_a_wrong_projection_is_drawn_and_one_that_stops_is_told_of():
     view = PinholeView(panels="picture yours", yours=lambda points, f, cx, cy: f * points[..., :2] + (cx, cy))
     assert 'class="orange"' in view.figure(draft=True).body
-    for function, words in ((None, "No function"), (lambda *_: None, "returns nothing"), (lambda x: x, "no answer")):
+    for function, words in ((None, "No function"), (lambda *_: None, "yours appears here"), (lambda x: x, "no answer")):
         figure = view.but(yours=function).figure(draft=True)
         assert words in figure.body
         assert 'class="orange"' not in figure.body
         assert "nan" not in figure.body
 
 
-@pytest.mark.parametrize("panels", PinholeView.layouts)
+def test_an_unwritten_projection_leaves_the_right_outlines_greyed():
+    body = PinholeView(panels="picture yours", yours=lambda *_: None).figure(draft=True).body
+    (awaited,) = re.findall(r'class="awaited">(.*)</g>', body)
+    left, greyed = re.findall(r'<path d="([^"]*)" class="yellow"', body)
+    assert greyed == left
+    assert greyed in awaited
+
+
+def tiles(view):
+    return [tile.name for tile in view.figure(draft=True).tiles]
+
+
+def test_a_picture_alone_is_all_there_is_until_the_reader_opens_more():
+    alone = PinholeView(panels="picture")
+    assert tiles(alone) == ["picture on the wall"]
+    assert alone.figure(draft=True).body.count(" ringed") == 0
+    opened = alone.with_panels({"box": True})
+    assert tiles(opened) == ["picture on the wall", "box"]
+    assert opened.figure(draft=True).body.count(" ringed") == 4
+    assert tiles(opened.with_panels({"numbers": True}))[2:] == ["numbers", "similar triangles"]
+    assert tiles(opened.with_panels({"picture": False})) == ["box"]
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_lamp_anywhere_on_its_ray_has_one_place_in_the_picture(turned):
+    """In the box its dot and its ray lead on; on the wall its mark stays where OpenCV projects the lamp."""
+
+    def mark(lamp_m):
+        view = PinholeView(object_m=4.0, lamp_m=lamp_m, panels="picture box", turn_picture=turned)
+        body = view.figure(draft=True).body
+        ((x, y),) = re.findall(r'<path d="M([\d.]+),([\d.]+)h0" class="yellow ringed', body)
+        return (float(x), float(y)), view
+
+    (near, first), (far, second) = mark(0.5), mark(3.9)
+    assert near == far
+    K, (lamp,) = first.camera().intrinsics.K, second._ray_starts().values()
+    pixel = cv2.projectPoints(lamp.reshape(1, 1, 3), np.zeros(3), np.zeros(3), K, None)[0].ravel()
+    np.testing.assert_allclose(pixel - K[:2, 2], LAMP_PX)
+    assert np.linalg.norm(lamp) == pytest.approx(3.9)
+    shown = pixel if turned else (PIXELS - 1, PIXELS * 0.75 - 1) - pixel
+    np.testing.assert_allclose(near, (shown + 0.5) * 380 / PIXELS, atol=0.06)  # drawn to a tenth
+    assert first.figure(draft=True).body != second.figure(draft=True).body
+
+
+def test_a_lamp_behind_the_camera_is_refused_by_name():
+    with pytest.raises(ValueError, match="lamp_m must not be below zero, got -1"):
+        PinholeView(lamp_m=-1.0)
+
+
+@pytest.mark.parametrize(
+    "panels",
+    ["picture", "box picture", "picture blur", "picture yours", "picture yours numbers", "box picture blur numbers"],
+)
 def test_words_stand_free_in_every_set_of_panels(panels):
     view = PinholeView(panels=panels, yours=by_a_reader)
     for tile in view.figure(draft=True).tiles:
         assert problems(tile, 1.0) + problems(tile, unit_on_a_telephone(tile)) == []
 
 
-def test_panels_that_there_are_not_are_refused():
-    with pytest.raises(ValueError, match="panels"):
-        PinholeView(panels="picture blur")
+@pytest.mark.parametrize("panels", ["", "numbers", "picture attic"])
+def test_panels_that_there_are_not_are_refused(panels):
+    with pytest.raises(ValueError, match="panels must be one or more of box, picture, yours, blur"):
+        PinholeView(panels=panels)
 
 
 def test_the_description_states_the_state():

@@ -21,7 +21,7 @@ GREEN = 550e-6
 FIRST_DARK_RING = 2 * jn_zeros(1, 1)[0] / np.pi
 """Of the Airy pattern: its diameter in λ f / d, from the first zero of J1."""
 K = np.array([[50 / 0.075, 0, 239.5], [0, 50 / 0.075, 179.5], [0, 0, 1]])
-"""The matrix of cell 8: 50 mm and pixels of 75 µm."""
+"""The matrix of section 2: 50 mm and pixels of 75 µm."""
 
 
 def on_the_wall(point, f):
@@ -47,7 +47,10 @@ def best(f=50.0):
 
 
 def test_the_picture_on_the_wall_is_turned_by_half_a_turn(says):
-    turns = [*says("Yes: turned by 180°."), *says("Turning the picture by 180° takes both minus signs away")]
+    turns = [
+        *says("Yes: turned by 180°."),
+        *says("Turning the picture by 180° takes both minus signs away, and most books write: x = f X/Z"),
+    ]
     turns += says("This is the image on the back wall, turned by 180°.")
     says("the image on the wall is (−f X/Z, −f Y/Z)")
     says("It is upside down, and left and right are exchanged.")
@@ -70,7 +73,7 @@ def test_seen_from_inside_left_and_right_look_unchanged(says):
 
 def test_twice_as_far_is_half_as_tall_and_a_deeper_box_waits_longer(says):
     says("twice as far is half as tall")
-    says("Make the box deeper (depth f). Notice that the picture grows, and that less of the garden fits on the wall.")
+    says("A deeper box (depth f) makes a larger picture, and less of the garden fits on the wall.")
     says(
         "The deeper the box, the longer the hole has to stay open, "
         "because the same light is spread over a larger picture."
@@ -97,9 +100,9 @@ def test_one_point_by_hand(says):
 
 
 def test_the_board_s_points_land_on_the_corners_of_the_photograph(says, samples):
-    (count,) = says("finds out how it is turned and how far it is moved, from the 54 inner corners")
+    (count,) = says("From the board's 54 inner corners `cv2.solvePnP` finds how it is turned and moved")
     (drawn,) = says("The blue dots are the board's 54 corners")
-    says("Half a pixel is what remains")
+    says("Half a pixel remains.")
     file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
     matrix, bend = file.getNode("camera_matrix").mat(), file.getNode("distortion_coefficients").mat()
     grey = cv2.undistort(cv2.imread(str(samples / "left08.jpg"), cv2.IMREAD_GRAYSCALE), matrix, bend)
@@ -120,7 +123,7 @@ def test_posts_that_were_passed_are_drawn_on_the_other_side_upside_down(says):
 
 
 def test_half_as_far_from_the_middle_row(says):
-    (row,) = says("The third point is the second one at twice the distance: half as far from the middle row 179.5.")
+    (row,) = says("The point twice as far lies half as far from the middle row 179.5.")
     (_, second), (_, third) = opencv_s([[0, 0.58, 3], [0, 0.58, 6]])
     assert third - row.value == pytest.approx((second - row.value) / 2)
     assert row == (360 - 1) / 2
@@ -135,6 +138,7 @@ def test_turning_the_box_changes_a_point_s_coordinates(says):
 def test_parallel_lines_meet_in_the_image_of_their_direction(says):
     says("Lamps and feet run into one pixel")
     says("It is not the middle of the picture. Which pixel is it?")
+    says("So all lines with direction D run into one pixel, the image K D of the direction")
     turned = cv2.Rodrigues(np.array([0.1, -0.2, 0.0]))[0]
     ends = opencv_s(np.array([[2.05, -0.70, 1e9], [2.05, 1.25, 1e9]]) @ turned.T)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-4)
@@ -180,7 +184,8 @@ def test_all_points_of_a_ray_share_a_pixel_and_so_does_what_is_behind(says):
     for one, other in ((x, y), (again_x, again_y)):
         pixels = opencv_s(np.outer([1, 2, 10, 3.8e8], [one.value, other.value, f]))
         np.testing.assert_allclose(pixels - K[:2, 2], np.tile([right.value, below.value], (4, 1)), atol=1e-9)
-    says("the equation gives a pixel even to what is behind the camera")
+    says("The last line is behind the hole: the equation gives a pixel even to what is behind the camera")
+    says("from here to the Moon it is one pixel")
     behind = -np.array([40.0, 30.0, f])
     np.testing.assert_allclose(f * behind[:2] / behind[2], [40, 30])
     says("in camviz a point without an image is NaN (not a number)")
@@ -314,7 +319,9 @@ def test_a_third_of_the_hole(says):
 
 
 def test_the_picture_made_by_waves_is_sharpest_there_too(says):
-    (hole,) = says("the picture is sharpest at about 0.25 mm and gets worse on either side")
+    (hole,) = says(
+        "Move hole d from end to end: the picture is sharpest at about 0.25 mm and gets worse on either side."
+    )
 
     def detail(d):
         picture = PinholeView(hole_mm=d, match_exposure=True, noise=False).image(320)
@@ -329,7 +336,7 @@ def test_the_picture_made_by_waves_is_sharpest_there_too(says):
 
 
 def test_near_and_far_are_about_equally_blurred(says):
-    says("in the numbers above, one metre and infinity differ by a twentieth at most")
+    says("Near and far are about equally sharp: in our box, one metre and infinity differ by a twentieth at most.")
     differences = [blur(d, Z=1000) / blur(d) - 1 for d in (0.1, 0.3, 1.0)]
     assert max(differences) == pytest.approx(1 / 20, abs=0.001)
     says("Only what is as near as a few depths of the box is noticeably softer.")

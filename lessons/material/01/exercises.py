@@ -1,4 +1,4 @@
-"""Lesson 01, the pinhole camera: projection and its inverse, vanishing points, what lies behind, and the best hole."""
+"""Lesson 01, the pinhole camera: projection and its inverse, the best hole, vanishing points, and what lies behind."""
 
 from __future__ import annotations
 
@@ -174,7 +174,259 @@ def rounded(points, f, cx, cy):
     return np.round(f * points[..., :2] / points[..., 2:] + (cx, cy))
 
 
-# 2: vanishing points -------------------------------------------------------------------------------------------------
+# 2: the ray of a pixel -----------------------------------------------------------------------------------------------
+
+
+def ray(uv: Array, f: float, cx: float, cy: float) -> Array:
+    """The unit directions (..., 3) of all points that share the pixels (..., 2)."""
+    xy = (uv - np.array([cx, cy])) / f
+    direction = np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
+    return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+
+
+def _ray_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        f, cx, cy = _pixels(rng)
+        yield (project(_points(rng, shape), f, cx, cy), f, cx, cy)
+    f, cx, cy = _shifted_pixels(rng)
+    yield (np.vstack([project(_points(rng, (3,)), f, cx, cy), [cx, cy]]), f, cx, cy)  # the last along the axis
+
+
+def _at_depth_one(uv, f, cx, cy):
+    return np.concatenate([(uv - (cx, cy)) / f, np.ones_like(uv[..., :1])], axis=-1)
+
+
+def _of_length_one(direction):
+    return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+
+
+RAY = Exercise(
+    name="01.ray",
+    reference=ray,
+    cases=_ray_cases,
+    hints=(
+        "Undo the projection from its end. What was added last, and what multiplied before that? At which depth do the "
+        "x and y that you get lie?",
+        "Without the principal point and divided by f, the pixel is (x, y, 1), a point on the ray. "
+        "`np.concatenate([…, …], axis=-1)` puts numbers side by side, and `np.linalg.norm(…, axis=-1, keepdims=True)` "
+        "is the length of each vector.",
+        "`xy = (uv - ___) / ___` and, in the end, `return direction / ___`",
+    ),
+    praise="A pixel gives a direction and no more: every positive multiple of it lands there.",
+)
+
+
+@RAY.right
+def by_the_inverse_matrix(uv, f, cx, cy):
+    homogeneous = np.concatenate([uv, np.ones_like(uv[..., :1])], axis=-1)
+    return _of_length_one(homogeneous @ np.linalg.inv(_matrix(f, cx, cy)).T)
+
+
+@RAY.right
+def with_pixels_for_its_unit(uv, f, cx, cy):
+    u, v = uv[..., 0] - cx, uv[..., 1] - cy
+    return np.stack([u, v, np.full_like(u, f)], axis=-1) / np.sqrt(u**2 + v**2 + f**2)[..., None]
+
+
+@RAY.right
+def from_opencv_s_normalised_points(uv, f, cx, cy):
+    import cv2
+
+    xy = cv2.undistortPoints(uv.reshape(-1, 1, 2), _matrix(f, cx, cy), None).reshape(uv.shape)
+    return _of_length_one(np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1))
+
+
+@RAY.wrong("This is a point on the ray, at depth 1. Divide it by its length to have the *unit* direction.")
+def point_at_depth_one(uv, f, cx, cy):
+    return _at_depth_one(uv, f, cx, cy)
+
+
+@RAY.wrong(
+    "This is the right direction, (u − cx, v − cy, f), but it is hundreds of pixels long. Divide it by its length."
+)
+def point_at_depth_f(uv, f, cx, cy):
+    return f * _at_depth_one(uv, f, cx, cy)
+
+
+@RAY.wrong(
+    "This is the ray of the pixel counted from the principal point. Here (u, v) counts from the corner of the image: "
+    "subtract (cx, cy) first."
+)
+def principal_point_forgotten(uv, f, cx, cy):
+    return ray(uv, f, 0.0, 0.0)
+
+
+@RAY.wrong("You add the principal point. Projecting added it; the way back takes it off again.")
+def principal_point_added(uv, f, cx, cy):
+    return ray(uv, f, -cx, -cy)
+
+
+@RAY.wrong("x and y have the wrong sign: a pixel to the right of the principal point looks to the right.")
+def mirrored_ray(uv, f, cx, cy):
+    return ray(uv, f, cx, cy) * [-1, -1, 1]
+
+
+@RAY.wrong("Your ray leads out of the back of the camera. The camera looks along +Z: the third number is positive.")
+def backwards(uv, f, cx, cy):
+    return ray(uv, f, cx, cy) * [1, 1, -1]
+
+
+@RAY.wrong("The ray is too close to the axis: divide by f once, either x and y or the whole vector, not both.")
+def divided_by_f_twice(uv, f, cx, cy):
+    return _of_length_one(_at_depth_one(uv, f, cx, cy) * [1 / f, 1 / f, 1])
+
+
+@RAY.wrong("You never divide by f: pixels stand beside a depth of 1. The depth at which a pixel is one unit is f.")
+def pixels_beside_a_one(uv, f, cx, cy):
+    return ray(uv, 1.0, cx, cy)
+
+
+@RAY.wrong("These are x and y alone. A direction in space has three numbers; the third is the depth, 1.")
+def two_numbers(uv, f, cx, cy):
+    return _at_depth_one(uv, f, cx, cy)[..., :2]
+
+
+@RAY.wrong("You divide all rays by one common length. Each has its own: `axis=-1`, with `keepdims=True`.")
+def one_length_for_all(uv, f, cx, cy):
+    direction = _at_depth_one(uv, f, cx, cy)
+    return direction / np.linalg.norm(direction)
+
+
+@RAY.wrong("You divide by the *square* of the length, x² + y² + 1. Take its root first.")
+def divided_by_the_squared_length(uv, f, cx, cy):
+    direction = _at_depth_one(uv, f, cx, cy)
+    return direction / np.sum(direction**2, axis=-1, keepdims=True)
+
+
+@RAY.wrong("You divide by the sum of x, y and 1. The length of a vector is the root of the sum of its *squares*.")
+def divided_by_the_sum(uv, f, cx, cy):
+    direction = _at_depth_one(uv, f, cx, cy)
+    return direction / np.sum(direction, axis=-1, keepdims=True)
+
+
+@RAY.wrong("cx belongs to u and cy to v. In yours they have changed places, so that even the axis looks aslant.")
+def ray_with_c_swapped(uv, f, cx, cy):
+    return ray(uv, f, cy, cx)
+
+
+# 3: the best hole ----------------------------------------------------------------------------------------------------
+
+
+def best_hole(focal_mm: float, wavelength_nm: float) -> float:
+    """The hole as wide as its own Airy disc, d = 2.44 λ f / d, in millimetres."""
+    return np.sqrt(2.44 * wavelength_nm * 1e-6 * focal_mm)
+
+
+def _hole_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for _ in range(4):
+        yield (float(rng.uniform(15, 150)), float(rng.uniform(420, 680)))
+
+
+BEST_HOLE = Exercise(
+    name="01.best_hole",
+    reference=best_hole,
+    cases=_hole_cases,
+    tolerance=1e-6,  # of a millimetre: who looks for the least blur by trying finds the hole to that
+    shown=((50.0, 550.0),),
+    hints=(
+        "Set the two widths equal, d = 2.44 λ f / d, and solve for d. In which unit is each of the three lengths?",
+        "Multiply both sides by d: then d² is a product, and `np.sqrt` gives d. A nanometre is 10⁻⁶ mm, so the "
+        "wavelength needs a factor of its own.",
+        "`return np.sqrt(2.44 * wavelength_nm * ___ * ___)`",
+    ),
+    praise="For 50 mm and green light that is 0.26 mm, or 1.56 √(f λ). With Young's constant, 2, it would be 0.33 mm.",
+)
+
+
+@BEST_HOLE.right
+def in_metres(focal_mm, wavelength_nm):
+    return 1000 * (2.44 * wavelength_nm * 1e-9 * focal_mm * 1e-3) ** 0.5
+
+
+@BEST_HOLE.right
+def by_looking_for_the_least_blur(focal_mm, wavelength_nm):
+    from scipy.optimize import minimize_scalar
+
+    blur = lambda d: np.hypot(d, 2.44 * wavelength_nm * 1e-6 * focal_mm / d)  # noqa: E731
+    return minimize_scalar(blur, bounds=(0.01, 2), method="bounded", options={"xatol": 1e-9}).x
+
+
+@BEST_HOLE.right
+def by_halving_towards_the_crossing(focal_mm, wavelength_nm):
+    low, high = 1e-3, 10.0
+    for _ in range(60):
+        d = (low + high) / 2
+        low, high = (d, high) if d < 2.44 * wavelength_nm * 1e-6 * focal_mm / d else (low, d)
+    return d
+
+
+@BEST_HOLE.wrong("This is d². Take its square root.")
+def not_yet_the_root(focal_mm, wavelength_nm):
+    return 2.44 * wavelength_nm * 1e-6 * focal_mm
+
+
+@BEST_HOLE.wrong(
+    "This is 1000 times too large. Either the wavelength still counts in nanometres, or your answer is in µm: a "
+    "nanometre is 10⁻⁶ mm, and millimetres are wanted."
+)
+def nanometres_taken_for_millimetres(focal_mm, wavelength_nm):
+    return np.sqrt(2.44 * wavelength_nm * focal_mm)
+
+
+@BEST_HOLE.wrong(
+    "The wavelength is in metres here and the focal length in millimetres. In mm, one nanometre is `1e-6`."
+)
+def wavelength_in_metres(focal_mm, wavelength_nm):
+    return np.sqrt(2.44 * wavelength_nm * 1e-9 * focal_mm)
+
+
+@BEST_HOLE.wrong("The wavelength is in micrometres here and the focal length in millimetres: bring both to mm.")
+def wavelength_in_micrometres(focal_mm, wavelength_nm):
+    return np.sqrt(2.44 * wavelength_nm * 1e-3 * focal_mm)
+
+
+@BEST_HOLE.wrong("1.22 λ f / d is the *radius* of the Airy disc. d is a diameter: compare it with 2.44 λ f / d.")
+def radius_of_the_airy_disc(focal_mm, wavelength_nm):
+    return np.sqrt(1.22 * wavelength_nm * 1e-6 * focal_mm)
+
+
+@BEST_HOLE.wrong(
+    "This is Rayleigh's constant, 1.9, for another notion of sharpness. Here the hole equals its Airy disc."
+)
+def rayleigh_s_hole(focal_mm, wavelength_nm):
+    return 1.9 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
+
+
+@BEST_HOLE.wrong(
+    "This is Young's constant, 2, for another notion of sharpness. Here the hole is to equal its Airy disc."
+)
+def young_s_hole(focal_mm, wavelength_nm):
+    return 2 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
+
+
+@BEST_HOLE.wrong("The 2.44 stands under the root: it is d² that equals 2.44 λ f.")
+def constant_outside_the_root(focal_mm, wavelength_nm):
+    return 2.44 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
+
+
+@BEST_HOLE.wrong("The 2.44 is missing. √(λ f) is the *radius* of one Fresnel zone; here the Airy disc's width counts.")
+def without_the_constant(focal_mm, wavelength_nm):
+    return np.sqrt(wavelength_nm * 1e-6 * focal_mm)
+
+
+@BEST_HOLE.wrong("You divide by f. In a deeper box the light spreads on for longer, so the best hole is *wider*.")
+def divided_by_the_depth(focal_mm, wavelength_nm):
+    return np.sqrt(2.44 * wavelength_nm * 1e-6 / focal_mm)
+
+
+@BEST_HOLE.wrong(
+    "The root covers the wavelength and not the depth. Both stand in 2.44 λ f: multiply first, then take the root."
+)
+def depth_outside_the_root(focal_mm, wavelength_nm):
+    return np.sqrt(2.44 * wavelength_nm * 1e-6) * focal_mm
+
+
+# 4: vanishing points -------------------------------------------------------------------------------------------------
 
 
 def vanishing_point(direction: Array, f: float, cx: float, cy: float) -> Array:
@@ -285,7 +537,7 @@ def where_they_meet_on_the_wall(direction, f, cx, cy):
     return -f * direction[..., :2] / direction[..., 2:] + (cx, cy)
 
 
-# 3: find the bug in what is behind -----------------------------------------------------------------------------------
+# 5: find the bug in what is behind -----------------------------------------------------------------------------------
 
 
 def in_front(points: Array, f: float, cx: float, cy: float) -> Array:
@@ -443,256 +695,4 @@ def only_from_some_depth_on(points, f, cx, cy):
     return f * points[..., :2] / z + (cx, cy)
 
 
-# 4: the ray of a pixel -----------------------------------------------------------------------------------------------
-
-
-def ray(uv: Array, f: float, cx: float, cy: float) -> Array:
-    """The unit directions (..., 3) of all points that share the pixels (..., 2)."""
-    xy = (uv - np.array([cx, cy])) / f
-    direction = np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
-    return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
-
-
-def _ray_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        f, cx, cy = _pixels(rng)
-        yield (project(_points(rng, shape), f, cx, cy), f, cx, cy)
-    f, cx, cy = _shifted_pixels(rng)
-    yield (np.vstack([project(_points(rng, (3,)), f, cx, cy), [cx, cy]]), f, cx, cy)  # the last along the axis
-
-
-def _at_depth_one(uv, f, cx, cy):
-    return np.concatenate([(uv - (cx, cy)) / f, np.ones_like(uv[..., :1])], axis=-1)
-
-
-def _of_length_one(direction):
-    return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
-
-
-RAY = Exercise(
-    name="01.ray",
-    reference=ray,
-    cases=_ray_cases,
-    hints=(
-        "Undo the projection from its end. What was added last, and what multiplied before that? At which depth do the "
-        "x and y that you get lie?",
-        "Without the principal point and divided by f, the pixel is (x, y, 1), a point on the ray. "
-        "`np.concatenate([…, …], axis=-1)` puts numbers side by side, and `np.linalg.norm(…, axis=-1, keepdims=True)` "
-        "is the length of each vector.",
-        "`xy = (uv - ___) / ___` and, in the end, `return direction / ___`",
-    ),
-    praise="A pixel gives a direction and no more: every positive multiple of it lands there.",
-)
-
-
-@RAY.right
-def by_the_inverse_matrix(uv, f, cx, cy):
-    homogeneous = np.concatenate([uv, np.ones_like(uv[..., :1])], axis=-1)
-    return _of_length_one(homogeneous @ np.linalg.inv(_matrix(f, cx, cy)).T)
-
-
-@RAY.right
-def with_pixels_for_its_unit(uv, f, cx, cy):
-    u, v = uv[..., 0] - cx, uv[..., 1] - cy
-    return np.stack([u, v, np.full_like(u, f)], axis=-1) / np.sqrt(u**2 + v**2 + f**2)[..., None]
-
-
-@RAY.right
-def from_opencv_s_normalised_points(uv, f, cx, cy):
-    import cv2
-
-    xy = cv2.undistortPoints(uv.reshape(-1, 1, 2), _matrix(f, cx, cy), None).reshape(uv.shape)
-    return _of_length_one(np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1))
-
-
-@RAY.wrong("This is a point on the ray, at depth 1. Divide it by its length to have the *unit* direction.")
-def point_at_depth_one(uv, f, cx, cy):
-    return _at_depth_one(uv, f, cx, cy)
-
-
-@RAY.wrong(
-    "This is the right direction, (u − cx, v − cy, f), but it is hundreds of pixels long. Divide it by its length."
-)
-def point_at_depth_f(uv, f, cx, cy):
-    return f * _at_depth_one(uv, f, cx, cy)
-
-
-@RAY.wrong(
-    "This is the ray of the pixel counted from the principal point. Here (u, v) counts from the corner of the image: "
-    "subtract (cx, cy) first."
-)
-def principal_point_forgotten(uv, f, cx, cy):
-    return ray(uv, f, 0.0, 0.0)
-
-
-@RAY.wrong("You add the principal point. Projecting added it; the way back takes it off again.")
-def principal_point_added(uv, f, cx, cy):
-    return ray(uv, f, -cx, -cy)
-
-
-@RAY.wrong("x and y have the wrong sign: a pixel to the right of the principal point looks to the right.")
-def mirrored_ray(uv, f, cx, cy):
-    return ray(uv, f, cx, cy) * [-1, -1, 1]
-
-
-@RAY.wrong("Your ray leads out of the back of the camera. The camera looks along +Z: the third number is positive.")
-def backwards(uv, f, cx, cy):
-    return ray(uv, f, cx, cy) * [1, 1, -1]
-
-
-@RAY.wrong("The ray is too close to the axis: divide by f once, either x and y or the whole vector, not both.")
-def divided_by_f_twice(uv, f, cx, cy):
-    return _of_length_one(_at_depth_one(uv, f, cx, cy) * [1 / f, 1 / f, 1])
-
-
-@RAY.wrong("You never divide by f: pixels stand beside a depth of 1. The depth at which a pixel is one unit is f.")
-def pixels_beside_a_one(uv, f, cx, cy):
-    return ray(uv, 1.0, cx, cy)
-
-
-@RAY.wrong("These are x and y alone. A direction in space has three numbers; the third is the depth, 1.")
-def two_numbers(uv, f, cx, cy):
-    return _at_depth_one(uv, f, cx, cy)[..., :2]
-
-
-@RAY.wrong("You divide all rays by one common length. Each has its own: `axis=-1`, with `keepdims=True`.")
-def one_length_for_all(uv, f, cx, cy):
-    direction = _at_depth_one(uv, f, cx, cy)
-    return direction / np.linalg.norm(direction)
-
-
-@RAY.wrong("You divide by the *square* of the length, x² + y² + 1. Take its root first.")
-def divided_by_the_squared_length(uv, f, cx, cy):
-    direction = _at_depth_one(uv, f, cx, cy)
-    return direction / np.sum(direction**2, axis=-1, keepdims=True)
-
-
-@RAY.wrong("You divide by the sum of x, y and 1. The length of a vector is the root of the sum of its *squares*.")
-def divided_by_the_sum(uv, f, cx, cy):
-    direction = _at_depth_one(uv, f, cx, cy)
-    return direction / np.sum(direction, axis=-1, keepdims=True)
-
-
-@RAY.wrong("cx belongs to u and cy to v. In yours they have changed places, so that even the axis looks aslant.")
-def ray_with_c_swapped(uv, f, cx, cy):
-    return ray(uv, f, cy, cx)
-
-
-# 5: the best hole ----------------------------------------------------------------------------------------------------
-
-
-def best_hole(focal_mm: float, wavelength_nm: float) -> float:
-    """The hole as wide as its own Airy disc, d = 2.44 λ f / d, in millimetres."""
-    return np.sqrt(2.44 * wavelength_nm * 1e-6 * focal_mm)
-
-
-def _hole_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for _ in range(4):
-        yield (float(rng.uniform(15, 150)), float(rng.uniform(420, 680)))
-
-
-BEST_HOLE = Exercise(
-    name="01.best_hole",
-    reference=best_hole,
-    cases=_hole_cases,
-    tolerance=1e-6,  # of a millimetre: who looks for the least blur by trying finds the hole to that
-    shown=((50.0, 550.0),),
-    hints=(
-        "Set the two widths equal, d = 2.44 λ f / d, and solve for d. In which unit is each of the three lengths?",
-        "Multiply both sides by d: then d² is a product, and `np.sqrt` gives d. A nanometre is 10⁻⁶ mm, so the "
-        "wavelength needs a factor of its own.",
-        "`return np.sqrt(2.44 * wavelength_nm * ___ * ___)`",
-    ),
-    praise="For 50 mm and green light that is 0.26 mm, or 1.56 √(f λ). With Young's constant, 2, it would be 0.33 mm.",
-)
-
-
-@BEST_HOLE.right
-def in_metres(focal_mm, wavelength_nm):
-    return 1000 * (2.44 * wavelength_nm * 1e-9 * focal_mm * 1e-3) ** 0.5
-
-
-@BEST_HOLE.right
-def by_looking_for_the_least_blur(focal_mm, wavelength_nm):
-    from scipy.optimize import minimize_scalar
-
-    blur = lambda d: np.hypot(d, 2.44 * wavelength_nm * 1e-6 * focal_mm / d)  # noqa: E731
-    return minimize_scalar(blur, bounds=(0.01, 2), method="bounded", options={"xatol": 1e-9}).x
-
-
-@BEST_HOLE.right
-def by_halving_towards_the_crossing(focal_mm, wavelength_nm):
-    low, high = 1e-3, 10.0
-    for _ in range(60):
-        d = (low + high) / 2
-        low, high = (d, high) if d < 2.44 * wavelength_nm * 1e-6 * focal_mm / d else (low, d)
-    return d
-
-
-@BEST_HOLE.wrong("This is d². Take its square root.")
-def not_yet_the_root(focal_mm, wavelength_nm):
-    return 2.44 * wavelength_nm * 1e-6 * focal_mm
-
-
-@BEST_HOLE.wrong(
-    "This is 1000 times too large. Either the wavelength still counts in nanometres, or your answer is in µm: a "
-    "nanometre is 10⁻⁶ mm, and millimetres are wanted."
-)
-def nanometres_taken_for_millimetres(focal_mm, wavelength_nm):
-    return np.sqrt(2.44 * wavelength_nm * focal_mm)
-
-
-@BEST_HOLE.wrong(
-    "The wavelength is in metres here and the focal length in millimetres. In mm, one nanometre is `1e-6`."
-)
-def wavelength_in_metres(focal_mm, wavelength_nm):
-    return np.sqrt(2.44 * wavelength_nm * 1e-9 * focal_mm)
-
-
-@BEST_HOLE.wrong("The wavelength is in micrometres here and the focal length in millimetres: bring both to mm.")
-def wavelength_in_micrometres(focal_mm, wavelength_nm):
-    return np.sqrt(2.44 * wavelength_nm * 1e-3 * focal_mm)
-
-
-@BEST_HOLE.wrong("1.22 λ f / d is the *radius* of the Airy disc. d is a diameter: compare it with 2.44 λ f / d.")
-def radius_of_the_airy_disc(focal_mm, wavelength_nm):
-    return np.sqrt(1.22 * wavelength_nm * 1e-6 * focal_mm)
-
-
-@BEST_HOLE.wrong(
-    "This is Rayleigh's constant, 1.9, for another notion of sharpness. Here the hole equals its Airy disc."
-)
-def rayleigh_s_hole(focal_mm, wavelength_nm):
-    return 1.9 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
-
-
-@BEST_HOLE.wrong(
-    "This is Young's constant, 2, for another notion of sharpness. Here the hole is to equal its Airy disc."
-)
-def young_s_hole(focal_mm, wavelength_nm):
-    return 2 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
-
-
-@BEST_HOLE.wrong("The 2.44 stands under the root: it is d² that equals 2.44 λ f.")
-def constant_outside_the_root(focal_mm, wavelength_nm):
-    return 2.44 * np.sqrt(wavelength_nm * 1e-6 * focal_mm)
-
-
-@BEST_HOLE.wrong("The 2.44 is missing. √(λ f) is the *radius* of one Fresnel zone; here the Airy disc's width counts.")
-def without_the_constant(focal_mm, wavelength_nm):
-    return np.sqrt(wavelength_nm * 1e-6 * focal_mm)
-
-
-@BEST_HOLE.wrong("You divide by f. In a deeper box the light spreads on for longer, so the best hole is *wider*.")
-def divided_by_the_depth(focal_mm, wavelength_nm):
-    return np.sqrt(2.44 * wavelength_nm * 1e-6 / focal_mm)
-
-
-@BEST_HOLE.wrong(
-    "The root covers the wavelength and not the depth. Both stand in 2.44 λ f: multiply first, then take the root."
-)
-def depth_outside_the_root(focal_mm, wavelength_nm):
-    return np.sqrt(2.44 * wavelength_nm * 1e-6) * focal_mm
-
-
-EXERCISES = (PROJECT, VANISHING, RAY, IN_FRONT, BEST_HOLE)
+EXERCISES = (PROJECT, RAY, BEST_HOLE, VANISHING, IN_FRONT)

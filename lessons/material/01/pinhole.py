@@ -5,7 +5,7 @@ A reader's own projection can draw the garden's outlines over that picture.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -16,35 +16,23 @@ import numpy as np
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
-from camviz.draw.flow import rows
-from camviz.draw.items import closed
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.flow import Cell, rows
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, logarithmic_grid, logs, plot_panel
 from camviz.draw.readout import listed, readout, seconds
-from camviz.draw.space import Dots, Face, Item, Label, Line, OrbitCamera, TexturedMesh, space_panel
+from camviz.draw.space import OrbitCamera, space_panel
 from camviz.poses import RigidTransform
-from camviz.scenes import render, snapshot, textured_scene, to_display
-from camviz.views.base import Drawn, OrbitView, answered, positive, slider, step_of, switch
+from camviz.scenes import render, textured_scene, to_display
+from camviz.views.base import Drawn, OrbitView, answered, positive, slider, step_of, switch, without
+from camviz_school.views.box_in_space import ENLARGED, TOWER, TOWER_M, WALL_MM, box_and_garden, garden_outlines
 
-WALL_MM = np.array([36.0, 27.0])
 PIXELS = 480  # across the wall: 75 µm each
 WHITE_PHOTONS = 2000  # in a pixel that is just white
-ENLARGED = 30  # the box beside the garden, or nobody would see it
-TOWER = np.array([0.68, 0.67, 3.3])  # the middle of the crate and the globe on it, in the world
-TOWER_M = 1.16
-_POINTS_A_LINE = 33
-_GRID = np.array([[0, 1], [3, 2]])  # of an outline's corners, as a picture hangs on them
-_PANELS = ("box picture blur", "box picture", "picture yours")
-_ABOVE = (330, {"box": 560, "picture on the wall": 400})
-_LAYOUTS = {
-    "box picture blur": rows(_ABOVE, (252, {"blur": 400}))
-    | {"numbers": (400, 330, 290, 200), "similar triangles": (690, 330, 270, 136)},
-    "box picture": rows(_ABOVE, (136, {"numbers": 290, "similar triangles": 270})),
-    "picture yours": rows(
-        (376, {"projected rightly": 480, "projected by you": 480}), (172, {"numbers": 290, "similar triangles": 270})
-    ),
-}
+_WIDTHS = {"box": 560, "picture": 400, "yours": 400, "blur": 560}  # of the panels, where they stand alone
+_NUMBERS: dict[str, float] = {"numbers": 290, "similar triangles": 270}
+_TILES = {"picture": "picture on the wall", "yours": "projected by you"}  # of panels that are not called as they are
+LAMP_PX = np.array([40.0, 30.0])  # where the lamp is seen, from the principal point of the upright picture
 _HOLES, _BLURS = (0.05, 2.0), (0.1, 4.0)  # the plot's range, mm
 _POINTS = {  # of the tower, from its middle, metres: what the rays start from
     "blue": (0.0, -TOWER_M / 2, 0.0),
@@ -62,14 +50,21 @@ class PinholeView(OrbitView):
     `noise`, counted in photons. `match_exposure` exposes for as long as it takes instead of `exposure_s`. On the wall
     the picture is turned by 180°, seen from behind; `turn_picture` puts it upright.
 
-    `panels` names what is drawn: "box picture blur"; without blur, for readers who are to predict it; or "picture
-    yours", the upright picture with the garden's outlines over it, once as they are projected, in yellow, and once in
-    orange by `yours`, a reader's function of (points, f, cx, cy): points (..., 3) in camera coordinates to pixels
-    (..., 2), with f, cx and cy in pixels.
+    `lamp_m` metres from the hole, on the ray of one pixel, hangs a yellow lamp; at 0 there is none.
+
+    `panels` names what is drawn, one to four of box, picture, yours and blur, and the numbers beside them. `yours` is
+    the upright picture with the garden's outlines over it, in orange, as they are projected by a reader's function of
+    (points, f, cx, cy): points (..., 3) in camera coordinates to pixels (..., 2), with f, cx and cy in pixels. Beside
+    it the picture is upright, too, and its outlines are yellow.
     """
 
     title: ClassVar[str] = "Pinhole camera"
-    layouts = _PANELS
+    openable: ClassVar[Mapping[str, str]] = {
+        "box": "box in space",
+        "picture": "picture",
+        "blur": "blur curve",
+        "numbers": "numbers",
+    }
 
     hole_mm: float = slider(0.3, 0.05, 2.0, 0.01, label="hole d", unit="mm", help="diameter of the hole")
     depth_mm: float = slider(50.0, 15.0, 120.0, 1.0, label="depth f", unit="mm", help="from the hole to the wall")
@@ -77,16 +72,23 @@ class PinholeView(OrbitView):
     exposure_s: float = slider(1.0, 0.05, 10.0, 0.05, label="exposure", unit="s", help="how long the hole is open")
     match_exposure: bool = switch(False, label="match exposure", help="expose as long as the brightness needs")
     turn_picture: bool = switch(False, label="turn the picture", help="as it hangs on the wall, or upright")
+    lamp_m: float = slider(0.0, 0.0, 6.0, 0.05, label="lamp s", unit="m", help="from the hole, on one pixel's ray")
     noise: bool = switch(True, label="photon noise", help="light arrives in photons: dim pictures are grainy")
     eye: OrbitCamera = OrbitCamera(
         distance=0.8, yaw_deg=46, pitch_deg=18
     )  # its distance counts in lengths of what there is to see
-    panels: str = "box picture blur"
+    panels: str = "box picture blur numbers"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         positive(self, "hole_mm", "depth_mm", "object_m", "exposure_s")
+        if self.lamp_m < 0:
+            raise ValueError(f"lamp_m must not be below zero, got {self.lamp_m}")
+        if not self._drawn or not set(self.panels.split()) <= {*_WIDTHS, "numbers"}:
+            raise ValueError(
+                f"panels must be one or more of {', '.join(_WIDTHS)}, and numbers beside them, got {self.panels!r}"
+            )
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -136,7 +138,7 @@ class PinholeView(OrbitView):
         return {
             "f-number": f"f/{float(optics.f_number(self.hole_mm, self.depth_mm)):.0f}",
             "field of view": f"{optics.field_of_view_deg(WALL_MM[0], self.depth_mm):.1f}° across",
-            **(blur if "blur" in self.panels else {}),
+            **(blur if self._has("blur") else {}),
             "exposure": seconds(self.exposed_s),
             "brightness": f"{_times(self.brightness)} correct",
         }
@@ -149,27 +151,57 @@ class PinholeView(OrbitView):
     def description(self) -> str:
         figures = listed(self.numbers())
         shown = "upright" if self._upright else "upside down, as on the wall"
+        lamp = f" A lamp hangs {self.lamp_m:g} m from the hole." if self.lamp_m else ""
         return (
             f"A hole of {self.hole_mm:g} mm, {self.depth_mm:g} mm before the wall, {self.object_m:g} m from the globe: "
             f"{figures}; the crate and globe, {TOWER_M} m tall, are {self._tower_image_mm:.1f} mm tall on the wall. "
-            f"Picture shown {shown}."
+            f"Picture shown {shown}.{lamp}"
         )
 
     @property
     def _upright(self) -> bool:
-        return self.turn_picture or "yours" in self.panels  # pixels count in the upright picture
+        return self.turn_picture or self._has("yours")  # pixels count in the upright picture
+
+    @property
+    def _drawn(self) -> list[str]:
+        """The panels beside the numbers, in their order."""
+        return [name for name in self.panels.split() if name != "numbers"]
 
     def figure(self, *, draft: bool = False) -> Picture:
         upright = self.image(320 if draft else PIXELS)
-        photographs = {"wall": jpeg(upright if self._upright else upright[::-1, ::-1].copy())}
-        if "yours" in self.panels:
-            parts = self._both_projections()
+        parts, photographs = dict[str, str](), dict[str, bytes]()
+        layout = self._layout
+        for name in self._drawn:
+            if name == "box":
+                parts[name], more = self._box_panel(layout[name], upright, draft)
+                photographs |= more
+            else:
+                draw = {"picture": self._picture_panel, "yours": self._your_panel, "blur": self._blur_panel}[name]
+                parts[name] = draw(layout[name])
+        if self._has("picture") or self._has("yours"):
+            photographs["wall"] = jpeg(upright if self._upright else upright[::-1, ::-1].copy())
+        if self._has("numbers"):
+            parts |= self._numbers(layout)
+        tiles = {_TILES.get(name, name): cell for name, cell in layout.items()}
+        return self.tiled(tiles, {_TILES.get(name, name): part for name, part in parts.items()}, photographs)
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        """Two panels in the first row, the others below them, and the numbers where there is room."""
+        first, below = self._drawn[:2], self._drawn[2:]
+        across = _WIDTHS[first[0]] if len(first) == 1 else 960
+        height = 374 if set(first) == {"picture", "yours"} else 330
+        found = [(height, _shared(first, across))]
+        numbers = _NUMBERS if self._has("numbers") else dict[str, float]()
+        tall = 200 if self._has("blur") else 172 if self._has("yours") else 136
+        if numbers and len(below) == 1:
+            found.append((252, {**_shared(below, 400), **numbers}))
         else:
-            box, more = self._box_panel(upright, draft)
-            photographs |= more
-            parts = {"box": box, "picture on the wall": self._picture_panel()}
-            parts |= {"blur": self._blur_panel() if "blur" in self.panels else ""} | self._numbers()
-        return self.tiled(_LAYOUTS[self.panels], parts, photographs)
+            found += [(252, _shared(below, 960))] if below else []
+            found += [(tall, numbers)] if numbers else []
+        cells = rows(*found)
+        heights = {name: tall if name == "numbers" else min(tall, 172) for name in numbers}
+        return {name: (x, y, width, heights.get(name, height)) for name, (x, y, width, height) in cells.items()}
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -182,18 +214,33 @@ class PinholeView(OrbitView):
             light += np.sqrt(np.maximum(light, 0) / WHITE_PHOTONS) * _grain(light.shape)
         return to_display(light)
 
-    def _picture_panel(self) -> str:
+    def _picture_panel(self, cell: Cell) -> str:
+        panel, picture = self._image_panel("wall", cell)
+        if self._has("yours"):
+            lines = Camera(self.camera().intrinsics).project(self._outlines)
+            outlines = svg.path(panel.place(lines), "yellow")
+            return panel.show(picture + outlines, title="The picture, its outlines projected")
+        title = "The picture, as a display shows it" if self._upright else "On the wall, from behind"
+        size = f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm" if self._has("numbers") else ""
+        return panel.show(picture + self._marks(panel), title=title, note=size)
+
+    def _image_panel(self, name: str, cell: Cell) -> tuple[Panel, str]:
+        """A panel of the picture in a tile, and the picture in it."""
         pixels = self.camera().intrinsics
-        panel = image_panel("wall", 570, 34, 380, pixels.width, pixels.height)
-        marks = "".join(
+        panel = image_in(cell, name, pixels.width, pixels.height)
+        return panel, placed_image(panel, "wall", pixels.width, pixels.height)
+
+    def _marks(self, panel: Panel) -> str:
+        """Where the rays that the box shows meet the wall."""
+        if self.lamp_m:
+            middle = (np.array([PIXELS, PIXELS * 3 // 4]) - 1) / 2
+            return svg.dots([panel.place(middle + (LAMP_PX if self._upright else -LAMP_PX))], "yellow ringed", 10)
+        if not self._has("box"):
+            return ""
+        ends = panel.place([self._pixel(_POINTS["blue"]), self._pixel(_POINTS["orange"])])
+        return svg.line(ends, "yellow dashed thin") + "".join(
             svg.dots([panel.place(self._pixel(point))], f"{colour} ringed", 8) for colour, point in _POINTS.items()
         )
-        ends = panel.place([self._pixel(_POINTS["blue"]), self._pixel(_POINTS["orange"])])
-        title = "The picture, turned upright" if self._upright else "On the wall, from behind"
-        content = (
-            placed_image(panel, "wall", pixels.width, pixels.height) + svg.line(ends, "yellow dashed thin") + marks
-        )
-        return panel.show(content, title=title, note=f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm")
 
     def _pixel(self, point: tuple[float, float, float]) -> np.ndarray:
         """Where a point of the tower is in the picture shown."""
@@ -203,45 +250,37 @@ class PinholeView(OrbitView):
 
     # The reader's own projection -------------------------------------------------------------------------------------
 
-    def _both_projections(self) -> dict[str, str]:
-        """The picture twice, with the garden's outlines over it: as they are projected, and as the reader does it."""
-        camera = self.camera()
-        outlines = _garden_outlines() - camera.centre  # the box is not turned
-        right = Camera(camera.intrinsics).project(outlines)
-        yours, problem = self._your_pixels(outlines)
-        words = svg.paragraph((14, 30), problem, 412) if problem else ""
-        return {
-            "projected rightly": self._outlined("right", 20, right, "yellow", "The picture, its outlines projected"),
-            "projected by you": self._outlined("yours", 500, yours, "orange", "The same, by your function", words),
-        } | self._pixel_numbers()
+    @property
+    def _outlines(self) -> np.ndarray:
+        """The garden's outlines in camera coordinates; the box is not turned."""
+        return garden_outlines() - self.camera().centre
 
-    def _your_pixels(self, points: np.ndarray) -> tuple[np.ndarray, str]:
-        """Where the reader's function puts points (..., 3), and what is wrong with it."""
-        pixels = self.camera().intrinsics
-        return answered(self.yours, (points, pixels.fx, pixels.cx, pixels.cy), points[..., :2])
+    def _your_panel(self, cell: Cell) -> str:
+        """The picture with the garden's outlines over it as the reader's function projects them."""
+        panel, picture = self._image_panel("yours", cell)
+        pixels, points = self.camera().intrinsics, self._outlines
+        lines, problem = answered(self.yours, (points, pixels.fx, pixels.cx, pixels.cy), points[..., :2])
+        title = "The same, by your function"
+        if problem:
+            right = Camera(pixels).project(points)
+            return without(panel, problem, title, right=picture + svg.path(panel.place(right), "yellow"))
+        return panel.show(picture + svg.path(panel.place(lines), "orange"), title=title)
 
-    def _outlined(self, name: str, x: float, lines: np.ndarray, colour: str, title: str, words: str = "") -> str:
-        pixels = self.camera().intrinsics
-        panel = image_panel(name, x, 34, 440, pixels.width, pixels.height)
-        picture = "" if words else placed_image(panel, "wall", pixels.width, pixels.height)
-        return panel.show(picture + svg.path(panel.place(lines), colour) + words, title=title)
-
-    def _pixel_numbers(self) -> dict[str, str]:
-        """What the function is given, under the pictures."""
+    def _pixel_numbers(self, x: float, y: float) -> str:
+        """What the reader's function is given, from a place on."""
         pixels, pitch_um = self.camera().intrinsics, 1000 * WALL_MM[0] / PIXELS
         given = [
             ("focal length", f"f = {self.depth_mm:g} mm / {pitch_um:g} µm = {pixels.fx:.1f} px"),
             ("principal point", f"cx = {pixels.cx:g} px, cy = {pixels.cy:g} px"),
             ("picture", f"{pixels.width} × {pixels.height} pixels, {WALL_MM[0]:g} × {WALL_MM[1]:g} mm"),
         ]
-        title = svg.text((20, 398), "What your function is given", "title")
-        numbers = title + readout(given, (20, 424), (0, 44), (0, 19))
-        return {"numbers": numbers, "similar triangles": self._triangles(310, 398)}
+        return svg.text((x, y), "What your function is given", "title") + readout(given, (x, y + 26), (0, 44), (0, 19))
 
     # The box ---------------------------------------------------------------------------------------------------------
 
-    def _box_panel(self, upright: np.ndarray, draft: bool) -> Drawn:
-        panel = space_panel("box", 10, 34, 540, 285)
+    def _box_panel(self, cell: Cell, upright: np.ndarray, draft: bool) -> Drawn:
+        x, y, width, height = cell
+        panel = space_panel("box", x + 10, y + 34, width - 20, height - 45)
         behind = ENLARGED * self.depth_mm / 1000
         extent = self.object_m + behind
         aim = (0.0, 0.0, (self.object_m - behind) / 2 - 0.08 * extent)
@@ -249,42 +288,24 @@ class PinholeView(OrbitView):
         label = "The box and the garden in space; drag or press the arrow keys to walk around"
         note = f"the box is drawn {ENLARGED} times as large"
         heading: dict[str, Any] = {"eye": eye, "note": note, "hint": "", "drag": "orbit"}
-        return self.in_space(panel, self._box_items(upright), draft, "Light in a box", label, **heading)
+        items = box_and_garden(upright, self.depth_mm, self.object_m, self._ray_starts(), lamp=self.lamp_m > 0)
+        return self.in_space(panel, items, draft, "Light in a box", label, **heading)
 
-    def _box_items(self, upright: np.ndarray) -> list[Item]:
-        """The garden as a picture in its place, the rays through the hole, and the picture they make."""
-        half, behind = ENLARGED * WALL_MM / 2000, ENLARGED * self.depth_mm / 1000
-        wall = np.array([(half[0], half[1]), (-half[0], half[1]), (-half[0], -half[1]), (half[0], -half[1])])
-        front, back = (np.insert(wall, 2, z, axis=1) for z in (0.0, -behind))
-        stage = np.array([(-0.95, -0.72), (0.95, -0.72), (0.95, 0.72), (-0.95, 0.72)])
-        scene = np.insert(stage, 2, self.object_m, axis=1)
-        items: list[Item] = [
-            TexturedMesh.over(scene[_GRID], _stage()),
-            TexturedMesh.over(back[_GRID], upright),
-            Line(closed(scene), "muted", 1.2),
-            Face(front, "shade", 0.25),
-            *(Line(closed(rim), "ink", 1.6) for rim in (front, back)),
-            *(Line(np.array([a, b]), "ink", 1.4) for a, b in zip(front, back, strict=True)),
-            Line(np.array([(0, 0, -behind), (0, 0, self.object_m)]), "muted dashed", 1.0),
-            Dots(np.zeros(3), "ink", 7),
-        ]
-        for colour, point in _POINTS.items():
-            start = np.array(point) + (0, 0, self.object_m)
-            end = -start * _reach(start, half, behind)
-            items += [Line(np.array([start, end]), colour, 1.9), Dots(np.array([start, end]), colour, 7)]
-        return [
-            *items,
-            Label(np.array([0, -half[1] - 0.12, 0]), "hole"),
-            Label(np.array([0, -0.9, self.object_m]), "scene"),
-        ]
+    def _ray_starts(self) -> dict[str, np.ndarray]:
+        """Where the rays start that the box shows, by their colours, from the hole: at the tower, or at the lamp."""
+        if self.lamp_m:
+            along = np.append(LAMP_PX, self.camera().intrinsics.fx)
+            return {"yellow": self.lamp_m * along / np.linalg.norm(along)}
+        return {colour: np.array(point) + (0, 0, self.object_m) for colour, point in _POINTS.items()}
 
     # The blur --------------------------------------------------------------------------------------------------------
 
     @cached_property
     def _plot(self) -> Panel:
-        return plot_panel("blur", 76, 364, 316, 166, logs(_HOLES), logs(_BLURS))
+        x, y, width, height = self._layout["blur"]
+        return plot_panel("blur", x + 76, y + 34, width - 84, height - 86, logs(_HOLES), logs(_BLURS))
 
-    def _blur_panel(self) -> str:
+    def _blur_panel(self, cell: Cell) -> str:
         panel = self._plot
         hole = np.geomspace(*_HOLES, 121)
         shadow = optics.geometric_blur_mm(hole, self.depth_mm, 1000 * self.object_m)
@@ -330,11 +351,11 @@ class PinholeView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers(self) -> dict[str, str]:
-        left = 420 if "blur" in self.panels else 10
-        figures = readout(self.numbers(), (left, 380), (0, 22), (122, 0))
-        numbers = svg.text((left, 356), "This box", "title") + figures
-        return {"numbers": numbers, "similar triangles": self._triangles(left + 290, 356)}
+    def _numbers(self, layout: Mapping[str, Cell]) -> dict[str, str]:
+        (x, y), (right, top) = ((layout[name][0] + 20, layout[name][1] + 26) for name in _NUMBERS)
+        numbers = svg.text((x, y), "This box", "title") + readout(self.numbers(), (x, y + 24), (0, 22), (122, 0))
+        numbers = self._pixel_numbers(x, y) if self._has("yours") else numbers
+        return {"numbers": numbers, "similar triangles": self._triangles(right, top)}
 
     def _triangles(self, x: float, y: float) -> str:
         """How tall the crate and globe are on the wall, from a place on."""
@@ -351,35 +372,15 @@ def _sharp(depth_mm: float, object_m: float, width: int) -> np.ndarray:
     return light
 
 
-@lru_cache(maxsize=1)
-def _stage() -> np.ndarray:
-    """The garden around the tower as it looks from three metres away: 1.9 × 1.44 m of it."""
-    pixels = Intrinsics(380, 288, 600, 600, 189.5, 143.5)
-    pose = RigidTransform.from_translation(TOWER - (0, 0, 3.0))
-    return snapshot(textured_scene(), Camera(pixels, world_from_cam=pose))
-
-
-@lru_cache(maxsize=1)
-def _garden_outlines() -> np.ndarray:
-    """The outlines (lines, points, 3) of what stands in the garden, in the world, all with as many points."""
-    lines = [line for name, line in textured_scene().outlines() if name not in ("terrace", "lawn", "easel")]
-    share = np.linspace(0, 1, _POINTS_A_LINE)
-    along = [np.linspace(0, 1, len(line)) for line in lines]
-    return np.array(
-        [np.stack([np.interp(share, t, c) for c in line.T], axis=-1) for t, line in zip(along, lines, strict=True)]
-    )
-
-
 @lru_cache(maxsize=2)
 def _grain(shape: tuple[int, ...]) -> np.ndarray:
     """One fixed draw of standard normal numbers, so that the grain holds still while something else moves."""
     return np.random.default_rng(1).standard_normal(shape, dtype=np.float32)
 
 
-def _reach(start: np.ndarray, half: np.ndarray, behind: float) -> float:
-    """How far a ray goes on behind the hole, as a share of the way before it: to the wall, or to the box's side."""
-    sides = np.divide(half, np.abs(start[:2]), out=np.full(2, np.inf), where=start[:2] != 0)
-    return float(min(behind / start[2], *sides))
+def _shared(names: list[str], across: float) -> dict[str, float]:
+    """The widths of some panels that fill a row together."""
+    return {name: across * _WIDTHS[name] / sum(_WIDTHS[one] for one in names) for name in names}
 
 
 _HOLE_TICKS = [(float(np.log10(d)), f"{d:g}") for d in (0.05, 0.1, 0.2, 0.5, 1, 2)]
