@@ -35,7 +35,9 @@ _FOCAL: dict[str, Any] = {"low": 150.0, "high": 2000.0, "step": 1.0, "unit": "px
 _LEAN_DRAWN = 3  # times
 _YOURS_M = 2.8  # as deep as a reader's rays are drawn, twice as deep as the camera's own pyramid
 _MAIN = ("picture", "rays")
-_ASIDE = {"K": 495, "pixels": 185, "numbers": 280}  # and their shares of a row of their own
+_AFTER = "what becomes of it"
+_ASIDE = ("K", "pixels", "numbers")
+_SHARES = {"K": 265, _AFTER: 230, "pixels": 185, "numbers": 280}  # of the second row, where K takes two tiles
 _MARKS = ("balloon", "globe", "centre", "corners")
 # Of one row, by how many panels of either kind stand in it: its height at most and their widths.
 _ONE_ROW: dict[tuple[int, int], tuple[float, tuple[float, ...]]] = {
@@ -46,8 +48,8 @@ _ONE_ROW: dict[tuple[int, int], tuple[float, tuple[float, ...]]] = {
     (2, 1): (330, (345, 330, 285)),
 }
 _TWO_ROWS = {1: (374, (960,)), 2: (374, (460, 500))}  # of the first: the second is as high as K needs
-_MATRIX_HIGH, _MATRICES_WIDE = 222, 460
-_BESIDE, _BELOW = 245, 140  # picture units from one matrix to the other
+_MATRIX_HIGH = 222
+_BELOW = 140  # picture units from one matrix to the other
 _RAYS = "The rays it picks out"
 
 
@@ -236,13 +238,13 @@ class IntrinsicsView(OrbitView):
         ).capitalize()
 
     def rule(self) -> str:
-        """What the operation does to K, with its numbers."""
+        """What the operation does to K, with its numbers; "" for a picture as taken."""
         (x0, y0), s = self._corner, self.intrinsics.width / self.width
         return {
-            "as taken": "K turns directions into pixels; its inverse turns pixels into directions.",
-            "cropped": f"cropped: c′ = c − (x0, y0) = c − ({x0}, {y0}); f and skew stay",
-            "resized": f"resized by {s:g}: f′ = {s:g} f,  c′ = {s:g} c {_signed((s - 1) / 2)}",
-            "binned": f"binned {BINS} × {BINS}: f′ = f / {BINS},  c′ = c / {BINS} {_signed((s - 1) / 2)}",
+            "as taken": "",
+            "cropped": f"c′ = c − ({x0}, {y0}); f and skew stay",
+            "resized": f"f′ = {s:g} f,  c′ = {s:g} c {_signed((s - 1) / 2)}",
+            "binned": f"f′ = f / {BINS},  c′ = c / {BINS} {_signed((s - 1) / 2)}",
         }[self.operation]
 
     # The picture -----------------------------------------------------------------------------------------------------
@@ -253,7 +255,8 @@ class IntrinsicsView(OrbitView):
         if self._has("rays"):
             parts["rays"], attached = self._space_panel(draft)
             photographs |= attached
-        parts |= {name: draw[name]() for name in _ASIDE if self._has(name)}
+        for name in _ASIDE:
+            parts |= draw[name]() if self._has(name) else {}
         return self.tiled(self._layout, parts, photographs)
 
     @cached_property
@@ -264,8 +267,9 @@ class IntrinsicsView(OrbitView):
             height, widths = _ONE_ROW[len(main), len(aside)]
             return rows((height, dict(zip([*main, *aside], widths, strict=True))))
         height, widths = _TWO_ROWS[len(main)]
-        whole = sum(_ASIDE[name] for name in aside)
-        second = {name: WIDTH * _ASIDE[name] / whole for name in aside}
+        tiles = [name for name in _SHARES if self._has("K" if name == _AFTER else name)]
+        whole = sum(_SHARES[name] for name in tiles)
+        second = {name: WIDTH * _SHARES[name] / whole for name in tiles}
         return rows((height, dict(zip(main, widths, strict=True))), (_MATRIX_HIGH, second))
 
     def _marked(self, name: str) -> bool:
@@ -412,23 +416,29 @@ class IntrinsicsView(OrbitView):
 
     # The matrices ----------------------------------------------------------------------------------------------------
 
-    def _matrices(self) -> str:
-        """K, and where something is done to the picture, what becomes of it: beside it, or in a narrow tile below."""
-        left, top, across, _ = self._layout["K"]
-        x, y, K = left + 10, top + 48, self.intrinsics
-        there = (x + _BESIDE, y) if across >= _MATRICES_WIDE else (x, y + _BELOW)
+    def _matrices(self) -> dict[str, str]:
+        """K, and what becomes of it: in a tile beside it, or in one narrow tile below it."""
+        x, y, across, _ = self._layout["K"]
+        x, y = x + 10, y + 48
+        name = "K" if self.operation == "as taken" else "K, as taken"
+        before = intrinsic_matrix(x, y, name, self.taken.K)
+        if _AFTER not in self._layout:
+            return {"K": before + self._afterwards(x, y + _BELOW, across - 30)}
+        left, _, wide, _ = self._layout[_AFTER]
+        return {"K": before, _AFTER: self._afterwards(left + 10, y, wide - 20)}
+
+    def _afterwards(self, x: float, y: float, width: float) -> str:
+        """What the operation makes of K, and by which rule; of a picture as taken, what K does."""
+        K = self.intrinsics
         if self.operation == "as taken":
             u = f"u = {K.fx:.2f} x {_signed(K.skew)} y {_signed(K.cx)}"
             lines = [(u, "number"), (f"v = {K.fy:.2f} y {_signed(K.cy)}", "number"), ("with x = X/Z, y = Y/Z", "note")]
-            at = there if there[1] == y else (x, y + 98)
-            told = [svg.text((at[0], at[1] + 10 + 20 * i), *line) for i, line in enumerate(lines)]
-            return intrinsic_matrix(x, y, "K", K.K) + "".join(told)
+            return "".join(svg.text((x, y + 10 + 20 * i), *line) for i, line in enumerate(lines))
         changed = ~np.isclose(self.taken.K, K.K, rtol=0, atol=1e-9)
-        after = intrinsic_matrix(*there, f"K, {self.operation}", K.K, changed)
-        rule = svg.paragraph((x, there[1] + 98), self.rule(), across - 30)
-        return intrinsic_matrix(x, y, "K, as taken", self.taken.K) + after + rule
+        after = intrinsic_matrix(x, y, f"K, {self.operation}", K.K, changed)
+        return after + svg.paragraph((x, y + 98), self.rule(), width)
 
-    def _lattice_panel(self) -> str:
+    def _lattice_panel(self) -> dict[str, str]:
         """A few pixels as they lie on the sensor, their lean drawn larger than it is."""
         K = replace(self.intrinsics, skew=_LEAN_DRAWN * self.intrinsics.skew)
         x, y, across, high = self._layout["pixels"]
@@ -453,15 +463,15 @@ class IntrinsicsView(OrbitView):
             + svg.text(v[1] + (6, 6), "v", "green halo")
         )
         note = f"lean drawn {_LEAN_DRAWN} ×" if K.skew else ""
-        return panel.show(content, title="Its pixels", note=note)
+        return {"pixels": panel.show(content, title="Its pixels", note=note)}
 
-    def _numbers_column(self) -> str:
+    def _numbers_column(self) -> dict[str, str]:
         """All figures, and the shape of a pixel only beside K or pixels, or where millimetres count."""
         x, y, _, _ = self._layout["numbers"]
         figures = self.numbers()
         if not (self._has("K") or self._has("pixels") or self.millimetres):
             del figures["pixel width / height"]
-        return readout(figures, (x + 10, y + 26), (0, 40), (0, 17))
+        return {"numbers": readout(figures, (x + 10, y + 26), (0, 40), (0, 17))}
 
     # The hands -------------------------------------------------------------------------------------------------------
 
