@@ -142,9 +142,9 @@ def test_a_picture_alone_has_neither_grid_nor_numbers_until_they_are_opened():
     alone = DistortionView(panels="picture")
     assert tiles(alone) == ["the picture"]
     assert alone.figure(draft=True).body.count("stroke:#f2c94c") == 0
-    assert alone.opening({"grid": True}).figure(draft=True).body.count("stroke:#f2c94c") == 1
-    assert tiles(alone.opening({"grid": True})) == ["the picture"]
-    assert tiles(alone.opening({"curve": True, "numbers": True})) == ["the picture", "radial curve", "numbers"]
+    assert alone.with_panels({"grid": True}).figure(draft=True).body.count("stroke:#f2c94c") == 1
+    assert tiles(alone.with_panels({"grid": True})) == ["the picture"]
+    assert tiles(alone.with_panels({"curve": True, "numbers": True})) == ["the picture", "radial curve", "numbers"]
 
 
 def test_a_new_view_has_all_that_can_be_opened_but_one():
@@ -240,3 +240,16 @@ def test_an_unwritten_function_leaves_the_right_picture_greyed_and_a_faulty_one_
     assert "yours appears here" not in figure.body
     assert "IndexError" in figure.body
     assert list(figure.photographs) == ["camera"]
+
+
+def test_a_wrong_function_bends_a_given_photograph_otherwise_in_each_mode():
+    stripes = np.repeat(np.repeat(np.arange(32) % 2 * 255, 20)[None, :, None], 480, axis=0).repeat(3, axis=2)
+
+    def turned(xy, k1, k2, k3):
+        return polynomial(xy, -k1, -k2, -k3)
+
+    for show in ("distorted", "undistorted"):
+        state = {"show": show, "panels": "picture yours", "photograph": stripes.astype(np.uint8)}
+        shown = DistortionView(k1=-0.2, k2=0.0, yours=turned, **state).figure(draft=True).photographs
+        camera, yours = (cv2.imdecode(np.frombuffer(shown[name], np.uint8), 1) for name in ("camera", "yours"))
+        assert cv2.PSNR(camera, yours) < 15

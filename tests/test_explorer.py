@@ -16,6 +16,7 @@ from traitlets import TraitError, link
 from camviz.draw.picture import Picture
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.frustum import FrustumView
+from camviz.views.light_field import LightFieldView
 from camviz.widgets import Explorer, explore
 from camviz.widgets.still import _show_box
 from camviz.widgets.waiting import hand_out
@@ -535,3 +536,11 @@ def test_a_function_that_cannot_be_drawn_leaves_the_picture_as_it_was():
     assert hand_out(written(1000)) == 0
     assert waiting.frame["described"] == "waits"
     assert waiting.view.yours is double
+
+
+def test_every_view_can_be_reset_whatever_its_fields_are_called():
+    """Two views have a field of the word `opening`, an aperture's."""
+    for view in (LightFieldView(), FrustumView()):
+        explorer = explore(view)
+        assert wish(explorer, reset=True)["error"] == ""
+        assert explorer.opened == []

@@ -11,6 +11,8 @@ import nbformat
 import numpy as np
 import pytest
 
+from camviz.draw.gallery import side_by_side
+from camviz.views.yours import faded
 from camviz_school.course import notebooks
 from camviz_school.teaching import deck, panels, parts, plans, slides
 
@@ -186,10 +188,12 @@ def test_no_picture_of_an_unsolved_lesson_is_black_or_empty(path):
 
 
 def test_the_black_map_of_an_unwritten_function_would_be_seen():
-    lesson = notebooks.read(next(path for path in LESSONS if path.name.startswith("05")))
-    drawn = parts.drawn_by_reader(lesson)
-    (black,) = [one for cell in lesson.cells if cell.id in drawn for one in panels.panels(cell) if black_or_empty(one)]
-    assert "your map" in black.description
+    """And the greyed picture that stands in its place is neither."""
+    photograph = np.random.default_rng(1).integers(0, 255, (90, 120, 3)).astype(np.uint8)
+    shown = side_by_side({"black": np.zeros((90, 120, 3), np.uint8), "yours": faded(photograph)})
+    cell = nbformat.v4.new_code_cell("shown")
+    cell.outputs = [nbformat.v4.new_output("display_data", data=shown._repr_mimebundle_())]
+    assert [black_or_empty(one) for one in panels.panels(cell)] == [True, False]
 
 
 # Whose function draws it ---------------------------------------------------------------------------------------------
@@ -247,7 +251,8 @@ def test_an_unsolved_deck_says_where_the_readers_picture_is_and_a_solved_one_sho
     headings = {
         one.heading: one.body for one in deck.planned_slides(notebooks.read(path)) if one.kind.startswith("picture")
     }
-    assert headings["Your map straightens a real photograph"] == slides.WITHHELD
+    wall = "Left: the wall bent by the lens. Right: the wall bent by your function"
+    assert headings[wall] == slides.WITHHELD
     assert "<img" in headings["Two arrows at each point: OpenCV&#x27;s and yours"]  # given, and to be mended
     assert not [one for one in made(path) if one.body == slides.WITHHELD]
 
@@ -258,10 +263,8 @@ def test_an_unsolved_deck_says_where_the_readers_picture_is_and_a_solved_one_sho
 def test_a_plan_that_names_no_panel_of_its_picture_is_complained_of():
     path = next(path for path in LESSONS if path.name.startswith("05"))
     plan = plans.plan("05")
-    wrong = [*plan.notice[:3], plans.Notice("A.", ("radial curve", "wedge")), *plan.notice[4:]]
+    wrong = [*plan.notice[:7], plans.Notice("A.", ("radial curve", "wedge")), *plan.notice[8:]]
     found = plans.complaints(
         plans.Plan("05", "a", "b", "c", plan.steps, plan.votes, tuple(wrong)), notebooks.read(path)
     )
-    assert found == [
-        "the plan names the panel 'wedge' of picture 4, whose panels are the picture, radial curve, numbers"
-    ]
+    assert found == ["the plan names the panel 'wedge' of picture 8, whose panels are the picture, radial curve"]

@@ -144,7 +144,7 @@ class View:
         """Which of its `openable` panels are drawn, in the order in which `openable` has them."""
         return tuple(name for name in self.openable if self._has(name))
 
-    def opening(self, opened: Mapping[str, bool]) -> Self:
+    def with_panels(self, opened: Mapping[str, bool]) -> Self:
         """The view with panels opened (True) or closed (False), by their names; those opened come last.
 
         Raises ValueError for a panel that is not openable.

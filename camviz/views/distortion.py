@@ -50,10 +50,10 @@ _TILES = {  # of the panels
 _GRID = "grid"  # a panel that is no tile: lines over the pictures
 _NUMBERS = "numbers"
 _MOST = 4  # panels beside the numbers
+_ALONE, _MOST_ACROSS = 330, 620  # units of height and width of a panel that stands alone
 _LEAST = 240  # units of height: a curve needs them, and numbers do
 # Of the first row, by how many panels stand there and whether the numbers do: its height at most and their widths.
 _FIRST: dict[tuple[int, bool], tuple[float, tuple[float, ...]]] = {
-    (1, False): (480, (960,)),
     (1, True): (480, (700, 260)),
     (2, False): (390, (480, 480)),
     (2, True): (320, (380, 380, 200)),
@@ -225,8 +225,11 @@ class DistortionView(OrbitView):
         """The first two panels beside the numbers, and the others below them."""
         names = [_TILES[name] for name in self._beside_the_numbers]
         first, below = names[:2], names[2:]
+        aspect = self.intrinsics.width / self.intrinsics.height
+        if len(first) == 1 and not self._has(_NUMBERS):  # as wide as its picture: a telephone shows all of it
+            return rows((_ALONE, {first[0]: min(_MOST_ACROSS, round(aspect * (_ALONE - 44) + 20))}))
         height, widths = _FIRST[len(first), self._has(_NUMBERS)]
-        height = min(height, max(_LEAST, widths[0] * self.intrinsics.height / self.intrinsics.width + 30))
+        height = min(height, max(_LEAST, round(widths[0] / aspect + 35)))
         columns = [*first, _NUMBERS][: len(widths)]
         found = [(height, dict(zip(columns, widths, strict=True)))]
         if below:
@@ -287,7 +290,7 @@ class DistortionView(OrbitView):
         shown = self._photograph(panel, "camera") + drawn + fold
         return panel.show(shown, title=title), {"camera": jpeg(self.image(draft=draft))}
 
-    def _over(self, panel: Panel, lines: np.ndarray, kind: str, **style: str) -> str:
+    def _over(self, panel: Panel, lines: np.ndarray, kind: str, **style: Any) -> str:
         """The lines of the grid over a picture, where the grid is open."""
         return svg.path(panel.place(self.intrinsics.to_pixels(lines)), kind, **style) if self._has(_GRID) else ""
 

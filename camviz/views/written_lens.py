@@ -80,6 +80,6 @@ def _missed_and_slopes(
     bend: Callable[[Array], Array], xy: Array, wanted: Array
 ) -> tuple[Array, tuple[Array, Array, Array, Array]]:
     """How far (n, 2) the function of points (n, 2) is from where it should be; ∂x_d/∂x, ∂x_d/∂y, ∂y_d/∂x, ∂y_d/∂y."""
-    bent = bend(xy)
-    along, down = ((bend(xy + step) - bent) / _STEP for step in _STEP * np.eye(2))
+    bent, *beside = (bend((xy + step)[:, None])[:, 0] for step in (0, *(_STEP * np.eye(2))))  # a column of points
+    along, down = ((one - bent) / _STEP for one in beside)
     return bent - wanted, (along[:, 0], down[:, 0], along[:, 1], down[:, 1])

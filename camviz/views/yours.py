@@ -74,7 +74,9 @@ def faded(picture: np.ndarray) -> np.ndarray:
     size, thick = picture.shape[1] / 480, max(1, round(picture.shape[1] / 240))
     (width, height), _ = cv2.getTextSize(YOURS_HERE, cv2.FONT_HERSHEY_SIMPLEX, size, thick)
     at = (picture.shape[1] - width) // 2, (picture.shape[0] + height) // 2
-    return np.asarray(cv2.putText(made, YOURS_HERE, at, cv2.FONT_HERSHEY_SIMPLEX, size, (28, 35, 48), thick, cv2.LINE_AA))
+    return np.asarray(
+        cv2.putText(made, YOURS_HERE, at, cv2.FONT_HERSHEY_SIMPLEX, size, (28, 35, 48), thick, cv2.LINE_AA)
+    )
 
 
 def was_missed(function: Function) -> bool:

@@ -106,7 +106,7 @@ function render({ model, el }) {
 function opening(more, model, ask) {
   const buttons = (model.get("panels") ?? []).map(({ name, words }) => {
     const button = build(`<button type="button"></button>`);
-    button.dataset.panel = name;
+    button.dataset.opens = name;
     button.addEventListener("click", () => ask({ panels: { [name]: button.getAttribute("aria-pressed") === "false" } }, false));
     return { name, words, button };
   });

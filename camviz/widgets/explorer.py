@@ -252,10 +252,10 @@ class Explorer(StillWidget):
 
     def _wished(self, wish: Wish) -> View:
         self._units |= wish.units
-        view = self._first.opening(self._as_now()) if wish.reset else self.view
+        view = self._first.with_panels(self._as_now()) if wish.reset else self.view
         if wish.values:
             view = view.but(**{name: self._wished_value(name, value) for name, value in wish.values.items()})
-        view = view.opening(wish.panels)
+        view = view.with_panels(wish.panels)
         for drag in wish.drags:
             view = self._within(view.dragged(*drag), view)
         for key in wish.keys:

@@ -43,7 +43,7 @@ def opens(file_name: str) -> str:
 
 
 def prepared(notebook: Notebook, file_name: str) -> Notebook:
-    """A copy with the badge beside Binder's and the cell above the setup cell; the same where it has both.
+    """A copy with the badge beside Binder's and the cell above all other code; the same where it has both.
 
     Raises ValueError where the lesson has no badge of Binder's or no cell tagged setup.
     """
@@ -57,8 +57,8 @@ def prepared(notebook: Notebook, file_name: str) -> Notebook:
             raise ValueError(f"{file_name}: expected Binder's badge in the first cell, there is none")
         told.source = told.source.replace(binder, f"{binder}\n{badge(file_name)}")
     if not tagged(made, "colab"):
-        places = [number for number, cell in enumerate(made.cells) if "setup" in cell.metadata.get("tags", [])]
-        if not places:
+        places = [number for number, cell in enumerate(made.cells) if cell.cell_type == "code"]
+        if not tagged(made, "setup"):
             raise ValueError(f"{file_name}: expected a cell tagged setup, there is none")
         cell = nbformat.v4.new_code_cell(INSTALL, id="colab", metadata=deepcopy(_FOLDED) | {"tags": ["colab"]})
         made.cells.insert(places[0], cell)

@@ -1,8 +1,8 @@
 """The pattern of a lesson that has a core and goes deeper: what a first reading meets, and how much of it there is.
 
 The header asks the question and names the ideas; one live view comes with it, then what the lesson is about (folded,
-tagged `about`), then what the reader thinks at first. The core ends with quiz and recap. Below `## Going deeper` each
-section stands alone and says what it asks for and how long it takes.
+tagged `about`), the setup cell, and what the reader thinks at first. The core ends with quiz and recap. Below
+`## Going deeper` each section stands alone and says what it asks for and how long it takes.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ MOST_CONTROLS, MOST_PANELS = 2, 2
 """Of the first view of a section of the core."""
 SOON = 2
 """Cells after a prediction, one of which shows what comes of it."""
-BEFORE_THE_VIEW = 4
-"""Cells down to the first view, itself among them: the header, what Colab needs, what the lesson needs, the view."""
+BEFORE_THE_VIEW = 2
+"""Cells above the first view: the header, and what Colab needs. What the lesson needs stands below it."""
 
 _IDEAS = re.compile(r"^\*\*Ideas:\*\* (.+)$", re.MULTILINE)
 _ASKS = re.compile(r"\*About (\d+) minutes\. Asks for: [^*]+\*")
@@ -60,14 +60,17 @@ def _begins(core: list[Cell], number: str) -> list[str]:
     named = _IDEAS.search(core[0].source)
     if not named:
         found.append("the header must name the ideas of the lesson: **Ideas:** one · two · three")
-    elif len(named[1].split(" · ")) > MOST_IDEAS:
+    elif len(named[1].partition(". ")[0].split(" · ")) > MOST_IDEAS:
         found.append(f"the header names more than {MOST_IDEAS} ideas: {named[1]}")
     viewed = _first(core, lambda cell: cell.cell_type == "code" and "explore(" in cell.source)
-    if viewed >= BEFORE_THE_VIEW:
-        found.append(f"a live view must be among the first {BEFORE_THE_VIEW} cells; the first is cell {viewed}")
+    if viewed > BEFORE_THE_VIEW:
+        found.append(f"at most {BEFORE_THE_VIEW} cells may stand above the first view, {viewed} do")
     about = _first(core, lambda cell: "about" in cell.metadata.get("tags", []))
-    if about != viewed + 1 or "<details>" not in core[about].source:
+    if about != viewed + 1 or about == len(core) or "<details>" not in core[about].source:
         found.append("below the first view a cell tagged about must say, folded, what the lesson is about")
+    setup = _first(core, lambda cell: "setup" in cell.metadata.get("tags", []))
+    if setup != about + 1 or setup == len(core) or not core[setup].metadata.get("jupyter", {}).get("source_hidden"):
+        found.append("the setup cell must stand, folded, below what the lesson is about")
     asked, taught = _first(core, _asks_first(number)), _first(core, lambda cell: cell.source.startswith("## "))
     if questions.quiz_questions(number, "A") and not viewed < asked < taught:
         found.append(f'quiz("{number}", "A") must stand below the first view and above the first section')

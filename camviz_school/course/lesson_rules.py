@@ -79,6 +79,8 @@ def _setup(notebook: Notebook) -> list[str]:
             return [f"the cell tagged colab must be the same as everywhere:\n{colab.INSTALL}"]
     code = [cell for cell in notebook.cells if cell.cell_type == "code" and cell.source != colab.INSTALL]
     setup = notebooks.tagged(notebook, "setup")
+    if is_layered(notebook):  # its first view stands above the setup cell
+        code = code[1:]
     if len(setup) != 1 or not code or code[0] is not setup[0]:
         return [f"the first code cell, and no other, must be tagged setup; {len(setup)} are"]
     return [] if setup[0].source == SETUP else [f"setup must be the same as everywhere:\n{SETUP}"]

@@ -5,11 +5,23 @@ import re
 import cv2
 import numpy as np
 import pytest
+from mutants import function_of, solution_of
+from mutation import mutants
+from quoting import LESSONS
 from scipy.optimize import brentq
 
+from camviz.scenes.wall import LAMP
 from camviz.views.distortion import DistortionView
+from camviz_school.course import notebooks
+from camviz_school.course.exercises import exercises
 
 EXCEPTIONS: dict[str, str] = {}
+
+VISIBLE = 5e-4
+"""Of a picture's pixels: as many as one moved marker covers, as in test_own_functions.py."""
+
+UNSEEN = re.compile(r"np\.(?:abs|maximum)\(|2\.02|3\.03|1\.01")
+"""Absolute values of what is above zero in the view, and a hundredth of a number: the checker finds them, no eye."""
 
 LEFT = ((534.80, 335.69, 240.66), (0.29589439552724328, -1.0354662043042675))
 RIGHT = ((534.80, 334.56, 242.05), (-0.16916358306948096, -0.11214173641213163))
@@ -37,21 +49,33 @@ def bend(xy, *coefficients):
 
 
 def test_a_barrel_draws_corners_in_most(says):
-    (k1,) = says("You set k1 = −0.3.")
-    says("the corners are drawn in towards the centre")
-    says("So points far out are drawn in most, the corners most of all, and the sides of the square bow outwards.")
+    says("With k1 < 0 the corners are drawn in, and the picture bulges like a barrel.")
+    says("With k1 < 0 points far out are drawn in most, the corners most of all")
+    says("and the sides of a square bow outwards")
+    says("With k1 > 0 the corners are pulled out, as in a pincushion.")
+    k1, r, strength, square, factor = says(
+        "With k1 = −0.3 it is near 1 in the middle, and at r = 0.5 it is 1 − 0.3 · 0.25 = 0.925."
+    )
     corner, middle, half = g(np.sqrt(2), k1.value), g(1.0, k1.value), np.linspace(0, 1, 9)
     assert np.sqrt(2) - corner > 1 - middle > 0
+    assert g(np.sqrt(2), -k1.value) > np.sqrt(2)
     side = bend(np.stack([np.full(9, 0.5), half / 2], axis=-1), k1.value, 0.0, 0.0, 0.0)
     assert (np.diff(side[:, 0]) < 0).all()  # widest in the middle: the side bows outwards
-    r, strength, square, factor = says("at r = 0.5 the factor is 1 − 0.3 · 0.25 = 0.925, which brings the point in")
+    assert g(0.05, k1.value) / 0.05 > 0.999
     assert square == r.value**2
     assert factor == 1 - strength.value * r.value**2
     assert strength == -k1.value
 
 
+def test_near_the_left_end_of_the_slider_the_model_has_no_ray_for_the_corners(says):
+    """The slider ends at k1 = -0.2; the corners of a picture of 90° across and 16:9 are as far out as its diagonal."""
+    says("Near the left end of the slider the corners go dark: the model has no ray for them.")
+    corner = np.hypot(1, 9 / 16)
+    assert g(folds_at(-0.2), -0.2) < corner < g(folds_at(-0.1), -0.1)
+
+
 def test_a_point_moves_along_its_line_to_the_centre_by_what_r_alone_says(says):
-    says("a line through the centre stays straight whatever you do: points move along the line to the centre")
+    says("A line through the centre stays straight whatever k1 is: each point moves along its line to the centre.")
     says("The factor depends on r alone, so one curve says everything")
     angle = np.linspace(0, 2 * np.pi, 12)
     circle = 0.7 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -60,28 +84,38 @@ def test_a_point_moves_along_its_line_to_the_centre_by_what_r_alone_says(says):
     np.testing.assert_allclose(np.linalg.norm(bent - circle, axis=-1), 0.7 - g(0.7, -0.28, 0.07), atol=1e-12)
 
 
-def test_a_reader_s_function_bends_the_grid_and_straightens_the_picture(says):
-    """With every sign turned round: which of the panel's picture and grid change, under either choice of *show*."""
-    says("Both sides show the same picture, as the lens bends it.")
-    says("The yellow grid on the left is bent by the lens, the orange one on the right by your function")
-    says("Choose undistorted, and on the right your function straightens the garden itself.")
+def shown_beside(view, function):
+    """The picture that a view draws by a function, (height, width, 3); None where it draws none."""
+    shown = view.but(yours=function).figure(draft=True).photographs.get("yours")
+    return None if shown is None else cv2.imdecode(np.frombuffer(shown, np.uint8), cv2.IMREAD_COLOR)
 
-    def turned(xy, k1, k2, k3):
-        return bend(xy, -k1, -k2, 0.0, 0.0, -k3)
 
-    def right(xy, k1, k2, k3):
-        return bend(xy, k1, k2, 0.0, 0.0, k3)
+@pytest.fixture(scope="module")
+def view_beside():
+    """The lesson's view of the reader's own `distort`, as its cell makes it."""
+    cells = [cell.source for cell in notebooks.read(LESSONS / "05_distortion.ipynb").cells if cell.cell_type == "code"]
+    (source,) = (one for one in cells if "bent = DistortionView" in one)
+    namespace = {"DistortionView": DistortionView, "distort": None}
+    exec(source.splitlines()[0], namespace)
+    return namespace["bent"]
 
-    def panel(yours, show):
-        figure = DistortionView(panels="picture yours", yours=yours, show=show).figure(draft=True)
-        (grid,) = re.findall(r'<path d="([^"]*)" class="orange thin"', figure.body)
-        return figure.photographs["yours"], grid
 
-    (true, true_grid), (wrong, wrong_grid) = (panel(one, "distorted") for one in (right, turned))
-    assert true == wrong
-    assert true_grid != wrong_grid
-    (straight, _), (garbled, _) = (panel(one, "undistorted") for one in (right, turned))
-    assert straight != garbled
+@pytest.mark.parametrize("show", ["distorted", "undistorted"])
+def test_each_slip_of_the_pen_in_distort_changes_the_wall_in_each_mode(says, view_beside, show):
+    """Signs, factors, powers, axes, terms: each small change of the solution makes another picture, or none at all."""
+    says("The lens bends the left picture, and your `distort` bends the right one: the two should look alike")
+    says("Choose undistorted, and your function straightens the wall.")
+    exercise, view = exercises("05")["05.distort"], view_beside.but(show=show)
+    right = shown_beside(view, function_of(exercise, solution_of(exercise)))
+    every = mutants(solution_of(exercise), "distort", exercise.parameters, [])
+    made = [mutant for mutant in every if not UNSEEN.search(mutant.change)]
+    assert len(made) >= 40
+    alike = []
+    for mutant in made:
+        yours = shown_beside(view, function_of(exercise, mutant.source))
+        if yours is not None and np.mean(np.abs(right.astype(int) - yours).max(axis=-1) > 40) < VISIBLE:
+            alike.append(mutant.change)
+    assert alike == []
 
 
 def test_one_point_by_hand(says):
@@ -143,7 +177,10 @@ def test_rays_past_the_fold_come_back(says):
     far = np.tan(np.radians(beyond.value + np.array([-0.1, 0.1])))
     assert abs(g(far[0], k1.value)) < g(fold, k1.value) < abs(g(far[1], k1.value))
     assert g(far[1], k1.value) < 0
-    (through,) = says("Beyond 61.3° the polynomial even passes through the centre and out on the other side.")
+    through, again = says(
+        "Beyond 61.3° the polynomial with k1 = −0.3 even passes through the centre and out on the other side."
+    )
+    assert again == k1.value
     assert through == degrees(np.sqrt(-1 / k1.value))
     (angle,) = says("such as that of an orthographic fisheye at 90°")
     assert np.cos(np.radians(angle.value)) == pytest.approx(0, abs=1e-12)  # the slope of sin θ
@@ -152,18 +189,29 @@ def test_rays_past_the_fold_come_back(says):
 
 
 def test_a_small_k2_takes_the_fold_away(says):
-    (k2,) = says("Give k2 a small positive value, about 0.05. The fold moves outwards, and then it is gone.")
+    (k2,) = says("A positive k2 of 0.05 takes this fold away.")
     assert folds_at(-0.3) < folds_at(-0.3, 0.02) < np.inf
     assert folds_at(-0.3, k2.value) == np.inf
 
 
-def test_in_the_corners_the_mirror_image_lies_outside_the_dashed_circle(says):
-    says("mirror images of what lies inside it")
-    fold, beyond = folds_at(-0.3), np.array([1.1, 1.2])
-    inside = np.array([np.roots([-0.3, 0, 1, -g(r, -0.3)]).real.max() for r in beyond])
-    assert (beyond > fold).all()
-    assert np.abs(np.roots([-0.3, 0, 1, -g(1.2, -0.3)])).size == 3
-    assert (inside >= fold).all()
+def test_the_one_lamp_is_there_twice_and_the_second_lies_outside_the_dashed_circle(says):
+    """In the upper right: by the roots of r + k1 r³ = r_d, within the frame of 90° across and 16:9."""
+    (k1,) = says("Pull k1 to −0.5, and look for the lamp in the upper right corner.")
+    (again,) = says("With k1 = −0.5 the garden's one lamp is there twice.")
+    says("There are two lamps, and the garden has one.")
+    says("Outside it you see mirror images of what lies inside it.")
+    (taught,) = says("Pull k1 to −0.5 and wait until someone sees the second lamp.")
+    assert taught == k1.value
+    assert again == k1.value
+    lamp = np.array(LAMP[:2]) / LAMP[2]
+    r, fold = np.hypot(*lamp), folds_at(k1.value)
+    farther = max(np.roots([k1.value, 0, 1, -g(r, k1.value)]).real)
+    assert r < fold < farther
+    x, y = lamp / r * farther
+    assert 0.8 < x < 1
+    assert -9 / 16 < y < -0.3
+    x, y = lamp / r * max(np.roots([-0.3, 0, 1, -g(r, -0.3)]).real)
+    assert not (x < 1 and y > -9 / 16)  # at first the second lamp lies outside the frame
 
 
 def test_the_ways_to_straighten_the_photograph(says):
@@ -212,7 +260,7 @@ def test_flipping_the_sign_of_k1_is_not_the_inverse(says):
 
 
 def test_the_published_stereo_calibration_folds_inside_its_images(says):
-    width, height = says("Look at both lenses out to the corners of their 640 × 480 images.")
+    width, height = says("This is its left lens, out to the corners of its 640 × 480 image:")
     folds, reaches, nearest, corners = {}, {}, {}, {}
     for name, ((f, cx, cy), coefficients) in (("left", LEFT), ("right", RIGHT)):
         folds[name] = folds_at(*coefficients)
@@ -251,7 +299,7 @@ def test_one_of_the_two_goes_out_and_then_in(says):
 
 
 def test_the_value_that_the_calibration_of_the_chessboard_published(says, samples):
-    pictures, k1, f = says("A calibration of all 13 pictures published k1 = −0.27 for this lens, at f = 536 px.")
+    pictures, k1, f = says("a calibration of all 13 pictures published k1 = −0.27 for this lens, at f = 536 px.")
     file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
     assert k1 == file.getNode("distortion_coefficients").mat()[0, 0]
     assert pictures == file.getNode("nframes").real()
@@ -294,7 +342,7 @@ def test_the_quiz_about_a_low_error(says):
 
 def test_the_corners_of_the_straightened_picture_are_lost(says):
     """With the same K, the corner of the picture that was taken lands beyond the new frame."""
-    says("The lens had drawn its corners in; now they lie outside the frame, and their content is lost.")
+    says("A straightened picture of a barrel loses its corners: the lens had drawn them in")
     grid = DistortionView().camera.intrinsics
     taken = grid.from_pixels([0, 0])
     far = np.hypot(*taken)

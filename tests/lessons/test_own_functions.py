@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from quoting import LESSONS
 
+from camviz.draw.picture import Picture
 from camviz.widgets.explorer import Explorer
 from camviz_school.course import notebooks
 from camviz_school.course.exercises import exercises
@@ -65,13 +66,19 @@ def run(cell, namespace) -> Shown:
     plt.close("all")
     if isinstance(value, Explorer):
         add_view(shown, value.view)
+    elif isinstance(value, Picture):
+        shown.pictures += photographs_of(value)
     return shown
+
+
+def photographs_of(picture) -> list[np.ndarray]:
+    return [cv2.imdecode(np.frombuffer(b, np.uint8), cv2.IMREAD_COLOR) for b in picture.photographs.values()]
 
 
 def add_view(shown: Shown, view) -> None:
     """The photographs of a view, and what it draws in orange, the reader's own, on a canvas."""
     figure = view.figure()
-    shown.pictures += [cv2.imdecode(np.frombuffer(b, np.uint8), cv2.IMREAD_COLOR) for b in figure.photographs.values()]
+    shown.pictures += photographs_of(figure)
     canvas = np.zeros((700, 1000, 1), np.uint8)
     for found in _CURVE.finditer(figure.svg()):
         for piece in re.split("[Mm]", found[1] or found[2]):
