@@ -41,12 +41,12 @@ _SHARES = {"K": 265, _AFTER: 230, "pixels": 185, "numbers": 280}  # of the secon
 _MARKS = ("balloon", "globe", "centre", "corners")
 # Of one row, by how many panels of either kind stand in it: its height at most and their widths.
 _ONE_ROW: dict[tuple[int, int], tuple[float, tuple[float, ...]]] = {
-    (1, 0): (480, (960,)),
     (1, 1): (440, (675, 285)),
     (1, 2): (390, (410, 285, 265)),
     (2, 0): (390, (480, 480)),
     (2, 1): (330, (345, 330, 285)),
 }
+_ALONE, _MOST_ACROSS = 330, 620  # units of height and width of a picture that stands alone
 _TWO_ROWS = {1: (374, (960,)), 2: (374, (460, 500))}  # of the first: the second is as high as K needs
 _MATRIX_HIGH = 222
 _BELOW = 140  # picture units from one matrix to the other
@@ -263,6 +263,8 @@ class IntrinsicsView(OrbitView):
     def _layout(self) -> dict[str, Cell]:
         """One row of up to three panels; else picture and rays in the first, and the others below them."""
         main, aside = [name for name in _MAIN if self._has(name)], [name for name in _ASIDE if self._has(name)]
+        if len(main) + len(aside) == 1:  # as wide as its picture: a telephone shows all of it
+            return rows((_ALONE, {"picture": min(_MOST_ACROSS, round((_ALONE - 44) * self.width / self.height + 20))}))
         if (len(main), len(aside)) in _ONE_ROW:
             height, widths = _ONE_ROW[len(main), len(aside)]
             return rows((height, dict(zip([*main, *aside], widths, strict=True))))

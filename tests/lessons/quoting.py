@@ -40,7 +40,7 @@ CODE = ((r"```.*?```", "it is run"), (r"``[^`]*``|`[^`]*`", "it is run"))
 NOT_STATED = (
     (r"\[\d\d [^\]]*\]\([^)]*\)", "the name of a lesson"),
     (r"\]\([^)]*\)|</?[A-Za-z][^<>]*>|&\w+;", "an address"),
-    (r"(?m)^#+ \d+ ·|^#+ Deeper \d+:|^#+ .*?Exercise \d+|^\s*\d+\. ", "the number of a heading or of an item"),
+    (r"(?m)^#+ \d+ ·|^#+ .*?Exercise \d+|^\s*\d+\. ", "the number of a heading or of an item"),
     (r"(?i)\b(?:lessons?|parts?|exercises?|sections?|chapters?|chap\.|sec\.|figures?|steps?|cells?|table|volume"
      r"|vol\.|pages?|pp?\.|release|version|views?|question) \d+(?:\.\d+)*(?:(?:,| and| to|–) ?\d+(?:\.\d+)*)*"
      r"(?![\d.]*\d? ?(?:mm|cm|m|px|°|%)\b)",
