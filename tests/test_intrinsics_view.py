@@ -139,15 +139,21 @@ def test_aspect_and_focal_length_in_millimetres_are_read_from_fx_fy_and_pitch_an
     assert (wider.fx, wider.focal_mm) == (450, 5.4)
 
 
-def test_the_matrices_in_the_picture_are_k_and_a_thousand_times_its_inverse():
-    """By hand: K⁻¹ = [[1/fx, -s/(fx fy), (s cy - fy cx)/(fx fy)], [0, 1/fy, -cy/fy], [0, 0, 1]]."""
-    fx, fy, s, cx, cy = 450.0, 400.0, 40.0, 319.5, 239.5
-    inverse = [[1 / fx, -s / (fx * fy), (s * cy - fy * cx) / (fx * fy)], [0, 1 / fy, -cy / fy], [0, 0, 1]]
-    drawn = IntrinsicsView(fx=fx, fy=fy, skew=s, cx=cx, cy=cy).figure(draft=True).svg()
+def entries(view):
+    """The numbers of the matrices that are drawn, one after the other."""
+    drawn = view.figure(draft=True).svg()
     numbers = re.findall(r'<text[^>]*class="number end[^"]*"[^>]*>([^<]*)</text>', drawn)
-    values = np.array([float(number.replace("−", "-")) for number in numbers])
-    np.testing.assert_allclose(values[:9], [fx, s, cx, 0, fy, cy, 0, 0, 1], atol=0.005)
-    np.testing.assert_allclose(values[9:], 1000 * np.ravel(inverse), atol=0.0051)
+    return np.array([float(number.replace("−", "-")) for number in numbers])
+
+
+@pytest.mark.parametrize("panels", ["picture rays K pixels numbers", "picture K"])
+def test_the_matrix_in_the_picture_is_k_and_beside_it_what_an_operation_makes_of_it(panels):
+    """By hand, for a picture resized by one half: f and skew halved, c' = c/2 - 1/4."""
+    view = IntrinsicsView(fx=450, fy=400, skew=40, cx=319.5, cy=241.0, panels=panels)
+    K = [450, 40, 319.5, 0, 400, 241, 0, 0, 1]
+    np.testing.assert_allclose(entries(view), K, atol=0.005)
+    half = [225, 20, 159.5, 0, 200, 120.25, 0, 0, 1]
+    np.testing.assert_allclose(entries(view.but(operation="resized")), [*K, *half], atol=0.005)
 
 
 def test_a_focal_length_in_pixels_changes_fx_and_fy_together():
@@ -241,7 +247,7 @@ def orange_lines(body):
 def test_a_reader_s_rays_run_to_the_frame_of_the_right_ones():
     view = IntrinsicsView(cx=200.0, skew=40.0, yours=by_a_reader)
     body = view.figure(draft=True).body
-    (right, *spokes, yours), _ = view._your_rays()
+    (right, *spokes, yours), _, _ = view._your_rays()
     np.testing.assert_allclose(yours.points, right.points, atol=1e-9)
     corners = [spoke.points[1] for spoke in spokes]
     np.testing.assert_allclose(view.camera.project(corners), view.intrinsics.border(1), atol=1e-6)
@@ -251,15 +257,86 @@ def test_a_reader_s_rays_run_to_the_frame_of_the_right_ones():
 
 def test_a_reader_s_function_that_stops_draws_no_rays_and_is_told_of():
     none = orange_lines(IntrinsicsView().figure(draft=True).body)
-    body = IntrinsicsView(yours=lambda *_: None).figure(draft=True).body
-    assert "returns nothing" in body
+    body = IntrinsicsView(yours=lambda uv, K: uv @ K).figure(draft=True).body
+    assert "ValueError" in body
     assert len(orange_lines(body)) <= len(none)
 
 
-def test_fewer_panels_leave_out_k():
-    view = IntrinsicsView(panels="picture space")
+# One panel first, and what the reader opens ---------------------------------------------------------------------------
+
+
+def tiles(view):
+    return [tile.name for tile in view.figure(draft=True).tiles]
+
+
+def test_a_picture_stands_alone_until_rays_k_pixels_or_numbers_are_opened():
+    alone = IntrinsicsView.alone()
+    assert tiles(alone) == ["picture"]
+    assert tiles(alone.with_panels({"K": True})) == ["picture", "K"]
+    assert tiles(alone.with_panels({"numbers": True, "rays": True})) == ["picture", "rays", "numbers"]
+    assert tiles(IntrinsicsView()) == ["picture", "rays", "K", "what becomes of it", "pixels", "numbers"]
+    assert IntrinsicsView().opened == ("rays", "K", "pixels", "numbers")
+
+
+@pytest.mark.parametrize("opened", range(16))
+def test_no_two_panels_share_a_place_and_each_row_is_full_whatever_is_open(opened):
+    names = [name for bit, name in enumerate(IntrinsicsView.openable) if opened >> bit & 1]
+    cells = IntrinsicsView.alone().with_panels(dict.fromkeys(names, True))._layout.values()
+    for top in {y for _, y, _, _ in cells}:
+        row = sorted((x, width) for x, y, width, _ in cells if y == top)
+        ends = np.cumsum([width for _, width in row])
+        np.testing.assert_allclose([x for x, _ in row], [0, *ends[:-1]])
+        assert ends[-1] == pytest.approx(960 if names else 528)  # alone, a picture's tile is as wide as the picture
+    two_tiles = "K" in names and len(names) > 2  # where K and what becomes of it stand beside each other
+    assert len(cells) == len(names) + 1 + two_tiles
+
+
+@pytest.mark.parametrize("bad", [{"panels": "rays"}, {"panels": "picture attic"}, {"marks": "balloon attic"}])
+def test_unknown_panels_and_marks_are_refused(bad):
+    with pytest.raises(ValueError, match=f"{next(iter(bad))} must be"):
+        IntrinsicsView(**bad)
+
+
+def test_only_what_is_marked_is_named_in_the_picture_and_the_numbers():
+    names = {"balloon": "a balloon, behind the wall", "globe": "81 px", "centre": "(cx, cy)", "corners": "(639, 359)"}
+    for mark in ("", *names):
+        body = IntrinsicsView.alone(marks=mark).figure(draft=True).body
+        assert [name for name, words in names.items() if words in body] == mark.split()
+    assert "red balloon" in IntrinsicsView(marks="balloon").numbers()
+    assert "red balloon" not in IntrinsicsView(marks="globe").numbers()
+    assert "camera to globe" in IntrinsicsView(marks="globe").numbers()
+    assert "camera to globe" not in IntrinsicsView(marks="centre corners").numbers()
+
+
+def test_without_its_mark_the_garden_has_no_balloon():
+    """From 12 m it is in sight at one place of the picture: red with it, and the sky without it."""
+    with_it = IntrinsicsView(distance=12.0)
+    u, v = with_it.taken.resized(440, 330).to_pixels((BALLOON - with_it.camera.centre)[:2] / (BALLOON[2] + 8.7))
+    red, _, blue = with_it.image(draft=False)[round(v), round(u)].astype(int)
+    assert red > blue + 50
+    red, _, blue = with_it.but(marks="globe").image(draft=False)[round(v), round(u)].astype(int)
+    assert blue >= red
+
+
+def test_the_shape_of_a_pixel_is_a_number_only_beside_what_shows_it():
+    alone = IntrinsicsView.alone(panels="picture numbers")
+    assert "pixel width / height" not in alone.figure(draft=True).body
+    assert "pixel width / height" in alone.with_panels({"pixels": True}).figure(draft=True).body
+    assert "pixel width / height" in alone.but(millimetres=True).figure(draft=True).body
+
+
+def test_an_unwritten_function_leaves_the_right_rays_greyed_and_a_faulty_one_its_error():
+    def unwritten(uv, K): ...
+
+    def faulty(uv, K):
+        return uv[7, 7, 7]
+
+    view = IntrinsicsView(panels="picture rays", yours=unwritten)
     body = view.figure(draft=True).body
-    assert "Its pixels" not in body
-    assert "% in sight" in body
-    with pytest.raises(ValueError, match="panels"):
-        IntrinsicsView(panels="matrices")
+    assert 'class="awaited"' in body
+    assert "yours appears here" in body
+    (right, *_, waiting), _, _ = view._your_rays()
+    np.testing.assert_allclose(waiting.points, right.points)
+    body = view.but(yours=faulty).figure(draft=True).body
+    assert "awaited" not in body
+    assert "IndexError" in body

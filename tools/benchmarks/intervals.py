@@ -6,11 +6,12 @@
     python tools/benchmarks/intervals.py --virtual     the virtual sets alone
     … --few                                            fewer halves and sets, for a look
 
-CAMVIZ_FIELD names the folder of the pictures. They are the sets of field.toml with 20 views or more, and OpenCV's left and right ones of 13. Their
-views are halved by lot, and each program calibrates both halves by itself, from the same corners. The two halves share
-no view, and the variance of their difference is the sum of both variances. So (difference) / √(σ₁² + σ₂²) is 1 in the
-RMS, within 1 in 68 % and within 1.96 in 95 % of all halves and parameters, if a σ is right. Halves do not show what is
-wrong in the same way in all views, such as a bend of the board. Virtual sets have a truth, and show it.
+CAMVIZ_FIELD names the folder of the pictures. They are the sets of field.toml with 20 views or more, and OpenCV's
+left and right ones of 13. Their views are halved by lot, and each program calibrates both halves by itself, from the
+same corners. The two halves share no view, and the variance of their difference is the sum of both variances. So
+(difference) / √(σ₁² + σ₂²) is 1 in the RMS, within 1 in 68 % and within 1.96 in 95 % of all halves and parameters, if
+a σ is right. Halves do not show what is wrong in the same way in all views, such as a bend of the board. Virtual sets
+have a truth, and show it.
 """
 
 from __future__ import annotations

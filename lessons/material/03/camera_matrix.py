@@ -143,13 +143,13 @@ class CameraMatrix(OrbitView):
         return balloon_in_sight(self.camera.centre)
 
     def rule(self) -> str:
-        """What the operation does to K, with its numbers."""
+        """What the operation does to K, with its numbers; "" for a picture as taken."""
         (x0, y0), s = self._corner, self.intrinsics.width / self.width
         return {
-            "as taken": "K turns directions into pixels; its inverse turns pixels into directions.",
-            "cropped": f"cropped: c′ = c − (x0, y0) = c − ({x0}, {y0}); f and skew stay",
-            "resized": f"resized by {s:g}: f′ = {s:g} f,  c′ = {s:g} c {added((s - 1) / 2)}",
-            "binned": f"binned {BINS} × {BINS}: f′ = f / {BINS},  c′ = c / {BINS} {added((s - 1) / 2)}",
+            "as taken": "",
+            "cropped": f"c′ = c − ({x0}, {y0}); f and skew stay",
+            "resized": f"f′ = {s:g} f,  c′ = {s:g} c {added((s - 1) / 2)}",
+            "binned": f"f′ = f / {BINS},  c′ = c / {BINS} {added((s - 1) / 2)}",
         }[self.operation]
 
 

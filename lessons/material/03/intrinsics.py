@@ -5,7 +5,7 @@ A reader's own rays can be drawn beside the right ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
@@ -14,61 +14,99 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows
 from camviz.draw.items import closed
 from camviz.draw.matrix import intrinsic_matrix
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout
-from camviz.draw.space import Item, Label, Line, OrbitCamera, camera_body, scene_items, space_panel
+from camviz.draw.space import Item, Label, Line, OrbitCamera, camera_body, draw_space, scene_items, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.scenes import render, to_display
+from camviz.scenes import render, textured_scene, to_display
 from camviz.scenes.balloon import BALLOON, balloon_rim, balloon_scene, towards_balloon
-from camviz.views.base import Drawn
-from camviz.views.yours import tried
+from camviz.views.base import Drawn, without
+from camviz.views.yours import is_unwritten, tried
 from camviz_school.views.camera_matrix import GLOBE, GLOBE_RADIUS, CameraMatrix, added
 
 _LEAN_DRAWN = 3  # times
 _YOURS_M = 2.8  # as deep as a reader's rays are drawn, twice as deep as the camera's own pyramid
-_LAYOUTS = {
-    "picture space": rows((314, {"picture": 380, "rays": 340, "numbers": 240})),
-    "picture space matrices": rows(
-        (374, {"picture": 460, "rays": 500}), (222, {"K": 265, "other matrix": 230, "pixels": 185, "numbers": 280})
-    ),
+_MAIN = ("picture", "rays")
+_AFTER = "what becomes of it"
+_ASIDE = ("K", "pixels", "numbers")
+_SHARES = {"K": 265, _AFTER: 230, "pixels": 185, "numbers": 280}  # of the second row, where K takes two tiles
+_MARKS = ("balloon", "globe", "centre", "corners")
+# Of one row, by how many panels of either kind stand in it: its height at most and their widths.
+_ONE_ROW: dict[tuple[int, int], tuple[float, tuple[float, ...]]] = {
+    (1, 1): (440, (675, 285)),
+    (1, 2): (390, (410, 285, 265)),
+    (2, 0): (390, (480, 480)),
+    (2, 1): (330, (345, 330, 285)),
 }
+_ALONE, _MOST_ACROSS = 330, 620  # units of height and width of a picture that stands alone
+_TWO_ROWS = {1: (374, (960,)), 2: (374, (460, 500))}  # of the first: the second is as high as K needs
+_MATRIX_HIGH = 222
+_BELOW = 140  # picture units from one matrix to the other
+_RAYS = "The rays it picks out"
 
 
 @dataclass(frozen=True)
 class IntrinsicsView(CameraMatrix):
     """Nine numbers, the picture they make of the garden and the rays they choose.
 
-    Without `millimetres` the readings leave out what K alone cannot know. `panels` is "picture space matrices", or
-    "picture space" for a question that needs no K. `yours` is a reader's function of (uv, K), pixels (..., 2) to unit
-    rays (..., 3) in camera coordinates; its rays are orange.
+    Without `millimetres` the readings leave out what K alone cannot know.
+
+    `panels` names what is drawn: the picture, and beside it any of rays, K, pixels and numbers. `marks` names what is
+    marked in the picture, any of balloon, globe, centre and corners; where the balloon is not, the garden has none.
+    `yours` is a reader's function of (uv, K), pixels (..., 2) to unit rays (..., 3) in camera coordinates; its rays are
+    orange.
     """
 
     title: ClassVar[str] = "Intrinsics"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {
+        "rays": "rays in space",
+        "K": "K",
+        "pixels": "its pixels",
+        "numbers": "numbers",
+    }
 
     millimetres: bool = True
     eye: OrbitCamera = OrbitCamera(distance=20.5, yaw_deg=-62, pitch_deg=34, vfov_deg=30)
-    panels: str = "picture space matrices"
+    panels: str = "picture rays K pixels numbers"
+    marks: str = "balloon globe centre corners"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        wanted = self.panels.split()
+        if "picture" not in wanted or not set(wanted) <= {*_MAIN, *_ASIDE}:
+            raise ValueError(
+                f"panels must be picture and any of rays, {', '.join(_ASIDE)} beside it, got {self.panels!r}"
+            )
+        if not set(self.marks.split()) <= set(_MARKS):
+            raise ValueError(f"marks must be any of {', '.join(_MARKS)}, got {self.marks!r}")
+
+    @classmethod
+    def alone(cls, **state: Any) -> Self:
+        """One wide picture of 640 × 360 pixels, and nothing else open; `state` are fields of the view."""
+        first: dict[str, Any] = {"height": 360, "cy": 179.5, "millimetres": False, "panels": "picture"}
+        return cls(**{**first, **state})
 
     # The words -------------------------------------------------------------------------------------------------------
 
     def numbers(self) -> dict[str, str]:
-        """The state's key figures, as text."""
+        """The state's key figures, as text; of the globe and the balloon where they are marked."""
         across, down = self.field_of_view_deg()
         pitch = self.pitch_um * self.taken.fx / self.intrinsics.fx
         lens = {"focal length": f"{self.focal_mm:.2f} mm, if a pixel is {pitch:.3g} µm wide"}
+        globe = {"camera to globe": f"{self.distance:.2f} m; there, 1 m is {self.intrinsics.fx / self.distance:.0f} px"}
+        balloon = {"red balloon": f"{100 * self.in_sight():.0f} % in sight"}
         return {
             "field of view": f"{across:.1f}° × {down:.1f}°",
             **(lens if self.millimetres else {}),
             "pixel width / height": f"{self.aspect:.3f}, axes at {self.axes_angle_deg():.1f}°",
-            "camera to globe": f"{self.distance:.2f} m; there, 1 m is {self.intrinsics.fx / self.distance:.0f} px",
-            "red balloon": f"{100 * self.in_sight():.0f} % in sight",
+            **(globe if self._marked("globe") or self._marked("balloon") else {}),
+            **(balloon if self._marked("balloon") else {}),
         }
 
     def description(self) -> str:
@@ -82,43 +120,65 @@ class IntrinsicsView(CameraMatrix):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        space, photographs = self._space_panel(draft)
-        parts = {"picture": self._picture_panel(), "rays": space}
-        if "matrices" in self.panels:
-            parts |= self._matrices() | {"pixels": self._lattice_panel()}
-        parts["numbers"] = self._numbers_column()
-        return self.tiled(self._layout, parts, photographs | {"camera": jpeg(self.image(draft=draft))})
+        draw = {"K": self._matrices, "pixels": self._lattice_panel, "numbers": self._numbers_column}
+        parts, photographs = {"picture": self._picture_panel()}, {"camera": jpeg(self.image(draft=draft))}
+        if self._has("rays"):
+            parts["rays"], attached = self._space_panel(draft)
+            photographs |= attached
+        for name in _ASIDE:
+            parts |= draw[name]() if self._has(name) else {}
+        return self.tiled(self._layout, parts, photographs)
 
-    @property
+    @cached_property
     def _layout(self) -> dict[str, Cell]:
-        return _LAYOUTS[self.panels]
+        """One row of up to three panels; else picture and rays in the first, and the others below them."""
+        main, aside = [name for name in _MAIN if self._has(name)], [name for name in _ASIDE if self._has(name)]
+        if len(main) + len(aside) == 1:  # as wide as its picture: a telephone shows all of it
+            return rows((_ALONE, {"picture": min(_MOST_ACROSS, round((_ALONE - 44) * self.width / self.height + 20))}))
+        if (len(main), len(aside)) in _ONE_ROW:
+            height, widths = _ONE_ROW[len(main), len(aside)]
+            return rows((height, dict(zip([*main, *aside], widths, strict=True))))
+        height, widths = _TWO_ROWS[len(main)]
+        tiles = [name for name in _SHARES if self._has("K" if name == _AFTER else name)]
+        whole = sum(_SHARES[name] for name in tiles)
+        second = {name: WIDTH * _SHARES[name] / whole for name in tiles}
+        return rows((height, dict(zip(main, widths, strict=True))), (_MATRIX_HIGH, second))
+
+    def _marked(self, name: str) -> bool:
+        return name in self.marks.split()
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The picture (height, width, 3); a crop is shown within the whole, so it shows the picture as taken."""
         K = self.taken if self.operation == "cropped" else self.intrinsics
         wide = min(K.width, 320 if draft else 440)
         grid = K if wide == K.width else K.resized(wide, max(1, round(wide * K.height / K.width)))
-        return _photographed(grid, float(self.camera.centre[2]), max(1, round(320 / wide)))
+        return _photographed(grid, float(self.camera.centre[2]), max(1, round(320 / wide)), self._marked("balloon"))
 
     @cached_property
     def _picture(self) -> Panel:
         """In the pixels of the picture as taken."""
-        _, _, across, high = self._layout["picture"]
-        return image_panel("picture", 10, 34, across - 20, self.width, self.height, tallest=high - 44)
+        return image_in(self._layout["picture"], "picture", self.width, self.height)
 
     def _picture_panel(self) -> str:
         panel, K = self._picture, self.intrinsics
         coarse = {"style": "image-rendering:pixelated"} if K.width < 200 else {}
         content = placed_image(panel, "camera", self.width, self.height, **coarse) + self._window()
-        content += self._behind() + self._globe()
+        content += self._behind() if self._marked("balloon") else ""
+        content += self._globe() if self._marked("globe") else ""
+        content += self._principal_point() if self._marked("centre") else ""
         note = f"{K.width} × {K.height} pixels"
-        return panel.show(content + self._principal_point(), title=f"The picture, {self.operation}", note=note)
+        title = "The picture" if self.operation == "as taken" else f"The picture, {self.operation}"
+        return panel.show(content, title=title, note=note)
 
     def _window(self) -> str:
         """The corners' names in the picture's own pixels; around a crop, what it leaves out."""
         panel, K = self._picture, self.intrinsics
         (x0, y0), (x1, y1) = self._as_taken([(-0.5, -0.5), (K.width - 0.5, K.height - 0.5)])
-        names = _tag((x0 + 8, y0 + 17), "(0, 0)") + _tag((x1 - 8, y1 - 9), f"({K.width - 1}, {K.height - 1})", "end")
+        names = ""
+        if self._marked("corners"):
+            names = _tag((x0 + 8, y0 + 17), "(0, 0)") + _tag(
+                (x1 - 8, y1 - 9), f"({K.width - 1}, {K.height - 1})", "end"
+            )
         if self.operation != "cropped":
             return names
         hole = f"M0,0H{panel.width:g}V{panel.height:g}H0ZM{x0:.1f},{y0:.1f}V{y1:.1f}H{x1:.1f}V{y0:.1f}Z"
@@ -173,15 +233,18 @@ class IntrinsicsView(CameraMatrix):
     def _space_panel(self, draft: bool) -> Drawn:
         x, _, across, high = self._layout["rays"]
         panel = space_panel("space", x + 10, 34, across - 20, high - 44)
-        items = [*self._frustum(), *self._line_of_sight()]
+        items = [*self._frustum(), *(self._line_of_sight() if self._marked("balloon") else [])]
         span = BALLOON[2] - self.camera.centre[2]  # the onlooker steps back so far as to see both its ends
         target = (0.0, 0.2, float(BALLOON[2] - 0.49 * span))
         eye = replace(self.eye, target=target, distance=self.eye.distance * (3 + span) / 14)
-        scenery = scene_items(balloon_scene, "wire")
-        yours, words = self._your_rays() if self.yours else ([], "")
+        scenery = scene_items(balloon_scene if self._marked("balloon") else textured_scene, "wire")
+        yours, words, problem = self._your_rays() if self.yours else ([], "", "")
+        if is_unwritten(problem):
+            right, attached = draw_space(panel, items + yours, eye, draft=draft, renderer="wire", scenery=scenery)
+            return without(panel, problem, _RAYS, right=right), attached
         label = "The camera, its rays and the garden in space; drag or press the arrow keys to walk around"
         seen: dict[str, Any] = {"eye": eye, "scenery": scenery, "over": words, "drag": "orbit"}
-        return self.in_space(panel, items + yours, draft, "The rays it picks out", label, **seen)
+        return self.in_space(panel, items + yours, draft, _RAYS, label, **seen)
 
     def _frustum(self) -> list[Item]:
         items = camera_body(self.camera, 1.4, colour="blue")
@@ -194,23 +257,24 @@ class IntrinsicsView(CameraMatrix):
             items += [Line(_ray(whole, corner, 1.4), "muted dashed", 1.0) for corner in self.taken.border(1)]
         return items
 
-    def _your_rays(self) -> tuple[list[Item], str]:
+    def _your_rays(self) -> tuple[list[Item], str, str]:
         """The rays of the picture's corners and border by the reader's function, as long as right ones to one depth,
-        which are blue, and what is wrong with it."""
+        which are blue; words over them; and what is wrong with it. An unwritten one has right rays to wait for it.
+        """
         assert self.yours is not None
         _, _, across, high = self._layout["rays"]
         uv = self.intrinsics.border(4)
         right = self.camera.unproject(uv)
         rays, problem = tried(self.yours, (uv, self.intrinsics.K), right)
-        name = svg.text((14, high - 52), "orange: your rays of corners and border", "orange halo")
         length = _YOURS_M / right[:, 2:]
         rim = self.camera.centre + length * right
         frame: list[Item] = [Line(closed(rim), "blue", 3.4)]
-        if problem:
-            return frame, svg.paragraph((14, 24), problem, across - 48)
-        ends = self.camera.centre + length * rays
+        if problem and not is_unwritten(problem):
+            return frame, svg.paragraph((14, 24), problem, across - 48), problem
+        ends = rim if problem else self.camera.centre + length * rays
         spokes = [Line(np.array([self.camera.centre, ends[i]]), "orange", 1.8) for i in range(0, len(uv), len(uv) // 4)]
-        return [*frame, *spokes, Line(closed(ends), "orange", 1.8)], name
+        name = svg.text((14, high - 52), "orange: your rays of corners and border", "orange halo")
+        return [*frame, *spokes, Line(closed(ends), "orange", 1.8)], name, problem
 
     def _line_of_sight(self) -> list[Item]:
         """To the balloon: broken where something stands in the way."""
@@ -225,23 +289,33 @@ class IntrinsicsView(CameraMatrix):
     # The matrices ----------------------------------------------------------------------------------------------------
 
     def _matrices(self) -> dict[str, str]:
-        before, after, K = self.taken.K, self.intrinsics.K, self.intrinsics
-        left = intrinsic_matrix(10, 422, "K, as taken" if self.operation != "as taken" else "K", before)
-        if self.operation == "as taken":
-            right = intrinsic_matrix(275, 422, "K⁻¹ × 1000", 1000 * np.asarray(np.linalg.inv(before)))
-        else:
-            changed = ~np.isclose(before, after, rtol=0, atol=1e-9)
-            right = intrinsic_matrix(275, 422, f"K, {self.operation}", after, changed)
-        u = f"u = {K.fx:.2f} x {added(K.skew)} y {added(K.cx)}"
-        v = f"v = {K.fy:.2f} y {added(K.cy)}"
-        lines = svg.text((10, 520), u, "number") + svg.text((10, 540), v, "number")
-        lines += svg.text((10, 560), "with x = X/Z, y = Y/Z", "note")
-        return {"K": left + lines, "other matrix": right + svg.paragraph((275, 520), self.rule(), 210)}
+        """K, and what becomes of it: in a tile beside it, or in one narrow tile below it."""
+        x, y, across, _ = self._layout["K"]
+        x, y = x + 10, y + 48
+        name = "K" if self.operation == "as taken" else "K, as taken"
+        before = intrinsic_matrix(x, y, name, self.taken.K)
+        if _AFTER not in self._layout:
+            return {"K": before + self._afterwards(x, y + _BELOW, across - 30)}
+        left, _, wide, _ = self._layout[_AFTER]
+        return {"K": before, _AFTER: self._afterwards(left + 10, y, wide - 20)}
 
-    def _lattice_panel(self) -> str:
+    def _afterwards(self, x: float, y: float, width: float) -> str:
+        """What the operation makes of K, and by which rule; of a picture as taken, what K does."""
+        K = self.intrinsics
+        if self.operation == "as taken":
+            u = f"u = {K.fx:.2f} x {added(K.skew)} y {added(K.cx)}"
+            lines = [(u, "number"), (f"v = {K.fy:.2f} y {added(K.cy)}", "number"), ("with x = X/Z, y = Y/Z", "note")]
+            return "".join(svg.text((x, y + 10 + 20 * i), *line) for i, line in enumerate(lines))
+        changed = ~np.isclose(self.taken.K, K.K, rtol=0, atol=1e-9)
+        after = intrinsic_matrix(x, y, f"K, {self.operation}", K.K, changed)
+        return after + svg.paragraph((x, y + 98), self.rule(), width)
+
+    def _lattice_panel(self) -> dict[str, str]:
         """A few pixels as they lie on the sensor, their lean drawn larger than it is."""
         K = replace(self.intrinsics, skew=_LEAN_DRAWN * self.intrinsics.skew)
-        panel = Panel("lattice", 505, 408, 165, 165, -90, 90, -90, 90)
+        x, y, across, high = self._layout["pixels"]
+        side = min(across - 20, high - 44)
+        panel = Panel("lattice", x + 10, y + 34, side, side, -90, 90, -90, 90)
         scale = 30 * np.sqrt(K.fx * K.fy)
 
         def place(uv: Any) -> Array:
@@ -261,14 +335,15 @@ class IntrinsicsView(CameraMatrix):
             + svg.text(v[1] + (6, 6), "v", "green halo")
         )
         note = f"lean drawn {_LEAN_DRAWN} ×" if K.skew else ""
-        return panel.show(content, title="Its pixels", note=note)
+        return {"pixels": panel.show(content, title="Its pixels", note=note)}
 
-    def _numbers_column(self) -> str:
-        """All figures, or those that need no K."""
-        x, y, figures = self._layout["numbers"][0] + 10, self._layout["numbers"][1] + 26, self.numbers()
-        if "matrices" not in self.panels:
-            figures = {name: figures[name] for name in ("field of view", "camera to globe", "red balloon")}
-        return readout(figures, (x, y), (0, 40), (0, 17))
+    def _numbers_column(self) -> dict[str, str]:
+        """All figures, and the shape of a pixel only beside K or pixels, or where millimetres count."""
+        x, y, _, _ = self._layout["numbers"]
+        figures = self.numbers()
+        if not (self._has("K") or self._has("pixels") or self.millimetres):
+            del figures["pixel width / height"]
+        return {"numbers": readout(figures, (x + 10, y + 26), (0, 40), (0, 17))}
 
     # The hands -------------------------------------------------------------------------------------------------------
 
@@ -304,8 +379,8 @@ def _ray(camera: Camera, uv: Array, length: float) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _photographed(intrinsics: Intrinsics, z: float, supersample: int) -> np.ndarray:
+def _photographed(intrinsics: Intrinsics, z: float, supersample: int, balloon: bool) -> np.ndarray:
     camera = Camera(intrinsics, world_from_cam=RigidTransform.from_translation([0, 0, z]))
-    picture = to_display(render(balloon_scene(), camera, supersample))
+    picture = to_display(render(balloon_scene() if balloon else textured_scene(), camera, supersample))
     picture.flags.writeable = False
     return picture
