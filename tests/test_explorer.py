@@ -16,10 +16,10 @@ from traitlets import TraitError, link
 from camviz.draw.picture import Picture
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.frustum import FrustumView
-from camviz.views.light_field import LightFieldView
 from camviz.widgets import Explorer, explore
 from camviz.widgets.still import _show_box
 from camviz.widgets.waiting import hand_out
+from camviz_school.views.light_field import LightFieldView
 
 
 @dataclass(frozen=True)

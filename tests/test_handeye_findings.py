@@ -7,7 +7,7 @@ import pytest
 
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.handeye import PoseError, RobotPoses
-from camviz_clinic.handeye.diagnosis import DISAGREE, KINDS, LITTLE_DEG, Case, turning_finding
+from camviz_clinic.handeye.diagnosis import DISAGREE, KINDS, LITTLE_DEG, PosedPictures, turning_finding
 from camviz_clinic.handeye.mends import FEWEST_TRIED
 from camviz_clinic.handeye.motion import Turning
 from camviz_clinic.handeye.virtual import FAULTS, about_one_axis, cell, healthy_case, moving, scaled, strayed
@@ -15,7 +15,7 @@ from camviz_clinic.handeye.virtual import FAULTS, about_one_axis, cell, healthy_
 
 def case(true, poses=None, **more):
     told = poses or RobotPoses(true.base_from_hand)
-    return Case(told, true.pixels, true.camera, true.board, true.eye_to_hand, **more)
+    return PosedPictures(told, true.pixels, true.camera, true.board, true.eye_to_hand, **more)
 
 
 def of(found, id):
@@ -147,7 +147,9 @@ def test_a_delay_is_measured():
 
 def test_squares_of_another_length_are_told_with_the_length_that_fits():
     true = cell(np.random.default_rng(12), 15)
-    told = Case(RobotPoses(true.base_from_hand), true.pixels, true.camera, replace(true.board, square_size=0.026))
+    told = PosedPictures(
+        RobotPoses(true.base_from_hand), true.pixels, true.camera, replace(true.board, square_size=0.026)
+    )
     finding = of(told, "scale-differs")
     assert finding.value == pytest.approx(1.04, abs=0.004)
     fits = float(finding.remedy.split("with ")[1].split(" mm")[0])

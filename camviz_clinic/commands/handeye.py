@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from camviz_clinic.calibration import Detections
     from camviz_clinic.files import Board, Calibration
     from camviz_clinic.handeye import RobotPoses
-    from camviz_clinic.handeye.diagnosis import Case
+    from camviz_clinic.handeye.diagnosis import PosedPictures
 
 PAINT = {"^Nothing wrong.*": "green", "^Most likely.*": "red", "^✗ fault": "red", "^! warning": "yellow"}
 HANDEYE = """\
@@ -121,11 +121,11 @@ def handeye(options: argparse.Namespace) -> int:
     return FOUND if any(each.severity == "fault" for each in case.findings) else OK
 
 
-def _case(calibration: Calibration, options: argparse.Namespace) -> tuple[Case, tuple[tuple[str, str], ...]]:
+def _case(calibration: Calibration, options: argparse.Namespace) -> tuple[PosedPictures, tuple[tuple[str, str], ...]]:
     """The poses with the corners of their pictures; and the pictures that were skipped, with the reason."""
     from camviz_clinic.calibration import CannotCalibrate, detect
     from camviz_clinic.handeye import read_poses
-    from camviz_clinic.handeye.diagnosis import Case
+    from camviz_clinic.handeye.diagnosis import PosedPictures
 
     poses = read_poses(options.poses, rotation=options.rotation, angles=options.angles, unit=options.unit)
     if options.invert:
@@ -153,7 +153,7 @@ def _case(calibration: Calibration, options: argparse.Namespace) -> tuple[Case, 
     names = {row: path.name for path, row in zip(paths, rows, strict=True) if row is not None}
     pixels = _pixels(found, board, rows, len(poses.base_from_hand))
     labels = tuple(names.get(row, "no picture") for row in range(len(poses.base_from_hand)))
-    case = Case(poses, pixels, camera, board, options.eye_to_hand, labels)
+    case = PosedPictures(poses, pixels, camera, board, options.eye_to_hand, labels)
     return case, (*found.skipped, *skipped)
 
 

@@ -25,7 +25,7 @@ ROUNDS = 40
 LEARNT = 1e-3  # of the robot's errors: a smaller change ends the rounds
 
 
-class Measured(Protocol):
+class BoardMeasurements(Protocol):
     """What each pose's points of the board are compared in."""
 
     @property
@@ -120,7 +120,7 @@ class Adjusted:
     """
 
     motions: Motions
-    measured: Measured
+    measured: BoardMeasurements
     X: RigidTransform
     Z: RigidTransform
     weights: Array | None = None

@@ -46,7 +46,7 @@ CAUSES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class PosedPictures:
     """A robot's poses, row by row, and the board's corners in the picture of each row.
 
     Args:
@@ -62,7 +62,7 @@ class Case:
     >>> import numpy as np
     >>> from camviz_clinic.handeye.virtual import cell, scaled
     >>> true = scaled(cell(np.random.default_rng(3)), 1000)  # a robot that tells millimetres, which were read as metres
-    >>> case = Case(RobotPoses(true.base_from_hand), true.pixels, true.camera, true.board)
+    >>> case = PosedPictures(RobotPoses(true.base_from_hand), true.pixels, true.camera, true.board)
     >>> [finding.id for finding in case.findings]
     ['wrong-unit']
     """

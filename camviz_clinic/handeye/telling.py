@@ -10,21 +10,21 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.checks import words
 from camviz_clinic.files.output import as_rows
-from camviz_clinic.handeye.diagnosis import Case
+from camviz_clinic.handeye.diagnosis import PosedPictures
 from camviz_clinic.handeye.motion import Mask
 from camviz_clinic.handeye.solving import HandEye
 
 ARRANGEMENTS = ("eye in hand", "eye to hand")
 
 
-def as_text(case: Case, skipped_pictures: tuple[tuple[str, str], ...] = ()) -> str:
+def as_text(case: PosedPictures, skipped_pictures: tuple[tuple[str, str], ...] = ()) -> str:
     """The verdict, the findings with what to do, X with its ±, and what was assumed."""
     lines = [*(f"{name}: skipped, {why}." for name, why in skipped_pictures), *case.poses.assumed]
     glance = [*(solution(case) if case.usable else []), *lines]
     return words.text(case.findings, case.checked, case.skipped, glance=glance)
 
 
-def solution(case: Case) -> list[str]:
+def solution(case: PosedPictures) -> list[str]:
     """X and Z in lines, each number with its standard deviation."""
     found = case.result
     lines = [
@@ -38,7 +38,7 @@ def solution(case: Case) -> list[str]:
     return lines
 
 
-def as_tree(case: Case) -> dict[str, Any]:
+def as_tree(case: PosedPictures) -> dict[str, Any]:
     """The verdict, the findings and the solution, for programs; null where something is not known."""
     return {
         "verdict": words.verdict(case.findings, case.checked, case.skipped),
@@ -51,7 +51,7 @@ def as_tree(case: Case) -> dict[str, Any]:
     }
 
 
-def result_tree(case: Case) -> dict[str, Any]:
+def result_tree(case: PosedPictures) -> dict[str, Any]:
     """What is kept of a solution: X and Z in metres, radians inside the covariance, and how each pose agrees."""
     found = case.result
     noise, names = found.noise, case.pictures or [None] * len(found.used)

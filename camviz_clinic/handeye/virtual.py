@@ -15,7 +15,7 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.handeye.diagnosis import Case
+from camviz_clinic.handeye.diagnosis import PosedPictures
 from camviz_clinic.handeye.motion import Turning
 from camviz_clinic.handeye.pose_table import RobotPoses
 from camviz_clinic.handeye.turn_forms import other_readings, rotations
@@ -185,12 +185,12 @@ def _stopping(rng: Rng) -> Cell:
     return cell(rng, int(rng.integers(12, 21)), bool(rng.integers(2)))
 
 
-def _case(healthy: Cell, poses: RobotPoses | None = None, board: Board | None = None) -> Case:
+def _case(healthy: Cell, poses: RobotPoses | None = None, board: Board | None = None) -> PosedPictures:
     told = poses or RobotPoses(healthy.base_from_hand, times=healthy.times)
-    return Case(told, healthy.pixels, healthy.camera, board or healthy.board, healthy.eye_to_hand)
+    return PosedPictures(told, healthy.pixels, healthy.camera, board or healthy.board, healthy.eye_to_hand)
 
 
-def _reordered(rng: Rng) -> Case:
+def _reordered(rng: Rng) -> PosedPictures:
     """Reversed, sorted as words, in no order, or two poses exchanged."""
     well = _stopping(rng)
     count = len(well.base_from_hand)
@@ -202,7 +202,7 @@ def _reordered(rng: Rng) -> Case:
     return _case(well.told(well.base_from_hand[orders[rng.integers(4)]]))
 
 
-def _shifted(rng: Rng) -> Case:
+def _shifted(rng: Rng) -> PosedPictures:
     """The first one to three poses, or pictures, are missing."""
     well, shift = _stopping(rng), int(rng.integers(1, 4))
     if rng.integers(2):
@@ -210,7 +210,7 @@ def _shifted(rng: Rng) -> Case:
     return _case(replace(well, base_from_hand=well.base_from_hand[:-shift], pixels=well.pixels[shift:]))
 
 
-def _misread(rng: Rng) -> Case:
+def _misread(rng: Rng) -> PosedPictures:
     """Quaternions in the other order, or Euler angles about other axes."""
     well = _stopping(rng)
     form, read = (("wxyz", "xyzw"), ("euler-ZYX", "euler-xyz"), ("rotvec", "euler-xyz"))[rng.integers(3)]
@@ -227,31 +227,31 @@ def _misread(rng: Rng) -> Case:
     return _case(well, RobotPoses(posed(rotations(read, numbers, degrees=False)), others=others))
 
 
-def _inverted(rng: Rng) -> Case:
+def _inverted(rng: Rng) -> PosedPictures:
     """hand_from_base in place of base_from_hand."""
     well = _stopping(rng)
     return _case(well.told(well.base_from_hand.inv()))
 
 
-def _one_axis(rng: Rng) -> Case:
+def _one_axis(rng: Rng) -> PosedPictures:
     """The hand turned about one axis, and by 0.2° about the others."""
     return _case(cell(rng, eye_to_hand=bool(rng.integers(2)), turns=about_one_axis(rng, 15, 0.2)))
 
 
-def _little_turning(rng: Rng) -> Case:
+def _little_turning(rng: Rng) -> PosedPictures:
     """The hand turned by 2° to 6° (RMS) about every axis."""
     turns = Rotation.from_rotvec(rng.normal(0, rng.uniform(2, 6), (15, 3)), degrees=True)
     return _case(cell(rng, eye_to_hand=bool(rng.integers(2)), turns=turns))
 
 
-def _squares(rng: Rng) -> Case:
+def _squares(rng: Rng) -> PosedPictures:
     """The board's squares are 2 to 5 % longer or shorter than told."""
     well = _stopping(rng)
     factor = 1 + rng.uniform(0.02, 0.05) * rng.choice([-1, 1])
     return _case(well, board=replace(well.board, square_size=factor * well.board.square_size))
 
 
-FAULTS: Mapping[str, Callable[[Rng], Case]] = {
+FAULTS: Mapping[str, Callable[[Rng], PosedPictures]] = {
     "wrong-unit": lambda rng: _case(scaled(_stopping(rng), float(rng.choice([0.001, 1000])))),
     "poses-inverted": _inverted,
     "poses-shifted": _shifted,
@@ -266,6 +266,6 @@ FAULTS: Mapping[str, Callable[[Rng], Case]] = {
 """By finding, a random case that must lead to it."""
 
 
-def healthy_case(rng: Rng) -> Case:
+def healthy_case(rng: Rng) -> PosedPictures:
     """A random case in which nothing is wrong."""
     return _case(healthy(rng))

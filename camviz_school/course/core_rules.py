@@ -11,7 +11,7 @@ import re
 from typing import Any
 
 from camviz_school.course import minutes, questions
-from camviz_school.course.minutes import Cell, Section
+from camviz_school.course.minutes import Cell, DeeperSection
 
 Notebook = Any
 
@@ -99,7 +99,7 @@ def _ends(core: list[Cell], number: str) -> list[str]:
     return [] if quiz < recap < len(core) else ["the core must end with the quiz and the recap"]
 
 
-def _deeper(section: Section) -> list[str]:
+def _deeper(section: DeeperSection) -> list[str]:
     """A deeper section says what it asks for and its minutes, uses nothing that another one has made, and is short."""
     needed, (least, most) = minutes.said(minutes.reckoned(section.cells)), SECTION_MINUTES
     asks = _ASKS.search(section.cells[0].source)

@@ -74,7 +74,7 @@ _NOT_GIVEN = {"setup", "colab", "stub", "check"}
 
 
 @dataclass(frozen=True)
-class Section:
+class DeeperSection:
     """A deeper section: its heading and its cells, the first of which begins with that heading."""
 
     title: str
@@ -96,7 +96,7 @@ def core(notebook: Notebook) -> list[Cell]:
     return found
 
 
-def sections(notebook: Notebook) -> list[Section]:
+def sections(notebook: Notebook) -> list[DeeperSection]:
     """The deeper sections, in their order; cells between the heading `## Going deeper` and the first are in none."""
     found: list[tuple[str, list[Cell]]] = []
     for cell in notebook.cells[len(core(notebook)) :]:
@@ -105,7 +105,7 @@ def sections(notebook: Notebook) -> list[Section]:
             found.append((heading[1].strip(), []))
         if found:
             found[-1][1].append(cell)
-    return [Section(title, tuple(cells)) for title, cells in found]
+    return [DeeperSection(title, tuple(cells)) for title, cells in found]
 
 
 def minutes(notebook: Notebook, number: str) -> int:
