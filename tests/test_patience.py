@@ -4,6 +4,7 @@ import _thread
 import contextlib
 import io
 import queue
+import signal
 import sys
 import threading
 import time
@@ -27,6 +28,9 @@ def impatient(monkeypatch):
     monkeypatch.setattr(patience, "LIMIT_S", 0.2)
     monkeypatch.setattr(patience, "NOTICE_S", 0.1)
     monkeypatch.setattr(yours, "_stopped", {})
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background is deaf to it
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def loop(x):

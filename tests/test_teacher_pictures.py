@@ -43,7 +43,7 @@ def shown(slide):
     for row in slide.body.split("</div>"):
         images = re.findall(r'<img alt="([^"]*)"[^>]*? src="([^"]*)"', row)
         if images:
-            found.append([panels.Panel(source, unescape(alt)) for alt, source in images])
+            found.append([panels.SavedImage(source, unescape(alt)) for alt, source in images])
     return found
 
 
@@ -114,14 +114,14 @@ def drawing(width, height, name="view", panel=True):
     source = (
         f'<svg width="{width}" height="{height}" style="--w:{width};--shown:100vw" aria-label="{name}"><g{mark}/></svg>'
     )
-    return panels.Panel(f"data:image/svg+xml;base64,{b64encode(source.encode()).decode()}", name)
+    return panels.SavedImage(f"data:image/svg+xml;base64,{b64encode(source.encode()).decode()}", name)
 
 
 def test_panels_share_a_slide_as_long_as_their_letters_stay_as_large_as_they_may():
     """Side by side 1228 − 10 pixels are shared; three of 420 units would be drawn at 0.96, and letters touch below."""
     (page,) = panels.pages([drawing(400, 300)] * 3, "A")
     assert page.scale == pytest.approx((1228 - 20) / 1200)
-    smallest = panels.Panel.least.fget(drawing(400, 300))
+    smallest = panels.SavedImage.least.fget(drawing(400, 300))
     fits, too_wide = (1208 / (3 * smallest) + off for off in (-0.01, 0.01))
     assert len(panels.pages([drawing(fits, 560)] * 3, "A")) == 1
     assert len(panels.pages([drawing(too_wide, 560)] * 3, "A")) == 2
