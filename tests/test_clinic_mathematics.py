@@ -197,7 +197,7 @@ def test_depth_scatters_as_foretold(pair, uv) -> None:
             noise = match * rng.normal(size=(2, 1)) * [1, 0]
             uvs = np.stack([np.tile(pixel, (2, 1)), matched + noise])
             found.append(triangulate([left, right], uvs)[:, 2])
-    expected = depth_uncertainty(one, depths, 0.3, uv=uv)
+    expected = depth_uncertainty(one.by_corners, depths, 0.3, uv=uv)
     scale = SIGMA / one.sigma
     assert np.allclose(np.std(calibrated, axis=0), scale * expected.from_calibration, rtol=0.3)
     assert np.allclose(np.std(both, axis=0), expected.total, rtol=0.3)
@@ -281,7 +281,7 @@ def test_parallel_boards_show_in_the_correlation_of_f_and_z(parallel, solved) ->
     assert np.allclose(np.diag(bad), 1)
     assert bad[0, -1] > 0.99
     assert good[0, -1] < 0.97
-    assert np.allclose(correlation(solved.covariance), good[:-1, :-1])
+    assert np.allclose(correlation(solved.corner_covariance), good[:-1, :-1])
 
 
 def test_correlation_of_f_and_z_is_that_of_many_solutions(solved) -> None:

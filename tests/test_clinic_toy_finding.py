@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from camviz_clinic.report.notebook import inspect as inspect_in_a_notebook
 from camviz_school.views.ward import Patient, reply
 
 DATA = Path(__file__).parent / "data"
+CLINIC = run_path(str(Path(__file__).parents[1] / "tools/docs/clinic.py"))
 TOY = '''
 """A toy: cameras that see in portrait format."""
 
@@ -81,7 +83,7 @@ def test_one_file_makes_a_finding_that_comes_after_all_others(folder):
     assert [path.name for path in folder.iterdir() if path.is_file()] == ["turned.py"]
     assert list(kinds())[-1] == "portrait"
     assert list(faults())[-1] == "camera on its side"
-    assert len(kinds()) == 37
+    assert len(kinds()) == 38
 
 
 def test_text_and_json_tell_of_it(sick):
@@ -112,14 +114,14 @@ def test_the_report_and_the_notebook_show_it(sick, monkeypatch):
 
 
 def test_the_page_and_the_statistics_have_a_row_for_it(folder):
-    page = statistics.page("")
+    page = CLINIC["page"]("")
     assert '<a id="portrait"></a>' in page
     assert "- Named when: The height is more than the width.\n" in page
-    assert "| `portrait` | 3 of 120 | 0 of 120 |" in statistics._healthy_table(Counter(portrait=3), Counter())
+    assert "| `portrait` | 3 of 120 | 0 of 120 |" in CLINIC["_healthy_table"](Counter(portrait=3), Counter())
     toy = faults()["camera on its side"]
     counted = statistics.hits(toy, 1, count=2)
     assert counted.hits == 2
-    row = statistics._row(toy, [counted])
+    row = CLINIC["_row"](toy, [counted])
     assert row.startswith("| camera on its side [quarters]: The image is turned by so many quarters. | `portrait` |")
     assert "**1: 2/2**" in row
     assert statistics.false_alarms(healthy, count=2)["portrait"] == 0

@@ -286,7 +286,10 @@ def test_the_contour_named_1_px_lies_where_the_uncertainty_is_1_px(distance):
 def test_the_map_says_that_it_leaves_out_model_error():
     for view in (UncertaintyView.of(single()), UncertaintyRangeView.of(single())):
         words = re.sub(r"\s+", " ", re.sub("<[^>]*>", " ", view.figure().body))
-        assert "leaves out model error" in words
+        assert (
+            "leaves out what is wrong alike in all views: a bent board, or a lens that the model cannot describe"
+            in words
+        )
 
 
 def test_the_calibration_is_best_where_the_boards_were():
@@ -305,7 +308,7 @@ def test_a_calibration_with_too_few_measurements_has_no_uncertainty_and_says_so(
     )
     sparse = one.detections["camera"].copy()
     sparse[0, 6:] = np.nan
-    with pytest.raises(Missing, match="too few to tell the noise"):
+    with pytest.raises(Missing, match="too few to tell how far they scatter"):
         UncertaintyView.of(replace(one, detections={"camera": sparse}))
 
 

@@ -113,8 +113,9 @@ def test_the_same_photographs_by_the_better_finder_are_healthy_and_a_note_names_
     left_corners,
 ):
     inspection = inspect(calibrate(left_corners, BOARD))
-    (note,) = inspection.findings
+    assert sorted(each.id for each in inspection.findings) == ["corners-set-aside", "views-disagree"]
     assert inspection.healthy
+    note = one(inspection, "corners-set-aside")
     assert note.sentence.startswith("left07.jpg: 7 of 54 corners are set aside, 6 of them in column 9; ")
 
 
@@ -382,7 +383,8 @@ def test_the_photographed_pair_is_healthy_and_its_corners_set_aside_are_a_note(l
     right = detect(sorted(folder.glob("right*.jpg")), BOARD)
     calibration = calibrate_pair(left_corners, right, BOARD)
     assert calibration.set_aside["left"][11].any()
-    assert [(each.id, each.severity) for each in inspect(calibration).findings] == [("corners-set-aside", "note")]
+    found = [(each.id, each.severity) for each in inspect(calibration).findings]
+    assert sorted(set(found)) == [("corners-set-aside", "note"), ("views-disagree", "note")]  # the board bends
 
 
 def test_a_view_without_corners_is_no_reason_to_stop(healthy):

@@ -6,6 +6,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import nbformat
 import pytest
+from test_lessons import replace
 
 from camviz_school.course import core_rules, minutes, notebooks
 from camviz_school.teaching import plans
@@ -156,15 +157,6 @@ def more_lines(count):
     return change
 
 
-def replaced(old, new):
-    def change(lesson):
-        assert any(old in cell.source for cell in lesson.cells)
-        for cell in lesson.cells:
-            cell.source = cell.source.replace(old, new)
-
-    return change
-
-
 def without(start):
     def change(lesson):
         lesson.cells.remove(cell_of(lesson, start))
@@ -192,18 +184,18 @@ def three_panels(lesson):
     [
         (longer(1301), "the core has 1301 words, more than 1300"),
         (more_lines(61), "the core gives 61 lines of code, more than 60"),
-        (replaced("straightening runs forwards.", "one · two."), "names more than 3 ideas"),
-        (replaced("**Ideas:**", "Ideas:"), "must name the ideas"),
+        (replace("straightening runs forwards.", "one · two."), "names more than 3 ideas"),
+        (replace("**Ideas:**", "Ideas:"), "must name the ideas"),
         (later("from camviz.views.distortion", 1), "at most 2 cells may stand above the first view, 3 do"),
-        (replaced("<details><summary>About", "<p>About"), "must say, folded, what the lesson is about"),
+        (replace("<details><summary>About", "<p>About"), "must say, folded, what the lesson is about"),
         (later("import numpy as np\n\nfrom camviz.widgets", 1), "the setup cell must stand, folded"),
         (later('quiz("05", "A")', -4), 'quiz("05", "A") must stand below the first view'),
         (later('ask("05.grid")', -1), 'ask("05.grid") must be followed by its view within 2 cells'),
-        (replaced('"hide_fold", k1=', '"hide_fold", "show", k1='), "the first view of a section has 1 to 2 controls"),
+        (replace('"hide_fold", k1=', '"hide_fold", "show", k1='), "the first view of a section has 1 to 2 controls"),
         (three_panels, "the first view of a section has at most 2 panels, not 3"),
         (later('quiz("05")', 1), "the core must end with the quiz and the recap"),
-        (replaced("*About 15 minutes. Asks for: sections 1 and 2", "*About 20 minutes. Asks for: 1"), "say *About 15"),
-        (replaced("Asks for: sections 1 and 3, and", "It needs"), "Deeper: the map of a whole photograph' must say"),
+        (replace("*About 15 minutes. Asks for: sections 1 and 2", "*About 20 minutes. Asks for: 1"), "say *About 15"),
+        (replace("Asks for: sections 1 and 3, and", "It needs"), "Deeper: the map of a whole photograph' must say"),
         (without("def fold_radius"), "the core has 1 exercises, not 2 or 3"),
     ],
 )  # fmt: skip

@@ -18,17 +18,13 @@ from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.virtual import SetUp, single
 
 SEVERITIES = ("fault", "warning", "note")  # the worst first
+VIEW_BY_VIEW = ("views-differ", "views-disagree", "outlier-view", "outlier-line", "corners-set-aside")
+"""Findings that whatever makes views disagree may lead to: its `explains` begins with them."""
+
 WRONG_NUMBERS = (
-    *(
-        "models-differ",
-        "views-differ",
-        "views-disagree",
-        "outlier-view",
-        "outlier-line",
-        "corners-set-aside",
-        "pose-absorbs-error",
-    ),
-    *("model-too-simple", "split-disagreement", "fold", "near-pole", "inverse-not-converged"),
+    *VIEW_BY_VIEW,
+    *("models-differ", "pose-absorbs-error", "model-too-simple", "split-disagreement"),
+    *("fold", "near-pole", "inverse-not-converged"),
 )
 """What may follow where a file's numbers are not those of its camera."""
 

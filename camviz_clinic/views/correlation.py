@@ -59,11 +59,17 @@ class CorrelationView(View):
 
     @classmethod
     def about(cls, adjustment: Any) -> CorrelationView:
-        """The view of an adjustment's shared parameters; a lone camera's without its name. Raises Missing."""
+        """The view of an adjustment's shared parameters; a lone camera's without its name. Raises Missing.
+
+        The standard deviations are by the scatter of the views. What hangs together follows from where the corners are,
+        and so the correlations are by their noise: a handful of views tells too little of so many.
+        """
         names = determined(adjustment).parameters
+        by_corners = adjustment.corner_covariance
+        times = np.sqrt(np.diag(adjustment.covariance) / np.diag(by_corners))
         alone = len(adjustment.cameras) == 1
         shown = tuple(name.split(".", 1)[1] if alone else name for name in names)
-        return cls(shown, adjustment.covariance)
+        return cls(shown, by_corners * np.outer(times, times))
 
     @cached_property
     def correlations(self) -> Array:

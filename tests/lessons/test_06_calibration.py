@@ -675,6 +675,10 @@ def test_the_photographs_and_the_second_one(says, taken):
         "the scatter."
     )
     assert said == deviations[0, 0]
+    (told,) = says(
+        "σ by the noise of independent corners (± 0.93) knows nothing about a corner found in the wrong place."
+    )
+    assert told == deviations[0, 0]
     squares = Board(9, 6, 0.025)
     real = CalibrationView.of(taken, squares, 640, 480, free="all")
     without = CalibrationView.of(np.delete(taken, 1, axis=0), squares, 640, 480, free="all")

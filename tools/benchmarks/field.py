@@ -25,7 +25,8 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -140,10 +141,9 @@ def fisheye_flag(name: str) -> int:
     return int(getattr(cv2.fisheye, f"CALIB_{name}", getattr(cv2, f"CALIB_{name}", 0)))
 
 
-def by_mrcal(detections: Detections, board: Board, model: str) -> Camera:
-    """mrcal-calibrate-cameras as it comes, from OpenCV's focal length; it has no Kannala–Brandt lens."""
-    if model not in MRCAL or not shutil.which("mrcal-calibrate-cameras"):
-        raise NotImplementedError
+@contextmanager
+def solved_by_mrcal(detections: Detections, board: Board, model: str) -> Iterator[Path]:
+    """The file of mrcal-calibrate-cameras as it comes, from OpenCV's focal length; gone when the block is left."""
     focal = by_opencv(detections, board, "standard").intrinsics.fx
     rows = ["# filename x y level"]
     for view, corners in enumerate(detections.corners):
@@ -154,7 +154,15 @@ def by_mrcal(detections: Detections, board: Board, model: str) -> Camera:
         command += f"--object-spacing {board.square_size} --object-width-n {board.columns} "
         command += f"--object-height-n {board.rows} --imagersize {detections.width} {detections.height} view*.png"
         subprocess.run(command.split(), cwd=folder, capture_output=True, check=True, timeout=LIMIT_S)
-        return next(iter(load(Path(folder, "camera-0.cameramodel")).cameras.values()))
+        yield Path(folder, "camera-0.cameramodel")
+
+
+def by_mrcal(detections: Detections, board: Board, model: str) -> Camera:
+    """It has no Kannala–Brandt lens."""
+    if model not in MRCAL or not shutil.which("mrcal-calibrate-cameras"):
+        raise NotImplementedError
+    with solved_by_mrcal(detections, board, model) as path:
+        return next(iter(load(path).cameras.values()))
 
 
 PROGRAMS: dict[str, Callable[[Detections, Board, str], Camera]] = {

@@ -20,15 +20,13 @@ import json
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
-from field import FAILURES, LIMIT_S, MRCAL, PAGE, Set, by_opencv, sets
+from field import FAILURES, LIMIT_S, MRCAL, PAGE, Set, sets, solved_by_mrcal
 from kernel import table
 
 from camviz_clinic.calibration import calibrate
@@ -107,18 +105,9 @@ def by_mrcal(views: Detections, board: Board, model: str) -> dict[str, Told]:
     python = mrcal_python()
     if model not in MRCAL or python is None:
         return {}
-    focal = by_opencv(views, board, "standard").intrinsics.fx
-    lines = ["# filename x y level"]
-    for view, corners in enumerate(views.corners):
-        lines += [f"view{view:04d}.png " + (f"{u} {v} 0" if np.isfinite(u) else "0 0 -") for u, v in corners]
-    with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "corners.vnl").write_text("\n".join(lines) + "\n", encoding="utf-8")
-        command = f"mrcal-calibrate-cameras --corners-cache corners.vnl --lensmodel {MRCAL[model]} --focal {focal} "
-        command += f"--object-spacing {board.square_size} --object-width-n {board.columns} "
-        command += f"--object-height-n {board.rows} --imagersize {views.width} {views.height} view*.png"
-        subprocess.run(command.split(), cwd=folder, capture_output=True, check=True, timeout=LIMIT_S)
-        path = str(Path(folder, "camera-0.cameramodel"))
-        done = subprocess.run([python, "-c", LIVE, path], capture_output=True, check=True, text=True, timeout=LIMIT_S)
+    with solved_by_mrcal(views, board, model) as path:
+        live = [python, "-c", LIVE, str(path)]
+        done = subprocess.run(live, capture_output=True, check=True, text=True, timeout=LIMIT_S)
     values, deviations = np.array(json.loads(done.stdout))
     return {"mrcal": (values, deviations)}
 

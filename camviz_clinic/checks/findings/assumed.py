@@ -12,7 +12,7 @@ from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.solving import STOPPED_SHORT
 from camviz_clinic.checks.evidence import Evidence
-from camviz_clinic.checks.registry import Finding, Rng, finding
+from camviz_clinic.checks.registry import VIEW_BY_VIEW, Finding, Rng, finding
 from camviz_clinic.checks.virtual import as_file
 from camviz_clinic.files.opencv import FOUR_COEFFICIENTS
 
@@ -32,9 +32,14 @@ LATER = ("set aside", STOPPED_SHORT)  # what a solution says in the same notes, 
     threshold="The two readings are a pixel apart somewhere in the image. It is a note below that, and where the "
     "file's corners fit the reading that was taken.",
     explains=(
-        *("fold", "near-pole", "inverse-not-converged", "outlier-view", "outlier-line", "pose-absorbs-error"),
-        *("corners-set-aside", "model-too-simple", "split-disagreement", "views-differ", "views-disagree"),
-        *("models-differ",),
+        *VIEW_BY_VIEW,
+        "fold",
+        "near-pole",
+        "inverse-not-converged",
+        "pose-absorbs-error",
+        "model-too-simple",
+        "split-disagreement",
+        "models-differ",
     ),
 )
 def assumed_coefficients(evidence: Evidence) -> Iterator[Finding]:

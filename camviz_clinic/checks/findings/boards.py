@@ -17,7 +17,7 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import held_out
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.observed import Observed
-from camviz_clinic.checks.registry import Finding, LabFault, Rng, finding
+from camviz_clinic.checks.registry import VIEW_BY_VIEW, Finding, LabFault, Rng, finding
 from camviz_clinic.checks.virtual import single, spread_boards
 
 COVERED = 0.4  # of the image: the outermost corners are a square inside the board
@@ -125,21 +125,27 @@ def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
             more = "" if uncertain is None else f" The focal length is uncertain by {uncertain:.2%} (1σ)."
             sentence = f"{name}: no two of the {len(pose)} boards differ by more than {spread:.1f}° in tilt.{more}"
             yield parallel_boards.found(sentence, spread, "°", name)
-        elif uncertain is not None and uncertain * _share_of_noise(evidence, name) > UNCERTAIN:
+        elif (open_left := _left_open(evidence, name)) is not None and open_left > UNCERTAIN:
             sentence = (
-                f"{name}: the focal length is uncertain by {uncertain:.2%} (1σ), with {len(pose)} boards whose tilts "
+                f"{name}: the focal length is uncertain by {open_left:.2%} (1σ), with {len(pose)} boards whose tilts "
                 f"differ by up to {spread:.0f}°."
             )
-            yield parallel_boards.found(sentence, uncertain * 100, "%", name)
+            yield parallel_boards.found(sentence, open_left * 100, "%", name)
 
 
-def _share_of_noise(evidence: Evidence, name: str) -> float:
-    """σ of the corners by their median over σ by their squares: 1, or less where a few are far out.
+def _left_open(evidence: Evidence, name: str) -> float | None:
+    """σ of fx over fx that the noise of ordinary corners leaves; by the file where it has no corners.
 
-    What those few do to the focal length is their own doing, not that of the boards' tilts.
+    What views that disagree add, or a few corners far out, is their own doing and not that of the boards' tilts.
     """
     observed = evidence.observed.get(name)
-    return 1.0 if observed is None else min(1.0, observed.scatter / observed.adjustment.sigma)
+    if observed is None or "fx" not in observed.adjustment.estimated[name]:
+        return evidence.focal_uncertainty(name)
+    adjustment = observed.adjustment.by_corners
+    place = adjustment.estimated[name].index("fx")
+    sigma = float(np.sqrt(max(adjustment.intrinsics_covariance(name)[place, place], 0)))
+    share = min(1.0, observed.scatter / adjustment.sigma)
+    return share * sigma / evidence.calibration.cameras[name].intrinsics.fx if np.isfinite(adjustment.sigma) else None
 
 
 @parallel_boards.fault(
@@ -173,7 +179,7 @@ def all_parallel(rng: Rng, strength: float) -> Evidence:
     remedy="Solve again with tilted boards at varied distances and a still camera. "
     "Trust held-out corners rather than the error of the fit.",
     threshold="The errors are twice as large as noise makes them, in the median of the views.",
-    explains=("views-differ", "views-disagree", "outlier-view", "outlier-line", "corners-set-aside"),
+    explains=VIEW_BY_VIEW,
 )
 def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
     """The check fits each view's pose to one half of its corners and tries it on the other half."""

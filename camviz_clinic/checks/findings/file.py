@@ -12,7 +12,7 @@ from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt, Perspective
 from camviz_clinic.calibration.types import CalibrationError
 from camviz_clinic.checks.evidence import Evidence, NotChecked
-from camviz_clinic.checks.registry import WRONG_NUMBERS, Finding, Rng, finding
+from camviz_clinic.checks.registry import VIEW_BY_VIEW, WRONG_NUMBERS, Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, as_file, healthy, healthy_pair, single, spread_boards
 from camviz_clinic.files import kalibr, ros
 
@@ -119,13 +119,9 @@ def mislabelled(rng: Rng, strength: float) -> Evidence:
     "say so where the file can (rectified, PINHOLE).",
     threshold="All are zero and, where there are corners, k1 is at least five standard deviations from 0.",
     explains=(
+        *VIEW_BY_VIEW,
         "models-differ",
-        "views-differ",
-        "views-disagree",
         "rolling-shutter",
-        "outlier-view",
-        "outlier-line",
-        "corners-set-aside",
         "pose-absorbs-error",
         "model-too-simple",
         "split-disagreement",

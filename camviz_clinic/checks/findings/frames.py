@@ -14,7 +14,7 @@ from camviz_clinic.calibration.solving import ANOTHER_WAY_DEG
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks import virtual
 from camviz_clinic.checks.evidence import Evidence, NotChecked
-from camviz_clinic.checks.registry import Finding, Kind, Rng, finding
+from camviz_clinic.checks.registry import VIEW_BY_VIEW, Finding, Kind, Rng, finding
 from camviz_clinic.checks.rig import FLIPPED, StereoPair, distances, fits_better, lone_poses
 from camviz_clinic.checks.virtual import healthy, healthy_pair
 
@@ -180,11 +180,7 @@ def in_opengl(rng: Rng, strength: float) -> Evidence:
     remedy="Use a board without symmetry (one side odd, the other even), or ChArUco. Turn the order of those views.",
     threshold="A view is more than 45° from the rest, and agrees with them once its order is turned.",
     explains=(
-        "views-differ",
-        "views-disagree",
-        "outlier-view",
-        "outlier-line",
-        "corners-set-aside",
+        *VIEW_BY_VIEW,
         "baseline-scale",
         "rectified-black",
     ),

@@ -18,7 +18,7 @@ from camviz_clinic.checks.between_views import FEWEST_VIEWS, Drift, Partings
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.fields import smooth_field, warp_columns
 from camviz_clinic.checks.observed import BY_CHANCE, Observed, explained
-from camviz_clinic.checks.registry import Finding, LabFault, Rng, finding
+from camviz_clinic.checks.registry import VIEW_BY_VIEW, Finding, LabFault, Rng, finding
 from camviz_clinic.checks.virtual import SetUp, alone, changed, healthy, single, spread_boards
 
 SYSTEMATIC = 0.5  # of the noise: what remains of a real lens under the standard model is a third of it
@@ -44,12 +44,8 @@ STANDARD_ERRORS = 5.0
     threshold="The field explains more than noise would in one set of a million. It makes up at least half of the "
     "noise and 0.1 px (RMS), and somewhere reaches three standard deviations of the corners.",
     explains=(
-        "views-differ",
-        "views-disagree",
+        *VIEW_BY_VIEW,
         "rolling-shutter",
-        "outlier-view",
-        "outlier-line",
-        "corners-set-aside",
         "fold",
         "near-pole",
         "inverse-not-converged",
@@ -112,11 +108,7 @@ def lens_too_rich(rng: Rng, strength: float) -> Evidence:
     threshold="Noise would show the bend in one set of a million, "
     "and it is at least half a percent of the board's longer side.",
     explains=(
-        "views-differ",
-        "views-disagree",
-        "outlier-view",
-        "outlier-line",
-        "corners-set-aside",
+        *VIEW_BY_VIEW,
         "pose-absorbs-error",
         "model-too-simple",
         "split-disagreement",
@@ -168,11 +160,7 @@ def warped_board(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     "Noise would show it in one set of a million, and so would views that scatter as these do in one of a "
     "thousand. Of 500 halves by lot at most one differs more clearly. Or both partings differ by two pixels.",
     explains=(
-        "views-differ",
-        "views-disagree",
-        "outlier-view",
-        "outlier-line",
-        "corners-set-aside",
+        *VIEW_BY_VIEW,
         "pose-absorbs-error",
     ),
 )

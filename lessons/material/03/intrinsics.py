@@ -303,8 +303,10 @@ class IntrinsicsView(CameraMatrix):
         """What the operation makes of K, and by which rule; of a picture as taken, what K does."""
         K = self.intrinsics
         if self.operation == "as taken":
-            u = f"u = {K.fx:.2f} x {added(K.skew)} y {added(K.cx)}"
-            lines = [(u, "number"), (f"v = {K.fy:.2f} y {added(K.cy)}", "number"), ("with x = X/Z, y = Y/Z", "note")]
+            u = f"u = {K.fx:.2f} x {added(K.skew)} y"
+            equations = [u, added(K.cx)] if K.skew else [f"{u} {added(K.cx)}"]
+            equations.append(f"v = {K.fy:.2f} y {added(K.cy)}")
+            lines = [*((line, "number") for line in equations), ("with x = X/Z, y = Y/Z", "note")]
             return "".join(svg.text((x, y + 10 + 20 * i), *line) for i, line in enumerate(lines))
         changed = ~np.isclose(self.taken.K, K.K, rtol=0, atol=1e-9)
         after = intrinsic_matrix(x, y, f"K, {self.operation}", K.K, changed)
