@@ -14,6 +14,7 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import twisted
 from camviz_clinic.calibration.arrowhead import inverse
+from camviz_clinic.calibration.clustered import ByView
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz_clinic.handeye.motion import Mask, Motions
 
@@ -269,17 +270,12 @@ class Adjusted:
     def covariance(self) -> Array:
         """Of the twists of X and Z, and of `also`, (unknowns, unknowns), in radians and metres.
 
-        It is the jackknife that leaves out one pose at a time, to first order: what the robot and the board's corners
-        do wrong is common to a pose's corners, so that poses are independent and corners are not.
-
-        Source: Bell & McCaffrey, *Bias reduction in standard errors for linear regression with multi-stage samples*,
-        Survey Methodology 28 (2002), CR3.
+        It is the jackknife that leaves out one pose at a time, to first order (`ByView`): what the robot and the
+        board's corners do wrong is common to a pose's corners, so that poses are independent and corners are not.
         """
-        count, total = len(self.motions), self.blocks.sum(axis=0)
-        step = self.step
-        left_out = self.gradients - np.einsum("pab,b->pa", self.blocks, step)
-        moves = np.einsum("pab,pb->pa", inverse(total - self.blocks), left_out)
-        return (count - 1) / count * moves.T @ moves
+        unknowns = self.blocks.shape[-1]
+        nothing = np.zeros((unknowns, unknowns))
+        return ByView(self.blocks, self.gradients, nothing, np.zeros(unknowns)).covariance(sigma=1.0)
 
     @property
     def model_covariance(self) -> Array:

@@ -100,7 +100,7 @@ def _ends(core: list[Cell], number: str) -> list[str]:
 
 
 def _deeper(section: DeeperSection) -> list[str]:
-    """A deeper section says what it asks for and its minutes, uses nothing that another one has made, and is short."""
+    """A deeper section says what it asks for and its minutes, and is short."""
     needed, (least, most) = minutes.said(minutes.reckoned(section.cells)), SECTION_MINUTES
     asks = _ASKS.search(section.cells[0].source)
     found = []
