@@ -1,92 +1,41 @@
 """Lenses: how directions become points on the image, before any pixel is counted.
 
-Every module of this folder is looked through for lenses, so that a new one is a new file and no line elsewhere. Its
-name in `LENSES` is the class's, in small letters.
+A new lens is a new file and no line elsewhere: `camviz.lenses.catalogue` finds it. The few lenses that every view
+needs are here at once, all others when one of them, or the catalogue, is first asked for.
 """
 
-import re
-from collections.abc import Iterator
 from importlib import import_module
-from inspect import isabstract
-from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Any
 
-# What is found below needs no line here; these tell type checkers of the lenses that camviz itself makes use of.
-from camviz.lenses.base import Lens
+from camviz.lenses.base import Lens  # noqa: F401 - the names of this folder, see __getattr__
 from camviz.lenses.brown_conrady import BrownConrady  # noqa: F401
-from camviz.lenses.declarations import CalibrationModel, Spelling
 from camviz.lenses.fisheye import Equidistant, Equisolid, FieldOfView, Orthographic, Stereographic  # noqa: F401
-from camviz.lenses.kannala_brandt import KannalaBrandt  # noqa: F401
-from camviz.lenses.modified_brown_conrady import ModifiedBrownConrady  # noqa: F401
 from camviz.lenses.panoramas import Cylindrical, Equirectangular  # noqa: F401
-from camviz.lenses.perspective import Perspective
-from camviz.lenses.spheres import DoubleSphere, ExtendedUnified, UnifiedSphere  # noqa: F401
-from camviz.lenses.thin_prism_fisheye import ThinPrismFisheye  # noqa: F401
+from camviz.lenses.perspective import Perspective  # noqa: F401
+
+if TYPE_CHECKING:  # the catalogue finds these without a line; type checkers do not
+    from camviz.lenses.catalogue import LENSES, calibration_models, same_lenses, spelled  # noqa: F401
+    from camviz.lenses.kannala_brandt import KannalaBrandt  # noqa: F401
+    from camviz.lenses.modified_brown_conrady import ModifiedBrownConrady  # noqa: F401
+    from camviz.lenses.spheres import DoubleSphere, ExtendedUnified, UnifiedSphere  # noqa: F401
+    from camviz.lenses.thin_prism_fisheye import ThinPrismFisheye  # noqa: F401
+
+_OF_ALL = ("LENSES", "calibration_models", "same_lenses", "spelled")
 
 
-def _found() -> Iterator[type[Lens]]:
-    """The lenses that the modules of this folder define."""
-    for module in (import_module(f"{__name__}.{each.name}") for each in iter_modules(__path__)):
-        for name, value in vars(module).items():
-            own = isinstance(value, type) and issubclass(value, Lens) and value.__module__ == module.__name__
-            if own and not isabstract(value) and not name.startswith("_"):
-                yield value
+def __getattr__(name: str) -> Any:
+    if name.startswith("_") and name != "__all__":
+        raise AttributeError(f"module 'camviz.lenses' has no attribute {name!r}")
+    catalogue = import_module("camviz.lenses.catalogue")
+    lenses = {lens.__name__: lens for lens in catalogue.LENSES.values()}
+    if name == "__all__":
+        return ["Lens", *_OF_ALL, *lenses]
+    if name in lenses:
+        return lenses[name]
+    if name in _OF_ALL:
+        return getattr(catalogue, name)
+    raise AttributeError(f"module 'camviz.lenses' has no attribute {name!r}")
 
 
-LENSES: dict[str, type[Lens]] = {  # the pinhole first, the others by their files
-    re.sub("(?<=[a-z])(?=[A-Z])", "_", lens.__name__).lower(): lens
-    for lens in sorted(_found(), key=lambda lens: lens is not Perspective)
-}
-"""Every lens by its class's name in small letters.
-
->>> LENSES["double_sphere"].parameters()
-('xi', 'alpha')
-"""
-globals().update({lens.__name__: lens for lens in LENSES.values()})
-
-__all__ = ["LENSES", "Lens", "calibration_models", "same_lenses", "spelled"]
-__all__ += [lens.__name__ for lens in LENSES.values()]
-
-
-def spelled(program: str) -> list[tuple[type[Lens], Spelling]]:
-    """The lenses that a program has, and how it writes them.
-
-    Args:
-        program: The name of a format, such as "kalibr".
-
-    Returns: list of (type of Lens, Spelling). A lens may have several spellings; none for a program that is not known.
-
-    >>> [(lens.__name__, spelling.model) for lens, spelling in spelled("ros")][:2]
-    [('BrownConrady', 'plumb_bob'), ('BrownConrady', 'rational_polynomial')]
-    """
-    return [(lens, each) for lens in LENSES.values() for each in lens.spellings if each.program == program]
-
-
-def calibration_models() -> dict[str, tuple[type[Lens], CalibrationModel]]:
-    """The models that can be calibrated, by name, each with its lens.
-
-    Returns: dict of str to (type of Lens, CalibrationModel), by the names that `camviz calibrate --model` takes.
-
-    >>> lens, model = calibration_models()["fisheye"]
-    >>> lens.__name__, model.parameters
-    ('KannalaBrandt', 'k1 k2 k3 k4')
-    """
-    return {each.name: (lens, each) for lens in LENSES.values() for each in lens.calibrations}
-
-
-def same_lenses(lens: Lens) -> Iterator[tuple[Lens, float]]:
-    """The same lens under other names.
-
-    Args:
-        lens: The lens to be written otherwise.
-
-    Yields:
-        other: A lens of another class with the same image, up to its scale.
-        factor: From this lens's focal lengths to the other's.
-
-    >>> list(same_lenses(BrownConrady()))  # nothing but 0: a perspective lens
-    [(Perspective(), 1.0)]
-    """
-    yield from lens.same_as()
-    for other in LENSES.values():
-        if other.plain is type(lens):
-            yield other(), 1.0
+def __dir__() -> list[str]:
+    return sorted(__getattr__("__all__"))

@@ -11,7 +11,7 @@ from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import sampson_distance, singular_values, to_homogeneous
 from camviz.twoview.plane import homography, normalising_transform
-from camviz.twoview.triangulate import ray_distances
+from camviz.twoview.triangulation import ray_distances
 
 ENOUGH = 16  # pairs, before a plane can be told from its noise
 PLAIN = 1.75  # times as much unexplained: below, of 2,000 random scenes 3 to 6 m deep 12 are refused, of planes 1,898

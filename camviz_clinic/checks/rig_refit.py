@@ -11,7 +11,7 @@ import numpy as np
 from camviz.cameras import Camera, transform
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.twoview.rectify import rectify
+from camviz.twoview.rectification import rectify
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
