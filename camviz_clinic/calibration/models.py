@@ -12,8 +12,8 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion.limits import NEARLY_A_POLE, image_reach, weakest_denominator
 from camviz.lenses import Lens, calibration_models
-from camviz.lenses.declarations import CalibrationModel
 from camviz.lenses.base import Array, unit
+from camviz.lenses.declarations import CalibrationModel
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.detection import CannotCalibrate
 from camviz_clinic.calibration.types import Board

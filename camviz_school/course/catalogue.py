@@ -7,7 +7,6 @@ and its minutes. `lesson.toml` in the folder says the rest:
     takeaway = "ISO adds no light"         # what a reader will not leave without
     real_data = "the edge of a chessboard"
     picture = "docs/images/sharpness.svg"  # from the top of the repository; without one the gallery shows the title
-    after = "02"                           # optional: the lesson stands behind lesson 02, and not at its number
     question = "How sharp is a camera?"    # only where the header asks none
 
 `python -m camviz_school.commands.lessons pages` writes the tables anew.
@@ -29,7 +28,7 @@ BEGINNING = "00"
 COLUMNS = 3
 """Pictures in a row of the gallery."""
 
-_KEYS = dict.fromkeys(("title", "question", "takeaway", "real_data", "picture", "after"), str)
+_KEYS = dict.fromkeys(("title", "question", "takeaway", "real_data", "picture"), str)
 _QUESTION = re.compile(r"\*\*([^*]+\?)\*\*")
 _MINUTES = re.compile(r"About (\d+) minutes")
 
@@ -46,12 +45,6 @@ class Lesson:
     real_data: str
     minutes: int
     picture: str = ""
-    after: str = ""
-
-    @property
-    def place(self) -> tuple[str, str]:
-        """What lessons are sorted by."""
-        return self.after or self.number, self.number
 
 
 def described(notebook: Notebook, file: str) -> Lesson:
@@ -64,7 +57,7 @@ def described(notebook: Notebook, file: str) -> Lesson:
     if not told.is_file():
         raise ValueError(f"lesson {number} needs a file {told.name} in {told.parent}, which says its title")
     where = f"{told.name} of lesson {number}"
-    table = shaped(table_of(told.read_text(encoding="utf-8"), where), _KEYS, where, {"question", "picture", "after"})
+    table = shaped(table_of(told.read_text(encoding="utf-8"), where), _KEYS, where, {"question", "picture"})
     asked, minutes = _QUESTION.search(header), _MINUTES.search(header)
     if minutes is None:
         raise ValueError(f"the header of {file} must say how long the lesson takes, About … minutes")
@@ -75,8 +68,8 @@ def described(notebook: Notebook, file: str) -> Lesson:
 
 
 def catalogue() -> list[Lesson]:
-    """All lessons, in the order in which they are taught."""
-    return sorted((described(read(path), path.name) for path in lesson_paths()), key=lambda one: one.place)
+    """All lessons, in the order of their numbers: 00 to 16 are the course, and electives follow."""
+    return sorted((described(read(path), path.name) for path in lesson_paths()), key=lambda one: one.number)
 
 
 # Tables ---------------------------------------------------------------------------------------------------------------

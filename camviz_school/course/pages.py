@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from camviz_school.course import catalogue, glossary
+from camviz_school.course import catalogue, glossary, paths
 from camviz_school.course.catalogue import BEGINNING, Lesson
 from camviz_school.course.material import checkout_lessons, lesson_paths
 from camviz_school.course.notebooks import read, tagged, text_of
@@ -34,16 +34,17 @@ def write_pages() -> list[Path]:
 
 def _readme(path: Path, listed: list[Lesson]) -> str:
     text = path.read_text(encoding="utf-8")
-    for table in (catalogue.gallery(listed), catalogue.overview(listed)):
+    for table in (paths.table(listed, "lessons/"), catalogue.gallery(listed), catalogue.overview(listed)):
         text = catalogue.with_table(text, table)
     return text
 
 
 def _beginning(path: Path, listed: list[Lesson]) -> str:
-    notebook, table = read(path), catalogue.lesson_map(listed)
-    for cell in notebook.cells:
-        if cell.cell_type == "markdown" and table.splitlines()[0] in cell.source:
-            cell.source = catalogue.with_table(cell.source, table)
+    notebook = read(path)
+    for table in (paths.table(listed), catalogue.lesson_map(listed)):
+        for cell in notebook.cells:
+            if cell.cell_type == "markdown" and table.splitlines()[0] in cell.source:
+                cell.source = catalogue.with_table(cell.source, table)
     for cell in tagged(notebook, "glossary"):
         cell.source = glossary.markdown().rstrip("\n")
     return text_of(notebook)

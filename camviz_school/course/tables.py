@@ -20,7 +20,7 @@ def shaped(table: object, kinds: Mapping[str, type], where: str, optional: Colle
 
     Only the `optional` keys may be missing. Raises ValueError, beginning with `where`, for any other table.
 
-    >>> shaped({"title": "Fisheye"}, {"title": str, "after": str}, "lesson 09", optional={"after"})
+    >>> shaped({"title": "Fisheye"}, {"title": str, "picture": str}, "lesson 09", optional={"picture"})
     {'title': 'Fisheye'}
     >>> shaped({"title": 9}, {"title": str}, "lesson 09")
     Traceback (most recent call last):

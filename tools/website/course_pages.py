@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from camviz.draw import prose
+from camviz_school.course import paths
 from camviz_school.course.catalogue import Lesson, catalogue
 from camviz_school.course.glossary import Term, glossary
 from camviz_school.course.questions import predict_questions, quiz_questions
@@ -26,6 +27,7 @@ def learn(lessons: list[Lesson]) -> str:
         "# Learn\n\n"
         f"{len(lessons)} lessons, about {hours:.0f} hours in all. Begin with the first, or with the question that "
         "brings you here. Your answers stay in this browser.\n\n"
+        f"{paths.table(lessons, 'lessons/')}\n\n"
         f"```{{toctree}}\n:hidden:\n\n{toctree}\ndocs/glossary\nlessons/conventions\n```\n\n"
         f'<div class="lesson-map">\n{cards}\n</div>\n\n'
         '<p><button type="button" class="camviz-clear" hidden>Clear my answers in all lessons</button>'
