@@ -36,6 +36,12 @@ def pytest_addoption(parser):
     parser.addoption("--all", action="store_true", help="everything: more seeds, both themes, Firefox, every pane")
 
 
+def pytest_ignore_collect(collection_path, config):
+    """The browser's tests are not even imported where none of them is to be run."""
+    browser = collection_path == Path(__file__).parent / "tests/browser"
+    return True if browser and config.getoption("markexpr") == "not browser" else None
+
+
 def pytest_collection_modifyitems(config, items):
     if not config.getoption("--all"):
         left_out = [item for item in items if item.get_closest_marker("thorough")]

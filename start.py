@@ -33,7 +33,7 @@ BUNDLED = MACHINES.is_file()
 SOLID = ("pyvista", "vtk")  # what --light leaves out
 LARGER = ("light", "reader", "site", "test")  # each holds the one before
 SIZE = {"light": "0.7 GB", "reader": "1.3 GB", "site": "1.4 GB", "test": "1.9 GB"}
-TESTS = ("-m", "pytest", "-n", "auto", "--dist", "loadscope")
+TESTS = ("-m", "pytest", "-n", "auto", "--dist", "loadscope", "--no-loadscope-reorder")
 
 
 def main(words):

@@ -348,6 +348,7 @@ def test_the_largest_allowed_file_is_refused(tmp_path, text):
     refusal(tmp_path, text)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="sets limits that only Linux keeps")
 def test_the_largest_allowed_files_need_neither_hours_nor_gigabytes(tmp_path):
     """All of them in a process that the system ends after two minutes of work, and gives 2 GB beside what it loads."""

@@ -98,7 +98,7 @@ def test_mtf50_is_within_one_percent_without_noise(blur, size, angle_deg):
     assert edge.mtf50 == pytest.approx(true_mtf50(blur, size, angle_deg), rel=0.01)
 
 
-@pytest.mark.parametrize("size", [0.5, 2.0])
+@pytest.mark.parametrize("size", [pytest.param(0.5, marks=pytest.mark.thorough), 2.0])
 def test_the_wide_feet_of_diffraction_are_cut_off_and_read_as_up_to_three_percent_sharper(size):
     """Its line spread falls with 1/x² only; no window holds all of it, and the standard's holds less."""
     edge = SlantedEdge.of(photograph("airy", size, 5))

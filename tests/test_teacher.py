@@ -33,8 +33,14 @@ def made(path):
     return edition.teacher_edition(notebooks.read(path))
 
 
+@cache
+def planned(path):
+    """A lesson's slides, not to be changed."""
+    return deck.planned_slides(notebooks.read(path))
+
+
 def numbers(path):
-    return numbering.Numbering.of(plans.plan(path.name[:2]), deck.planned_slides(notebooks.read(path)))
+    return numbering.Numbering.of(plans.plan(path.name[:2]), planned(path))
 
 
 def cell(source, **output):
@@ -204,7 +210,7 @@ def test_pictures_of_the_lessons_come_along(folder):
 @EACH
 def test_the_sheets_hold_every_exercise_and_the_quiz_and_load_nothing(path):
     number, lesson = path.name[:2], notebooks.read(path)
-    pages = sheets.sheets(lesson, number, deck.planned_slides(lesson))
+    pages = sheets.sheets(lesson, number, planned(path))
     for name, page in pages.items():
         assert not re.findall(r'(?:src|href)="(?!data:)[^"]*"|url\((?!data:)|@import', page), name
     stubs = notebooks.stubs(lesson)
@@ -354,7 +360,7 @@ def test_a_plan_numbers_the_slides_as_the_deck_does(path):
     if plans.plan(path.name[:2]) is None:
         assert path.name.startswith("00")
         return
-    made, numbered = deck.planned_slides(notebooks.read(path)), numbers(path)
+    made, numbered = planned(path), numbers(path)
     page = sheets.plan_page(notebooks.read(path), numbered)
     rows = re.findall(
         r"<tr><td>[^<]*</td><td>[^<]*</td><td>([^<]*)</td>", page.partition("Questions and their keys")[0]
