@@ -526,7 +526,7 @@ def test_extrinsics_and_camera_matrix_have_the_shapes_that_are_said(says):
 
 
 def test_the_first_picture_keeps_the_world_s_corner_in_its_middle(says):
-    says("why does the corner of the three coloured axes stay in the middle?")
+    says("yaw changes R, the way this camera is turned, and not t. Pull it: why does the corner of the axes stay in")
     says("t is (0, 0, 1) m all the time")
     for yaw in range(-60, 61, 20):
         view = FrustumView.held(yaw_deg=float(yaw))

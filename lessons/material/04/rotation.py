@@ -28,7 +28,7 @@ _RINGS = (  # name and colour of the turn, radius of its ring, and the axis at r
 )
 _LAYOUTS = {
     "rings numbers": rows((466, {"rings": 620, "numbers": 340})),
-    "rings": rows((380, {"rings": 520})),
+    "rings": rows((340, {"rings": 480})),
 }
 _STAND = 1.2  # where the outer ring's pins are held
 _BODY = Intrinsics.from_fov(640, 480, 60)
