@@ -297,7 +297,7 @@ class FrustumView(OrbitView):
         """The tiles of numbers, by name."""
         n, from_sliders = self.numbers(), " ← x, y, z"
         corners = {name: (x + 10, y + 18) for name, (x, y, _, _) in self._layout.items()}
-        parts = {}
+        parts: dict[str, str] = {}
         if self._has("numbers"):
             centre = "C = −Rᵀt [m]" if self._has("point") else "C [m]"
             (x, y), held = corners["position"], self.mode
