@@ -21,13 +21,11 @@ from camviz.views.yours import is_unwritten, tried
 class ChainView(FrustumView):
     """The garden's board seen by a camera, its corners blue, and orange where a reader's chain puts them.
 
-    `chain` takes (world_from_cam, world_from_board), each (4, 4), to cam_from_board. The view begins with the camera's
-    frame laid on the world's.
+    `chain` takes (world_from_cam, world_from_board), each (4, 4), to cam_from_board.
     """
 
     title: ClassVar[str] = "A chain of frames"
     openable: ClassVar[Mapping[str, str]] = {"world": "the camera in its world"}
-
     panels: str = "picture"
     chain: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
@@ -41,45 +39,27 @@ class ChainView(FrustumView):
         """(4, 4): the origin is the first inner corner, x runs along the rows of corners, y along the columns."""
         grid = board_corners().reshape(6, 9, 3)
         right, down = unit(grid[0, 1] - grid[0, 0]), unit(grid[1, 0] - grid[0, 0])
-        T = np.eye(4)
-        T[:3] = np.column_stack([right, down, np.cross(right, down), grid[0, 0]])
-        return T
+        return np.vstack([np.column_stack([right, down, np.cross(right, down), grid[0, 0]]), [0, 0, 0, 1]])
 
     @cached_property
     def your_corners(self) -> tuple[Array, str]:
-        """The board's corners (54, 3) in the camera's frame by the reader's chain, and what is wrong with it.
-
-        Where it is not written yet, they are where a right one would have them.
-        """
-        world_from_cam, world_from_board = self.camera.world_from_cam.as_matrix(), self.world_from_board
-        right = np.linalg.inv(world_from_cam) @ world_from_board
-        answer, problem = tried(self.chain, (world_from_cam, world_from_board), right) if self.chain else (right, "")
-        on_board = np.column_stack([board_corners(), np.ones(54)]) @ np.linalg.inv(world_from_board).T
+        """The board's corners (54, 3) in the camera's frame by the reader's chain, or a right one; what is wrong."""
+        given = self.camera.world_from_cam.as_matrix(), self.world_from_board
+        right = np.linalg.inv(given[0]) @ given[1]
+        answer, problem = tried(self.chain, given, right) if self.chain else (right, "")
+        on_board = np.column_stack([board_corners(), np.ones(54)]) @ np.linalg.inv(given[1]).T
         return (on_board @ (right if is_unwritten(problem) else answer).T)[:, :3], problem
-
-    def description(self) -> str:
-        corners, problem = self.your_corners
-        if self.chain is None or problem:
-            return f"{super().description()} {problem}".strip()
-        right = (board_corners() - self.camera.centre) @ self.camera.extrinsics[0].T
-        away = float(np.linalg.norm(corners - right, axis=-1).max())
-        return f"{super().description()} By the chain the corners are up to {away:.2f} m from where they are."
 
     def _corners(self, panel: Panel) -> str:
         return svg.dots(panel.place(self.camera.project(board_corners())), "blue", 4)
 
     def _your_corners(self, panel: Panel) -> str:
-        """A cross for each corner by the reader's chain, and where there is none in the picture, words."""
-        if self.chain is None:
-            return ""
         (corners, problem), k = self.your_corners, self.camera.intrinsics
-        if problem and not is_unwritten(problem):
-            return svg.paragraph((14, 24), problem, panel.width - 28)
+        if self.chain is None or (problem and not is_unwritten(problem)):
+            return svg.paragraph((14, 24), problem, panel.width - 28) if problem else ""
         x, y, z = np.where(corners[:, 2:] > 0, corners, np.nan).T
-        uv = np.stack([k.fx * x / z + k.skew * y / z + k.cx, k.fy * y / z + k.cy], axis=-1)
+        uv = (np.stack([x / z, y / z, np.ones(54)], axis=-1) @ k.K.T)[:, :2]
         inside = panel.place(uv[k.contains(uv)])
-        if not len(inside):
-            return svg.text((14, 24), "by the program: not in the picture", "label halo orange")
-        arms = np.array([(3.5, 3.5), (3.5, -3.5)])
-        crosses = [svg.segments(inside - arm, inside + arm, "orange thick") for arm in arms]
-        return "".join(crosses) + svg.text((14, 24), "orange: by the program", "label halo orange")
+        crosses = [svg.segments(inside - arm, inside + arm, "orange thick") for arm in ((3.5, 3.5), (3.5, -3.5))]
+        words = "orange: by the program" if len(inside) else "by the program: not in the picture"
+        return "".join(crosses if len(inside) else []) + svg.text((14, 24), words, "label halo orange")

@@ -107,11 +107,10 @@ class RotationView(OrbitView):
         x, y, across, high = layout["rings"]
         panel = space_panel("rings", x + 10, y + 34, across - 20, high - 44)
         label = "The rings in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        words = "gimbal lock: yaw and roll turn about one line"
-        over = svg.text((14, 24), words, "label halo red") if self.locked else ""
+        over = svg.text((14, 24), "gimbal lock: one line for both", "label halo red") if self.locked else ""
         space, attached = self.in_space(panel, self._items(), draft, "Three rings hold a camera", label, over=over)
-        numbers = self._numbers_panel() if self._has("numbers") else ""
-        return self.tiled(layout, {"rings": space, "numbers": numbers}, attached)
+        beside = {"numbers": self._numbers_panel()} if self._has("numbers") else {}
+        return self.tiled(layout, {"rings": space} | beside, attached)
 
     def _items(self) -> list[Item]:
         camera = Camera(_BODY, world_from_cam=RigidTransform.from_rotation(self.rotation))
