@@ -154,7 +154,7 @@ class BoardPosesView(OrbitView):
         centres, problem = self.your_centres
         if self.yours is None or not before_board:
             return self.in_space(panel, items, draft, title, label, eye=eye)
-        items.append(Dots(centres[np.isfinite(centres).all(axis=-1)], "orange", 9))
+        items.append(Dots(centres[np.isfinite(centres).all(axis=-1)], "orange", 16))
         if is_unwritten(problem):
             content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
             return without(panel, problem, title, right=content), attached
