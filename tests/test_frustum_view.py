@@ -199,7 +199,8 @@ def test_in_the_place_of_a_function_that_is_not_written_stands_the_right_camera_
     waiting = FrustumView(yours=lambda R, t: None)
     body = waiting.figure(draft=True).body
     assert "yours appears here" in body
-    assert 'class="awaited"' in body
+    awaited = body.split('class="awaited"')[1].split("yours appears here")[0]
+    assert awaited.count("<text") == 1  # the sentence itself: what waits is too pale to be read
     np.testing.assert_allclose(waiting._your_camera.centre, waiting.camera.centre)
     assert "from the camera" not in body
     assert "yours appears here" not in waiting.but(yours=lambda R, t: -t).figure(draft=True).body

@@ -224,12 +224,14 @@ class FrustumView(OrbitView):
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else None
         renderer = chosen_renderer(draft=draft)
+        awaited = is_unwritten(self.your_centre[1])
         items, scenery = self._items(image), scene_items(textured_scene, renderer)
+        items = [one for one in items if not (awaited and isinstance(one, Label))]  # what waits is too pale for words
         content, photographs = draw_space(
             panel, items, self.eye, draft=draft, renderer=renderer, frame=frame, scenery=scenery
         )
         title = "The world around the camera" if from_camera else _WORLD
-        if is_unwritten(self.your_centre[1]):
+        if awaited:
             return without(panel, self.your_centre[1], title, right=content), photographs
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
         content += self._whereabouts(panel, np.zeros(3) if from_camera else self.camera.centre)

@@ -156,7 +156,8 @@ class BoardPosesView(OrbitView):
             return self.in_space(panel, items, draft, title, label, eye=eye)
         items.append(Dots(centres[np.isfinite(centres).all(axis=-1)], "orange", 16))
         if is_unwritten(problem):
-            content, attached = draw_space(panel, items, eye, draft=draft, renderer="wire")
+            pale = [one for one in items if not isinstance(one, Label)]  # too pale for words
+            content, attached = draw_space(panel, pale, eye, draft=draft, renderer="wire")
             return without(panel, problem, title, right=content), attached
         away = np.linalg.norm(centres - self.centres, axis=-1).max()
         words = svg.text((14, 24), f"orange dots: your centres, wrong by up to {away:.2f} m", "label halo orange")
