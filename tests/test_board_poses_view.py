@@ -96,3 +96,26 @@ def test_poses_and_photographs_have_to_be_as_many():
         BoardPosesView(CAMERA, RigidTransform.identity())
     with pytest.raises(ValueError, match="as many as the 3 poses, got 1"):
         BoardPosesView(CAMERA, POSES, photographs=(np.zeros((480, 640, 3), np.uint8),))
+
+
+# The reader's own centres --------------------------------------------------------------------------------------------
+
+
+def test_the_readers_centres_are_dots_and_their_largest_error_is_told(view):
+    right = view.but(yours=lambda R, t: -R.T @ t)
+    np.testing.assert_allclose(right.your_centres[0], view.centres, atol=1e-12)
+    assert "wrong by up to 0.00 m" in right.figure(draft=True).body
+    wrong = view.but(yours=lambda R, t: t)
+    away = np.linalg.norm(PUBLISHED[:, 3:] - view.centres, axis=-1).max()
+    assert f"wrong by up to {away:.2f} m" in wrong.figure(draft=True).body
+    assert "wrong by" not in wrong.but(still="camera").figure(draft=True).body
+    assert "wrong by" not in view.figure(draft=True).body
+
+
+def test_a_function_that_is_not_written_has_its_place_and_one_that_fails_says_why(view):
+    waiting = view.but(yours=lambda R, t: None).figure(draft=True).body
+    assert "yours appears here" in waiting
+    assert 'class="awaited"' in waiting
+    failing = view.but(yours=lambda R, t: np.eye(3)).figure(draft=True).body
+    assert "answers in shape" in failing
+    assert "nan" not in failing

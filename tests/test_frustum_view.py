@@ -1,5 +1,7 @@
 """The frustum visualizer: where the camera stands is what its numbers say."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -171,7 +173,7 @@ def test_the_readers_camera_stands_where_their_function_says():
     assert "0.00 m from the camera" in view.figure(draft=True).body
     wrong = view.but(yours=lambda R, t: -t)
     np.testing.assert_allclose(wrong._your_camera.centre, (-0.2, 0, -1))
-    assert wrong._your_numbers() != view._your_numbers()
+    assert "0.00 m from the camera" not in wrong.figure(draft=True).body
     assert wrong._world_panel(np.zeros((3, 4, 3), np.uint8), True) != view._world_panel(
         np.zeros((3, 4, 3), np.uint8), True
     )
@@ -180,7 +182,6 @@ def test_the_readers_camera_stands_where_their_function_says():
 @pytest.mark.parametrize(
     ("function", "words"),
     [
-        (lambda R, t: None, "returns nothing yet"),
         (lambda R, t: np.eye(3), "answers in shape"),
         (lambda R, t: t / 0, "not all finite"),
         (lambda R, t: undefined, "NameError"),  # noqa: F821
@@ -194,11 +195,77 @@ def test_a_function_without_a_centre_puts_no_camera_there_and_says_why(function,
     assert ">yours</text>" not in body
 
 
+def test_in_the_place_of_a_function_that_is_not_written_stands_the_right_camera_greyed():
+    waiting = FrustumView(yours=lambda R, t: None)
+    body = waiting.figure(draft=True).body
+    assert "yours appears here" in body
+    awaited = body.split('class="awaited"')[1].split("yours appears here")[0]
+    assert awaited.count("<text") == 1  # the sentence itself: what waits is too pale to be read
+    np.testing.assert_allclose(waiting._your_camera.centre, waiting.camera.centre)
+    assert "from the camera" not in body
+    assert "yours appears here" not in waiting.but(yours=lambda R, t: -t).figure(draft=True).body
+
+
+def test_no_function_is_drawn_without_the_world_it_stands_in():
+    with pytest.raises(ValueError, match="must have the world"):
+        FrustumView(panels="picture", yours=lambda R, t: t)
+
+
+# One panel first -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "panels", ["world", "picture", "world picture", "picture numbers", "world K point", "world picture numbers K point"]
+)
+def test_the_panels_named_are_drawn_and_no_others(panels):
+    names = {"numbers": ["rotation", "position"], "K": ["intrinsics"], "point": ["one point"]}
+    wanted = [tile for panel in panels.split() for tile in names.get(panel, [panel])]
+    assert [tile.name for tile in FrustumView(panels=panels).figure(draft=True).tiles] == wanted
+
+
+def test_a_first_view_of_one_panel_opens_the_others_and_fits_a_screen():
+    """At most 495 CSS pixels high, for a tile grows to half as much again."""
+    for panel in ("world", "picture"):
+        view = FrustumView.held(panels=panel)
+        (tile,) = view.figure(draft=True).tiles
+        assert 1.5 * tile.cell[3] <= 495
+        assert [name for name in view.openable if name not in view.opened] == [n for n in view.openable if n != panel]
+        opened = view.with_panels({"numbers": True, "K": True, "point": True, "world": True, "picture": True})
+        assert len(opened.figure(draft=True).tiles) == 6
+
+
 def test_the_first_view_leaves_out_K_the_chain_and_the_formula():
-    body = FrustumView(panels="").figure(draft=True).body
+    body = FrustumView(panels="world picture numbers").figure(draft=True).body
     assert "−Rᵀt" not in body
     assert "intrinsics" not in body
     assert "R X + t" not in body
     assert "−Rᵀt" in FrustumView().figure(draft=True).body
-    with pytest.raises(ValueError, match="got \\['nonsense'\\]"):
-        FrustumView(panels="nonsense")
+
+
+@pytest.mark.parametrize("panels", ["nonsense", "numbers", "", "world nonsense"])
+def test_panels_that_cannot_be_drawn_are_refused(panels):
+    with pytest.raises(ValueError, match=f"got {panels!r}"):
+        FrustumView(panels=panels)
+
+
+def test_marks_are_the_corners_the_axes_or_neither():
+    bodies = {
+        marks: FrustumView.held(panels="picture", marks=marks).figure(draft=True).body
+        for marks in ("corners axes", "axes", "")
+    }
+    assert len(set(bodies.values())) == 3
+    assert ">X</text>" in bodies["axes"]
+    assert "red" not in bodies["axes"]
+    assert ">X</text>" not in bodies[""]
+    with pytest.raises(ValueError, match="marks must be"):
+        FrustumView(marks="globe")
+
+
+@pytest.mark.parametrize("yaw", [-60.0, 0.0, 60.0])
+def test_the_names_of_the_axes_stand_in_the_picture(yaw):
+    """An axis that runs straight from the eye has none."""
+    body = FrustumView.held(panels="picture", marks="axes", yaw_deg=yaw).figure(draft=True).body
+    assert (">Z</text>" in body) == (yaw != 0)
+    for x, y in re.findall(r'<text x="([-.\d]+)" y="([-.\d]+)" class="label halo', body):
+        assert 0 < float(x) < 370
+        assert 0 < float(y) < 286

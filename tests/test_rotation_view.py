@@ -73,3 +73,13 @@ def test_dragging_and_arrow_keys_walk_around():
     view = RotationView()
     assert view.dragged("eye", 0, 0, 50, 0).eye.yaw_deg == pytest.approx(view.eye.yaw_deg + 20)
     assert view.pressed("eye", "ArrowUp").eye.pitch_deg != view.eye.pitch_deg
+
+
+def test_the_rings_come_alone_and_the_numbers_are_opened_beside_them():
+    alone = RotationView(panels="rings")
+    assert [tile.name for tile in alone.figure(draft=True).tiles] == ["rings"]
+    assert [tile.name for tile in alone.with_panels({"numbers": True}).figure(draft=True).tiles] == ["rings", "numbers"]
+    assert "gimbal lock" in alone.but(pitch_deg=90.0).figure(draft=True).body
+    assert "gimbal lock" not in alone.figure(draft=True).body
+    with pytest.raises(ValueError, match="panels must be one of"):
+        RotationView(panels="numbers")

@@ -5,7 +5,7 @@ A reader's own function can say where the camera stands; that camera is drawn be
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import atan, degrees, radians, tan
@@ -15,7 +15,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.draw import svg
-from camviz.draw.flow import rows
+from camviz.draw.flow import Cell, rows
 from camviz.draw.matrix import matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture
@@ -38,16 +38,17 @@ from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import board_corners, textured_scene
 from camviz.views import garden
-from camviz.views.base import Drawn, OrbitView, choice, slider, switch
+from camviz.views.base import Drawn, OrbitView, choice, slider, switch, without
 from camviz.views.marks import border_arrow, clipped
-from camviz.views.yours import tried
+from camviz.views.yours import is_unwritten, tried
 
 SUBJECT = (0.0, 0.3, 3.2)  # what the camera orbits: a point in the middle of the scene
-_LAYOUT = rows(
-    (344, {"world": 540, "picture": 420}),
-    (110, {"rotation": 220, "position": 280, "intrinsics": 205, "one point": 255}),
-    (64, {"your centre": 300}),
-)
+_MAIN = ("world", "picture")
+_BOTH, _ALONE = 344, 330  # heights of a row of both, and of one alone, whose controls fit a screen with it
+_MOST_ACROSS = 560
+_TILES = {"numbers": {"rotation": 220, "position": 280}, "K": {"intrinsics": 205}, "point": {"one point": 255}}
+_WORLD = "The camera in its world"
+_REACH = 0.7  # metres of the world's axes that are drawn
 
 
 def _metres(default: float, help: str) -> Any:
@@ -64,12 +65,20 @@ class FrustumView(OrbitView):
 
     x, y, z are what `mode` says: the camera's centre C ("edit C"), the t of its extrinsics [R | t] ("edit t"), or where
     the camera has the middle of the scene ("orbit"). Changing the mode leaves the camera where it is.
-    `panels` names what stands below the pictures beside R, t and C: K, and the chain of one point with C's formula.
+    `panels` names what is drawn: the world, the picture or both, and below them any of numbers (R, t and C), K, and one
+    point, step by step, with C's formula. `marks` names what `points` projects over the picture: corners and axes.
     `yours` is a reader's function of (R, t) that gives the centre (3,): the camera that stands there is orange, with
     what it would see of the board, and the right camera is blue.
     """
 
     title: ClassVar[str] = "A camera in its world"
+    openable: ClassVar[Mapping[str, str]] = {
+        "world": "the camera in its world",
+        "picture": "what it sees",
+        "numbers": "R, t and C",
+        "K": "K",
+        "point": "one point, step by step",
+    }
 
     mode: str = choice("edit C", "edit t", "orbit", help="what x, y, z are: the centre C, the vector t, or the subject")
     x: float = _metres(-0.6, "right")
@@ -83,7 +92,8 @@ class FrustumView(OrbitView):
     far: float = slider(1.2, 0.3, 6.0, 0.1, unit="m", help="where the drawn volume ends")
     seen_from: str = choice("world view", "camera view", label="seen from", help="what stands still: world or camera")
     points: bool = switch(True, help="the board's corners and the world's axes, projected over the picture")
-    panels: str = "K chain"
+    panels: str = "world picture numbers K point"
+    marks: str = "corners axes"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     intrinsics: Intrinsics = field(default_factory=lambda: Intrinsics.from_fov(640, 480, 60))
     lens: Lens = field(default_factory=Perspective)
@@ -93,13 +103,30 @@ class FrustumView(OrbitView):
         super().__post_init__()
         if not 0 < self.hfov_deg < 180:
             raise ValueError(f"hfov_deg, the field of view, must lie between 0 and 180 degrees, got {self.hfov_deg:g}")
-        if not set(self.panels.split()) <= {"K", "chain"}:
-            raise ValueError(f"panels must be some of K, chain, got {self.panels.split()}")
+        wanted = set(self.panels.split())
+        if not wanted & set(_MAIN) or not wanted <= {*_MAIN, *_TILES}:
+            raise ValueError(
+                f"panels must be world, picture or both, and any of {', '.join(_TILES)} below them, got {self.panels!r}"
+            )
+        if self.yours is not None and "world" not in wanted:
+            raise ValueError("panels must have the world, where the camera of yours stands")
+        if not set(self.marks.split()) <= {"corners", "axes"}:
+            raise ValueError(f"marks must be any of corners, axes, got {self.marks!r}")
 
     @classmethod
     def of(cls, camera: Camera, **state: Any) -> Self:
         """The view of a given camera's intrinsics and lens, put where the view begins."""
         return cls(intrinsics=camera.intrinsics, lens=camera.lens, hfov_deg=_hfov_deg(camera.intrinsics), **state)
+
+    @classmethod
+    def held(cls, **state: Any) -> Self:
+        """A camera that has the world's origin 1 m straight ahead, as its t says, and an onlooker near it.
+
+        `state` are fields of the view.
+        """
+        first: dict[str, Any] = {"mode": "edit t", "x": 0.0, "y": 0.0, "z": 1.0, "yaw_deg": 0.0, "pitch_deg": 0.0}
+        near = OrbitCamera(target=(0.0, 0.25, 0.9), distance=5.0, yaw_deg=-38, pitch_deg=24)
+        return cls(**{**first, "far": 0.7, "panels": "world", "eye": near, **state})
 
     @cached_property
     def camera(self) -> Camera:
@@ -111,10 +138,15 @@ class FrustumView(OrbitView):
 
     @cached_property
     def your_centre(self) -> tuple[Array, str]:
-        """Where the reader's function has the camera, (3,), NaN where nowhere, and what is wrong with it."""
+        """Where the reader's function has the camera, (3,), NaN where nowhere, and what is wrong with it.
+
+        Where it is not written yet, it is where a right one would have it.
+        """
         if self.yours is None:
             return np.full(3, np.nan), ""
         centre, problem = tried(self.yours, self.camera.extrinsics, self.camera.centre)
+        if is_unwritten(problem):
+            return self.camera.centre, problem
         if not problem and not np.isfinite(centre).all():
             problem = "The numbers of your centre are not all finite, so no camera stands there."
         return centre, problem
@@ -123,7 +155,7 @@ class FrustumView(OrbitView):
     def _your_camera(self) -> Camera | None:
         """The camera at the reader's centre, turned as the right one is; None where there is none."""
         centre, problem = self.your_centre
-        if self.yours is None or problem:
+        if self.yours is None or (problem and not is_unwritten(problem)):
             return None
         return self.camera.at(RigidTransform.from_components(centre, self.camera.world_from_cam.rotation))
 
@@ -167,22 +199,43 @@ class FrustumView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         image, taken = garden.drafted(self.camera) if draft else garden.taken(self.camera, garden.FINE)
-        world, photographs = self._world_panel(image, draft)
-        parts = {"world": world, "picture": self._picture_panel()} | self._numbers()
-        return self.tiled(_LAYOUT, parts, photographs | {"camera": taken})
+        parts: dict[str, str] = {}
+        photographs = {"camera": taken}
+        if self._has("world"):
+            parts["world"], attached = self._world_panel(image, draft)
+            photographs |= attached
+        if self._has("picture"):
+            parts["picture"] = self._picture_panel()
+        return self.tiled(self._layout, parts | self._numbers(), photographs)
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        """World and picture side by side, or one as large as fits a screen; the numbers in a row below."""
+        tiles = {name: wide for panel, widths in _TILES.items() if self._has(panel) for name, wide in widths.items()}
+        if all(map(self._has, _MAIN)):
+            return rows((_BOTH, {"world": 540, "picture": 420}), (110, tiles))
+        k, high = self.camera.intrinsics, _ALONE - 44
+        across = _MOST_ACROSS if self._has("world") else min(_MOST_ACROSS, round(high * k.width / k.height) + 20)
+        return rows((_ALONE, {"world" if self._has("world") else "picture": across}), (110, tiles))
 
     def _world_panel(self, image: np.ndarray, draft: bool) -> Drawn:
-        panel = space_panel("world", 10, 34, 520, 300)
+        x, y, across, high = self._layout["world"]
+        panel = space_panel("world", x + 10, y + 34, across - 20, high - 44)
         from_camera = self.seen_from == "camera view"
         frame = self.camera.world_from_cam if from_camera else None
         renderer = chosen_renderer(draft=draft)
+        awaited = is_unwritten(self.your_centre[1])
         items, scenery = self._items(image), scene_items(textured_scene, renderer)
+        items = [one for one in items if not (awaited and isinstance(one, Label))]  # what waits is too pale for words
         content, photographs = draw_space(
             panel, items, self.eye, draft=draft, renderer=renderer, frame=frame, scenery=scenery
         )
-        title = "The world around the camera" if from_camera else "The camera in its world"
+        title = "The world around the camera" if from_camera else _WORLD
+        if awaited:
+            return without(panel, self.your_centre[1], title, right=content), photographs
         label = "The scene in space; drag or press the arrow keys to walk around it, plus and minus to go nearer"
         content += self._whereabouts(panel, np.zeros(3) if from_camera else self.camera.centre)
+        content += self._your_numbers(panel)
         return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs
 
     def _whereabouts(self, panel: Panel, centre: Array) -> str:
@@ -199,7 +252,7 @@ class FrustumView(OrbitView):
         if self._your_camera is not None:
             items += camera_body(self._your_camera, self.far, colour="orange", near=near)
             items.append(Label(self._your_camera.centre - 0.55 * _up(self.camera), "yours", "label orange"))
-        items += axes_triad(RigidTransform.identity(), 0.7, "world")
+        items += axes_triad(RigidTransform.identity(), _REACH, "world")
         items += axes_triad(self.camera.world_from_cam, 0.35)
         items.append(Label(self.camera.centre + 0.25 * _up(self.camera), "C", f"label {colour}"))
         if self.mode != "edit C":
@@ -208,55 +261,71 @@ class FrustumView(OrbitView):
         return items
 
     def _picture_panel(self) -> str:
-        k = self.camera.intrinsics
-        panel = image_panel("picture", 550, 34, 400, k.width, k.height, tallest=300)
+        (x, y, across, high), k = self._layout["picture"], self.camera.intrinsics
+        panel = image_panel("picture", x + 10, y + 34, across - 20, k.width, k.height, tallest=high - 44)
         content = placed_image(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
         label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
         return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)
 
     def _projected(self, panel: Panel) -> str:
+        marks = self.marks.split()
+        corners = self._corners(panel) + self._your_corners(panel) if "corners" in marks else ""
+        return corners + (self._axes(panel) if "axes" in marks else "")
+
+    def _corners(self, panel: Panel) -> str:
         uv = panel.place(self.camera.project(board_corners()))
         spacing = float(np.linalg.norm(uv[1] - uv[0]))
-        corners = svg.dots(uv, "red", float(np.clip(0.35 * spacing, 1, 5)) if np.isfinite(spacing) else 4)
-        reach = np.linspace(0, 0.7, 33)[:, None]
-        axes = [svg.path(clipped(panel, panel.place(self.camera.project(reach * axis))), f"{colour} thick")
-                for axis, colour in zip(np.eye(3), ("orange", "green", "blue"), strict=True)]  # fmt: skip
-        return corners + self._your_corners(panel) + "".join(axes)
+        return svg.dots(uv, "red", float(np.clip(0.35 * spacing, 1, 5)) if np.isfinite(spacing) else 4)
+
+    def _axes(self, panel: Panel) -> str:
+        """The world's axes where the camera sees them, each with its name at the last place in the picture."""
+        lines, names = "", ""
+        for name, axis, colour in zip("XYZ", np.eye(3), ("orange", "green", "blue"), strict=True):
+            line = panel.place(self.camera.project(np.linspace(0, _REACH, 33)[:, None] * axis))
+            lines += svg.path(clipped(panel, line), f"{colour} thick")
+            inside = line[((line > 20) & (line < (panel.width - 26, panel.height - 16))).all(axis=-1)]
+            if len(inside) and np.linalg.norm(inside[-1] - inside[0]) > 24:  # not one that runs straight from the eye
+                names += svg.text(inside[-1] + (8, -8), name, f"label halo {colour}")
+        return lines + names
 
     def _your_corners(self, panel: Panel) -> str:
         """The board's corners where the reader's camera would see them."""
-        if self._your_camera is None:
+        if self._your_camera is None or self.your_centre[1]:
             return ""
         uv = self._your_camera.project(board_corners())
         return svg.dots(panel.place(np.where(self.camera.intrinsics.contains(uv)[:, None], uv, np.nan)), "orange", 3.5)
 
     def _numbers(self) -> dict[str, str]:
         """The tiles of numbers, by name."""
-        n, from_sliders, shown = self.numbers(), " ← x, y, z", self.panels.split()
-        centre = "C = −Rᵀt [m]" if "chain" in shown else "C [m]"
-        t = matrix((230, 362), "t [m]" + from_sliders * (self.mode == "edit t"), n["t"][:, None], 3)
-        C = matrix((345, 362), centre + from_sliders * (self.mode == "edit C"), n["C"][:, None], 3)
-        return {
-            "rotation": matrix((10, 362), "R: the camera’s axes are its rows", n["R"], 3),
-            "position": t + C,
-            "intrinsics": matrix((510, 362), "K, intrinsics [px]", n["K"], 1) if "K" in shown else "",
-            "one point": self._chain() if "chain" in shown else "",
-            "your centre": self._your_numbers(),
-        }
+        n, from_sliders = self.numbers(), " ← x, y, z"
+        corners = {name: (x + 10, y + 18) for name, (x, y, _, _) in self._layout.items()}
+        parts: dict[str, str] = {}
+        if self._has("numbers"):
+            centre = "C = −Rᵀt [m]" if self._has("point") else "C [m]"
+            (x, y), held = corners["position"], self.mode
+            t = matrix((x, y), "t [m]" + from_sliders * (held == "edit t"), n["t"][:, None], 3)
+            C = matrix((x + 115, y), centre + from_sliders * (held == "edit C"), n["C"][:, None], 3)
+            R = matrix(corners["rotation"], "R: the camera’s axes are its rows", n["R"], 3)
+            parts |= {"rotation": R, "position": t + C}
+        if self._has("K"):
+            parts["intrinsics"] = matrix(corners["intrinsics"], "K, intrinsics [px]", n["K"], 1)
+        if self._has("point"):
+            parts["one point"] = self._chain(*corners["one point"])
+        return parts
 
-    def _your_numbers(self) -> str:
-        """The reader's centre and its distance from the right one, or why there is none."""
+    def _your_numbers(self, panel: Panel) -> str:
+        """The reader's centre and its distance from the right one, or why there is none, in a corner of the world."""
         if self.yours is None:
             return ""
-        (centre, problem), x, y = self.your_centre, 10, 474
+        (centre, problem), x, y = self.your_centre, 14, 24
         if problem:
-            return svg.paragraph((x, y), problem, 280)
+            return svg.paragraph((x, y), problem, panel.width - 2 * x)
         away = float(np.linalg.norm(centre - self.camera.centre))
-        where = svg.text((x, y), f"your C: {vector(centre, 2)} m", "label orange")
-        return where + svg.text((x, y + 18), f"{away:.2f} m from the camera", "label orange")
+        where = svg.text((x, y), f"your C: {vector(centre, 2)} m", "label halo orange")
+        return where + svg.text((x, y + 20), f"{away:.2f} m from the camera", "label halo orange")
 
-    def _chain(self) -> str:
-        """One point, step by step."""
+    def _chain(self, x: float, y: float) -> str:
+        """One point, step by step, from (x, y) on."""
         point = board_corners()[0]
         seen_at = self.camera.project(point)
         pixel = f"{vector(seen_at, 1)} px" if np.isfinite(seen_at).all() else "has no image"
@@ -265,7 +334,7 @@ class FrustumView(OrbitView):
             ("R X + t, in the camera's frame [m]", vector(transform(self.camera.cam_from_world, point), 2)),
             ("through lens and K", pixel),
         ]
-        return readout(steps, (715, 360), (0, 34), (0, 16), "number")
+        return readout(steps, (x, y - 2), (0, 34), (0, 16), "number")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 

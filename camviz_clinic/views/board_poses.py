@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,12 @@ from camviz.draw.flow import rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import readout, vector
-from camviz.draw.space import Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
+from camviz.draw.space import Dots, Item, Label, Line, OrbitCamera, axes_triad, camera_body, draw_space, space_panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.views.base import Control, Drawn, OrbitView, choice, slider
+from camviz.views.base import Control, Drawn, OrbitView, choice, slider, without
+from camviz.views.patience import Patience
+from camviz.views.yours import is_unwritten, tried
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.views.chessboard import outline, rim, squares
 
@@ -35,7 +37,8 @@ class BoardPosesView(OrbitView):
     `cam_from_board` holds one pose per picture. The board's frame has its origin at the first inner corner, x along the
     rows of corners, y along the columns and z away from the camera. `photographs`, uint8 RGB, are the pictures
     themselves where they are at hand; `hidden` are the indices of poses that are not drawn; `names` are what the
-    others are called, their places from 1 on where none are given.
+    others are called, their places from 1 on where none are given. `yours` is a reader's function of (R, t) that gives
+    a centre (3,): where it has the camera in each picture is an orange dot, while the board stands still.
     """
 
     title: ClassVar[str] = "Camera and board"
@@ -49,6 +52,7 @@ class BoardPosesView(OrbitView):
     eye: OrbitCamera = OrbitCamera(distance=0.9, yaw_deg=-50, pitch_deg=20)
     hidden: frozenset[int] = frozenset()
     names: tuple[str, ...] = ()
+    yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,6 +92,20 @@ class BoardPosesView(OrbitView):
     def centres(self) -> Array:
         """Where the camera stood in each picture, (n, 3) in the board's frame: C = -Rᵀ t."""
         return np.asarray(self.cam_from_board.inv().translation, dtype=np.float64)
+
+    @cached_property
+    def your_centres(self) -> tuple[Array, str]:
+        """Where the reader's function has the camera, (n, 3), NaN where nowhere, and what is wrong with it.
+
+        Where it is not written yet, it is where a right one would have it.
+        """
+        if self.yours is None:
+            return np.full_like(self.centres, np.nan), ""
+        R, t = self.cam_from_board.rotation.as_matrix(), self.cam_from_board.translation
+        with Patience() as patience:
+            each = [tried(self.yours, one, self.centres[0], patience) for one in zip(R, t, strict=True)]
+        problem = next((words for _, words in each if words), "")
+        return (self.centres if is_unwritten(problem) else np.stack([centre for centre, _ in each])), problem
 
     @property
     def chosen(self) -> RigidTransform:
@@ -133,7 +151,18 @@ class BoardPosesView(OrbitView):
         items = self._cameras() if before_board else self._boards()
         title = "Where the camera stood" if before_board else "Where the board was held"
         label = "The poses in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        return self.in_space(panel, items, draft, title, label, eye=eye)
+        centres, problem = self.your_centres
+        if self.yours is None or not before_board:
+            return self.in_space(panel, items, draft, title, label, eye=eye)
+        items.append(Dots(centres[np.isfinite(centres).all(axis=-1)], "orange", 16))
+        if is_unwritten(problem):
+            pale = [one for one in items if not isinstance(one, Label)]  # too pale for words
+            content, attached = draw_space(panel, pale, eye, draft=draft, renderer="wire")
+            return without(panel, problem, title, right=content), attached
+        away = np.linalg.norm(centres - self.centres, axis=-1).max()
+        words = svg.text((14, 24), f"orange dots: your centres, wrong by up to {away:.2f} m", "label halo orange")
+        over = svg.paragraph((14, 24), problem, panel.width - 28) if problem else words
+        return self.in_space(panel, items, draft, title, label, eye=eye, over=over)
 
     def _cameras(self) -> list[Item]:
         """The board, and every picture's camera around it."""

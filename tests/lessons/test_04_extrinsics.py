@@ -1,6 +1,7 @@
 """What lesson 04 says about R, t and C, recomputed with NumPy, SciPy and OpenCV."""
 
 import ast
+import builtins
 import re
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from camviz.scenes.standard import board_corners
 from camviz.views.frustum import FrustumView
-from camviz_school.course import notebooks
+from camviz_school.course import minutes, notebooks
 from camviz_school.course.exercises import exercise
 
 EXCEPTIONS: dict[str, str] = {}
@@ -162,12 +163,13 @@ def test_looking_straight_up_yaw_and_roll_are_one(says):
 
 
 def test_near_the_lock_the_two_differ_less_and_less(says):
-    at, back, there, off, near = says(
-        "At pitch 90°, move yaw, then roll, and watch R. Then take pitch back to 60° and do it again. "
-        "At 90° the two sliders change R in the same way, in opposite directions: two sliders, one freedom. At 60° "
-        "they differ. The nearer you come to 90°, the less the two differ."
+    at, back = says("Take pitch to 90°, and move the other two. Then go back to 60°.")
+    locked, off, near = says(
+        "At 90° the orange ring comes to lie in the green one, and the axis of roll in the axis of yaw. That is "
+        "[gimbal lock](00_start_here.ipynb#gimbal-lock). At 60° the two turns differ. The nearer you come to 90°, the "
+        "less they differ."
     )
-    assert at.value == there.value == near.value
+    assert at.value == near.value == locked.value
 
     def apart(pitch):
         return angle_of(world_from_cam(20, pitch, 0).T @ world_from_cam(0, pitch, -20))
@@ -175,9 +177,6 @@ def test_near_the_lock_the_two_differ_less_and_less(says):
     assert apart(at.value) == pytest.approx(0, abs=1e-5)
     assert back.value == off.value
     assert apart(off.value) > apart(80) > apart(88) > 0.5
-    (locked,) = says(
-        "Take pitch to 90°: the orange ring comes to lie in the green one, and the axis of roll in the axis of yaw."
-    )
     roll_axis = world_from_cam(30, locked.value, 0) @ [0, 0, 1]
     assert np.linalg.norm(np.cross(roll_axis, [0, 1, 0])) == pytest.approx(0, abs=1e-12)
     (both,) = says("at pitch ±90° two of them become one")
@@ -195,10 +194,9 @@ def test_near_the_lock_a_small_turn_makes_angles_jump(says):
 
 def test_four_ways_to_write_a_rotation(says, rng):
     (three,) = says("| 3 | telling a person |")
-    vector, turn = says(
-        "| 3 | calibration files, optimisation, small turns | not a list of three angles; θ and θ + 360° are"
-    )
-    (four,) = says("| 4, of length 1 | storing, blending, robots | q and −q are the same")
+    (vector,) = says("| 3 | calibration files, optimisation | not a list of three angles |")
+    (turn,) = says("rotation vectors by θ and by θ + 360° are the same rotation, and so are the quaternions q and −q")
+    (four,) = says("| 4, of length 1 | storing, blending | scalar last or first |")
     (nine,) = says("| 9, with RᵀR = I and det R = 1 | computing |")
     axis, angle = np.array([0.6, 0, 0.8]), 1.1
     R, q = about(axis, angle), np.array([*(np.sin(angle / 2) * axis), np.cos(angle / 2)])
@@ -234,20 +232,21 @@ def test_k_cross_is_the_matrix_of_the_cross_product_and_makes_rodrigues_formula(
 def test_the_same_three_angles_in_another_order(says):
     roll, pitch, yaw = says('A colleague sends you a pose: "roll 10, pitch 20, yaw 30".')
     (away,) = says("for these very angles pitch before yaw ends up 10° away")
+    *same, apart = says("Yaw 30°, pitch 20° and roll 10°, with yaw first or with pitch first, end 10° apart.")
+    assert [one.value for one in same] == [yaw.value, pitch.value, roll.value]
     one = world_from_cam(yaw.value, pitch.value, roll.value)
     turns = (([1, 0, 0], pitch), ([0, 1, 0], yaw), ([0, 0, 1], roll))
     other = np.linalg.multi_dot([about(axis, np.radians(angle.value)) for axis, angle in turns])
     assert away == angle_of(one.T @ other)
+    assert apart == angle_of(one.T @ other)
 
 
 # Chains and scale ----------------------------------------------------------------------------------------------------
 
 
 def test_four_by_four(says):
-    square = [*says(
-        "and their matrices are 4×4:"
-    ), *says("Other 4×4 matrices scale, shear, mirror, or project:"),
-              *says("shape (..., 4, 4)"), *says("What mends the 4×4 matrix cam_from_board")]  # fmt: skip
+    square = [*says("and their matrices are 4×4:"), *says("shape (..., 4, 4)")]
+    square += says("What mends the 4×4 matrix cam_from_board")
     assert {one.value for one in square} == {len("xyz") + 1}
     whole, again, three, by_three = says(
         "This is the transpose of the whole 4×4 matrix. Only the 3×3 rotation is inverted by transposing."
@@ -265,7 +264,7 @@ def test_four_by_four(says):
 
 
 def test_the_board_s_last_corner(says):
-    right, size, down = says("The board's last corner is 8 squares of 0.1 m to the right and 5 down:")
+    right, size, down = says("The board's last corner is 8 squares of 0.1 m to the right and 5 down.")
     corners = board_corners()
     across = corners[8] - corners[0]
     below = corners[9 * 5] - corners[0]
@@ -362,13 +361,14 @@ def corners_found(path):
 
 def test_the_published_rows(says, calibration):
     (pictures,) = says("a calibration made of 13 photographs of a board")
-    (again,) = says("find with your own functions where a camera stood in 13 pictures of a board")
+    (again,) = says("find with your own function where a camera stood in 13 pictures of a board")
     poses = calibration.getNode("extrinsic_parameters").mat()
     assert pictures.value == again.value == len(poses) == calibration.getNode("nframes").real()
     source = next(cell.source for cell in notebooks.read(LESSON).cells if cell.source.startswith("published ="))
     rows = np.array(re.search(r'"""(.*?)"""', source, re.DOTALL)[1].split(), dtype=float).reshape(poses.shape)
     np.testing.assert_allclose(rows, poses, atol=0.5e-4 + 1e-9)
-    (size,) = says("The board's squares are 25 mm wide, its z axis points away from the camera")
+    (size,) = says("The board's squares are 25 mm wide.")
+    says("Its z axis points away from the camera, so z is negative there.")
     assert size == 1000 * calibration.getNode("square_size").real()
     for rvec, t in zip(poses[:, :3], poses[:, 3:], strict=True):
         R = cv2.Rodrigues(rvec)[0]
@@ -482,14 +482,63 @@ def test_before_the_lesson_three_angles_are_not_enough(says):
     assert (about_y.value, about_x.value) == (first.value, second.value)
 
 
-def test_who_skips_exercise_2_has_what_the_later_cells_import():
-    imported, title = set(), ""
-    for cell in notebooks.read(LESSON).cells:
-        if cell.cell_type == "markdown":
-            title = next(iter(re.findall(r"^#{2,} (.*)", cell.source, re.MULTILINE)), title)
-        elif not title.startswith("Exercise 2"):
-            nodes = list(ast.walk(ast.parse(cell.source)))
-            found = [one for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for one in node.names]
-            imported |= {one.asname or one.name for one in found}
-            used = {node.id for node in nodes if isinstance(node, ast.Name)}
-            assert used & {"plt", "attempt", "Rotation", "cv2"} <= imported, cell.source
+# What stands where ---------------------------------------------------------------------------------------------------
+
+
+def _names(source):
+    """Names that a cell reads, and those that it defines or imports."""
+    nodes = list(ast.walk(ast.parse(source)))
+    imported = [one for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for one in node.names]
+    defined = {(one.asname or one.name).partition(".")[0] for one in imported}
+    defined |= {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+    defined |= {node.arg for node in nodes if isinstance(node, ast.arg)}
+    used = [node for node in nodes if isinstance(node, ast.Name)]
+    defined |= {node.id for node in used if isinstance(node.ctx, ast.Store)}
+    return {node.id for node in used if isinstance(node.ctx, ast.Load)}, defined
+
+
+def test_each_deeper_section_needs_the_cells_of_the_core_alone():
+    notebook = notebooks.read(LESSON)
+    known = set(dir(builtins)).union(*(_names(one.source)[1] for one in minutes.core(notebook) if _is_code(one)))
+    sections = minutes.sections(notebook)
+    assert len(sections) == 3
+    for section in sections:
+        here = set(known)
+        for cell in filter(_is_code, section.cells):
+            used, defined = _names(cell.source)
+            here |= defined
+            assert used <= here, (section.title, used - here)
+
+
+def _is_code(cell):
+    return cell.cell_type == "code"
+
+
+def test_extrinsics_and_camera_matrix_have_the_shapes_that_are_said(says):
+    a, b, c, d = says("of 3 × 3 numbers, [R | t] is 3 × 4, and the whole")
+    view = FrustumView()
+    R, t = view.numbers()["R"], view.numbers()["t"]
+    assert R.shape == (a.value, b.value)
+    assert np.column_stack([R, t]).shape == (c.value, d.value)
+    says("leads from the world to the pixels")
+    u, v, w = view.numbers()["K"] @ np.column_stack([R, t]) @ [*board_corners()[0], 1]
+    np.testing.assert_allclose((u / w, v / w), view.camera.project(board_corners()[0]))
+
+
+def test_the_first_picture_keeps_the_world_s_corner_in_its_middle(says):
+    says("yaw changes R, the way this camera is turned, and not t. Pull it: why does the corner of the axes stay in")
+    says("t is (0, 0, 1) m all the time")
+    for yaw in range(-60, 61, 20):
+        view = FrustumView.held(yaw_deg=float(yaw))
+        np.testing.assert_allclose(view.numbers()["t"], (0, 0, 1), atol=1e-12)
+        np.testing.assert_allclose(view.camera.project(np.zeros(3)), (319.5, 239.5), atol=1e-9)
+    assert not FrustumView.held(yaw_deg=60.0).camera.sees(board_corners()).any()  # the garden has gone by
+
+
+def test_a_camera_under_a_lamp_sees_it_whatever_yaw_and_roll_are(says):
+    says("Lay the camera under a lamp, looking straight up.")
+    lamp = np.array([2.05, 1.25 - 1.95, 3.5])
+    under = FrustumView(x=1.75, y=0.3, z=3.4, yaw_deg=0.0, pitch_deg=90.0)
+    assert under.camera.sees(lamp)
+    turned, rolled = under.but(yaw_deg=40.0).camera, under.but(roll_deg=-40.0).camera
+    np.testing.assert_allclose(turned.project(lamp), rolled.project(lamp), atol=1e-9)

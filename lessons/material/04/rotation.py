@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -25,7 +26,10 @@ _RINGS = (  # name and colour of the turn, radius of its ring, and the axis at r
     ("pitch", "orange", 0.84, 1),
     ("roll", "blue", 0.68, 0),
 )
-_LAYOUT = rows((466, {"rings": 620, "numbers": 340}))
+_LAYOUTS = {
+    "rings numbers": rows((466, {"rings": 620, "numbers": 340})),
+    "rings": rows((340, {"rings": 480})),
+}
 _STAND = 1.2  # where the outer ring's pins are held
 _BODY = Intrinsics.from_fov(640, 480, 60)
 
@@ -36,13 +40,17 @@ class RotationView(OrbitView):
 
     The outer ring turns about the world's vertical and carries the axis of pitch, the middle one carries the axis of
     roll, the inner one holds the camera. At pitch ±90° the axes of yaw and roll fall into one line: gimbal lock.
+    `panels` are the rings, alone or with the numbers beside them.
     """
 
     title: ClassVar[str] = "One rotation, written in every way"
+    layouts: ClassVar[Iterable[str]] = tuple(_LAYOUTS)
+    openable: ClassVar[Mapping[str, str]] = {"numbers": "the same in every way"}
 
     yaw_deg: float = slider(30.0, -180, 180, 1.0, label="yaw", unit="°", help="of the outer ring, to the right")
     pitch_deg: float = slider(20.0, -90, 90, 1.0, label="pitch", unit="°", help="of the middle ring, up")
     roll_deg: float = slider(10.0, -180, 180, 1.0, label="roll", unit="°", help="of the inner ring, clockwise")
+    panels: str = "rings numbers"
     eye: OrbitCamera = OrbitCamera(distance=4.3, yaw_deg=-35, pitch_deg=22)
 
     # The numbers -----------------------------------------------------------------------------------------------------
@@ -95,10 +103,14 @@ class RotationView(OrbitView):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        panel = space_panel("rings", 10, 34, 600, 422)
+        layout = _LAYOUTS[self.panels]
+        x, y, across, high = layout["rings"]
+        panel = space_panel("rings", x + 10, y + 34, across - 20, high - 44)
         label = "The rings in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        space, attached = self.in_space(panel, self._items(), draft, "Three rings hold a camera", label)
-        return self.tiled(_LAYOUT, {"rings": space, "numbers": self._numbers_panel()}, attached)
+        over = svg.text((14, 24), "gimbal lock: one line for both", "label halo red") if self.locked else ""
+        space, attached = self.in_space(panel, self._items(), draft, "Three rings hold a camera", label, over=over)
+        beside = {"numbers": self._numbers_panel()} if self._has("numbers") else {}
+        return self.tiled(layout, {"rings": space} | beside, attached)
 
     def _items(self) -> list[Item]:
         camera = Camera(_BODY, world_from_cam=RigidTransform.from_rotation(self.rotation))
