@@ -75,7 +75,7 @@ class ErrorBars(BoardPictures):
             return svg.paragraph((x, y + 16), problem, width, "note")
         shown = self.adjustment.rms if waits else value
         bar = _large_bar(x, y, width, "the same by your function", shown / _FULL_PX, "fill-orange")
-        bar += _large_number(x, y, width, shown / _FULL_PX, f"{_digits(shown)} px")
+        bar += _large_number(x, y, width, shown / _FULL_PX, f"{_digits(shown)} px", "orange")
         words = svg.text((x + width, y + 40), YOURS_HERE, "title halo end")
         return svg.group(bar, class_="awaited") + words if waits else bar
 
@@ -138,10 +138,11 @@ class ErrorBars(BoardPictures):
         if problem and not is_unwritten(problem):
             return svg.paragraph((x, foot - 150), problem, width, "note halo")
         values = self.per_board if problem else np.array([value for value, _ in found])
-        y = foot - scale * values
+        y = np.clip(foot - scale * values, foot - 1.09 * scale * np.nanmax(self.per_board), foot)
         left = x + step * np.arange(self.count) - 0.1 * step
-        lines = svg.segments(np.stack([left, y], -1), np.stack([left + 0.92 * step, y], -1), "ink thick")
-        name = svg.text((x, foot - scale * np.nanmax(self.per_board) - 8), "lines: your function", "note")
+        ends = np.stack([left, y], -1), np.stack([left + 0.92 * step, y], -1)
+        lines = svg.segments(*ends, "paper-line") + svg.segments(*ends, "orange thick")
+        name = svg.text((x, foot - scale * np.nanmax(self.per_board) - 8), "lines: your function", "note orange")
         words = svg.text((x + width / 2, foot - 60), YOURS_HERE, "title halo middle")
         return svg.group(lines, class_="awaited") + words if problem else lines + name
 
@@ -186,9 +187,9 @@ def _large_bar(x: float, y: float, width: float, words: str, share: float, class
     return svg.text((x, y + 14), words, "label") + bar
 
 
-def _large_number(x: float, y: float, width: float, share: float, words: str) -> str:
+def _large_number(x: float, y: float, width: float, share: float, words: str, colour: str = "") -> str:
     at = x + (width - _NUMBER) * float(np.clip(share, 0.008, 1)) + (18 if share > 1 else 8)
-    return svg.text((at, y + 42), words, "number", style=_LARGE)
+    return svg.text((at, y + 42), words, f"number {colour}".strip(), style=_LARGE)
 
 
 def _share(pixels: float) -> float:
