@@ -44,15 +44,10 @@ _TILES = {  # of the panels
     "each": "each board",
 }
 _EVERYTHING = "picture space corners estimate sigma errors each"
-_HIGH = {
-    "the fit": 260,
-    "estimate": 270,
-    "estimate ± σ": 310,
-    "errors": 160,
-    "each board": 260,
-}  # what stands in a tile
-_FIRST, _FURTHER = 396, 320  # units of height of the first row and of each below it
-_WIDE = {1: (510,), 2: (510, 450), 3: (390, 285, 285)}  # of the first row, by how many panels stand in it
+# Units of height: of what stands in a tile, of the first row, of each row below it.
+_HIGH = {"the fit": 260, "estimate": 310, "estimate ± σ": 310, "errors": 190, "each board": 260}
+_FIRST, _FURTHER = 350.0, 320.0
+_WIDE: dict[int, tuple[float, ...]] = {1: (440,), 2: (440, 520), 3: (390, 285, 285)}  # by how many panels stand in it
 _SHARES = {"boards in space": 1.25, "estimate ± σ": 1.15}  # of a row below it, among others' 1
 _MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 
@@ -177,7 +172,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         names = [_TILES[name] for name in self._tiles]
         first = names[: 3 if len(names) == 3 else 2]
         others, lines = names[len(first) :], 1 + (len(names) > 6)
-        high = 426 if _TILES["yours"] in first else 330 if len(first) == 3 else _FIRST
+        high = 410.0 if _TILES["yours"] in first else 330.0 if len(first) == 3 else _FIRST
         made = [(high, dict(zip(first, _WIDE[len(first)], strict=True)))]
         each = -(-len(others) // lines)
         for row in (others[i : i + each] for i in range(0, len(others), max(each, 1))):
@@ -276,7 +271,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
 
     def _space(self, cell: Cell, draft: bool) -> Drawn:
         x, y, width, height = cell
-        panel = space_panel("space", x + 10, y + 34, width - 20, height - 124)
+        panel = space_panel("space", x + 10, y + 34, width - 20, height - 134)
         far = float(self._poses_shown.translation[:, 2].max())
         eye = replace(
             self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.75
@@ -286,7 +281,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         shown, photographs = self.in_space(
             panel, self._items(), draft, "The boards in space", label, eye=eye, note=note, hint=""
         )
-        return shown + self._facts(x + 14, y + height - 70), photographs
+        return shown + self._facts(x + 14, y + height - 80), photographs
 
     @property
     def _poses_shown(self) -> RigidTransform:

@@ -22,7 +22,6 @@ from camviz_school.views.board_pictures import BoardPictures, middle_of
 _LOW, _HIGH = 0.05, 50.0  # pixels at the ends of the bars of two kinds of error
 _FULL_PX, _FULL_PERCENT = 3.0, 50.0  # at the ends of the bars of the fit
 _NUMBER = 88  # units beyond the longest bar, for the number at its end
-_LARGE = "font-size:20px"
 PIXELS = ("fx", "fy", "cx", "cy")
 NOTHING = "No board is seen: nothing to estimate from"
 
@@ -74,9 +73,9 @@ class ErrorBars(BoardPictures):
         if problem and not waits:
             return svg.paragraph((x, y + 16), problem, width, "note")
         shown = self.adjustment.rms if waits else value
-        bar = _large_bar(x, y, width, "the same by your function", shown / _FULL_PX, "fill-orange")
+        bar = _large_bar(x, y, width, "" if waits else "the same by your function", shown / _FULL_PX, "fill-orange")
         bar += _large_number(x, y, width, shown / _FULL_PX, f"{_digits(shown)} px", "orange")
-        words = svg.text((x + width, y + 40), YOURS_HERE, "title halo end")
+        words = svg.text((x, y + 14), f"the same: {YOURS_HERE}", "title")
         return svg.group(bar, class_="awaited") + words if waits else bar
 
     def _by_your_rms(self, boards: Any) -> tuple[float, str]:
@@ -95,7 +94,7 @@ class ErrorBars(BoardPictures):
             return title + svg.paragraph((x, y + 56), NOTHING, cell[2] - 28, "label")
         bars = [("on the boards it was fitted to", self.adjustment.rms, "fill-blue")]
         bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
-        parts = [_bar(x, y + 36 + 52 * i, longest, *bar) for i, bar in enumerate(bars)]
+        parts = [_bar(x, y + 40 + 64 * i, longest, *bar) for i, bar in enumerate(bars)]
         return title + self._noise_mark(x, y, longest) + "".join(parts)
 
     def _noise_mark(self, x: float, y: float, longest: float) -> str:
@@ -103,8 +102,8 @@ class ErrorBars(BoardPictures):
         if self.seen is not None or self.noise < _LOW:
             return ""
         x += longest * _share(np.sqrt(2) * self.noise)
-        mark = svg.segments([(x, y + 50), (x, y + 102)], [(x, y + 70), (x, y + 122)], "ink")
-        return mark + svg.text((x, y + 140), "noise alone", "tick middle")
+        mark = svg.segments([(x, y + 60), (x, y + 124)], [(x, y + 84), (x, y + 148)], "ink")
+        return mark + svg.text((x, y + 166), "noise alone", "tick middle")
 
     # Each board -------------------------------------------------------------------------------------------------------
 
@@ -160,19 +159,19 @@ class ErrorBars(BoardPictures):
 
     def _facts(self, x: float, y: float) -> str:
         """The quotient that the picked board shows, and how fx and its distance go together."""
-        lines = [svg.text((x, y + 19 + 19 * i), words, "number") for i, words in enumerate(self.levers())]
+        lines = [svg.text((x, y + 22 + 22 * i), words, "number") for i, words in enumerate(self.levers())]
         if self.adjustment and self.used[self.index]:
             words = f"correlation of fx with Z: {signed(self.correlation, 4)}"
-            lines.append(svg.text((x, y + 22 + 19 * len(lines)), words, "note"))
+            lines.append(svg.text((x, y + 22 + 22 * len(lines)), words, "note"))
         return svg.text((x, y), f"fx / Z of board {self.index + 1}, px/m", "note") + "".join(lines)
 
 
 def _bar(x: float, y: float, longest: float, words: str, value: float, class_: str) -> str:
     """An error in pixels as a bar, with its name above it and its number at its end."""
     return (
-        svg.text((x, y + 10), words, "note halo")
-        + svg.rectangle(x, y + 16, longest * _share(value), 16, class_, rx=2)
-        + svg.text((x + 6 + longest * _share(value), y + 29), f"{_digits(value)} px", "number halo")
+        svg.text((x, y + 12), words, "label")
+        + svg.rectangle(x, y + 22, longest * _share(value), 20, class_, rx=2)
+        + svg.text((x + 6 + longest * _share(value), y + 37), f"{_digits(value)} px", "number halo")
     )
 
 
@@ -184,12 +183,12 @@ def _large_bar(x: float, y: float, width: float, words: str, share: float, class
     if share > 1:
         tip = [(x + longest, y + 22), (x + longest + 13, y + 35), (x + longest, y + 48)]
         bar += svg.polygon(tip, class_)
-    return svg.text((x, y + 14), words, "label") + bar
+    return (svg.text((x, y + 14), words, "label") if words else "") + bar
 
 
 def _large_number(x: float, y: float, width: float, share: float, words: str, colour: str = "") -> str:
     at = x + (width - _NUMBER) * float(np.clip(share, 0.008, 1)) + (18 if share > 1 else 8)
-    return svg.text((at, y + 42), words, f"number {colour}".strip(), style=_LARGE)
+    return svg.text((at, y + 42), words, f"title {colour}".strip())
 
 
 def _share(pixels: float) -> float:

@@ -17,7 +17,7 @@ from camviz_school.views.board_pictures import FREE, INTRINSICS
 from camviz_school.views.error_bars import NOTHING, PIXELS, ErrorBars, number
 
 _REACH = 300.0  # pixels at the ends of the strip
-_ROW = 22  # units, from one estimate to the next
+_ROW, _LINE = 22, 26  # units, from one estimate to the next: in the strip, in the table
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class EstimateNumbers(ErrorBars):
         parts = [svg.text((x[0], y + 26), "The estimate", "title")]
         if self.adjustment is None:
             return parts[0] + svg.paragraph((x[0], y + 56), NOTHING, width - 28, "label")
-        parts += [svg.text((at, y + 52), words, "label end") for at, words in zip(x, heads, strict=True)]
+        parts += [svg.text((at, y + 54), words, "label end") for at, words in zip(x, heads, strict=True)]
         for row, name in enumerate(FREE[self.free]):
-            below = y + 76 + _ROW * row
+            below = y + 82 + _LINE * row
             value, sigma = self.estimates[name]
             parts.append(svg.text((x[0], below), name, "number"))
             words = (number(name, self.true[name]) if self.truth else "", number(name, value), spread(name, sigma))

@@ -44,6 +44,7 @@ def from_each(corners: Array, board: Board, camera: Camera, yours: Function | No
     """
     centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])
     right, own, problem = np.full((len(corners), 2), np.nan), np.full((len(corners), 2), np.nan), ""
+    undetermined = ""  # said of a board that has no right answer, which is a problem only where all are such
     with Patience() as patience:
         for i, uv in enumerate(_straightened(corners, camera)):
             try:
@@ -54,8 +55,9 @@ def from_each(corners: Array, board: Board, camera: Camera, yours: Function | No
                     continue
             if yours is not None:
                 own[i], said = tried(yours, (H, centre), centre, patience)
-                problem = problem or said
-    return FromEach(right, own, problem)
+                undetermined = undetermined or said
+                problem = problem or (said if np.isfinite(right[i]).all() else "")
+    return FromEach(right, own, problem or ("" if np.isfinite(right).all(axis=1).any() else undetermined))
 
 
 def _straightened(corners: Array, camera: Camera) -> Array:
