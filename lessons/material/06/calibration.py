@@ -48,6 +48,7 @@ _EVERYTHING = "picture space corners estimate sigma errors each"
 _HIGH = {"the fit": 260, "estimate": 310, "estimate ± σ": 310, "errors": 190, "each board": 260}
 _FIRST, _FURTHER = 350.0, 320.0
 _WIDE: dict[int, tuple[float, ...]] = {1: (440,), 2: (440, 520), 3: (390, 285, 285)}  # by how many panels stand in it
+_NARROW = ("estimate", "errors")  # beside one picture alone: a telephone shows the larger what is less wide
 _SHARES = {"boards in space": 1.25, "estimate ± σ": 1.15}  # of a row below it, among others' 1
 _MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 
@@ -173,7 +174,8 @@ class CalibrationView(OrbitView, EstimateNumbers):
         first = names[: 3 if len(names) == 3 else 2]
         others, lines = names[len(first) :], 1 + (len(names) > 6)
         high = 410.0 if _TILES["yours"] in first else 330.0 if len(first) == 3 else _FIRST
-        made = [(high, dict(zip(first, _WIDE[len(first)], strict=True)))]
+        wide = (440, 360) if len(first) == 2 and first[1] in _NARROW else _WIDE[len(first)]
+        made = [(high, dict(zip(first, wide, strict=True)))]
         each = -(-len(others) // lines)
         for row in (others[i : i + each] for i in range(0, len(others), max(each, 1))):
             whole = sum(_SHARES.get(name, 1) for name in row)
@@ -271,7 +273,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
 
     def _space(self, cell: Cell, draft: bool) -> Drawn:
         x, y, width, height = cell
-        panel = space_panel("space", x + 10, y + 34, width - 20, height - 134)
+        panel = space_panel("space", x + 10, y + 34, width - 20, height - 130)
         far = float(self._poses_shown.translation[:, 2].max())
         eye = replace(
             self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.75
@@ -281,7 +283,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         shown, photographs = self.in_space(
             panel, self._items(), draft, "The boards in space", label, eye=eye, note=note, hint=""
         )
-        return shown + self._facts(x + 14, y + height - 80), photographs
+        return shown + self._facts(x + 14, y + height - 72), photographs
 
     @property
     def _poses_shown(self) -> RigidTransform:

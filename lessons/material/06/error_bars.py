@@ -14,7 +14,7 @@ import numpy as np
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell
-from camviz.draw.readout import signed, true_minus
+from camviz.draw.readout import true_minus
 from camviz.poses import RigidTransform
 from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 from camviz_school.views.board_pictures import BoardPictures, middle_of
@@ -158,11 +158,8 @@ class ErrorBars(BoardPictures):
         return f"{number('fx', f)} / {z:.3f} m = {f / z:.0f}"
 
     def _facts(self, x: float, y: float) -> str:
-        """The quotient that the picked board shows, and how fx and its distance go together."""
-        lines = [svg.text((x, y + 22 + 22 * i), words, "number") for i, words in enumerate(self.levers())]
-        if self.adjustment and self.used[self.index]:
-            words = f"correlation of fx with Z: {signed(self.correlation, 4)}"
-            lines.append(svg.text((x, y + 22 + 22 * len(lines)), words, "note"))
+        """The quotient that the picked board shows."""
+        lines = [svg.text((x, y + 28 + 28 * i), words, "number") for i, words in enumerate(self.levers())]
         return svg.text((x, y), f"fx / Z of board {self.index + 1}, px/m", "note") + "".join(lines)
 
 
