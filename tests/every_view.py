@@ -27,7 +27,7 @@ from camviz_clinic.views.measured_noise import MeasuredNoiseView
 
 SHARED = (
     *("View", "OrbitView", "ObservedView", "SolvedView", "ViewChooser", "BoardPictures", "TwoCameras"),
-    *("CameraMatrix", "ErrorBars", "RefocusedField", "TurningPair"),
+    *("CameraMatrix", "ErrorBars", "EstimateNumbers", "RefocusedField", "TurningPair"),
 )
 """Classes of what views are made of; they draw no picture themselves."""
 

@@ -12,6 +12,7 @@ import pytest
 from camviz.cameras import Camera, transform
 from camviz.lenses import BrownConrady
 from camviz_clinic.calibration.types import Board
+from camviz_school.views.board_photograph import held_board
 from camviz_school.views.board_pictures import FREE, TRUTH
 from camviz_school.views.calibration import CalibrationView
 
@@ -272,7 +273,7 @@ def test_a_reader_s_function_is_drawn_beside_the_right_one_whatever_it_does():
     for function, words in (
         (from_one_homography, "yours: fx 542.7, fy 542.6"),
         (lambda H, centre: from_one_homography(H, centre)[::-1], "yours: fx 542.6, fy 542.7"),
-        (lambda H, centre: None, "returns nothing yet"),
+        (lambda H, centre: None, "yours appears here"),
         (lambda H, centre: 1 / 0, "ZeroDivisionError"),
     ):
         drawn = view.but(yours=function).figure().svg()
@@ -285,8 +286,68 @@ def test_the_view_opens_with_the_fit_alone():
     drawn = few.figure().svg()
     assert "774.2" in drawn
     assert "0.267 px" in drawn
+    assert "42 %" in drawn
     for later in ("not seen", "correlation", "±", "5.2 px"):
         assert later not in drawn
         assert later not in few.description()
-    with pytest.raises(ValueError, match="panels must be one of"):
-        CalibrationView(panels="picture space")
+
+
+@pytest.mark.parametrize("panels", ["fit", "picture fit colour", ""])
+def test_panels_that_there_are_not_are_refused(panels):
+    with pytest.raises(ValueError, match="panels must be picture and any of fit, yours, space"):
+        CalibrationView(panels=panels)
+
+
+@pytest.mark.parametrize("name", CalibrationView.openable)
+def test_each_panel_opens_beside_the_first_two_and_closes_again(name):
+    first = CalibrationView(panels="picture fit", tilt=2.0)
+    opened = first.with_panels({name: True})
+    assert opened.figure().svg() != first.figure().svg()
+    assert opened.with_panels({name: False}) == first
+
+
+def test_tiles_stand_in_rows_without_overlap_however_many_are_open():
+    panels = "picture fit"
+    for name in CalibrationView.openable:
+        panels += f" {name}"
+        cells = CalibrationView(panels=panels)._layout.values()
+        assert all(x + width <= 960.5 for x, _, width, _ in cells)
+        for one in cells:
+            beside = [other for other in cells if other is not one and other[1] == one[1]]
+            assert all(abs(other[0] - one[0]) >= min(other[2], one[2]) - 1e-6 for other in beside)
+
+
+def rms(found, projected):
+    return np.sqrt(np.nanmean(np.sum((found - projected) ** 2, axis=-1)))
+
+
+def test_a_reader_s_rms_is_a_bar_beside_the_right_one_and_a_line_across_each_board_s():
+    view = CalibrationView(panels="picture fit each", tilt=2.0)
+    for function, words in (
+        (rms, "lines: your function"),
+        (lambda found, projected: 4 * rms(found, projected), "1.07 px"),
+        (lambda found, projected: None, "yours appears here"),
+        (lambda found, projected: 1 / 0, "ZeroDivisionError"),
+    ):
+        assert words in view.but(your_rms=function).figure().svg()
+    assert view.but(your_rms=rms).figure().svg().count(">0.267 px</text>") == 2
+
+
+def test_the_first_picture_is_the_garden_with_the_board_in_its_place():
+    """Its squares meet where the corners are."""
+    view = CalibrationView(panels="picture fit", noise=0.0)
+    assert "garden" in view.figure().photographs
+    panel = view._image_panel
+    drawn = re.findall(r"M([\d.-]+),([\d.-]+)", held_board(panel, view.board, view.cam_from_board[0], TRUTH))
+    starts = np.array(drawn, dtype=float)
+    inner = panel.place(view.corners[0])
+    near = np.linalg.norm(starts[:, None] - inner, axis=-1).min(axis=0)
+    assert np.sum(near < 0.1) >= 20  # every other corner begins a dark square
+    assert "garden" not in view.but(panels="picture corners fit").figure().photographs
+
+
+def test_a_pinhole_s_focal_length_comes_out_of_two_pictures_and_not_of_one():
+    one, two = (CalibrationView.of_a_pinhole(boards=n) for n in (1, 2))
+    assert "± unknown" in one.numbers()["fx"]
+    assert abs(two.estimates["fx"][0] - 545) < 1
+    assert list(FREE[two.free]) == ["fx", "fy", "cx", "cy"]

@@ -33,7 +33,7 @@ PICTURES = {
     "frustum": FrustumView(),
     "distortion": DistortionView(k1=-0.28, k2=0.07),
     "fold": DistortionView.of(PUBLISHED),
-    "calibration": CalibrationView(tilt=2.0),
+    "calibration": CalibrationView(tilt=2.0, picked=3, panels="picture fit"),
     "epipolar": EpipolarView(),
     "rectification": RectificationView(),
     "colour": ColourView(),

@@ -5,7 +5,7 @@ A reader's own function can find the focal lengths of each picture beside the ri
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
-from camviz.draw.flow import rows, shortened
+from camviz.draw.flow import Cell, rows, shortened
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed
@@ -24,45 +24,69 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.views.base import Drawn, OrbitView
 from camviz_clinic.views.chessboard import outline, rim, squares
-from camviz_school.views.board_pictures import FREE, INTRINSICS, middle_of, transform_each
-from camviz_school.views.error_bars import NOTHING, PIXELS, ErrorBars, number
+from camviz_school.views.board_photograph import behind, held_board
+from camviz_school.views.board_pictures import FREE, TRUTH, middle_of, transform_each
+from camviz_school.views.error_bars import number, percent
+from camviz_school.views.estimate_numbers import EstimateNumbers, spread
 from camviz_school.views.one_board import FromEach, from_each, panel_of_each
 
-_MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 _CELLS = (16, 12)  # of the coverage map
-_REACH = 300.0  # pixels at the ends of the strip
 _NORMAL = 0.07  # metres, the length of the handle that tilts a board
-_EVERYTHING = "picture space estimate errors"
-_LAYOUTS = {
-    "picture fit": shortened(rows((464, {"picture": 620, "estimate": 340})), estimate=350),
-    "picture yours": rows((426, {"picture": 480, "each picture alone": 480})),
-    _EVERYTHING: shortened(
-        rows(
-            (382, {"picture": 480, "boards in space": 480}),
-            (318, {"estimate": 310, "estimate ± σ": 310, "errors": 340}),
-        ),
-        **{"estimate": 256, "estimate ± σ": 290},
-    ),
+_CORNERS = "corners"  # a panel that is no tile: all corners found, where the picture else shows one board
+_TILES = {  # of the panels
+    "picture": "picture",
+    "fit": "the fit",
+    "yours": "each picture alone",
+    "space": "boards in space",
+    "estimate": "estimate",
+    "sigma": "estimate ± σ",
+    "errors": "errors",
+    "each": "each board",
 }
-_ROW = 22  # units, from one estimate to the next
-_STRIP = Panel("estimates", 356, 428, 254, _ROW * len(INTRINSICS), -1, 1, 0, len(INTRINSICS))
+_EVERYTHING = "picture space corners estimate sigma errors each"
+# Units of height: of what stands in a tile, of the first row, of each row below it.
+_HIGH = {"the fit": 260, "estimate": 310, "estimate ± σ": 310, "errors": 190, "each board": 260}
+_FIRST, _FURTHER = 350.0, 320.0
+_WIDE: dict[int, tuple[float, ...]] = {1: (440,), 2: (440, 520), 3: (390, 285, 285)}  # by how many panels stand in it
+_NARROW = ("estimate", "errors")  # beside one picture alone: a telephone shows the larger what is less wide
+_SHARES = {"boards in space": 1.25, "estimate ± σ": 1.15}  # of a row below it, among others' 1
+_MAGNIFIED = np.array([1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000])
 
 
 @dataclass(frozen=True)
-class CalibrationView(OrbitView, ErrorBars):
-    """Corners and their residuals, the boards in space, the estimate ± σ against the truth, and two kinds of error.
+class CalibrationView(OrbitView, EstimateNumbers):
+    """Pictures of a board, the camera that is estimated from them against the true one, and two kinds of error.
 
-    `panels` says what is drawn: everything; "picture fit", the corners with the estimate and its RMS error alone; or
-    "picture yours", the corners and the focal lengths that each picture gives alone. `yours` is a reader's function of
-    (H, centre) for those, a homography (3, 3) and (cx, cy) to (fx, fy); what it answers is orange.
+    `panels` names what is drawn: the picture, and beside it any of fit, yours, space, estimate, sigma, errors and each.
+    With "corners" the picture shows the corners of all boards and how far they are off. `yours` is a reader's function
+    of (H, centre), a homography (3, 3) and (cx, cy), to the (fx, fy) of one picture; what it answers is orange.
     """
 
     title: ClassVar[str] = "Calibration"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {
+        "space": "boards in space",
+        "estimate": "numbers",
+        "sigma": "± σ",
+        "errors": "two kinds of error",
+        "each": "each board",
+        _CORNERS: "all corners",
+    }
 
     panels: str = _EVERYTHING
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     eye: OrbitCamera = OrbitCamera(distance=1.2, yaw_deg=-58, pitch_deg=26)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        wanted = self.panels.split()
+        if "picture" not in wanted or not set(wanted) <= {*_TILES, _CORNERS}:
+            others = ", ".join([*list(_TILES)[1:], _CORNERS])
+            raise ValueError(f"panels must be picture and any of {others} beside it, got {self.panels!r}")
+
+    @classmethod
+    def of_a_pinhole(cls, **state: Any) -> Self:
+        """The view of a camera without distortion, of which fx, fy, cx and cy are estimated."""
+        return cls(**{"truth": Camera(TRUTH.intrinsics, BrownConrady()), "free": "f, c", **state})
 
     # Words -----------------------------------------------------------------------------------------------------------
 
@@ -90,58 +114,104 @@ class CalibrationView(OrbitView, ErrorBars):
     def _told(self) -> dict[str, str]:
         """The figures that the panels show."""
         figures = self.numbers()
-        if self.panels == _EVERYTHING or self.adjustment is None:
+        if self.adjustment is None:
             return figures
-        if self.panels == "picture yours":
+        told: dict[str, str] = {}
+        if self._has("yours"):
             fx, fy = self.each.right[self.index]
-            return {f"from board {self.index + 1} alone": f"fx {fx:.1f}, fy {fy:.1f}"}
-        estimated = {
-            name: figures[name].replace(f" ± {_spread(name, self.estimates[name][1])}", "") for name in FREE[self.free]
-        }
-        return {**estimated, "RMS": figures["RMS"]}
+            told[f"from board {self.index + 1} alone"] = f"fx {fx:.1f}, fy {fy:.1f}"
+        if self._has("estimate") or self._has("sigma"):
+            told |= {name: figures[name] for name in FREE[self.free]}
+        if self._has("fit") or self._has("errors") or self._has("each"):
+            told["RMS"] = figures["RMS"]
+        if self._has("fit") and self.truth is not None:
+            value, true = (number("fx", one) for one in (self.estimates["fx"][0], self.true["fx"]))
+            told["focal length"] = f"off by {percent(self.off_percent)} %, {value} px in place of {true}"
+        if self._has("errors") and "on unseen boards" in figures:
+            told["on unseen boards"] = figures["on unseen boards"]
+        if self._has("space"):
+            told |= {name: value for name, value in figures.items() if name.startswith("correlation")}
+        return told
 
     def _written(self, name: str) -> str:
         value, sigma = self.estimates[name]
         true = f" (true {number(name, self.true[name])})" if self.truth else ""
-        return f"{number(name, value)} ± {_spread(name, sigma)}{true}"
+        return f"{number(name, value)} ± {spread(name, sigma)}{true}"
 
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
         view = self.but(coarse=True) if draft else self
         attached = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
-        parts = {"picture": view._image()}
-        if self.panels == "picture fit":
-            parts["estimate"] = view._fit()
-        elif self.panels == "picture yours":
-            place = (552, 34, 398, 286)
-            parts["each picture alone"] = panel_of_each(
-                view.each, view._known, self.index, place, self.yours is not None
-            )
-        else:
-            parts["boards in space"], photographs = view._space(draft)
-            parts |= {"estimate": view._estimates(), "estimate ± σ": view._strip(), "errors": view._errors()}
-            attached = attached | photographs
-        return self.tiled(_LAYOUTS[self.panels], parts, attached, view.description())
+        if self._shows_the_board:
+            attached |= behind(self._true_camera)
+        layout, parts = self._layout, dict[str, str]()
+        for name in self._tiles:
+            tile = _TILES[name]
+            if name == "picture":
+                parts[tile] = view._image()
+            elif name == "space":
+                parts[tile], photographs = view._space(layout[tile], draft)
+                attached = attached | photographs
+            elif name == "yours":
+                x, y, width, height = layout[tile]
+                place = (x + 72, y + 34, width - 82, height - 140)
+                parts[tile] = panel_of_each(view.each, view._known, self.index, place, self.yours is not None)
+            else:
+                draw = {"fit": view._fit, "estimate": view._estimates, "sigma": view._strip}
+                draw |= {"errors": view._errors, "each": view._each_board}
+                parts[tile] = draw[name](layout[tile])
+        return self.tiled(layout, parts, attached, view.description())
+
+    @property
+    def _tiles(self) -> list[str]:
+        return [name for name in self.panels.split() if name != _CORNERS]
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        """Up to three panels in one row; else the first two, and the others below them, as many in each row."""
+        names = [_TILES[name] for name in self._tiles]
+        first = names[: 3 if len(names) == 3 else 2]
+        others, lines = names[len(first) :], 1 + (len(names) > 6)
+        high = 410.0 if _TILES["yours"] in first else 330.0 if len(first) == 3 else _FIRST
+        wide = (440, 360) if len(first) == 2 and first[1] in _NARROW else _WIDE[len(first)]
+        made = [(high, dict(zip(first, wide, strict=True)))]
+        each = -(-len(others) // lines)
+        for row in (others[i : i + each] for i in range(0, len(others), max(each, 1))):
+            whole = sum(_SHARES.get(name, 1) for name in row)
+            made.append((_FURTHER, {name: 960 * _SHARES.get(name, 1) / whole for name in row}))
+        heights = _HIGH | {"the fit": 330 if self.your_rms else 260}
+        return shortened(rows(*made), **{name: heights[name] for name in names if name in heights})
 
     # What the camera saw ---------------------------------------------------------------------------------------------
 
     @cached_property
     def _image_panel(self) -> Panel:
-        return image_in(_LAYOUTS[self.panels]["picture"], "image", self.width, self.height)
+        return image_in(self._layout["picture"], "image", self.width, self.height)
+
+    @property
+    def _shows_the_board(self) -> bool:
+        """Whether the picture is one of the virtual camera, which is taken here, and not all corners at once."""
+        return not (self.photographs or self._has(_CORNERS) or self.seen is not None)
 
     def _image(self) -> str:
         panel = self._image_panel
         others = np.delete(self.corners, self.index, axis=0)
         marks = svg.dots(panel.place(others), "muted", 2.6) + self._vectors(panel) + self._handle(panel)
-        if self.photographs:
+        if self._shows_the_board:
+            found = panel.place(self.corners[self.index])
+            pose = self.cam_from_board[self.index]
+            held = held_board(panel, self.board, pose, self._true_camera)
+            content = held + svg.dots(found, "orange", 5) + self._handle(panel)
+        elif self.photographs:
             content = placed_image(panel, "photograph", self.width, self.height) + self._outlined(panel) + marks
         else:
             content = self._coverage(panel) + self._outlined(panel) + marks
-        note = f"errors drawn {self.magnified:g}×" if self.adjustment else ""
+        note = f"errors drawn {self.magnified:g}×" if self.adjustment and not self._shows_the_board else ""
         words = "What the camera saw: drag a board, or move it with the arrow keys, plus and minus"
         drag = {"drag": "board", "label": words} if self.seen is None else {}
-        title = f"Picture {self.index + 1} of {self.count}" if self.photographs else "What the camera saw"
+        one = self.photographs or self._shows_the_board
+        title = f"Picture {self.index + 1} of {self.count}" if one else "What the camera saw"
         return panel.show(content, title=title, note=note, **drag)
 
     def _coverage(self, panel: Panel) -> str:
@@ -201,15 +271,19 @@ class CalibrationView(OrbitView, ErrorBars):
 
     # The boards in space ---------------------------------------------------------------------------------------------
 
-    def _space(self, draft: bool) -> Drawn:
-        panel = space_panel("space", 490, 34, 460, 338)
+    def _space(self, cell: Cell, draft: bool) -> Drawn:
+        x, y, width, height = cell
+        panel = space_panel("space", x + 10, y + 34, width - 20, height - 130)
         far = float(self._poses_shown.translation[:, 2].max())
         eye = replace(
             self.eye, target=(0.0, -0.04 * far, 0.62 * far), distance=self.eye.distance * max(far, 0.3) / 0.75
         )
         label = "The boards in space; drag or press the arrow keys to walk around, plus and minus to go nearer"
         note = "dashed: as estimated" if self.truth else ""
-        return self.in_space(panel, self._items(), draft, "The boards in space", label, eye=eye, note=note, hint="")
+        shown, photographs = self.in_space(
+            panel, self._items(), draft, "The boards in space", label, eye=eye, note=note, hint=""
+        )
+        return shown + self._facts(x + 14, y + height - 72), photographs
 
     @property
     def _poses_shown(self) -> RigidTransform:
@@ -230,103 +304,10 @@ class CalibrationView(OrbitView, ErrorBars):
 
     # What each picture says alone ------------------------------------------------------------------------------------
 
-    @property
-    def _known(self) -> Camera:
-        """The camera whose lens and principal point are taken as known: the true one, or that which was estimated."""
-        return self.truth or self.camera or self._true_camera
-
     @cached_property
     def each(self) -> FromEach:
         """fx and fy from every picture alone, and by the reader's function."""
         return from_each(self.corners, self.board, self._known, self.yours)
-
-    # The estimate ----------------------------------------------------------------------------------------------------
-
-    def _fit(self) -> str:
-        """The estimated numbers against the truth, and the error of the fit: what a report of a calibration says."""
-        x = (640, 780, 890)
-        heads = ("", "true" if self.truth else "", "estimate")
-        parts = [svg.text((x[0], 26), "The estimate" + (", against the truth" if self.truth else ""), "title")]
-        parts += [svg.text((at, 54), words, "note end") for at, words in zip(x, heads, strict=True)]
-        for row, name in enumerate(FREE[self.free] if self.estimates else ()):
-            y = 80 + 24 * row
-            true = number(name, self.true[name]) if self.truth else ""
-            words = (true, number(name, self.estimates[name][0]))
-            parts.append(svg.text((x[0], y), name, "number"))
-            parts += [svg.text((at, y), one, "number end") for at, one in zip(x[1:], words, strict=True)]
-        if self.adjustment is None:
-            return "".join(parts) + svg.paragraph((x[0], 80), NOTHING, 300, "label")
-        return "".join(parts) + self._bar(
-            x[0], 80 + 24 * len(FREE[self.free]) + 20, "RMS error of all its corners", self.adjustment.rms, "fill-blue"
-        )
-
-    def _estimates(self) -> str:
-        x = (10, 120, 212, 300)
-        heads = ("", "true" if self.truth else "", "estimate", "± σ")
-        parts = [svg.text((10, 402), "The estimate" + (", against the truth" if self.truth else ""), "title")]
-        parts += [svg.text((at, 420), words, "note end") for at, words in zip(x, heads, strict=True)]
-        for row, name in enumerate(INTRINSICS):
-            y = _STRIP.y + _ROW * row + 15
-            free = name in FREE[self.free]
-            value, sigma = self.estimates.get(name, (np.nan, np.nan))
-            class_ = "number" if free else "number fill-muted"
-            parts.append(svg.text((x[0], y), name, class_))
-            words = (
-                number(name, self.true[name]) if self.truth else "",
-                number(name, value) if np.isfinite(value) else "",
-                _spread(name, sigma) if free else "held",
-            )
-            parts += [svg.text((at, y), one, f"{class_} end") for at, one in zip(x[1:], words, strict=True)]
-        return "".join(parts)
-
-    def _strip(self) -> str:
-        """Every estimate's distance from the truth with ± σ and ± 2σ, in pixels on a scale that is linear near 0."""
-        marks = np.array([-100, -10, -1, 0, 1, 10, 100])
-        xs = _STRIP.place(np.stack([_squeezed(marks), 0 * marks], axis=-1))[:, 0]
-        lines = [
-            svg.line([(x, 0), (x, _STRIP.height)], "grid" if m else "axis") for x, m in zip(xs, marks, strict=True)
-        ]
-        dots = [self._dot(name, row) for row, name in enumerate(INTRINSICS)]
-        below = _STRIP.y + _STRIP.height
-        ticks = [
-            svg.text((_STRIP.x + x, below + 15), signed(m, 0) if m else "0", "tick middle")
-            for x, m in zip(xs, marks, strict=True)
-        ]
-        names = [
-            svg.text((_STRIP.x - 10, _STRIP.y + _ROW * row + 15), name, "label end")
-            for row, name in enumerate(INTRINSICS)
-        ]
-        note = svg.text((_STRIP.x + _STRIP.width, below + 36), "k and p: at the image’s corner", "note end")
-        title = svg.text((320, 402), "Estimate less truth ± σ, px" if self.truth else "σ and 2σ, px", "title")
-        return title + _STRIP.show("".join(lines + dots)) + "".join(names + ticks) + note
-
-    def _dot(self, name: str, row: int) -> str:
-        value, sigma = self.estimates.get(name, (np.nan, np.nan))
-        unit = self._pixels_per[name]
-        error = (value - self.true[name]) * unit if self.truth else 0.0
-        free = name in FREE[self.free]
-        if not np.isfinite(error) or (not free and not self.truth):
-            return ""
-        reach = _squeezed(error + np.array([-2, 2, -1, 1, 0]) * sigma * unit)
-        (a, y), (b, _), (c, _), (d, _), at = _STRIP.place(np.stack([reach, np.full(5, row + 0.5)], axis=-1))
-        if not free:
-            return svg.dots([at], "muted", 6)
-        spread = svg.line([(a, y), (b, y)], "blue thin") + svg.line([(c, y), (d, y)], "blue thick")
-        if 0 < at[0] < _STRIP.width:
-            return spread + svg.dots([at], "blue", 9)
-        edge, inward = (_STRIP.width - 2, -11) if at[0] > 0 else (2, 11)
-        return spread + svg.polygon([(edge, y), (edge + inward, y - 6), (edge + inward, y + 6)], "fill-blue")
-
-    @cached_property
-    def _pixels_per(self) -> dict[str, float]:
-        """How far, in pixels, the image's corner moves when a coefficient changes by 1; 1 for fx, fy, cx and cy."""
-        camera = self._known
-        at = camera.intrinsics.from_pixels((-0.5, -0.5))
-        ray = camera.lens.unproject(at)
-        ideal = ray[:2] / ray[2] if np.isfinite(ray).all() else at  # the corner may lie beyond a fold
-        moved = {name: BrownConrady(**{name: 1.0}).distort(ideal) - ideal for name in INTRINSICS if name not in PIXELS}
-        scaled = {name: float(camera.intrinsics.fx * np.linalg.norm(shift)) for name, shift in moved.items()}
-        return dict.fromkeys(PIXELS, 1.0) | scaled
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
@@ -356,15 +337,3 @@ class CalibrationView(OrbitView, ErrorBars):
         away = np.linalg.norm(middles - uv, axis=1)
         reach = np.nanmax(np.linalg.norm(self.corners[self.index] - middles[self.index], axis=1), initial=20.0)
         return self if away[self.index] < reach else self.but(picked=int(np.nanargmin(away)) + 1)
-
-
-def _squeezed(pixels: np.ndarray | float) -> np.ndarray:
-    """-1 … 1 for pixels from -_REACH to _REACH: linear below a pixel, logarithmic above."""
-    return np.clip(np.arcsinh(2 * np.asarray(pixels)) / np.arcsinh(2 * _REACH), -1.1, 1.1)
-
-
-def _spread(name: str, sigma: float) -> str:
-    """Two significant digits, as metrology asks (GUM, 7.2.6): where little is known, rounding decides the third."""
-    if sigma >= (1e4 if name in PIXELS else 1e3):
-        return "unknown"
-    return f"{sigma:.4f}" if name not in PIXELS and sigma < 1 else f"{float(f'{sigma:.2g}'):g}"

@@ -14,7 +14,7 @@ from camviz.draw.panel import Panel
 from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
 from camviz.views.patience import Patience
-from camviz.views.yours import tried
+from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.calibration.zhang import focal_lengths, homography
 
@@ -44,6 +44,7 @@ def from_each(corners: Array, board: Board, camera: Camera, yours: Function | No
     """
     centre = np.array([camera.intrinsics.cx, camera.intrinsics.cy])
     right, own, problem = np.full((len(corners), 2), np.nan), np.full((len(corners), 2), np.nan), ""
+    undetermined = ""  # said of a board that has no right answer, which is a problem only where all are such
     with Patience() as patience:
         for i, uv in enumerate(_straightened(corners, camera)):
             try:
@@ -54,8 +55,9 @@ def from_each(corners: Array, board: Board, camera: Camera, yours: Function | No
                     continue
             if yours is not None:
                 own[i], said = tried(yours, (H, centre), centre, patience)
-                problem = problem or said
-    return FromEach(right, own, problem)
+                undetermined = undetermined or said
+                problem = problem or (said if np.isfinite(right[i]).all() else "")
+    return FromEach(right, own, problem or ("" if np.isfinite(right).all(axis=1).any() else undetermined))
 
 
 def _straightened(corners: Array, camera: Camera) -> Array:
@@ -75,14 +77,18 @@ def panel_of_each(
     content += _marks(panel, each.right, "blue", 9)
     entries = [("green dashed", "the camera’s fx"), ("blue thick", "from this picture alone")]
     if yours:
-        content += _marks(panel, each.yours, "orange", 0)
+        waits = is_unwritten(each.problem)
+        marks = _marks(panel, each.right if waits else each.yours, "orange", 0)
+        content += svg.group(marks, class_="awaited") if waits else marks
         entries.append(("orange thick", "yours"))
     content += plot.legend(panel, entries, "bottom left")
-    if each.problem:
+    if is_unwritten(each.problem):
+        content += svg.text((panel.width / 2, 0.14 * panel.height), YOURS_HERE, "title halo middle")
+    elif each.problem:
         content += svg.paragraph((14, 40), each.problem, panel.width - 28, "note halo")
     axes = plot.axes(panel, "board; fx on the left, fy on the right", "focal length, px", xticks=numbered, aside=50)
     shown = panel.show(content, title="From each picture alone")
-    return axes + shown + _written(each, picked, yours, x - 62, y + height + 62)
+    return axes + shown + _written(each, picked, yours and not is_unwritten(each.problem), x - 62, y + height + 62)
 
 
 def _marks(panel: Panel, values: Array, colour: str, diameter: float) -> str:
