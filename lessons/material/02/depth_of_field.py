@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz import optics
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows, shortened
+from camviz.draw.flow import Cell
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, band, curve, legend, logarithmic, logarithmic_grid, logs, plot_panel, upright
@@ -25,7 +25,9 @@ from camviz.scenes.aperture import Aperture, ThinLensCamera
 from camviz.views.base import View, choice, positive, slider, step_of, switch, without
 from camviz.views.yours import is_unwritten, tried
 from camviz_school.views import lens_diagram
+from camviz_school.views.blur_levels import BLURS, DEPTHS, levels, micrometres
 from camviz_school.views.garland import DUSK, GLOBE_M, GLOBE_Z, STAND, garden_at_dusk, garden_with_lamps
+from camviz_school.views.lens_tiles import NARROW, PANELS, TILES, lens_tiles
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = (0.25, 8, 24), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most
@@ -33,29 +35,6 @@ LAMPLIT_DRAFT, LAMPLIT_FINE = (0.25, 24, 64), (1.0, 64, 224)  # a lamp alone in 
 SHOWN = 64  # points in the picture of the aperture
 _NEAREST_M = 1.0  # of what is in the picture, in most states
 LIGHT_N = 4.0  # the f-number for which a fixed exposure is right
-_WORDS = ("rays", "photograph", "blur", "sensor", "numbers")
-_TILES = {"sensor": "at the sensor"}  # of panels that are not called as they are
-_ALONE = (384.0, {"photograph": 480.0})
-# Of the first row, by the panel beside the photograph: its height and the widths of the two.
-_BESIDE: dict[str, tuple[float, dict[str, float]]] = {
-    "rays": (308, {"rays": 580, "photograph": 380}),
-    "blur": (334, {"photograph": 420, "blur": 540}),
-    "sensor": (308, {"photograph": 380, "sensor": 580}),
-    "numbers": (330, {"photograph": 420, "numbers": 340}),
-}
-# Of the second row, by the panels in it.
-_BELOW: dict[str, tuple[float, dict[str, float]]] = {
-    "": (0, {}),
-    "blur": (330, {"blur": 620}),
-    "sensor": (190, {"sensor": 620}),
-    "numbers": (372, {"numbers": 340}),
-    "blur sensor": (380, {"blur": 600, "sensor": 360}),
-    "blur numbers": (372, {"blur": 600, "numbers": 360}),
-    "sensor numbers": (372, {"sensor": 620, "numbers": 340}),
-    "blur sensor numbers": (380, {"blur": 420, "sensor": 280, "numbers": 260}),
-}
-_NARROW, _SIDE_BY_SIDE = 400, 190  # of what is at the sensor: one below the other, or side by side and so high
-_DEPTHS, _BLURS = (0.5, 40.0), (0.002, 20.0)  # the plot's range: m and mm
 _SHAPES = {"disc": ("disc", 6), "hexagon": ("polygon", 6), "ring": ("ring", 6), "heart": ("heart", 6)}
 
 
@@ -106,7 +85,7 @@ class DepthOfFieldView(View):
         if not 1000 * min(self.focus_m, self.distance_m) > self.focal_mm:
             raise ValueError(f"focus_m and distance_m must lie beyond the focal length, got {self.focus_m} m")
         wanted = self.panels.split()
-        if "photograph" not in wanted or not set(wanted) <= set(_WORDS):
+        if "photograph" not in wanted or not set(wanted) <= set(PANELS):
             raise ValueError(f"panels must be photograph and any of {', '.join(self.openable)}, got {self.panels!r}")
 
     @classmethod
@@ -258,18 +237,13 @@ class DepthOfFieldView(View):
             "sensor": lambda: self._loupe_panel() + self._aperture_panel(),
             "numbers": self._numbers,
         }
-        tiles = {_TILES.get(name, name): cell for name, cell in self._layout.items()}
-        parts = {_TILES.get(name, name): draw[name]() for name in self._layout}
+        tiles = {TILES.get(name, name): cell for name, cell in self._layout.items()}
+        parts = {TILES.get(name, name): draw[name]() for name in self._layout}
         return self.tiled(tiles, parts, {"lens": _photographed(self, draft)})
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
-        """The photograph and one panel beside it in the first row, the others below them."""
-        beside = next((name for name in ("rays", "blur", "sensor", "numbers") if self._has(name)), "")
-        below = [name for name in ("blur", "sensor", "numbers") if self._has(name) and name != beside]
-        found = rows(_BESIDE[beside] if beside else _ALONE, _BELOW[" ".join(below)])
-        heights = {"sensor": _SIDE_BY_SIDE} if "sensor" in below and found["sensor"][2] >= _NARROW else {}
-        return shortened(found, **heights)
+        return lens_tiles(self.panels.split())
 
     def _cell(self, name: str) -> Cell:
         return self._layout[name]
@@ -289,7 +263,7 @@ class DepthOfFieldView(View):
     @cached_property
     def _loupe(self) -> Panel:
         x, y, width, _ = self._cell("sensor")
-        across = width - 20 if width < _NARROW else width - 234
+        across = width - 20 if width < NARROW else width - 234
         return lens_diagram.loupe_panel(x + 10, y + 34, across, 140, self.lens.image_mm)
 
     def _loupe_panel(self) -> str:
@@ -301,7 +275,7 @@ class DepthOfFieldView(View):
 
     def _aperture_panel(self) -> str:
         x, y, width, _ = self._cell("sensor")
-        x, y, width = (x + 10, y + 214, width - 20) if width < _NARROW else (x + width - 210, y + 34, 200)
+        x, y, width = (x + 10, y + 214, width - 20) if width < NARROW else (x + width - 210, y + 34, 200)
         across = 1.1 * width / 140
         panel = Panel("aperture", x, y, width, 140, -across, across, -1.1, 1.1)
         points, passes = self.lens.points(SHOWN)
@@ -316,25 +290,24 @@ class DepthOfFieldView(View):
     @cached_property
     def _plot(self) -> Panel:
         x, y, width, height = self._cell("blur")
-        return plot_panel("blur", x + 70, y + 34, width - 82, height - 84, logs(_DEPTHS), logs(_BLURS))
+        return plot_panel("blur", x + 70, y + 34, width - 82, height - 84, logs(DEPTHS), logs(BLURS))
 
     def _blur_panel(self) -> str:
         panel, (near, far) = self._plot, self.limits_m
         around = 1 + np.outer((-1, 1), np.geomspace(1e-4, 0.1, 9)).ravel()  # the curve comes down steeply to the focus
-        depth = np.sort(np.concatenate([np.geomspace(*_DEPTHS, 161), self.focus_m * around]))
+        depth = np.sort(np.concatenate([np.geomspace(*DEPTHS, 161), self.focus_m * around]))
         blur = np.maximum(self.blur_mm(depth), 1e-6)
         far_x = min(np.log10(far), panel.right)
-        lines, names = self._levels(panel)
+        allowed, airy = self.circle_mm if self.bounds else None, self.airy_mm if self.diffraction else None
         bounds = band(panel, np.log10(near), far_x, "fill-green") if self.bounds else ""
-        here = panel.place(logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), _BLURS[0]))))
-        xticks, yticks = logarithmic(*logs(_DEPTHS)), _micrometres()
+        here = panel.place(logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), BLURS[0]))))
+        xticks, yticks = logarithmic(*logs(DEPTHS)), micrometres()
         content = (
             logarithmic_grid(panel, xticks, yticks)
             + bounds
-            + lines
             + curve(panel, np.log10(depth), np.log10(blur), "blue thick")
             + upright(panel, np.log10(self.focus_m), "red thin")
-            + names
+            + levels(panel, allowed, airy, self.limits_m)
             + svg.dots([here], "blue", 10)
             + svg.text(here + (8, -8), "globe", "blue halo")
         )
@@ -348,25 +321,6 @@ class DepthOfFieldView(View):
         else:
             shown = panel.show(content + drawn, title=title, hint="drag to focus", drag="focus", label=label)
         return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks, aside=56) + shown
-
-    def _levels(self, panel: Panel) -> tuple[str, str]:
-        """The lines of the blur that is allowed and of the Airy disc, and their names, at opposite ends.
-
-        Outside the depth of field the curve runs above the blur that is allowed: there its name stands below the line.
-        """
-        near, far = self.limits_m
-        right_is_free = near < 1.8 and far < 14  # of the depth of field; the left is not
-        allowed = f"allowed: c = {1000 * self.circle_mm:.0f} µm"
-        levels = [(self.circle_mm, allowed, "green", "dashed", 14, right_is_free)] if self.bounds else []
-        if self.diffraction:
-            levels.append((self.airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free))
-        lines = names = ""
-        for blur, name, colour, stroke, below, at_right in levels:
-            left, right = panel.place([(panel.left, np.log10(blur)), (panel.right, np.log10(blur))])
-            lines += svg.line([left, right], f"{colour} {stroke}")
-            place, end = (right + (-8, below), " end") if at_right else (left + (8, below), "")
-            names += svg.text(place, name, f"{colour} halo{end}")
-        return lines, names
 
     def _your_part(self, panel: Panel, depth_m: np.ndarray) -> tuple[str, str]:
         """The reader's blur over distance, their limits and the names of both; and what is wrong with either."""
@@ -429,10 +383,6 @@ def _photographed(view: DepthOfFieldView, rough: bool) -> bytes:
 def _log10(values: np.ndarray) -> np.ndarray:
     """NaN for what has no logarithm."""
     return np.log10(np.where(values > 0, values, np.nan))
-
-
-def _micrometres() -> list[tuple[float, str]]:
-    return [(float(np.log10(um / 1000)), f"{um:g}") for um in (10, 100, 1000, 10_000)]
 
 
 def _range_m(near: float, far: float) -> str:
