@@ -121,7 +121,7 @@ def test_out_of_focus_the_blur_of_half_a_lens_is_smaller(says):
 
 def test_in_front_of_the_focus_it_is_the_other_half(says):
     """Where rays through the right half of a lens meet the sensor, from points of the axis nearer and farther."""
-    says("A lamp out of focus becomes half a disc. In front of the focus it is the other half.")
+    says("A lamp out of focus becomes half a disc. Lamps nearer than the focus show the other half.")
 
     def at_sensor(u):
         y = np.linspace(0, 30, 4)
@@ -182,6 +182,8 @@ def test_the_usual_circle(says):
 def test_from_half_of_h_to_infinity(says):
     says("Focus on H or beyond, and there is no far limit.")
     says("Focus on H, and everything from H/2 to infinity is sharp enough.")
+    says("At the [hyperfocal distance](00_start_here.ipynb#hyperfocal-distance) H it reaches from H/2 to infinity.")
+    says("focused on H, it is sharp enough from H/2 to infinity")
     f, N, s = says("Take one lens by hand: 50 mm at f/8, focused at 3 m.")
     near, far = limits(f.value, N.value, 1000 * s.value, 0.03)
     assert near == pytest.approx(2338, abs=0.5)

@@ -284,7 +284,7 @@ class DepthOfFieldView(View):
 
     def _photograph_panel(self) -> str:
         panel = image_in(self._cell("photograph"), "lens", 320, 240)
-        note = f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
+        note = "" if len(self._layout) == 1 else f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
         return panel.show(placed_image(panel, "lens", 320, 240), title="The photograph, traced", note=note)
 
     @cached_property
@@ -345,11 +345,11 @@ class DepthOfFieldView(View):
         return drawn, words if all(is_unwritten(one) for one in problems) else ""
 
     def _numbers(self) -> str:
-        x, y, _, _ = self._cell("numbers")
-        figures, step = self._told(), 42
+        x, y, _, high = self._cell("numbers")
+        figures = self._told()
         if self._has("rays") and self._has("blur"):
-            step = 34
             figures |= {"1/f = 1/s + 1/v, in mm": self.equation()}
+        step = min(42, (high - 52) // len(figures))
         return svg.text((x + 10, y + 26), "This lens", "title") + readout(figures, (x + 10, y + 48), (0, step), (0, 16))
 
     # What it does when touched ---------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from itertools import cycle
 
 import numpy as np
 
+from camviz.lenses.base import Array
 from camviz.scenes import Rectangle, Scene, Texture, textured_scene
 
 GLOBE_Z = 3.3  # of the globe in the world, towards which the camera looks along +z
@@ -33,8 +34,9 @@ _GARLANDS = (  # depth z, ends in x, how high the ends hang in y, how far the mi
 def garden_with_lamps() -> Scene:
     """The garden with a garland of lamps before its wall: points of light, which show the aperture's shape."""
     heights = [-0.62, -0.72, -0.86, -0.74, -0.7, -0.84]
-    places = [(x, y, 6.3) for x, y in zip(np.linspace(-1.5, 0.94, 6), heights, strict=True)]
-    return _hung([_lamp(place, _DAY_SIDE, _WARM, _DAY_GLOW) for place in places])
+    places = [np.array([x, y, 6.3]) for x, y in zip(np.linspace(-1.5, 0.94, 6), heights, strict=True)]
+    across, down = _DAY_SIDE * np.eye(3)[:2]
+    return _hung([_lamp(place, across, down, _WARM, _DAY_GLOW) for place in places])
 
 
 @lru_cache(maxsize=1)
@@ -47,12 +49,20 @@ def garden_at_dusk() -> Scene:
         places += [(across, down, z) for across, down in zip(x, y, strict=True)]
     sides = [_SIDE_RAD * (z - eye[2]) for _, _, z in places]
     coloured = zip(places, sides, cycle(_COLOURS))  # which go on for ever
-    return _hung([_lamp(place, side, colour, _GLOW) for place, side, colour in coloured])
+    return _hung([one for place, side, colour in coloured for one in _round(place, side, colour)])
 
 
-def _lamp(place: Sequence[float], side: float, colour: tuple[float, float, float], glow: float) -> Rectangle:
-    edges = np.array([side, 0, 0]), np.array([0, side, 0])
-    return Rectangle(np.array(place), *edges, Texture.plain(colour), shade=glow, name="garland")
+def _round(place: Sequence[float], side: float, colour: tuple[float, float, float]) -> list[Rectangle]:
+    """A lamp whose outline is nearly round: a square, and another that stands on its corner."""
+    half, middle = side / 2, np.array(place)
+    return [
+        _lamp(middle - half * (a + b), 2 * half * a, 2 * half * b, colour, _GLOW)
+        for a, b in (np.array(((1.0, 0, 0), (0, 1.0, 0))), np.array(((1, -1, 0), (1, 1, 0))) / 2**0.5)
+    ]
+
+
+def _lamp(corner: Array, across: Array, down: Array, colour: tuple[float, float, float], glow: float) -> Rectangle:
+    return Rectangle(corner, across, down, Texture.plain(colour), shade=glow, name="garland")
 
 
 def _hung(lamps: Sequence[Rectangle]) -> Scene:
