@@ -16,19 +16,17 @@ def levels(panel: Panel, allowed_mm: float | None, airy_mm: float | None, limits
     Outside the depth of field the curve runs above the blur that is allowed: there its name stands below the line.
     """
     right_is_free = limits_m[0] < 1.8 and limits_m[1] < 14  # of the depth of field; the left is not
+    allowed = f"allowed: c = {1000 * (allowed_mm or 0):.0f} µm"
     drawn = ""
-    if allowed_mm is not None:
-        name = f"allowed: c = {1000 * allowed_mm:.0f} µm"
-        drawn += _level(panel, allowed_mm, name, "green", "dashed", 14, right_is_free)
-    if airy_mm is not None:
-        drawn += _level(panel, airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free)
+    for blur, name, colour, stroke, below, at_right in (
+        (allowed_mm, allowed, "green", "dashed", 14, right_is_free),
+        (airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free),
+    ):
+        if blur:
+            left, right = panel.place([(panel.left, np.log10(blur)), (panel.right, np.log10(blur))])
+            place, end = (right + (-8, below), " end") if at_right else (left + (8, below), "")
+            drawn += svg.line([left, right], f"{colour} {stroke}") + svg.text(place, name, f"{colour} halo{end}")
     return drawn
-
-
-def _level(panel: Panel, blur: float, name: str, colour: str, stroke: str, below: float, at_right: bool) -> str:
-    left, right = panel.place([(panel.left, np.log10(blur)), (panel.right, np.log10(blur))])
-    place, end = (right + (-8, below), " end") if at_right else (left + (8, below), "")
-    return svg.line([left, right], f"{colour} {stroke}") + svg.text(place, name, f"{colour} halo{end}")
 
 
 def micrometres() -> list[tuple[float, str]]:

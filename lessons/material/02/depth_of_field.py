@@ -245,12 +245,9 @@ class DepthOfFieldView(View):
     def _layout(self) -> dict[str, Cell]:
         return lens_tiles(self.panels.split())
 
-    def _cell(self, name: str) -> Cell:
-        return self._layout[name]
-
     @cached_property
     def _rays(self) -> Panel:
-        x, y, width, height = self._cell("rays")
+        x, y, width, height = self._layout["rays"]
         return lens_diagram.diagram_panel(x + 10, y + 34, width - 20, height - 44)
 
     def _ray_panel(self) -> str:
@@ -262,7 +259,7 @@ class DepthOfFieldView(View):
 
     @cached_property
     def _loupe(self) -> Panel:
-        x, y, width, _ = self._cell("sensor")
+        x, y, width, _ = self._layout["sensor"]
         across = width - 20 if width < NARROW else width - 234
         return lens_diagram.loupe_panel(x + 10, y + 34, across, 140, self.lens.image_mm)
 
@@ -274,7 +271,7 @@ class DepthOfFieldView(View):
         return self._loupe.show(content, title="At the sensor", note=note, drag="sensor", label=label)
 
     def _aperture_panel(self) -> str:
-        x, y, width, _ = self._cell("sensor")
+        x, y, width, _ = self._layout["sensor"]
         x, y, width = (x + 10, y + 214, width - 20) if width < NARROW else (x + width - 210, y + 34, 200)
         across = 1.1 * width / 140
         panel = Panel("aperture", x, y, width, 140, -across, across, -1.1, 1.1)
@@ -283,13 +280,13 @@ class DepthOfFieldView(View):
         return panel.show(content, title="Points of the lens")
 
     def _photograph_panel(self) -> str:
-        panel = image_in(self._cell("photograph"), "lens", 320, 240)
+        panel = image_in(self._layout["photograph"], "lens", 320, 240)
         note = "" if len(self._layout) == 1 else f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
         return panel.show(placed_image(panel, "lens", 320, 240), title="The photograph, traced", note=note)
 
     @cached_property
     def _plot(self) -> Panel:
-        x, y, width, height = self._cell("blur")
+        x, y, width, height = self._layout["blur"]
         return plot_panel("blur", x + 70, y + 34, width - 82, height - 84, logs(DEPTHS), logs(BLURS))
 
     def _blur_panel(self) -> str:
@@ -345,7 +342,7 @@ class DepthOfFieldView(View):
         return drawn, words if all(is_unwritten(one) for one in problems) else ""
 
     def _numbers(self) -> str:
-        x, y, _, high = self._cell("numbers")
+        x, y, _, high = self._layout["numbers"]
         figures = self._told()
         if self._has("rays") and self._has("blur"):
             figures |= {"1/f = 1/s + 1/v, in mm": self.equation()}
