@@ -13,12 +13,12 @@ NARROW = 400  # below it, what is at the sensor stands one below the other; else
 _FIRST: dict[str, tuple[float, dict[str, float]]] = {  # row, by the panel beside the photograph: height and widths
     "": (328, {"photograph": 398}),  # at its largest, with its controls, 600 pixels high
     "rays": (308, {"rays": 580, "photograph": 380}),
-    "blur": (334, {"photograph": 420, "blur": 540}),
+    "blur": (334, {"photograph": 440, "blur": 420}),
     "sensor": (308, {"photograph": 380, "sensor": 580}),
     "numbers": (330, {"photograph": 420, "numbers": 340}),
 }
 _ONLY: tuple[float, dict[str, float]] = (346, {"photograph": 320, "blur": 400, "numbers": 240})
-_SECOND, _WIDEST = {"blur": 420, "sensor": 280, "numbers": 260}, 620  # shares of the second row
+_SECOND, _WIDEST = {"blur": 420, "sensor": 280, "numbers": 260}, 440  # shares of the second row
 
 
 def lens_tiles(wanted: Collection[str]) -> dict[str, Cell]:
