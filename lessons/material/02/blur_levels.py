@@ -15,7 +15,7 @@ def levels(panel: Panel, allowed_mm: float | None, airy_mm: float | None, limits
 
     Outside the depth of field the curve runs above the blur that is allowed: there its name stands below the line.
     """
-    right_is_free = limits_m[0] < 1.8 and limits_m[1] < 14  # of the depth of field; the left is not
+    right_is_free = limits_m[1] < (14 if limits_m[0] < 1.8 else 6)  # of the depth of field; the left is not
     allowed = f"allowed: c = {1000 * (allowed_mm or 0):.0f} µm"
     drawn = ""
     for blur, name, colour, stroke, below, at_right in (
