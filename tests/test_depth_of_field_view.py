@@ -1,6 +1,7 @@
 """The depth-of-field visualizer shows what the lens does, and its controls do what they are named for."""
 
 import re
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from camviz import optics
 from camviz.scenes import aperture, to_display
 from camviz_school.views import lens_diagram
 from camviz_school.views.depth_of_field import DepthOfFieldView
-from camviz_school.views.garland import GLOBE_M, garden_with_lamps
+from camviz_school.views.garland import GLOBE_M, garden_at_dusk, garden_with_lamps
 from camviz_school.views.lens_elements import LensElementsView
 
 ENDS = [
@@ -89,11 +90,54 @@ def test_a_view_with_fewer_panels_says_only_what_they_show():
     rays, blur = (DepthOfFieldView(panels=panels) for panels in ("rays photograph", "photograph blur"))
     assert "depth of field" not in rays.description()
     assert "Blur against distance" not in rays.figure(draft=True).body
-    assert "depth of field" not in blur.description()
-    assert "depth of field" in blur.but(your_limits=reader_s_limits).description()
+    assert "depth of field" in blur.description()
+    quiet = blur.but(bounds=False)
+    assert "depth of field" not in quiet.description()
+    assert "allowed" not in quiet.figure(draft=True).body
     assert "At the sensor" not in blur.figure(draft=True).body
     with pytest.raises(ValueError, match="panels"):
         DepthOfFieldView(panels="rays")
+    with pytest.raises(ValueError, match="panels"):
+        DepthOfFieldView(panels="photograph, blur")
+
+
+PANELS = ("rays", "sensor", "blur", "numbers")
+
+
+@pytest.mark.parametrize("opened", [few for count in range(5) for few in combinations(PANELS, count)], ids=" ".join)
+def test_whatever_panels_are_opened_stand_beside_the_photograph_and_apart(opened):
+    view = DepthOfFieldView(panels="photograph").with_panels(dict.fromkeys(opened, True))
+    assert set(view.opened) == set(opened)
+    tiles = view.figure(draft=True).tiles
+    assert len(tiles) == 1 + len(opened)
+    for (x, y, width, height), (u, v, across, high) in combinations([tile.cell for tile in tiles], 2):
+        assert x + width <= u or u + across <= x or y + height <= v or v + high <= y
+    assert all(tile.cell[0] + tile.cell[2] <= 960 for tile in tiles)
+
+
+def test_a_function_that_is_not_written_yet_keeps_its_place_grey():
+    def blur(f, N, s, u):
+        """Not yet."""
+
+    view = DepthOfFieldView(panels="photograph blur", yours=blur)
+    body = view.figure(draft=True).body
+    assert "awaited" in body
+    assert "yours appears here" in body
+    assert "awaited" not in view.but(yours=by_a_reader).figure(draft=True).body
+
+
+def test_at_dusk_each_lamp_in_focus_is_as_large_in_the_picture():
+    camera = DepthOfFieldView.at_dusk(focus_m=4.5).lens.camera
+    squares = [one for one in garden_at_dusk().surfaces if one.name == "garland"]
+    sides = np.array([np.ptp(camera.project(one.corners)[:, 0]) for one in squares]).reshape(-1, 2)
+    np.testing.assert_allclose(sides / [1, 2**0.5], sides[0, 0], rtol=1e-3)  # every other one stands on its corner
+    assert 4 < sides[0, 0] < 8
+
+
+def test_at_dusk_the_picture_is_dark_but_for_its_lamps():
+    day, dusk = (DepthOfFieldView.at_dusk(focus_m=7.4, dusk=dusk).image(32).astype(float) for dusk in (False, True))
+    assert np.median(dusk) < 0.6 * np.median(day)
+    assert (dusk.max(axis=-1) == 255).sum() > 300
 
 
 def test_a_reader_who_is_to_predict_diffraction_is_shown_none():

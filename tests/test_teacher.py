@@ -348,7 +348,7 @@ def test_a_view_that_another_cell_has_named_is_known_by_its_class():
     """Lesson 05's eighth has a name that its own cell gives in a loop; lesson 02's first is made on the spot."""
     assert (7, "", "hide what folds, show") in list(one_page.settings(notebooks.read(DISTORTION)))
     first = {path.name[:2]: next(one_page.settings(notebooks.read(path)), None) for path in LESSONS}
-    assert first["02"][2] == "aperture, cover, focus s, f-number N"
+    assert first["02"][2] == "focus s (0.9 … 7.4)"
 
 
 # The plan and the slides ---------------------------------------------------------------------------------------------

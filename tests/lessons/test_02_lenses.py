@@ -8,7 +8,8 @@ from scipy.special import jn_zeros
 from camviz import optics
 from camviz.scenes.photographs import photograph
 from camviz_school.course.material import module
-from camviz_school.views.depth_of_field import DepthOfFieldView
+from camviz_school.views.depth_of_field import LAMPLIT_FINE, DepthOfFieldView
+from camviz_school.views.garland import GLOBE_Z
 from camviz_school.views.lens_elements import LensElementsView
 
 lesson02 = module("02")
@@ -77,18 +78,26 @@ def through(surfaces):
 # 1: all of the lens makes all of the picture -------------------------------------------------------------------------
 
 
-def test_the_lens_in_the_garden(says):
-    f, wide, focus = says(
-        "Its [focal length](00_start_here.ipynb#focal-length) is 50 mm and its width 36 mm. It is focused at 1.3 m"
-    )
-    assert wide == f.value / 1.4
-    (points,) = says("The picture is the sum of 256 pictures")
-    assert points.value == len(DepthOfFieldView(f_number=1.4, focus_m=focus.value).lens.points(256)[0])
+def test_the_lens_before_the_lamps(says):
+    (f,) = says("The [focal length](00_start_here.ipynb#focal-length) is 85 mm.")
+    view = DepthOfFieldView.at_dusk()
+    assert f == view.focal_mm
+    (points,) = says("The picture is the sum of 224 pictures")
+    assert points == view.samples_for(*LAMPLIT_FINE)
+    assert points == view.but(focus_m=0.9).samples_for(*LAMPLIT_FINE)
+
+
+def test_a_lamp_out_of_focus_is_a_large_heart(says):
+    """The heart of a far lamp, focused at the left end of the first slider, is a tenth of the picture wide and more."""
+    says("A card with a heart-shaped hole is in front of this lens.")
+    view = DepthOfFieldView.at_dusk(focus_m=0.9)
+    far = view.lens.blur_px(6.3 - GLOBE_Z + view.distance_m)
+    assert 0.1 * view.lens.width < far < 0.2 * view.lens.width
 
 
 def test_covering_half_the_lens_darkens_all_and_takes_nothing_away(says):
     says("Notice that the picture gets darker as a whole.")
-    says("But the picture is not a heart, and nothing of it is missing.")
+    says("But nothing of it is missing.")
     says("All of it is there, half as bright.")
     view = DepthOfFieldView(f_number=4.0, focus_m=2.3)
     whole, half, heart = (
@@ -110,11 +119,16 @@ def test_out_of_focus_the_blur_of_half_a_lens_is_smaller(says):
     assert half == pytest.approx(whole / 2)
 
 
-def test_behind_the_lamps(says):
-    (metres,) = says("Then focus behind them (drag focus s to 10 m)")
-    lamps = 6.3 - (3.3 - DepthOfFieldView().distance_m)  # from the camera, which is 2.3 m from the globe at 3.3
-    assert metres.value > lamps
-    assert metres.value == DepthOfFieldView.controls()["focus_m"].high
+def test_in_front_of_the_focus_it_is_the_other_half(says):
+    """Where rays through the right half of a lens meet the sensor, from points of the axis nearer and farther."""
+    says("A lamp out of focus becomes half a disc. Lamps nearer than the focus show the other half.")
+
+    def at_sensor(u):
+        y = np.linspace(0, 30, 4)
+        return y * (1 - image(85, 4500) / image(85, u))
+
+    assert (at_sensor(2200) >= 0).all()
+    assert (at_sensor(7500) <= 0).all()
 
 
 # 2: blur -------------------------------------------------------------------------------------------------------------
@@ -142,9 +156,7 @@ def test_the_image_moves_away_and_then_is_virtual(says):
 
 
 def test_the_blur_of_the_globe_by_hand(says):
-    f, N, s, u = says(
-        "In the garden the lens has f = 50 mm and N = 1.4, and it is focused at s = 1.3 m. The globe is at u = 2.3 m:"
-    )
+    f, N, s, u = says("Take a lens of f = 50 mm and N = 1.4, focused at s = 1.3 m. A globe is at u = 2.3 m:")
     assert blur(f.value, N.value, 1000 * s.value, 1000 * u.value) == pytest.approx(0.621, abs=5e-4)
     view = DepthOfFieldView(f_number=N.value, focus_m=s.value)
     assert (view.focal_mm, view.distance_m) == (f.value, u.value)
@@ -170,6 +182,8 @@ def test_the_usual_circle(says):
 def test_from_half_of_h_to_infinity(says):
     says("Focus on H or beyond, and there is no far limit.")
     says("Focus on H, and everything from H/2 to infinity is sharp enough.")
+    says("At the [hyperfocal distance](00_start_here.ipynb#hyperfocal-distance) H it reaches from H/2 to infinity.")
+    says("focused on H, it is sharp enough from H/2 to infinity")
     f, N, s = says("Take one lens by hand: 50 mm at f/8, focused at 3 m.")
     near, far = limits(f.value, N.value, 1000 * s.value, 0.03)
     assert near == pytest.approx(2338, abs=0.5)
@@ -270,7 +284,7 @@ def test_refocusing_a_lens_that_moves_as_a_whole(says):
     assert narrow == view_deg(width.value, v)
     (again,) = says("Yes: the sensor is v = 114 mm behind the lens now")
     assert again == v
-    says("The last line is a life-size picture: at s = 2f the sensor stands at 2f.")
+    says("At s = 2f the sensor stands at 2f: a life-size picture.")
     assert image(100, 200) == pytest.approx(200)
 
 
@@ -592,6 +606,17 @@ def test_the_phone_against_full_frame(says):
     shares = [
         blur(f, 1.8, 1000 * s.value, 5000) / wide for f, wide in ((5.7, FULL_FRAME * 5.7 / 26), (26.0, FULL_FRAME))
     ]
+    assert times.about(shares[1] / shares[0], 0.02)
+
+
+def test_the_phone_in_the_core(says):
+    f, number, small, full, again, large, times = says(
+        "A phone with 5.7 mm at f/1.8 has an aperture 3.2 mm wide. A full-frame camera with the same view has 26 mm at "
+        "f/1.8, and 14.4 mm. Its blur is about 4.6 times as large a part of the picture"
+    )
+    assert small == f.value / number.value
+    assert large == full.value / again.value
+    shares = [blur(one.value, 1.8, 1000, 5000) / one.value for one in (f, full)]  # the sensors go with f
     assert times.about(shares[1] / shares[0], 0.02)
 
 

@@ -5,7 +5,7 @@ A reader's own blur and their own limits of the depth of field can be drawn besi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz import optics
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import Cell
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, band, curve, legend, logarithmic, logarithmic_grid, logs, plot_panel, upright
@@ -22,24 +22,19 @@ from camviz.draw.readout import listed, readout
 from camviz.poses import RigidTransform
 from camviz.scenes import parallax, to_display
 from camviz.scenes.aperture import Aperture, ThinLensCamera
-from camviz.views.base import View, choice, positive, slider, step_of, switch
-from camviz.views.yours import tried
+from camviz.views.base import View, choice, positive, slider, step_of, switch, without
+from camviz.views.yours import is_unwritten, tried
 from camviz_school.views import lens_diagram
-from camviz_school.views.garland import GLOBE_M, GLOBE_Z, STAND, garden_with_lamps
+from camviz_school.views.blur_levels import BLURS, DEPTHS, levels, micrometres
+from camviz_school.views.garland import DUSK, GLOBE_M, GLOBE_Z, STAND, garden_at_dusk, garden_with_lamps
+from camviz_school.views.lens_tiles import NARROW, PANELS, TILES, lens_tiles
 
 SENSORS = {"full frame": 36.0, "APS-C": 23.5, "Four Thirds": 17.3}
 DRAFT, FINE = (0.25, 8, 24), (1.0, 32, 128)  # points of the lens for a pixel of the largest blur; at least, at most
+LAMPLIT_DRAFT, LAMPLIT_FINE = (0.25, 24, 64), (1.0, 64, 224)  # a lamp alone in the dark shows each of them
 SHOWN = 64  # points in the picture of the aperture
 _NEAREST_M = 1.0  # of what is in the picture, in most states
 LIGHT_N = 4.0  # the f-number for which a fixed exposure is right
-_LAYOUTS = {
-    "rays photograph blur": rows(
-        (308, {"rays": 580, "photograph": 380}), (380, {"blur": 420, "at the sensor": 280, "numbers": 260})
-    ),
-    "rays photograph": rows((308, {"rays": 580, "photograph": 380}), (190, {"at the sensor": 620, "numbers": 340})),
-    "photograph blur": rows((334, {"blur": 400, "photograph": 320, "numbers": 240})),
-}
-_DEPTHS, _BLURS = (0.5, 40.0), (0.002, 20.0)  # the plot's range: m and mm
 _SHAPES = {"disc": ("disc", 6), "hexagon": ("polygon", 6), "ring": ("ring", 6), "heart": ("heart", 6)}
 
 
@@ -51,16 +46,22 @@ class DepthOfFieldView(View):
     for which the camera steps back or forth until the globe is as large as before, and the focus with it. The picture
     is traced through the aperture's shape, of which a half may be covered. `match_exposure` exposes for as long as the
     f-number needs; otherwise as f/4 needs. A covered half is never made up for. Without `diffraction` the view says
-    nothing of the Airy disc, for readers who are to predict what it does.
+    nothing of the Airy disc, and without `bounds` nothing of the depth of field, for readers who are yet to meet them.
+    `dusk` lights the garden with lamps of many colours.
 
-    `panels` is "rays photograph blur" or two of the three words, the photograph among them; the figures are those that
-    the panels speak of. `yours` is a reader's blur(f, N, s, u) for points u (...), and `your_limits` a reader's
-    limits(f, N, s, c) for focus distances s (...), two arrays, all in millimetres; both are drawn in orange over the
-    blur, and without the rays the depth of field appears with `your_limits` only.
+    `panels` names what is drawn: the photograph, and beside it any of rays, blur, sensor (the cones that meet there)
+    and numbers; the figures are those that the panels speak of. `yours` is a reader's blur(f, N, s, u) for points
+    u (...), and `your_limits` a reader's limits(f, N, s, c) for focus distances s (...), two arrays, all in
+    millimetres; both are drawn in orange over the blur.
     """
 
     title: ClassVar[str] = "Lens and depth of field"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {
+        "rays": "rays",
+        "sensor": "at the sensor",
+        "blur": "blur curve",
+        "numbers": "numbers",
+    }
 
     focal_mm: float = slider(50.0, 20.0, 100.0, 1.0, label="focal length f", unit="mm")
     f_number: float = slider(2.0, 1.4, 22.0, 0.1, label="f-number N", help="focal length / diameter of the aperture")
@@ -72,7 +73,9 @@ class DepthOfFieldView(View):
     covered: str = choice("nothing", "left half", "upper half", label="cover", help="black card before the lens")
     match_exposure: bool = switch(True, label="match exposure", help="expose as long as the f-number needs")
     diffraction: bool = True
-    panels: str = "rays photograph blur"
+    bounds: bool = True
+    dusk: bool = False
+    panels: str = "rays photograph blur sensor numbers"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     your_limits: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
@@ -81,6 +84,16 @@ class DepthOfFieldView(View):
         positive(self, "focal_mm", "f_number", "focus_m", "distance_m")
         if not 1000 * min(self.focus_m, self.distance_m) > self.focal_mm:
             raise ValueError(f"focus_m and distance_m must lie beyond the focal length, got {self.focus_m} m")
+        wanted = self.panels.split()
+        if "photograph" not in wanted or not set(wanted) <= set(PANELS):
+            raise ValueError(f"panels must be photograph and any of {', '.join(self.openable)}, got {self.panels!r}")
+
+    @classmethod
+    def at_dusk(cls, **state: Any) -> Self:
+        """A long lens, wide open, before the garden's lamps in the evening, and nothing else open."""
+        first: dict[str, Any] = {"focal_mm": 85.0, "f_number": 1.4, "distance_m": 4.5, "focus_m": 7.4, "dusk": True}
+        first |= {"diffraction": False, "bounds": False, "panels": "photograph"}
+        return cls(**{**first, **state})
 
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed, and what `hold` makes of another focal length or sensor."""
@@ -175,18 +188,13 @@ class DepthOfFieldView(View):
 
     def _told(self) -> dict[str, str]:
         left_out = set()
-        if self.panels != "rays photograph blur":
+        if not (self._has("rays") and self._has("blur")):
             left_out |= {"field of view", "globe on the sensor"}
-        if "blur" not in self.panels:
+        if not self._has("blur"):
             left_out |= {"blur of the globe", "Airy disc"}
-        if "blur" not in self.panels or not self._bounded:
+        if not (self._has("blur") and self.bounds):
             left_out |= {"depth of field", "hyperfocal distance"}
         return {name: figure for name, figure in self.numbers().items() if name not in left_out}
-
-    @property
-    def _bounded(self) -> bool:
-        """True where the depth of field is drawn."""
-        return "rays" in self.panels or self.your_limits is not None
 
     def equation(self) -> str:
         """The lens equation, with this state's numbers."""
@@ -205,10 +213,13 @@ class DepthOfFieldView(View):
 
         It is traced through `samples` points of the lens, at first as many as the blur needs.
         """
-        samples = samples or self.samples_for(*(DRAFT if rough else FINE))
-        light = parallax.photograph(garden_with_lamps(), self.lens, samples, rough=rough)
+        least, most = (LAMPLIT_DRAFT, LAMPLIT_FINE) if self.dusk else (DRAFT, FINE)
+        samples = samples or self.samples_for(*(least if rough else most))
+        light = parallax.photograph(
+            garden_at_dusk() if self.dusk else garden_with_lamps(), self.lens, samples, rough=rough
+        )
         share = self.lens.points(samples)[1].mean()
-        return to_display(light * np.float32(self.brightness / share))
+        return to_display(light * (DUSK if self.dusk else 1) * np.float32(self.brightness / share))
 
     def samples_for(self, per_px: float, least: int, most: int) -> int:
         """How many points of the lens fill the largest disc, of what is far away or as near as anything shown."""
@@ -219,21 +230,25 @@ class DepthOfFieldView(View):
     # What it looks like ----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        parts = {"photograph": self._photograph_panel(), "numbers": self._numbers()}
-        if "rays" in self.panels:
-            parts |= {"rays": self._ray_panel(), "at the sensor": self._loupe_panel() + self._aperture_panel()}
-        if "blur" in self.panels:
-            parts["blur"] = self._blur_panel()
-        photographs = {"lens": _photographed(self, draft)}
-        layout = _LAYOUTS[self.panels]
-        return self.tiled(layout, {name: parts[name] for name in layout}, photographs)
+        draw = {
+            "rays": self._ray_panel,
+            "photograph": self._photograph_panel,
+            "blur": self._blur_panel,
+            "sensor": lambda: self._loupe_panel() + self._aperture_panel(),
+            "numbers": self._numbers,
+        }
+        tiles = {TILES.get(name, name): cell for name, cell in self._layout.items()}
+        parts = {TILES.get(name, name): draw[name]() for name in self._layout}
+        return self.tiled(tiles, parts, {"lens": _photographed(self, draft)})
 
-    def _cell(self, name: str) -> Cell:
-        return _LAYOUTS[self.panels][name]
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        return lens_tiles(self.panels.split())
 
     @cached_property
     def _rays(self) -> Panel:
-        return lens_diagram.diagram_panel(10, 34, 560, 264)
+        x, y, width, height = self._layout["rays"]
+        return lens_diagram.diagram_panel(x + 10, y + 34, width - 20, height - 44)
 
     def _ray_panel(self) -> str:
         content = lens_diagram.rays(self._rays, self.lens, 1000 * self.distance_m)
@@ -244,8 +259,9 @@ class DepthOfFieldView(View):
 
     @cached_property
     def _loupe(self) -> Panel:
-        x, y, width, _ = self._cell("at the sensor")
-        return lens_diagram.loupe_panel(x + 10, y + 34, 260 if width < 400 else 386, 140, self.lens.image_mm)
+        x, y, width, _ = self._layout["sensor"]
+        across = width - 20 if width < NARROW else width - 234
+        return lens_diagram.loupe_panel(x + 10, y + 34, across, 140, self.lens.image_mm)
 
     def _loupe_panel(self) -> str:
         depths = [(1000 * self.distance_m, "blue", "globe"), (np.inf, "orange", "far away")]
@@ -255,8 +271,8 @@ class DepthOfFieldView(View):
         return self._loupe.show(content, title="At the sensor", note=note, drag="sensor", label=label)
 
     def _aperture_panel(self) -> str:
-        x, y, width, _ = self._cell("at the sensor")
-        x, y, width = (x + 10, y + 214, 260) if width < 400 else (x + 410, y + 34, 200)
+        x, y, width, _ = self._layout["sensor"]
+        x, y, width = (x + 10, y + 214, width - 20) if width < NARROW else (x + width - 210, y + 34, 200)
         across = 1.1 * width / 140
         panel = Panel("aperture", x, y, width, 140, -across, across, -1.1, 1.1)
         points, passes = self.lens.points(SHOWN)
@@ -264,61 +280,47 @@ class DepthOfFieldView(View):
         return panel.show(content, title="Points of the lens")
 
     def _photograph_panel(self) -> str:
-        panel = image_in(self._cell("photograph"), "lens", 320, 240)
-        note = f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
+        panel = image_in(self._layout["photograph"], "lens", 320, 240)
+        note = "" if len(self._layout) == 1 else f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
         return panel.show(placed_image(panel, "lens", 320, 240), title="The photograph, traced", note=note)
 
     @cached_property
     def _plot(self) -> Panel:
-        x, y, width, height = self._cell("blur")
-        return plot_panel("blur", x + 70, y + 34, width - 82, height - 84, logs(_DEPTHS), logs(_BLURS))
+        x, y, width, height = self._layout["blur"]
+        return plot_panel("blur", x + 70, y + 34, width - 82, height - 84, logs(DEPTHS), logs(BLURS))
 
     def _blur_panel(self) -> str:
         panel, (near, far) = self._plot, self.limits_m
         around = 1 + np.outer((-1, 1), np.geomspace(1e-4, 0.1, 9)).ravel()  # the curve comes down steeply to the focus
-        depth = np.sort(np.concatenate([np.geomspace(*_DEPTHS, 161), self.focus_m * around]))
+        depth = np.sort(np.concatenate([np.geomspace(*DEPTHS, 161), self.focus_m * around]))
         blur = np.maximum(self.blur_mm(depth), 1e-6)
         far_x = min(np.log10(far), panel.right)
-        lines, names = self._levels(panel)
-        bounds = band(panel, np.log10(near), far_x, "fill-green") if self._bounded else ""
-        here = panel.place(logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), _BLURS[0]))))
-        xticks, yticks = logarithmic(*logs(_DEPTHS)), _micrometres()
+        allowed, airy = self.circle_mm if self.bounds else None, self.airy_mm if self.diffraction else None
+        bounds = band(panel, np.log10(near), far_x, "fill-green") if self.bounds else ""
+        here = panel.place(logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), BLURS[0]))))
+        xticks, yticks = logarithmic(*logs(DEPTHS)), micrometres()
         content = (
             logarithmic_grid(panel, xticks, yticks)
             + bounds
-            + lines
             + curve(panel, np.log10(depth), np.log10(blur), "blue thick")
             + upright(panel, np.log10(self.focus_m), "red thin")
-            + names
+            + levels(panel, allowed, airy, self.limits_m)
             + svg.dots([here], "blue", 10)
             + svg.text(here + (8, -8), "globe", "blue halo")
-            + self._your_part(panel, depth)
         )
-        label = "Blur against distance; drag or press the arrow keys to change the focus"
-        shown = panel.show(content, title="Blur against distance", hint="drag to focus", drag="focus", label=label)
+        drawn, problem = self._your_part(panel, depth)
+        title, label = (
+            "Blur against distance",
+            "Blur against distance; drag or press the arrow keys to change the focus",
+        )
+        if is_unwritten(problem):
+            shown = without(panel, problem, title, right=content)
+        else:
+            shown = panel.show(content + drawn, title=title, hint="drag to focus", drag="focus", label=label)
         return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks, aside=56) + shown
 
-    def _levels(self, panel: Panel) -> tuple[str, str]:
-        """The lines of the blur that is allowed and of the Airy disc, and their names, at opposite ends.
-
-        Outside the depth of field the curve runs above the blur that is allowed: there its name stands below the line.
-        """
-        near, far = self.limits_m
-        right_is_free = near < 1.8 and far < 14  # of the depth of field; the left is not
-        allowed = f"allowed: c = {1000 * self.circle_mm:.0f} µm"
-        levels = [(self.circle_mm, allowed, "green", "dashed", 14, right_is_free)] if self._bounded else []
-        if self.diffraction:
-            levels.append((self.airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free))
-        lines = names = ""
-        for blur, name, colour, stroke, below, at_right in levels:
-            left, right = panel.place([(panel.left, np.log10(blur)), (panel.right, np.log10(blur))])
-            lines += svg.line([left, right], f"{colour} {stroke}")
-            place, end = (right + (-8, below), " end") if at_right else (left + (8, below), "")
-            names += svg.text(place, name, f"{colour} halo{end}")
-        return lines, names
-
-    def _your_part(self, panel: Panel, depth_m: np.ndarray) -> str:
-        """The reader's blur over distance, their limits, the names of both, and what is wrong with either."""
+    def _your_part(self, panel: Panel, depth_m: np.ndarray) -> tuple[str, str]:
+        """The reader's blur over distance, their limits and the names of both; and what is wrong with either."""
         drawn, entries, problems = "", [], []
         state = (self.focal_mm, self.f_number)
         if self.yours:
@@ -336,14 +338,15 @@ class DepthOfFieldView(View):
         words = "\n".join(filter(None, dict.fromkeys(problems)))
         drawn += legend(panel, entries, "top right") if entries else ""
         below = 40 * len(entries)  # the legend, where it is shown largest
-        return drawn + (svg.paragraph((12, 22 + below), words, panel.width - 24, "note halo") if words else "")
+        drawn += svg.paragraph((12, 22 + below), words, panel.width - 24, "note halo") if words else ""
+        return drawn, words if all(is_unwritten(one) for one in problems) else ""
 
     def _numbers(self) -> str:
-        x, y, _, _ = self._cell("numbers")
-        figures, step = self._told(), 42
-        if self.panels == "rays photograph blur":
-            step = 34
+        x, y, _, high = self._layout["numbers"]
+        figures = self._told()
+        if self._has("rays") and self._has("blur"):
             figures |= {"1/f = 1/s + 1/v, in mm": self.equation()}
+        step = min(42, (high - 52) // len(figures))
         return svg.text((x + 10, y + 26), "This lens", "title") + readout(figures, (x + 10, y + 48), (0, step), (0, 16))
 
     # What it does when touched ---------------------------------------------------------------------------------------
@@ -377,10 +380,6 @@ def _photographed(view: DepthOfFieldView, rough: bool) -> bytes:
 def _log10(values: np.ndarray) -> np.ndarray:
     """NaN for what has no logarithm."""
     return np.log10(np.where(values > 0, values, np.nan))
-
-
-def _micrometres() -> list[tuple[float, str]]:
-    return [(float(np.log10(um / 1000)), f"{um:g}") for um in (10, 100, 1000, 10_000)]
 
 
 def _range_m(near: float, far: float) -> str:
