@@ -12,13 +12,12 @@ from camviz.cameras import transform
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.arrowhead import Arrowhead
+from camviz_clinic.calibration.clustered import ByView
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz_clinic.calibration.linearisation import sagittas
 from camviz_clinic.calibration.problem import POSE
 
 Indices = NDArray[np.intp]
-FRAMES_AT_ONCE = 50
-ALONE = 1 - 1e-6  # of what is known of a direction: from here on a frame determines it alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +41,8 @@ class RigAdjustment(Adjustment):
 
     A camera's pixels depend on its own intrinsics, its own place and the board's pose, so that its rows of the Jacobian
     are kept by these alone (Triggs et al. 2000, section 6.1: the board poses are eliminated frame by frame).
+
+    What are views elsewhere are frames here: moments of the whole rig, whose scatter gives the `covariance`.
     """
 
     @cached_property
@@ -99,59 +100,17 @@ class RigAdjustment(Adjustment):
         return normal
 
     @cached_property
-    def clustered_covariance(self) -> Array:
-        """Of the shared `parameters`, (s, s), from how much the frames disagree; never less than by corner noise alone.
+    def by_view(self) -> ByView:
+        """What every frame that has a say asks of the shared parameters, and what priors do.
 
-        The errors of one frame's corners may go together as they like (a bent board, motion, light): whole frames are
-        left out in turn, Cov = (n - 1)/n Σ δᵢ δᵢᵀ, with δᵢ = (H - Hᵢ)⁻¹ gᵢ how far the solution moves without frame i.
-        That is the delete-one jackknife, to first order (Bell & McCaffrey 2002, "Bias reduction in standard errors", as
-        CR3). What a frame determines alone cannot move so, and has corner noise for its σ. So has every direction in
-        which few frames happen to agree better than their corners are found.
+        A frame that alone ties a camera to the others cannot be left out: there the covariance is by corners' noise.
         """
-        normal = self.normal_equations
-        scale, root = _inverse_root(normal.information)
-        moves = np.concatenate([root @ self._left_out(rows, root / scale[:, None]) for rows in self._chunks()], axis=-1)
-        n = moves.shape[-1]
-        scatter = (n - 1) / n * moves @ moves.T / np.outer(scale, scale)
-        return _at_least(scatter, self.covariance)
-
-    def _chunks(self) -> list[Indices]:
-        views = int(self.posed.sum())
-        return [np.arange(start, min(start + FRAMES_AT_ONCE, views)) for start in range(0, views, FRAMES_AT_ONCE)]
-
-    def _left_out(self, frames: Indices, whitening: Array) -> Array:
-        """(1 - Kᵢ)⁻¹ W gᵢ, (s, frames), with K = W Hᵢ Wᵀ, where W takes the information H to 1."""
-        normal = self.normal_equations
-        H = np.zeros((len(frames), len(self.parameters), len(self.parameters)))
-        g = np.zeros((len(frames), len(self.parameters)))
+        normal, shape = self.normal_equations, (int(self.posed.sum()), len(self.parameters))
+        information, gradient = np.zeros((*shape, shape[1])), np.zeros(shape)
         for part in self.parts.values():
-            here = (part.frames >= frames[0]) & (part.frames <= frames[-1])
-            by_own, place = part.by_own[here], part.frames[here] - frames[0]
-            H[place[:, None, None], part.own[:, None], part.own] += np.swapaxes(by_own, 1, 2) @ by_own
-            g[place[:, None], part.own] += np.einsum("vnk,vn->vk", by_own, part.residuals[here])
-        W, B = normal.pose_response[frames], normal.border[frames]
-        H -= B @ W
-        g -= np.einsum("vms,vm->vs", W, normal.gradients[frames])
-        values, vectors = np.linalg.eigh(whitening.T @ H @ whitening)
-        amplified = np.where(values < ALONE, 1 / (1 - np.minimum(values, ALONE)), 0)
-        along = np.einsum("vsk,vs->vk", vectors, g @ whitening)
-        return np.einsum("vsk,vk->sv", vectors, amplified * along)
-
-
-def _inverse_root(information: Array) -> tuple[Array, Array]:
-    """The scale d (s,) and R (s, s) with H⁻¹ = D⁻¹ R Rᵀ D⁻¹, H being D X D with a diagonal of 1 in X."""
-    scale = np.sqrt(np.diag(information))
-    scale = np.where(scale > 0, scale, 1)
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    floor = len(values) * np.finfo(float).eps * max(values[-1], 1)
-    return scale, vectors / np.sqrt(np.maximum(values, floor))
-
-
-def _at_least(scatter: Array, least: Array) -> Array:
-    """The smallest covariance above both in the directions in which the two are diagonal together."""
-    scale = np.sqrt(np.diag(least))
-    root = np.linalg.cholesky(least / np.outer(scale, scale) + 1e-14 * np.eye(len(least)))
-    half = np.linalg.solve(root, scatter / np.outer(scale, scale))
-    values, vectors = np.linalg.eigh(np.linalg.solve(root, half.T))
-    wide = root @ vectors * np.sqrt(np.maximum(values, 1))
-    return np.asarray(wide @ wide.T * np.outer(scale, scale))
+            by_own, rows = part.by_own, part.frames[:, None]
+            information[rows[..., None], part.own[:, None], part.own] += np.swapaxes(by_own, 1, 2) @ by_own
+            gradient[rows, part.own] += np.einsum("vnk,vn->vk", by_own, part.residuals)
+        information -= normal.border @ normal.pose_response
+        gradient -= np.einsum("vms,vm->vs", normal.pose_response, normal.gradients)
+        return ByView(information, gradient, *self.by_priors, alone=1)

@@ -83,7 +83,7 @@ def rig_of(calibration: Calibration) -> RigAdjustment:
 
 
 def relative_pose(rig: RigAdjustment, of: str, seen_from: str) -> RelativePose:
-    """Where a camera stands in another one's frame, with the covariance that is clustered by frame.
+    """Where a camera stands in another one's frame, with the covariance by the scatter of the frames.
 
     Args:
         rig: The solution.
@@ -116,4 +116,4 @@ def relative_pose(rig: RigAdjustment, of: str, seen_from: str) -> RelativePose:
     centre = np.eye(6)
     centre[3:, :3] = -cross(pose.translation)
     jacobian = centre @ jacobian
-    return RelativePose(of, seen_from, pose, jacobian @ rig.clustered_covariance @ jacobian.T)
+    return RelativePose(of, seen_from, pose, jacobian @ rig.covariance @ jacobian.T)

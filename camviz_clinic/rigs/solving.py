@@ -48,7 +48,7 @@ def calibrate_rig(
         robust: Set aside corners and views that the rest contradicts, by a σ for each camera.
 
     Returns: Calibration with these cameras in place. Its covariances are clustered by frame
-        (`RigAdjustment.clustered_covariance`); `relative_pose` gives those of the places.
+        (`RigAdjustment.covariance`); `relative_pose` gives those of the places.
 
     Raises:
         CannotCalibrate: Where the frames do not tie all cameras together, or a camera's views do not give a camera.
@@ -143,7 +143,7 @@ def _refuse_parted(adjustment: RigAdjustment, aside: Masks) -> None:
 
 
 def _calibration(adjustment: RigAdjustment, detections: Mapping[str, Detections], frames: Sequence[int]) -> Calibration:
-    covariance = adjustment.clustered_covariance
+    covariance = adjustment.covariance
     pictures = {}
     for name, each in detections.items():
         named = dict(zip(each.places, each.pictures, strict=True))
