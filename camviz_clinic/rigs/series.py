@@ -32,11 +32,11 @@ FEWEST_CORNERS = 6  # of a view, to solve for a camera by it
 BETTER = 3.0  # times smaller must the error be with the delay, or on either side of a jump
 PLAIN = 3.0  # pixels: an error that is smaller needs no explanation of this kind
 
-Found = TypeVar("Found", "Delay", "Jump")
+Found = TypeVar("Found", "Lag", "Jump")
 
 
 @dataclass(frozen=True)
-class Delay:
+class Lag:
     """A camera's pictures lag behind those of the others.
 
     Args:
@@ -131,7 +131,7 @@ def frame_numbers(pictures: Mapping[str, Sequence[str]], there: Mapping[str, Mas
     return counted if (np.diff(counted) > 0).all() and counted[-1] < 2**31 else np.arange(rows)
 
 
-def delays(alone: Mapping[str, Adjustment], numbers: Indices) -> dict[str, Delay]:
+def delays(alone: Mapping[str, Adjustment], numbers: Indices) -> dict[str, Lag]:
     """Cameras that lag behind the rest, by a delay that takes their contradictions away.
 
     Args:
@@ -171,9 +171,9 @@ def _blamed(
     return blamed
 
 
-def _late(found: Sequence[tuple[Delay, int]]) -> Delay:
+def _late(found: Sequence[tuple[Lag, int]]) -> Lag:
     """The delay of one camera by those of its pairs, signed by its place in them."""
-    return Delay(
+    return Lag(
         float(np.median([each.frames * sign for each, sign in found])),
         float(np.median([each.without for each, _ in found])),
         float(np.median([each.along for each, _ in found])),
@@ -185,7 +185,7 @@ def _moved(found: Sequence[tuple[Jump, int]]) -> Jump:
     return sorted((each for each, _ in found), key=lambda each: each.row)[len(found) // 2]
 
 
-def _delay(one: Adjustment, other: Adjustment, numbers: Indices) -> Delay | None:
+def _delay(one: Adjustment, other: Adjustment, numbers: Indices) -> Lag | None:
     """By how many frames the other lags behind the one, where that explains their contradictions."""
     if not PLAIN < _error_late(one, other, numbers, 0) < np.inf:
         return None
@@ -195,7 +195,7 @@ def _delay(one: Adjustment, other: Adjustment, numbers: Indices) -> Delay | None
     without, best = errors[0.0], min(errors, key=lambda frames: (errors[frames], abs(frames)))
     if not (without > PLAIN and errors[best] * BETTER < without):
         return None
-    return Delay(best, without, errors[best])
+    return Lag(best, without, errors[best])
 
 
 def _error_late(one: Adjustment, other: Adjustment, numbers: Indices, frames: float) -> float:

@@ -225,6 +225,8 @@ def _pose(rng: np.random.Generator, cameras: list[Camera], spread: float) -> Rig
         turn = facing * Rotation.from_rotvec(tilt * np.array([np.cos(side), np.sin(side), 0])) * spin
         pixel = (aim + 1) / 2 * [grid.width, grid.height] - 0.5
         ray = camera.lens.unproject(grid.from_pixels(pixel))
+        if not np.isfinite(ray).all():  # beyond what a fisheye sees
+            continue
         away = rng.uniform(0.5, 1.0) if len(cameras) == 1 else rng.uniform(0.9, 1.4)
         away *= 0.5 if isinstance(camera.lens, KannalaBrandt) and len(cameras) == 1 else 1.0
         where = camera.world_from_cam.apply(away * ray / np.linalg.norm(ray))
