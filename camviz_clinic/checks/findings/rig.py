@@ -27,17 +27,34 @@ APART = 3.0  # pixels between the two cameras' numbers, or they cannot be told a
 CLOSER = 5.0  # times closer must the exchanged cameras be
 
 
+def _a_rig(evidence: Evidence) -> bool:
+    """Whether a file is of a rig: of more cameras than a pair, or of a pair with what it saw frame by frame."""
+    count = len(evidence.calibration.cameras)
+    return count > 2 or (count == 2 and _holds_frames(evidence.calibration))
+
+
+def _comparable(evidence: Evidence) -> bool:
+    """Whether a file is of a rig, or of a pair that is compared with another."""
+    return _a_rig(evidence) or (len(evidence.calibration.cameras) == 2 and evidence.compare is not None)
+
+
+def _holds_frames(calibration: Calibration) -> bool:
+    """Whether a file holds what all of its cameras saw of one board, frame by frame."""
+    held = [calibration.detections.get(name) for name in calibration.cameras]
+    shapes = {None if each is None else each.shape[:2] for each in held}
+    return calibration.board is not None and len(shapes) == 1 and None not in shapes
+
+
 def _together(evidence: Evidence) -> Calibration:
     """The calibration, where several of its cameras saw one board in the same frames; NotChecked otherwise."""
     calibration = evidence.calibration
     if len(calibration.cameras) < 2:
         raise NotChecked("the file holds one camera, not a rig")
-    held = [calibration.detections.get(name) for name in calibration.cameras]
-    there = [each for each in held if each is not None]
-    board = calibration.board
-    if board is None or len(there) < len(held) or len({each.shape[:2] for each in there}) > 1:
+    if not _holds_frames(calibration):
         raise NotChecked("the file does not hold what all cameras of a rig saw of one board, frame by frame")
-    if there[0].shape[1] != board.columns * board.rows:
+    assert calibration.board is not None
+    corners = next(iter(calibration.detections.values()))
+    if corners.shape[1] != calibration.board.columns * calibration.board.rows:
         raise NotChecked("the file's corners are not those of its board")
     return calibration
 
@@ -60,6 +77,7 @@ def _alone(evidence: Evidence) -> Mapping[str, Adjustment]:
     causes=("two groups of cameras that never saw the board in the same frame",),
     remedy="Show the board to the two cameras that are named, both at once, in several frames, and solve again.",
     threshold="No frame is common to the groups.",
+    asked_of=_a_rig,
 )
 def rig_islands(evidence: Evidence) -> Iterator[Finding]:
     """The check follows the frames in which two cameras both saw the board, from camera to camera."""
@@ -96,6 +114,7 @@ def _rows(truth: VirtualRig) -> Indices:
     causes=("a camera that saw the board together with the others only once",),
     remedy="Show the board to this camera and a neighbour together, in ten frames at different places and angles.",
     threshold="It shares one frame with all other cameras together.",
+    asked_of=_a_rig,
 )
 def rig_one_frame(evidence: Evidence) -> Iterator[Finding]:
     """The check counts the frames that a camera shares with any other."""
@@ -138,6 +157,7 @@ def _solved(truth: VirtualRig, rng: Rng) -> Evidence:
     causes=("a board on a turntable, or carried on its stand",),
     remedy="Add frames with the board tilted to all sides by 20° to 40°.",
     threshold="All turns but those about one axis are below 4° RMS, and those about it above 8°.",
+    asked_of=_a_rig,
 )
 def rig_one_axis(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the board's attitudes in all frames with the middle one."""
@@ -180,6 +200,7 @@ def turntable(rng: Rng, strength: float) -> Evidence:
     remedy="Shift its pictures by the delay, or trigger the cameras together, and solve again.",
     threshold="With the delay taken off, its error is a third of what it is, and that is above 3 px.",
     explains=("outlier-view", "corners-set-aside", "views-differ", "rolling-shutter", "split-disagreement"),
+    asked_of=_a_rig,
 )
 def rig_late(evidence: Evidence) -> Iterator[Finding]:
     """The check lets the frames of one camera lag behind another's, by quarters of a frame up to four, and asks whether
@@ -214,6 +235,7 @@ def a_frame_late(rng: Rng, strength: float) -> Evidence:
     remedy="Fix the camera, and solve again from the frames after it was moved, or from those before.",
     threshold="By its place on the other side of a frame its error is above 3 px, and three times that by its own.",
     explains=("outlier-view", "corners-set-aside", "views-differ", "split-disagreement"),
+    asked_of=_a_rig,
 )
 def rig_moved(evidence: Evidence) -> Iterator[Finding]:
     """The check asks for every frame whether two cameras stand otherwise to each other before it and from it on."""
@@ -254,6 +276,7 @@ def _direction(rng: Rng) -> Array:
     remedy="Exchange the two folders, or the two names.",
     threshold="Exchanged, the two are five times closer to the other calibration, from which they are 3 px off.",
     explains=("models-differ",),
+    asked_of=_comparable,
 )
 def rig_exchanged(evidence: Evidence) -> Iterator[Finding]:
     """The check compares focal lengths and principal points with those of the other calibration, and with those under
