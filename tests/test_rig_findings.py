@@ -8,6 +8,7 @@ import pytest
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.findings import rig as checks
+from camviz_clinic.checks.inspection import inspect
 from camviz_clinic.checks.virtual import healthy
 from camviz_clinic.rigs import calibrate_rig, virtual
 from camviz_clinic.rigs.series import by_themselves, delays, frame_numbers, jumps
@@ -110,3 +111,25 @@ def test_a_single_camera_is_not_checked_as_a_rig():
     for kind in KINDS:
         with pytest.raises(NotChecked, match="the file holds one camera, not a rig"):
             list(kind.check(evidence))
+
+
+def mentioned(calibration, **more):
+    """Which of a rig's kinds an inspection says anything of."""
+    inspection = inspect(calibration, **more)
+    said = {*inspection.checked, *(id for id, _ in inspection.skipped)}
+    assert ("rig-" in inspection.as_text()) == bool({kind.id for kind in KINDS} & said)
+    return {kind.id for kind in KINDS} & said
+
+
+def test_a_report_says_nothing_of_rigs_but_of_what_may_be_one():
+    """Not of one camera, nor of a pair without frames unless it is compared; of a pair with frames and of any rig."""
+    every = {kind.id for kind in KINDS}
+    rng = np.random.default_rng(76)
+    truth = virtual.rig(rng, 3, frames=6, shared=0.5)
+    solved = calibrate_rig({name: each for name, each in truth.observed(rng).items() if name != "cam2"}, truth.board)
+    bare = replace(solved, detections={}, cam_from_board={})
+    assert mentioned(healthy(rng)) == set()
+    assert mentioned(bare) == set()
+    assert mentioned(bare, compare=solved) == {"rig-exchanged"}
+    assert mentioned(solved) == every
+    assert mentioned(replace(bare, cameras=truth.cameras)) == every

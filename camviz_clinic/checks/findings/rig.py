@@ -50,6 +50,7 @@ def _together(evidence: Evidence) -> Calibration:
     calibration = evidence.calibration
     if len(calibration.cameras) < 2:
         raise NotChecked("the file holds one camera, not a rig")
+    evidence.with_corners()
     if not _holds_frames(calibration):
         raise NotChecked("the file does not hold what all cameras of a rig saw of one board, frame by frame")
     assert calibration.board is not None
@@ -286,7 +287,7 @@ def rig_exchanged(evidence: Evidence) -> Iterator[Finding]:
         raise NotChecked("the file holds one camera, not a rig")
     both = {name: (ours, other) for name, ours, other in evidence.matched()}
     if len(both) < 2:
-        raise NotChecked("it needs another calibration of the same cameras (--compare)")
+        raise NotChecked("it needs another calibration (--compare)")
     names = list(both)
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
