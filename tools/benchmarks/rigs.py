@@ -6,9 +6,9 @@
     python tools/benchmarks/rigs.py --faults N what is named in N rigs with each fault, and in N healthy ones
 
 "within 3 ±" and "95 % intervals" (1.96 ±) count the six numbers of every two cameras' relative pose; behind the stroke
-are the intervals by the noise of corners alone. A board that bends does so otherwise in every frame, by 0.5 px in each of
-four ways. OpenCV's `calibrateMultiview` (from 5.0 on) has the same corners in the same run; it says no ±. "worst" is the
-largest error of a relative position, in millimetres.
+are the intervals by the noise of corners alone. A board that bends does so otherwise in every frame, by 0.5 px in each
+of four ways. OpenCV's `calibrateMultiview` (from 5.0 on) has the same corners in the same run; it says no ±. "worst" is
+the largest error of a relative position, in millimetres.
 """
 
 from __future__ import annotations

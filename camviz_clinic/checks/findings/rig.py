@@ -34,8 +34,8 @@ def _a_rig(evidence: Evidence) -> bool:
 
 
 def _comparable(evidence: Evidence) -> bool:
-    """Whether a file is of a rig, or of a pair that is compared with another."""
-    return _a_rig(evidence) or (len(evidence.calibration.cameras) == 2 and evidence.compare is not None)
+    """Whether a file is of several cameras, and compared with another."""
+    return len(evidence.calibration.cameras) > 1 and evidence.compare is not None
 
 
 def _holds_frames(calibration: Calibration) -> bool:
