@@ -13,7 +13,7 @@ from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.types import Calibration, Mask
 from camviz_clinic.checks.evidence import Evidence, NotChecked
-from camviz_clinic.checks.registry import Finding, Rng, finding
+from camviz_clinic.checks.registry import VIEW_BY_VIEW, Finding, Rng, finding
 from camviz_clinic.rigs import calibrate_rig, virtual
 from camviz_clinic.rigs.graph import Indices, islands, parted
 from camviz_clinic.rigs.series import by_themselves, delays, frame_numbers, jumps
@@ -200,7 +200,7 @@ def turntable(rng: Rng, strength: float) -> Evidence:
     causes=("a camera that started a frame late or lost one", "a trigger or a clock that lags", "files numbered apart"),
     remedy="Shift its pictures by the delay, or trigger the cameras together, and solve again.",
     threshold="With the delay taken off, its error is a third of what it is, and that is above 3 px.",
-    explains=("outlier-view", "corners-set-aside", "views-differ", "rolling-shutter", "split-disagreement"),
+    explains=(*VIEW_BY_VIEW, "rolling-shutter", "split-disagreement"),
     asked_of=_a_rig,
 )
 def rig_late(evidence: Evidence) -> Iterator[Finding]:
@@ -235,7 +235,7 @@ def a_frame_late(rng: Rng, strength: float) -> Evidence:
     causes=("a camera that was knocked or whose mount slipped", "frames of two set-ups in one folder"),
     remedy="Fix the camera, and solve again from the frames after it was moved, or from those before.",
     threshold="By its place on the other side of a frame its error is above 3 px, and three times that by its own.",
-    explains=("outlier-view", "corners-set-aside", "views-differ", "split-disagreement"),
+    explains=(*VIEW_BY_VIEW, "split-disagreement"),
     asked_of=_a_rig,
 )
 def rig_moved(evidence: Evidence) -> Iterator[Finding]:
