@@ -2,6 +2,7 @@
 
     calibration   boards found in pictures, and the camera that saw them
     measuring     how sharp a camera is, and how noisy its sensor
+    rigs          many cameras that saw a board in any of the frames, solved for together
     files         calibrations read from what other programs write, and written for them
     checks        the findings: what an inspection looks for, and how sure it is
     views         residuals, coverage, uncertainty: a picture for each finding
@@ -23,7 +24,7 @@ _HOME = {
     "load": "camviz_clinic.files",
 }
 
-_PARTS = ("calibration", "checks", "meshes", "plots")
+_PARTS = ("calibration", "checks", "meshes", "plots", "rigs")
 
 __all__ = ["Calibration", "inspect", "load", *_PARTS]
 

@@ -26,7 +26,7 @@ LAYERS = {
     ),
     "camviz_clinic": (
         ("calibration", "measuring"),
-        ("files",),
+        ("files", "rigs"),
         ("checks",),
         ("handeye", "views"),
         ("meshes", "plots", "report"),
@@ -45,7 +45,7 @@ LAYERS = {
 WHAT_IS_TRUE = (
     *("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics"),
     *("optics", "panoramas", "poses", "scenes", "sensors", "twoview"),
-    *("calibration", "checks", "files", "handeye", "measuring", "samples"),
+    *("calibration", "checks", "files", "handeye", "measuring", "rigs", "samples"),
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
 

@@ -94,6 +94,23 @@ def test_what_no_view_measures_or_one_alone_is_beyond_all_digits(linear) -> None
     )
 
 
+def test_what_one_view_alone_measures_may_have_the_noise_of_its_corners(linear) -> None:
+    """Two parameters of the third group alone: their covariance, by σ = 0.5 of its corners, is that of least squares.
+
+    By np.linalg.inv of all columns' normal equations, and in every direction, as a view is left out of none.
+    """
+    X, Z, y = linear
+    own = np.zeros((10, 12, 2))
+    own[2] = np.random.default_rng(0).normal(size=(12, 2))
+    X = np.concatenate([X, own], axis=-1)[..., [3, 4]]
+    D = dense(X, Z, range(10))
+    expected = 0.5**2 * np.linalg.inv(D.T @ D)[:2, :2]
+    found = replace(by_view(X, Z, y), alone=1).covariance(0.5)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    beyond = by_view(X, Z, y).covariance(0.5)
+    assert np.linalg.eigvalsh(beyond / np.sqrt(np.outer(np.diag(beyond), np.diag(beyond))))[0] > 1e-3
+
+
 def test_what_is_assumed_scatters_as_it_was_assumed_to(linear) -> None:
     """Under a prior that holds the first parameter a million times better than the data its σ is the prior's."""
     X, Z, y = linear

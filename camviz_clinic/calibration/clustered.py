@@ -15,6 +15,7 @@ from camviz.lenses.base import Array
 
 FEWEST_VIEWS = 3  # fewer tell no scatter
 UNKNOWN = 1e-12  # of a parameter's own information: less is rounding, and nothing that a view measures
+ALONE = 1e-6  # of the information on a direction: where all other views have less, one measures it alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +23,15 @@ class ByView:
     """Every view's share in the normal equations of the s shared parameters, with the view's own pose taken out.
 
     `information` (views, s, s) is Aᵢ - Bᵢ Cᵢ⁻¹ Bᵢᵀ and `gradient` (views, s) the same of Jᵀr, in the views that have a
-    say (`Arrowhead`). `assumed` (s, s) and `pull` (s,) are what priors add to the sums of both.
+    say (`Arrowhead`). `assumed` (s, s) and `pull` (s,) are what priors add to the sums of both. `alone` is the variance
+    of a direction that a single view measures, in that by the noise of its corners: beyond all digits unless given.
     """
 
     information: Array
     gradient: Array
     assumed: Array
     pull: Array
+    alone: float = 1 / UNKNOWN
 
     def covariance(self, sigma: float) -> Array:
         """The covariance (s, s) of the shared parameters by the delete-one-view jackknife.
@@ -39,7 +42,8 @@ class ByView:
         standard errors for linear regression with multi-stage samples", Survey Methodology 28, 169; Tukey 1958). A
         prior adds its own σ² H⁻¹ PᵀP H⁻¹, `sigma` being the corners' σ in pixels.
 
-        A direction that no view measures, or a single one alone, gets a variance beyond all digits.
+        A direction that no view measures gets a variance beyond all digits, and one that a single view measures, which
+        no other can contradict, that of `alone`.
         """
         whole = self.information.sum(axis=0) + self.assumed
         scale = np.sqrt(np.einsum("ii->i", whole))
@@ -50,18 +54,21 @@ class ByView:
         shares = white.T @ self.information @ white
         step = white.T @ (self.gradient.sum(axis=0) + self.pull)  # to the least sum of squares, where it is not there
         scores = self.gradient @ white - shares @ step
-        changes = _without_each(shares, scores, sigma)
+        changes, alone = _without_each(shares, scores)
         n = len(changes)
         scatter = (n - 1) / n * changes.T @ changes + sigma**2 * white.T @ self.assumed @ white
+        scatter += sigma**2 * self.alone * alone.T @ alone
         beyond = vectors[:, ~known] / scale[:, None]
         return np.asarray(white @ scatter @ white.T + sigma**2 / UNKNOWN * beyond @ beyond.T)
 
 
-def _without_each(shares: Array, scores: Array, sigma: float) -> Array:
-    """(1 - Sᵢ)⁻¹ zᵢ (views, k) of shares (views, k, k) that with the prior's add up to 1."""
+def _without_each(shares: Array, scores: Array) -> tuple[Array, Array]:
+    """(1 - Sᵢ)⁻¹ zᵢ (views, k) of shares (views, k, k) that with the prior's add up to 1.
+
+    Without the directions that a single view measures, in which Sᵢ is 1: these, (n, k), are the second result.
+    """
     shares, axes = np.linalg.eigh(shares)
     left = 1 - shares
-    along = np.einsum("vij,vi->vj", axes, scores)
-    alone = left < UNKNOWN * shares.shape[1]
-    along = np.where(alone, sigma / np.sqrt(UNKNOWN), along / np.where(alone, 1, left))
-    return np.einsum("vij,vj->vi", axes, along)
+    single = left < ALONE
+    along = np.where(single, 0, np.einsum("vij,vi->vj", axes, scores) / np.where(single, 1, left))
+    return np.einsum("vij,vj->vi", axes, along), np.swapaxes(axes, 1, 2)[single]

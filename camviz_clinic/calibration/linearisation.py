@@ -129,10 +129,16 @@ class Linearisation(Problem):
             along += np.einsum("vns,vn->vs", by_shared, residuals)
         information = own - normal.border @ normal.pose_response
         gradient = along - np.einsum("vms,vm->vs", normal.pose_response, normal.gradients)
+        return ByView(information, gradient, *self.by_priors)
+
+    @property
+    def by_priors(self) -> tuple[Array, Array]:
+        """What priors add to JᵀJ (s, s) and Jᵀr (s,) of the shared parameters."""
+        s = len(self.parameters)
         assumed, pull = np.zeros((s, s)), np.zeros(s)
         for rows, expected in self._assumed.values():
             assumed, pull = assumed + rows.T @ rows, pull + rows.T @ expected
-        return ByView(information, gradient, assumed, pull)
+        return assumed, pull
 
     def intrinsics_covariance(self, name: str) -> Array:
         """Of the `estimated` intrinsics of camera `name`, (n, n)."""

@@ -74,6 +74,8 @@ class Inspection:
         findings: list[Finding] = []
         checked, skipped = [], []
         for id, kind in kinds().items():
+            if kind.asked_of and not kind.asked_of(evidence):
+                continue
             try:
                 findings += kind.check(evidence)
                 checked.append(id)
@@ -221,7 +223,7 @@ def inspect_board(
     if not findings:
         return None
     why = "the board is not as described, and there is no calibration"
-    skipped = tuple((id, why) for id in kinds() if id != findings[0].id)
+    skipped = tuple((id, why) for id in _asked_of_all() if id != findings[0].id)
     return Inspection(None, findings, (findings[0].id,), skipped, source=source, made=findings)
 
 
@@ -260,7 +262,7 @@ def inspect_file(
             raise
         finding = kinds()[error.id].found(f"{str(error).removeprefix(f'{Path(path)}: ')}.", error.value)
         why = "the file could not be read beyond the fault above"
-        skipped = tuple((id, why) for id in kinds() if id != error.id)
+        skipped = tuple((id, why) for id in _asked_of_all() if id != error.id)
         return Inspection(None, (finding,), (error.id,), skipped, source=Path(path), made=(finding,))
     calibration = prepare(calibration) if prepare else calibration
     return inspect(
@@ -272,3 +274,8 @@ def inspect_file(
         baseline=baseline,
         photographs=photographs,
     )
+
+
+def _asked_of_all() -> list[str]:
+    """The ids of the findings that are looked for in every calibration."""
+    return [id for id, kind in kinds().items() if kind.asked_of is None]

@@ -149,7 +149,8 @@ class Kind:
 
     `symptom`, `evidence`, `threshold` and `remedy` are sentences, `causes` are phrases, the most likely first. What it
     `explains` are the ids of findings that follow from it in the same camera. The check takes Evidence and gives
-    findings; it raises NotChecked where the evidence is missing.
+    findings; it raises NotChecked where the evidence is missing. Where `asked_of` the evidence gives False, the
+    question does not arise, and nobody is told that it was not checked.
     """
 
     id: str
@@ -162,6 +163,7 @@ class Kind:
     threshold: str
     check: Callable[[Evidence], Iterable[Finding]]
     explains: tuple[str, ...] = ()
+    asked_of: Callable[[Evidence], bool] | None = None
 
     def __post_init__(self) -> None:
         if self.severity not in SEVERITIES:

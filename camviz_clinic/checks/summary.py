@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from camviz_clinic.calibration.detection import seen
 from camviz_clinic.calibration.guidance import instruction, next_board_poses
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.calibration.uncertainty import largest_expected_error, projection_uncertainty
@@ -64,7 +65,8 @@ class Summary:
         calibration = self.calibration
         used = [calibration.used(name).any(axis=1) for name in calibration.detections]
         if used:
-            count, given = sum(int(mask.sum()) for mask in used), sum(mask.size for mask in used)
+            count = sum(int(mask.sum()) for mask in used)
+            given = sum(int(seen(corners).any(axis=1).sum()) for corners in calibration.detections.values())
             return f"{count} of {given + len({name for name, _ in calibration.skipped})} pictures used"
         views = sum(len(errors) for errors in calibration.per_view_errors.values())
         return f"{views} views" if views else "the file does not name its pictures"

@@ -33,9 +33,19 @@ from camviz_clinic.commands.corners import add_corners, corners_of
 from camviz_clinic.commands.gate import EPILOG as GATE
 from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz_clinic.commands.pictures import Bar, pictures
+from camviz_clinic.commands.rig import (
+    RIG,
+    add_rig,
+    by_camera,
+    format_of_rig,
+    placed,
+    refuse_mixed,
+    rig_of_pictures,
+    usual_name,
+)
 
 if TYPE_CHECKING:
-    from camviz_clinic.calibration import CannotCalibrate
+    from camviz_clinic.calibration import CannotCalibrate, Detections
     from camviz_clinic.checks import Inspection
     from camviz_clinic.files import Board, Calibration
     from camviz_clinic.files.corners import LoadedCorners
@@ -62,6 +72,7 @@ examples:
   camviz calibrate --corners corners.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate --corners left.vnl --right right.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
+  camviz calibrate --rig cam0/ cam1/ cam2/ --board 9x6 --square-mm 50 --model-of cam2=fisheye -o rig.toml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
   camviz calibrate shots/ --board 9x6 --square-mm 25 --fail-on warning --limit rms-px=0.5 --junit clinic.xml
 """
@@ -77,13 +88,16 @@ FINDERS = ("auto", "sectors", "classic")
 
 
 def add(commands: Any) -> None:
-    command = add_command(commands, "calibrate", calibrate, "calibrate a camera or a pair from pictures", CALIBRATE)
+    command = add_command(
+        commands, "calibrate", calibrate, "calibrate a camera, a pair or a rig from pictures", f"{CALIBRATE}\n{RIG}"
+    )
     models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
     command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
     command.add_argument("images", metavar="IMAGES", nargs="*", help="pictures, folders of them, or patterns")
     command.add_argument(
         "--right", metavar="IMAGES", nargs="+", help="those of the right camera, or files of its corners"
     )
+    add_rig(command)
     add_board(command, required=False, default=False)
     add_corners(command)
     add_baseline(command)
@@ -95,7 +109,7 @@ def add(commands: Any) -> None:
     command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
     add_seconds(command)
     command.add_argument(
-        "-o", "--output", metavar="OUT", type=Path, default=Path("camera.yaml"), help="(default: camera.yaml)"
+        "-o", "--output", metavar="OUT", type=Path, help="(default: camera.yaml, of a rig rig with its format's ending)"
     )
     command.add_argument(
         "--conditions",
@@ -132,21 +146,24 @@ def calibrate(options: argparse.Namespace) -> int:
     from camviz_clinic.files import CalibrationError
 
     _refuse_words(options)
-    left = pictures(options.images) if options.images else []
-    right = _right(options)
-    sources = [*left, *right, *(options.corners or [])]
+    left, right = pictures(options.images) if options.images else [], _right(options)
+    cameras = by_camera(options.rig, pictures) if options.rig else {"left": left, "right": right}
+    shots = [path for paths in cameras.values() for path in paths]
+    sources = [*shots, *(options.corners or [])]
+    form = format_of_rig(options) if options.rig else "opencv"
+    options.output = options.output or Path(usual_name(form) if options.rig else "camera.yaml")
     refuse_output(options.output, "calibration", *sources)
     if options.report:
         refuse_output(options.report, "page", options.output, *sources)
     gate = given_gate(options)
     refuse_junit(options, options.output, *([options.report] if options.report else []), *sources)
     try:
-        calibration = _of_corners(left, right, options) if options.corners else _of_pictures(left, right, options)
+        calibration = _of_corners(left, right, options) if options.corners else _of_pictures(cameras, options)
     except CannotCalibrate as error:
-        raise Refusal(_complaint(error, left + right, options)) from error
-    calibration = _stamped(calibration, left, right, options)
+        raise Refusal(_complaint(error, shots, options)) from error
+    calibration = _stamped(calibration, list(cameras.values()), options)
     try:
-        write_calibration(calibration, options.output, "opencv")
+        left_out = write_calibration(calibration, options.output, form)
     except CalibrationError as error:
         raise Refusal(str(error)) from error
     except OSError as error:
@@ -154,20 +171,21 @@ def calibrate(options: argparse.Namespace) -> int:
         raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
     calibration = replace(calibration, source=options.output)
     told = narrator(options.output)
-    for sentence in report(calibration):
+    for sentence in [*report(calibration), *(placed(calibration) if options.rig else [])]:
         told(sentence)
     for sentence in worth(calibration, options.goal):
         told(sentence)
-    if doctored := _prescribed(left + right, options, calibration):
+    if doctored := "" if options.rig else _prescribed(shots, options, calibration):
         told(f"Is the board as described? {doctored}")
-    told(f"{options.output}: written.")
+    told(f"{options.output}: written.{' ' * bool(left_out)}{' '.join(left_out)}")
     decides = gate.asked or options.junit is not None
     if not (options.report or decides):
         return OK
     outcome = gate.judge(inspect(calibration))
     told("\n".join(["", outcome.inspection.as_text(), *outcome.lines()]))
     if options.report:
-        folders = [each[0].parent for each in (left or options.corners, right) if each]
+        given = list(cameras.values()) if not options.corners else [left or options.corners, right]
+        folders = [each[0].parent for each in given if each]
         _page(outcome.inspection, dict(zip(calibration.cameras, folders, strict=True)), options.report)
         told(f"{options.report}: open it in a browser.")
     write_junit(options, {str(options.output): outcome})
@@ -177,7 +195,8 @@ def calibrate(options: argparse.Namespace) -> int:
 def _refuse_words(options: argparse.Namespace) -> None:
     """Refuses a command that lacks what it works on, or that says it twice."""
     square = options.square_mm or isinstance(options.board, Path)
-    needed = {"IMAGES": options.images, "--board": options.board, "--square-mm": square}
+    refuse_mixed(options)
+    needed = {"IMAGES": options.images or options.rig, "--board": options.board, "--square-mm": square}
     missing = [word for word, given in needed.items() if not given]
     if missing and not options.corners:
         raise Refusal(f"the following arguments are required: {', '.join(missing)}; see `camviz calibrate --help`.")
@@ -223,22 +242,30 @@ def _pair_of_corners(left: LoadedCorners, right: LoadedCorners, options: argpars
     return replace(calibration, notes=tuple(dict.fromkeys(left.notes + right.notes)) + calibration.notes)
 
 
-def _of_pictures(left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
-    """The camera or the pair that took pictures."""
+def _of_pictures(cameras: Mapping[str, list[Path]], options: argparse.Namespace) -> Calibration:
+    """The camera, the pair or the rig that took pictures."""
     board = board_of(options)
+    if options.rig:
+        return rig_of_pictures(cameras, board, options, lambda paths: _looked(paths, board, options), _how(options))
+    left, right = cameras.values()
     return _pair(left, right, board, options) if right else _single(left, board, options)
 
 
-def _stamped(calibration: Calibration, left: list[Path], right: list[Path], options: argparse.Namespace) -> Calibration:
+def _stamped(calibration: Calibration, shots: list[list[Path]], options: argparse.Namespace) -> Calibration:
     """With what the calibration of each camera holds for; and a note where the setting changed between its pictures."""
     from camviz import __version__
     from camviz_clinic.calibration.stamp import Stamp, now
     from camviz_clinic.checks.stamps import settings_differ
 
     made = {"made": now(), "program": f"camviz {__version__}", "model": options.model, "conditions": options.conditions}
+    models = dict(word.split("=", 1) for word in options.model_of)
     stamps = {
-        name: Stamp.of(pictures, views=int(calibration.used(name).any(axis=1).sum()), **made)
-        for name, pictures in zip(calibration.cameras, (left, right), strict=False)
+        name: Stamp.of(
+            pictures,
+            views=int(calibration.used(name).any(axis=1).sum()),
+            **made | {"model": models.get(name, options.model)},
+        )
+        for name, pictures in zip(calibration.cameras, shots, strict=False)
     }
     notes = [f"{name}: {said}" for name, stamp in stamps.items() for said in settings_differ(stamp)]
     return replace(calibration, stamps=stamps, notes=(*calibration.notes, *notes))
@@ -304,11 +331,17 @@ def worth(calibration: Calibration, goal: float | None) -> list[str]:
 
 
 def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Calibration:
-    from camviz_clinic.calibration import calibrate, detect
+    from camviz_clinic.calibration import calibrate
+
+    detections = _looked(paths, board, options)
+    return _solved(lambda: calibrate(detections, board, options.model, **_how(options)), detections.skipped)
+
+
+def _looked(paths: list[Path], board: Board, options: argparse.Namespace) -> Detections:
+    from camviz_clinic.calibration import detect
 
     with Bar() as bar:
-        detections = detect(paths, board, progress=bar, **_search(options))
-    return _solved(lambda: calibrate(detections, board, options.model, **_how(options)), detections.skipped)
+        return detect(paths, board, progress=bar, **_search(options))
 
 
 def _pair(left: list[Path], right: list[Path], board: Board, options: argparse.Namespace) -> Calibration:

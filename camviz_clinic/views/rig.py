@@ -57,7 +57,9 @@ class RigView(OrbitView):
             return cls(calibration.cameras)
         boards = calibration.cameras[name].world_from_cam * calibration.cam_from_board[name]
         if name in calibration.detections:
-            boards = boards[np.isfinite(calibration.detections[name]).any(axis=(1, 2))]
+            corners = calibration.detections[name]
+            same = [each for each in calibration.detections.values() if each.shape == corners.shape]
+            boards = boards[np.any([np.isfinite(each).any(axis=(1, 2)) for each in same], axis=0)]
         return cls(calibration.cameras, calibration.board, boards)
 
     @cached_property

@@ -24,6 +24,7 @@ from camviz_clinic.checks.snapshots import snapshot
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.files.writing import write as write_calibration
 from camviz_clinic.handeye.virtual import cell
+from camviz_clinic.rigs import virtual
 
 BOARD = Board(9, 6, 0.025)
 LEFT = Camera(Intrinsics(640, 480, 530, 531, 322, 238), BrownConrady(-0.2, 0.05))
@@ -61,7 +62,7 @@ cam0:
 
 
 def write(folder: Path) -> None:
-    """left/, right/, later/ and knocked/ show a board, two files are solved from them, others stand beside."""
+    """left/, right/, later/, knocked/ and rig/ show a board, two files are solved from them, others stand beside."""
     rng = np.random.default_rng(18)
     together, later = (spread_boards(rng, seen_by, BOARD, VIEWS, (15, 40)) for seen_by in ((LEFT, RIGHT), (KNOCKED,)))
     shoot(folder / "left", LEFT, together, rng)
@@ -77,6 +78,7 @@ def write(folder: Path) -> None:
     around = photograph(textured_scene(), equirectangular_camera(256, 128))
     cv2.imwrite(str(folder / "around.png"), around[..., ::-1])
     expose(folder / "frames", rng)
+    shoot_rig(folder / "rig")
     robot(folder)
 
 
@@ -86,6 +88,19 @@ def shoot(folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.
     alone = camera.at(RigidTransform.identity())
     for number, pose in enumerate(cam_from_board, 1):
         cv2.imwrite(str(folder / f"{number:02}.png"), snapshot(alone, BOARD, pose, rng, NOISE))
+
+
+def shoot_rig(folder: Path) -> None:
+    """Three cameras around a room, the last one a fisheye; each has the pictures of the frames that it sees."""
+    rng = np.random.default_rng(19)
+    truth = virtual.rig(rng, 3, frames=4, shared=0.75, fisheye=(2,), size=(640, 480))
+    for name, camera in truth.cameras.items():
+        (folder / name).mkdir(parents=True)
+        for frame in np.flatnonzero(truth.seen[name]):
+            image = snapshot(
+                camera, truth.board, camera.cam_from_world * truth.world_from_board[int(frame)], rng, NOISE
+            )
+            cv2.imwrite(str(folder / name / f"{frame:02}.png"), image)
 
 
 def robot(folder: Path) -> None:

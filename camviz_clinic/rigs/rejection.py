@@ -1,0 +1,89 @@
+"""Outliers among the corners and views of a rig, by the rule of `calibration.outliers` with a σ for each camera.
+
+Cameras of a rig may find corners with different noise: a fisheye of few pixels beside a long lens. One σ for all would
+lose good corners of the one and keep bad ones of the other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camviz.lenses.base import Array
+from camviz_clinic.calibration.boards.charuco import FEWEST
+from camviz_clinic.calibration.detection import seen
+from camviz_clinic.calibration.outliers import FALSE_ALARMS, FINEST, Masks
+from camviz_clinic.rigs.adjustment import RigAdjustment
+
+HOPELESS = 30.0  # times the median of all views: a view that is that far off has no say in the first solution
+
+
+def hopeless(start: RigAdjustment) -> Masks:
+    """Which corners (frames, corners) belong to views that are far from where the chain of cameras puts them.
+
+    Such a view, with its corners counted from another end or of another frame, could spoil the first solution.
+    """
+    errors = {name: _medians(_distances(start, name)) for name in start.cameras}
+    usual = float(np.nanmedian(np.concatenate(list(errors.values()))))
+    return {
+        name: seen(start.detections[name]) & ~(error <= HOPELESS * max(usual, 1.0))[:, None]
+        for name, error in errors.items()
+    }
+
+
+def deviation(adjustment: RigAdjustment, name: str, *, at_first: bool = False) -> float:
+    """The σ in pixels of a coordinate of a camera's corners; at first from their median distance."""
+    if at_first:
+        return float(np.nanmedian(_distances(adjustment, name)) / np.sqrt(2 * np.log(2)))
+    used = adjustment.used[name]
+    spare = (adjustment.measurements - adjustment.unknowns) / max(adjustment.measurements, 1)
+    squares = float(np.sum(adjustment.residuals[name][used] ** 2))
+    return float(np.sqrt(squares / max(2 * used.sum() * spare, 1e-9)))
+
+
+def limit(adjustment: RigAdjustment, name: str, *, at_first: bool = False) -> float:
+    """The distance in pixels from which a corner of a camera is an outlier."""
+    count = sum(int(seen(corners).sum()) for corners in adjustment.detections.values())
+    return max(deviation(adjustment, name, at_first=at_first), FINEST) * float(
+        np.sqrt(2 * np.log(count / FALSE_ALARMS))
+    )
+
+
+def outliers(adjustment: RigAdjustment, *, at_first: bool = False) -> Masks:
+    """Which corners (frames, corners) are to be set aside, by camera; a view that keeps less than half goes whole."""
+    found = {}
+    for name in adjustment.cameras:
+        there = seen(adjustment.detections[name])
+        out = there & ~(_distances(adjustment, name) <= limit(adjustment, name, at_first=at_first))
+        kept = (there & ~out).sum(axis=1)
+        whole = (kept < FEWEST) | (kept < there.sum(axis=1) / 2)
+        found[name] = out | (there & whole[:, None])
+    return found
+
+
+def sentences(adjustment: RigAdjustment) -> tuple[str, ...]:
+    """What was set aside of each camera, in words."""
+    said = []
+    for name in adjustment.cameras:
+        there, aside = seen(adjustment.detections[name]), adjustment.set_aside[name]
+        views = int(((aside == there).all(axis=1) & there.any(axis=1)).sum())
+        corners = int(aside[(aside != there).any(axis=1)].sum())
+        parts = [f"{views} of {int(there.any(axis=1).sum())} views"] * bool(views)
+        parts += [f"{corners} of {int(there.sum())} corners"] * bool(corners)
+        if parts:
+            most = limit(adjustment, name)
+            said.append(
+                f"{name}: {' and '.join(parts)} lie more than {most:.2f} px from where the rig has them: set aside."
+            )
+    return tuple(said)
+
+
+def _medians(distances: Array) -> Array:
+    """Of every view (frames,); NaN where nothing was seen."""
+    there = np.isfinite(distances).any(axis=1)
+    found = np.full(len(distances), np.nan)
+    found[there] = np.nanmedian(distances[there], axis=1)
+    return found
+
+
+def _distances(adjustment: RigAdjustment, name: str) -> Array:
+    return np.asarray(np.linalg.norm(adjustment.residuals[name], axis=-1))
