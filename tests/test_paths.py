@@ -46,11 +46,11 @@ def test_the_links_of_the_first_pages_lead_to_lessons(page, folder):
 
 
 def test_lessons_that_follow_one_another_are_named_by_the_first_and_the_last():
-    assert "[01](01_pinhole.html) to [16](16_clinic.html) | 2" in paths.table(LESSONS, suffix=".html")
+    assert "[01](01_pinhole.html) to [16](16_clinic.html) |" in paths.table(LESSONS, suffix=".html")
 
 
 def test_a_stop_that_is_no_lesson_is_named(monkeypatch, tmp_path):
-    (tmp_path / "paths.toml").write_text('[[path]]\ntitle = "A walk"\nstops = ["05 beginn"]\n', encoding="utf-8")
+    (tmp_path / "paths.toml").write_text('[[path]]\ntitle = "A walk"\nstops = ["05 all"]\n', encoding="utf-8")
     monkeypatch.setattr(paths, "material", tmp_path.joinpath)
-    with pytest.raises(ValueError, match=r'paths\.toml: a stop is a lesson, such as "05".*got \'05 beginn\''):
+    with pytest.raises(ValueError, match=r'paths\.toml: a stop is a lesson, such as "05".*got \'05 all\''):
         paths.paths(LESSONS)

@@ -39,7 +39,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Path:
+class LearningPath:
     """A way through the course. `minutes` are what its stops take together, as a header would say them."""
 
     title: str
@@ -54,13 +54,13 @@ class Path:
         return minutes.said(sum(one.minutes for one in self.stops))
 
 
-def paths(lessons: Iterable[Lesson]) -> list[Path]:
+def paths(lessons: Iterable[Lesson]) -> list[LearningPath]:
     """The paths of the course. Raises ValueError naming what is wrong in paths.toml."""
     by_number = {one.number: one for one in lessons}
     where = "paths.toml"
     listed = table_of(material(where).read_text(encoding="utf-8"), where)["path"]
     tables = [shaped(one, {"title": str, "stops": list}, where) for one in listed]
-    return [Path(one["title"], tuple(_stop(stop, by_number, where) for stop in one["stops"])) for one in tables]
+    return [LearningPath(one["title"], tuple(_stop(stop, by_number, where) for stop in one["stops"])) for one in tables]
 
 
 def _stop(written: str, lessons: dict[str, Lesson], where: str) -> Stop:
@@ -97,7 +97,7 @@ def table(lessons: Iterable[Lesson], folder: str = "", suffix: str = ".ipynb") -
     return "\n".join(["| You have, or are | Read | Time |", "|---|---|---|", *rows])
 
 
-def _links(path: Path, folder: str, suffix: str) -> str:
+def _links(path: LearningPath, folder: str, suffix: str) -> str:
     links = [f"[{one.number}]({folder}{one.file.removesuffix('.ipynb')}{suffix})" for one in path.lessons]
     parts = {one.part for one in path.stops}
     said = _SAID[parts.pop()] if len(parts) == 1 else ""
