@@ -299,24 +299,21 @@ class DepthOfFieldView(View):
         bounds = band(panel, np.log10(near), far_x, "fill-green") if self.bounds else ""
         here = panel.place(logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), BLURS[0]))))
         xticks, yticks = logarithmic(*logs(DEPTHS)), micrometres()
-        content = (
+        right = (
             logarithmic_grid(panel, xticks, yticks)
             + bounds
             + curve(panel, np.log10(depth), np.log10(blur), "blue thick")
             + upright(panel, np.log10(self.focus_m), "red thin")
-            + levels(panel, allowed, airy, self.limits_m)
-            + svg.dots([here], "blue", 10)
-            + svg.text(here + (8, -8), "globe", "blue halo")
         )
         drawn, problem = self._your_part(panel, depth)
-        title, label = (
-            "Blur against distance",
-            "Blur against distance; drag or press the arrow keys to change the focus",
-        )
+        title = "Blur against distance"
+        label = f"{title}; drag or press the arrow keys to change the focus"
         if is_unwritten(problem):
-            shown = without(panel, problem, title, right=content)
+            shown = without(panel, problem, title, right=right)
         else:
-            shown = panel.show(content + drawn, title=title, hint="drag to focus", drag="focus", label=label)
+            globe = svg.dots([here], "blue", 10) + svg.text(here + (8, -8), "globe", "blue halo")
+            content = right + levels(panel, allowed, airy, self.limits_m) + globe + drawn
+            shown = panel.show(content, title=title, hint="drag to focus", drag="focus", label=label)
         return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks, aside=56) + shown
 
     def _your_part(self, panel: Panel, depth_m: np.ndarray) -> tuple[str, str]:
