@@ -195,7 +195,7 @@ def turntable(rng: Rng, strength: float) -> Evidence:
 @finding(
     "rig-late",
     severity="fault",
-    view="residuals",
+    view="per-view-errors",
     symptom="A camera of a rig takes its pictures later than the others.",
     causes=("a camera that started a frame late or lost one", "a trigger or a clock that lags", "files numbered apart"),
     remedy="Shift its pictures by the delay, or trigger the cameras together, and solve again.",
@@ -230,7 +230,7 @@ def a_frame_late(rng: Rng, strength: float) -> Evidence:
 @finding(
     "rig-moved",
     severity="fault",
-    view="residuals",
+    view="per-view-errors",
     symptom="A camera of a rig was moved between the frames.",
     causes=("a camera that was knocked or whose mount slipped", "frames of two set-ups in one folder"),
     remedy="Fix the camera, and solve again from the frames after it was moved, or from those before.",
