@@ -74,7 +74,8 @@ class ErrorBars(BoardPictures):
             return svg.paragraph((x, y + 16), problem, width, "note")
         shown = self.adjustment.rms if waits else value
         bar = _large_bar(x, y, width, "" if waits else "the same by your function", shown / _FULL_PX, "fill-orange")
-        bar += _large_number(x, y, width, shown / _FULL_PX, f"{_digits(shown)} px", "orange")
+        if not waits:
+            bar += _large_number(x, y, width, shown / _FULL_PX, f"{_digits(shown)} px", "orange")
         words = svg.text((x, y + 14), f"the same: {YOURS_HERE}", "title")
         return svg.group(bar, class_="awaited") + words if waits else bar
 
