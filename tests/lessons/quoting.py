@@ -38,7 +38,7 @@ FORMULA = re.compile(r"\$\$.*?\$\$|\$[^$\n]*\$", re.DOTALL)
 """Its whole numbers are part of it, and the lesson's truth check and exercises run it; its decimals are results."""
 CODE = ((r"```.*?```", "it is run"), (r"``[^`]*``|`[^`]*`", "it is run"))
 NOT_STATED = (
-    (r"\[\d\d [^\]]*\]\([^)]*\)", "the name of a lesson"),
+    (r"\[\d\d(?: [^\]]*)?\]\([^)]*\)", "the name of a lesson"),
     (r"\]\([^)]*\)|</?[A-Za-z][^<>]*>|&\w+;", "an address"),
     (r"(?m)^#+ \d+ ·|^#+ .*?Exercise \d+|^\s*\d+\. ", "the number of a heading or of an item"),
     (r"(?i)\b(?:lessons?|parts?|exercises?|sections?|chapters?|chap\.|sec\.|figures?|steps?|cells?|table|volume"
@@ -49,7 +49,7 @@ NOT_STATED = (
      r"|illuminant|Apache|CC BY|BY) ?[A-Z]{0,3}-?\d[\d.:-]*", "a proper name"),
     (r"(?:(?<=[(A-Za-zé.,;] )|(?<=\())(?:1[5-9]|20)\d\d(?=[,;.:)\s]|$)(?! ?(?:K|px|mm|nm|µm|m|DN|e⁻|photons|electrons"
      r"|pixels|[×x%°–]))", "a year"),
-    (r"\d+(?:–\d+)? minutes?|(?m:(?<=\? )\| \d+ \|$)", "a plan; test_lessons.py holds that the places agree"),
+    (r"\d+(?:–\d+)? minutes?|(?m:(?<=\? )\| \d+ \|$)|(?m:\| \d+ hours \|$)", "a plan; tests hold that the places agree"),
     (r"(?m)^\| \d\d \|", "the number of a lesson"),
     (r"\(\d{4}–\d{4}\)", "the years of a life"),
     (rf"(?<![A-Za-z_\d.])\d(?= ?{_SYMBOL})|(?<=[/^])2(?!\d|\.\d)", "a coefficient in a formula"),
