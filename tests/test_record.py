@@ -14,6 +14,7 @@ import traitlets
 
 from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import View, choice, slider, switch
+from camviz.views.distortion import DistortionView
 from camviz.widgets import explore
 from camviz_school.record import Axis, Budget, BudgetError, RecordedPane, Widget, record
 from camviz_school.record.packing import Images, Pack
@@ -115,6 +116,21 @@ def test_axes_alone_keep_the_others_at_first_and_those_together_are_combined(tmp
     assert {v["lit"] for v in found} == {True, False}
     assert all(v["size"] == 1.0 for v in found if v["height"] or v["colour"] != "red" or not v["lit"])
     assert made.counts == {"size": 6, "height": 6, "colour": 3, "lit": 2}
+
+
+def test_a_panel_that_a_button_opens_is_recorded_with_each_control(tmp_path):
+    """One at a time: a reader who opens a panel and moves a slider then still has it."""
+    view = DistortionView.by_the_wall()
+    made = record(explore(view, "k1", "show"), tmp_path, budget=Budget(slider=3, grid=3))
+    found = states(made)
+    further = [name for name in view.openable if name not in view.opened]
+    assert {(one["panel"], one["k1"]) for one, _ in found} >= {(name, k1) for name in further for k1 in (-1.0, 1.0)}
+    assert {(one["panel"], one["show"]) for one, _ in found} >= {(name, "undistorted") for name in further}
+    for values, frame in found:
+        assert frame["opened"] == ([values["panel"]] if values["panel"] else list(view.opened))
+        drawn = view.with_panels({values["panel"]: True} if values["panel"] else {})
+        drawn = drawn.but(k1=values["k1"], show=values["show"])
+        assert frame["frame"]["described"] == drawn.figure().description
 
 
 def test_a_sliders_positions_hold_both_ends_the_first_value_and_only_steps():

@@ -102,7 +102,7 @@ function render({ model, el }) {
 }
 
 // Below the picture a button for each panel that is not there at first: it opens the panel, and closes it again. A page
-// without a kernel has the first panels only, and no buttons.
+// without a kernel opens one at a time, of those that were recorded (record/panes.py).
 function opening(more, model, ask) {
   const buttons = (model.get("panels") ?? []).map(({ name, words }) => {
     const button = build(`<button type="button"></button>`);

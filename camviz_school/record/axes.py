@@ -18,6 +18,8 @@ class Axis:
         first: The value to begin with.
         values: All values, in order.
         period: Of an angle in degrees, 360; 0 for what does not come round.
+        with_each: Whether it is recorded with each of the other axes, too: a panel that is opened must not close when
+            a slider is moved.
 
     Raises: ValueError where the first value is none of the values.
 
@@ -29,6 +31,7 @@ class Axis:
     first: Any
     values: tuple[Any, ...]
     period: float = 0.0
+    with_each: bool = False
 
     def __post_init__(self) -> None:
         if self.first not in self.values:

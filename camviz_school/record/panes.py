@@ -21,6 +21,7 @@ Values = Mapping[str, Any]
 
 UNITS = (1.0, 1.4, 2.0, 2.8)  # picture units a CSS pixel: wide columns, a telephone's, and both with large words
 EYE = "eye"
+PANEL = "panel"  # which further panel the reader has opened, by its name in the view's `openable`; "" for none
 
 
 class Pane(Protocol):
@@ -150,12 +151,19 @@ class Explored:
         axes = [_axis(**control) for control in self._explorer.controls]
         if any(f'data-drag="{handle}"' in tile.body for handle in ORBIT_HANDLES for tile in self._picture.tiles):
             axes.append(Axis.turn(EYE, _read(self._first, EYE)))
+        if self._further:
+            axes.append(Axis(PANEL, "", ("", *self._further), with_each=True))
         return tuple(axes)
+
+    @property
+    def _further(self) -> list[str]:
+        """The panels that a button opens. On a page one of them is open at a time: that many positions can be kept."""
+        return [each["name"] for each in self._explorer.panels]
 
     @cached_property
     def traits(self) -> dict[str, Any]:
-        kept = {"still_hidden": "", **self._explorer.get_state(["controls", "_title", "_scale"])}
-        names = [axis.name for axis in self.axes]
+        kept = {"still_hidden": "", **self._explorer.get_state(["controls", "panels", "_title", "_scale"])}
+        names = [axis.name for axis in self.axes if axis.name != PANEL]
         trial = Reading(self._first, lambda view: {name: _read(view, name) for name in names}, (EYE,))
         return {**kept, "hands": hands(trial, self._picture), "pulls": list(PULLS)}
 
@@ -168,14 +176,16 @@ class Explored:
             view, picture, error = self._first, self._picture, self._explorer.in_words(problem)
         shown = {control["name"]: getattr(view, control["name"]) for control in self._explorer.controls}
         view.forget()
-        return {"values": shown, "frame": {**_frame(picture), "answers": 0, "draft": False, "error": error}}
+        frame = {**_frame(picture), "answers": 0, "draft": False, "error": error}
+        return {"values": shown, "opened": list(view.opened), "frame": frame}
 
     def _view(self, values: Values) -> View:
         """The view at a position."""
         moved = {axis.name: values[axis.name] for axis in self.axes if values[axis.name] != axis.first}
+        first = self._first.with_panels({moved.pop(PANEL): True}) if PANEL in moved else self._first
         if EYE in moved:
             moved[EYE] = replace(self._first.eye, yaw_deg=(moved[EYE] + 180) % 360 - 180)  # type: ignore[attr-defined]
-        return self._first.but(**moved) if moved else self._first
+        return first.but(**moved) if moved else first
 
     def still(self) -> Picture | None:
         return self._picture

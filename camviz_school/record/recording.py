@@ -92,6 +92,7 @@ class RecordedPane:
         size: Bytes as transferred (gzip) once all photographs are there; the stills of `html` come on top.
         still: What stands on the page before any script.
         controls: Of the pane, for which `html` keeps room.
+        panels: That buttons open, for which it keeps room as well.
 
     >>> from pathlib import Path
     >>> RecordedPane("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, None).html("dots/")[:63]
@@ -107,6 +108,7 @@ class RecordedPane:
     size: int
     still: Picture | None = field(repr=False, compare=False)
     controls: int = 0
+    panels: int = 0
 
     def html(self, base: str = "") -> str:
         """The pane for a page that loads `replay.js`.
@@ -121,6 +123,7 @@ class RecordedPane:
         Raises: OSError where the folder cannot be written.
         """
         stills = _room(self.controls) + _stills(self.still, self.folder, base) if self.still else ""
+        stills += '<div aria-hidden="true" style="height:34px"></div>' if self.still and self.panels else ""
         words = f"A still picture. With JavaScript it moves: {self.positions} positions are recorded."
         return (
             f'<div class="camviz-recorded" data-recording="{escape(base + self.pack)}" '
@@ -214,8 +217,9 @@ class _Recorder:
         self._scripts[pack] = content
         counts = {sheet.axes[0].name: len(sheet.values[0]) for sheet in sheets if len(sheet.axes) == 1}
         names = (pack, self._source, *images)
-        still, controls = self._pane.still(), len(self._pane.traits.get("controls", ()))
-        return RecordedPane(self._pane.title, self._folder, pack, names, len(states), counts, size, still, controls)
+        still, traits = self._pane.still(), self._pane.traits
+        room = {"controls": len(traits.get("controls", ())), "panels": len(traits.get("panels", ()))}
+        return RecordedPane(self._pane.title, self._folder, pack, names, len(states), counts, size, still, **room)
 
     def _written(self, kept: RecordedPane) -> RecordedPane:
         """The recording, its files written."""
@@ -225,10 +229,13 @@ class _Recorder:
         return kept
 
     def _sheets(self, share: float) -> list[PositionGrid]:
-        """Each axis alone, and those that belong together."""
+        """Each axis alone, those that belong together, and each with what is recorded with each."""
         alone = [((axis,), False) for axis in self._pane.axes]
         joint = tuple(axis for axis in self._pane.axes if axis.name in self._pane.together)
         wanted = [*alone, (joint, True)] if len(joint) > 1 else alone
+        wanted += [
+            ((axis, one), True) for one in self._pane.axes if one.with_each for axis in self._pane.axes if axis != one
+        ]
         return [
             PositionGrid(axes, tuple(axis.thinned(self._budget.count(axis, share, together=many)) for axis in axes))
             for axes, many in wanted

@@ -3,6 +3,7 @@
 // A classic script, and recordings are scripts too: both may be loaded by a page that was opened as a file.
 (() => {
   const NEAR = "600px";   // from the screen, where a recording is fetched
+  const PANEL = "panel";   // the axis of panels that a button opens (record/panes.py)
   const LATE = "This picture stands still: its recording could not be loaded.";
   const waiting = new Map(), sources = new Map();
 
@@ -154,7 +155,10 @@
       tell(state, back);
     };
     const answer = (message) => {
+      const open = wished[PANEL];
       if (message.reset) (wished = { ...first }), (state = start), tell(state, []);
+      if (message.reset && open) wish({ [PANEL]: open }, false);   // a reset leaves panels to the reader who opened them
+      for (const [name, wanted] of Object.entries(message.panels ?? {})) wish({ [PANEL]: wanted ? name : "" }, false);
       Object.assign(told, message.units);
       wish(message.values ?? message, false);
       for (const drag of message.drags ?? []) wish(pulled(traits, periods, wished, drag), true);
@@ -179,8 +183,9 @@
 
   // The line below a pane: what is shown, what went back because it was recorded alone, and how many positions there are.
   function says({ traits, positions, axes }, line) {
-    const label = (name) => traits.controls?.find((one) => one.name === name)?.label ?? (name === "eye" ? "turned by" : name);
+    const label = (name) => name === PANEL ? "panel" : traits.controls?.find((one) => one.name === name)?.label ?? (name === "eye" ? "turned by" : name);
     const value = (one, name) => {
+      if (name === PANEL) return traits.panels.find((panel) => panel.name === one)?.words ?? "none more";
       if (typeof one !== "number") return one === true ? "on" : one === false ? "off" : one;
       const axis = axes.find((axis) => axis.name === name);
       return axis.period ? `${Math.round(one - axis.first)}°` : String(Number(one.toPrecision(4))).replace("-", "−");

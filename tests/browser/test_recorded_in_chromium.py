@@ -28,6 +28,7 @@ FEW = Budget(slider=5, grid=3, orbit=8)
 PANES: dict[str, Explorer] = {
     "distortion": explore(DistortionView(k1=-0.28, k2=0.07), "k1", "k2", "show", together=("k1", "k2")),
     "frustum": explore(FrustumView(), "hfov_deg", "mode"),
+    "wall": explore(DistortionView.by_the_wall(), "k1"),
     "readout": explore(ReadoutView(), "time", "readout"),
 }
 SHEET = (
@@ -132,6 +133,35 @@ def test_every_control_goes_to_both_ends_and_back_as_the_view_draws_it(site: Sit
         root.evaluate("root => hands.reset(root)")
         assert same(page, rested(root), explorer.first)
     assert page.complaints == []
+    page.close()
+
+
+def test_a_button_opens_its_panel_which_stays_while_a_slider_moves(site: Site) -> None:
+    page, wall = site.open("wall"), PANES["wall"].first
+    root = live(page)
+    page.click("[data-opens=curve]")
+    assert same(page, rested(root), wall.with_panels({"curve": True}))
+    move(root, "k1", 1)
+    high = wall.but(k1=PANES["wall"]._controls["k1"].high)
+    assert same(page, root, high.with_panels({"curve": True}))
+    assert "panel radial curve" in line(page)
+    page.click("[data-opens=rays]")
+    assert same(page, rested(root), high.with_panels({"rays": True})), "one at a time"
+    assert page.get_attribute("[data-opens=curve]", "aria-pressed") == "false"
+    page.click("[data-opens=rays]")
+    assert same(page, rested(root), high)
+    assert page.complaints == []
+    page.close()
+
+
+def test_nothing_jumps_when_a_picture_with_buttons_comes_to_life(site: Site) -> None:
+    page = site.open("wall", java_script_enabled=False)
+    page.wait_for_load_state()
+    still = page.query_selector(".camviz-recorded").bounding_box()
+    page.close()
+    page = site.open("wall")
+    live(page)
+    assert page.query_selector(".camviz-recorded").bounding_box()["height"] == pytest.approx(still["height"], abs=6)
     page.close()
 
 
