@@ -173,6 +173,7 @@ def detecting(tmp_path):
         text=True,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background is deaf to it
     )
     assert process.stdout.readline() == "started\n"
     assert process.stdout.readline() == "1\n"
