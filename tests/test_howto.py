@@ -23,7 +23,7 @@ def test_the_commands_of_a_page_print_what_it_shows(page, files):
 def test_there_is_a_page_for_each_task():
     index = (console.HERE / "README.md").read_text(encoding="utf-8")
     assert [page.name for page in console.pages() if f"]({page.name})" not in index] == []
-    assert len(console.pages()) == 12
+    assert len(console.pages()) == 13
 
 
 @pytest.mark.parametrize(

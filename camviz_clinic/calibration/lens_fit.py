@@ -15,6 +15,7 @@ from camviz_clinic.calibration.jacobian import parameter, pixel_jacobian, with_p
 
 FITTED_ON = (60, 40)  # columns × rows of pixels
 JUDGED_ON = 320  # at most so many columns and rows
+SAME = 1 - 1e-4  # of the worst error: corners that mirror each other differ by rounding, and the first is named
 FAR = 1e6  # pixels: the error of parameters that the lens does not take
 
 
@@ -98,5 +99,5 @@ def _judged(camera: Camera, fitted: Camera) -> LensFit:
     seen = np.isfinite(rays).all(axis=1)
     error = np.linalg.norm(fitted.intrinsics.to_pixels(fitted.lens.project(rays[seen])) - uv[seen], axis=1)
     error = np.nan_to_num(error, nan=np.inf)
-    u, v = uv[seen][error.argmax()]
+    u, v = uv[seen][np.argmax(error >= error.max() * SAME)]
     return LensFit(fitted, float(np.median(error)), float(error.max()), (float(u), float(v)), float(seen.mean()))

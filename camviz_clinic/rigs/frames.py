@@ -21,6 +21,7 @@ def synchronised(pictures: Mapping[str, Sequence[Path]], *, by_order: bool = Tru
     Returns: By camera, one frame's number for each picture; frames count in the order of their names.
     Raises: CannotCalibrate where nothing tells which pictures are of one moment.
 
+    >>> from pathlib import Path
     >>> films = {"cam0": [Path("cam0/07.png"), Path("cam0/09.png")], "cam1": [Path("cam1/08.png"), Path("cam1/09.png")]}
     >>> synchronised(films)
     {'cam0': (0, 2), 'cam1': (1, 2)}
@@ -51,6 +52,7 @@ def in_frames(detections: Mapping[str, Detections]) -> dict[str, Detections]:
     Raises: CannotCalibrate where the names do not tell which views are of one moment.
 
     >>> import numpy as np
+    >>> from camviz_clinic.calibration import Detections
     >>> film = Detections(("a7.png", "a9.png"), np.zeros((2, 4, 2)), 640, 480)
     >>> other = Detections(("b8.png", "b9.png"), np.zeros((2, 4, 2)), 640, 480)
     >>> [each.places for each in in_frames({"a": film, "b": other}).values()]

@@ -22,6 +22,7 @@ class RelativePose:
         pose: seen_from_of: its translation is the one camera's centre in the other's frame, in metres.
         covariance: (6, 6) of a small turn in the other's frame, in radians, and of the centre, in metres.
 
+    >>> from camviz.poses import RigidTransform
     >>> pose = RigidTransform.from_translation([0.3, 0, 0.4])
     >>> beside = RelativePose("right", "left", pose, np.diag([1e-4] * 3 + [1e-3] * 3) ** 2)
     >>> beside.distance, round(beside.distance_deviation, 6)
