@@ -51,13 +51,13 @@ def outside(one, how, found):
 # Many cameras ---------------------------------------------------------------------------------------------------------
 
 
-def test_every_figure_of_random_cameras_is_near_the_truth_or_withheld():
+def test_every_figure_of_random_cameras_is_near_the_truth_or_withheld(thorough):
     """K 0.01–10 DN/e⁻, 8–16 bits, read noise 0.3–30 e⁻, row noise up to 30 e⁻, up to 60 % of the dark pixels clipped.
 
     At four standard errors chance alone is 1 in 16 000, of figures that are just told. False failure: below 1 %.
     """
-    told = 0
-    for number in range(48):
+    told, cameras = 0, 48 if thorough else 16
+    for number in range(cameras):
         rng = np.random.default_rng([48, number])
         one = random_camera(rng, (64, 64) if number % 3 else SIZE)
         how = random_shooting(rng, one, int(rng.integers(10, 41)))
@@ -67,7 +67,7 @@ def test_every_figure_of_random_cameras_is_near_the_truth_or_withheld():
             continue
         assert outside(one, how, found)[0] == [], number
         told += sum(np.isfinite(figure.value) for figure in found.judged.values())
-    assert told > 70  # of 960: much is withheld of such frames, and not all
+    assert told > 1.4 * cameras  # of 20 each: much is withheld of such frames, and not all
 
 
 def test_a_well_exposed_camera_of_twelve_bits_tells_every_figure():

@@ -1,6 +1,7 @@
 """An inspection names every fault of the symptom table at the strength it promises, and nothing in healthy ones."""
 
 import re
+from functools import cache
 from pathlib import Path
 from runpy import run_path
 
@@ -21,9 +22,10 @@ FAULTS = faults()
 SEED = 20_003
 
 
-def found(name: str, strength: float, seed: int = SEED):
+@cache
+def found(name: str, strength: float):
     """The findings that a fault must lead to."""
-    inspection = Inspection.of(FAULTS[name].inject(np.random.default_rng(seed), strength))
+    inspection = Inspection.of(FAULTS[name].inject(np.random.default_rng(SEED), strength))
     return [finding for finding in inspection.findings if finding.id == FAULTS[name].finding]
 
 

@@ -58,7 +58,7 @@ def test_what_is_read_by_columns_is_no_shutter_of_rows(monkeypatch):
 
 @pytest.mark.skipif("CAMVIZ_SAMPLES" not in os.environ, reason="needs OpenCV's photographs in CAMVIZ_SAMPLES")
 @pytest.mark.parametrize("side", ["left", "right"])
-@pytest.mark.parametrize("finder", ["auto", "classic"])
+@pytest.mark.parametrize("finder", ["auto", pytest.param("classic", marks=pytest.mark.thorough)])
 def test_photographs_of_a_global_shutter_have_no_rolling_one(side, finder):
     """An F-test calls the same velocities certain (1 in 10^40); columns and diagonals explain as much."""
     pictures = sorted(Path(sample("left01.jpg")).parent.glob(f"{side}*.jpg"))
