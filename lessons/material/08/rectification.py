@@ -81,7 +81,7 @@ class RectificationView(TurningPair):
             **figures,
             "no disparity": f"{100 * score.missing:.0f} % of the pixels",
             f"off by more than {WRONG:g} px": f"{100 * (score.bad - score.missing):.1f} %",
-            "mean error": f"{score.mean_error:.2f} px" if np.isfinite(score.mean_error) else "none found",
+            "mean error": f"{score.mean_error:.3g} px" if np.isfinite(score.mean_error) else "none found",
         }
 
     def _with_depth(self, disparity: float) -> str:
