@@ -81,7 +81,7 @@ class RectificationView(TurningPair):
             **figures,
             "no disparity": f"{100 * score.missing:.0f} % of the pixels",
             f"off by more than {WRONG:g} px": f"{100 * (score.bad - score.missing):.1f} %",
-            "mean error": f"{score.mean_error:.3g} px" if np.isfinite(score.mean_error) else "none found",
+            "mean error": _pixels(score.mean_error),
         }
 
     def _with_depth(self, disparity: float) -> str:
@@ -294,3 +294,10 @@ def _small(values: np.ndarray) -> np.ndarray:
     """A map no finer than a screen shows it, which keeps a saved notebook light."""
     scale = min(1.0, 1.5 * _MAP_WIDTH / values.shape[1])
     return cv2.resize(values, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+
+
+def _pixels(error: float) -> str:
+    """An error in words; one of ten pixels and more, of rows that do not match, depends on the machine in its digits."""
+    if not np.isfinite(error):
+        return "none found"
+    return f"{error:.2f} px" if error < 10 else f"{error:.0f} px"
