@@ -297,7 +297,7 @@ def _small(values: np.ndarray) -> np.ndarray:
 
 
 def _pixels(error: float) -> str:
-    """An error in words; one of ten pixels and more, of rows that do not match, depends on the machine in its digits."""
+    """An error in words: the decimals of a large one, of rows that do not match, depend on the machine."""
     if not np.isfinite(error):
         return "none found"
     return f"{error:.2f} px" if error < 10 else f"{error:.0f} px"
