@@ -122,7 +122,7 @@ def measured() -> list[Row]:
 
 
 def table(rows: list[Row]) -> str:
-    head = "| | measured | at most |\n|---|---|---|\n"
+    head = "| what | measured | at most |\n|---|---|---|\n"
     return head + "".join(f"| {what} | {found} | {bound} |\n" for what, found, bound in rows)
 
 
@@ -132,7 +132,7 @@ def main() -> None:
     written = table(measured())
     print(written)
     if parser.parse_args().page:
-        before, _, after = PAGE.read_text(encoding="utf-8").partition("| | measured")
+        before, _, after = PAGE.read_text(encoding="utf-8").partition("| what | measured")
         rest = after.partition("\n\n")[2]
         PAGE.write_text(f"{before}{written}\n{rest}".rstrip() + "\n", encoding="utf-8")
 
