@@ -67,7 +67,7 @@ def test_every_figure_of_random_cameras_is_near_the_truth_or_withheld(thorough):
             continue
         assert outside(one, how, found)[0] == [], number
         told += sum(np.isfinite(figure.value) for figure in found.judged.values())
-    assert told > 1.4 * cameras  # of 20 each: much is withheld of such frames, and not all
+    assert told > 1.46 * cameras  # of 20 each: much is withheld of such frames, and not all
 
 
 def test_a_well_exposed_camera_of_twelve_bits_tells_every_figure():
