@@ -230,9 +230,10 @@ class _Recorder:
 
     def _sheets(self, share: float) -> list[PositionGrid]:
         """Each axis alone, those that belong together, and each with what is recorded with each."""
-        alone = [((axis,), False) for axis in self._pane.axes]
+        wanted: list[tuple[tuple[Axis, ...], bool]] = [((axis,), False) for axis in self._pane.axes]
         joint = tuple(axis for axis in self._pane.axes if axis.name in self._pane.together)
-        wanted = [*alone, (joint, True)] if len(joint) > 1 else alone
+        if len(joint) > 1:
+            wanted.append((joint, True))
         wanted += [
             ((axis, one), True) for one in self._pane.axes if one.with_each for axis in self._pane.axes if axis != one
         ]
