@@ -1,7 +1,7 @@
 """What a reader writes makes the picture: a wrong function gives a visibly other one (with --all three). Nothing stops.
 
-The lesson is run once with its solutions. Then each exercise's function is replaced by a wrong one, and what depends
-on it is run again to the lesson's end.
+The lesson is run once with its solutions, and every check accepts them. Then each exercise's function is replaced by a
+wrong one, and what depends on it is run again to the lesson's end.
 """
 
 import ast
@@ -50,15 +50,20 @@ def visibly_different(one: np.ndarray, other: np.ndarray) -> bool:
     return np.mean(np.abs(one.astype(int) - other).max(axis=-1) > 40) > VISIBLE
 
 
-def run(cell, namespace) -> Shown:
-    """Runs a cell as Jupyter does, and gathers what it shows."""
+def value_of(cell, namespace):
+    """Runs a cell as Jupyter does; the value of its last line."""
     tree, value = ast.parse(cell.source), None
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     with redirect_stdout(io.StringIO()):
         exec(compile(tree, "<cell>", "exec"), namespace)
         if last:
             value = eval(compile(ast.Expression(last.value), "<cell>", "eval"), namespace)
-    shown = Shown()
+    return value
+
+
+def run(cell, namespace) -> Shown:
+    """Runs a cell, and gathers what it shows."""
+    shown, value = Shown(), value_of(cell, namespace)
     for number in plt.get_fignums():
         canvas = plt.figure(number).canvas
         canvas.draw()
@@ -107,7 +112,11 @@ class Lesson:
         solutions, namespace = notebooks.solutions(notebook), {"__name__": "__main__", "display": print}
         for cell in notebook.cells:
             tags = set(cell.metadata.get("tags", []))
-            if cell.cell_type != "code" or "check" in tags or "raises-exception" in tags:
+            if cell.cell_type != "code" or "raises-exception" in tags:
+                continue
+            if "check" in tags:
+                answer = value_of(cell, namespace)
+                assert answer.correct, (cell.source, answer)
                 continue
             name = cell.metadata.get("camviz", {}).get("exercise")
             if name:
