@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a worker for each processor; and sums in one order on all
+
 import matplotlib
 import pytest
 from nbval.plugin import IPyNbCell, IPyNbFile

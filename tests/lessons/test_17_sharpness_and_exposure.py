@@ -127,9 +127,9 @@ def test_four_times_the_rows_halve_the_error(says):
     for rows in (80, 320):
         v, u = np.indices((rows, 160))
         light = 1 / (1 + np.exp(-(u - 80 - 0.087 * (v - rows / 2)) / 0.6))
-        found = [SlantedEdge.of(light + rng.normal(0, 0.02, light.shape)).mtf50 for _ in range(80)]
+        found = [SlantedEdge.of(light + rng.normal(0, 0.02, light.shape)).mtf50 for _ in range(30)]
         errors.append(np.std(found))
-    assert errors[0] / errors[1] == pytest.approx(2, abs=0.5)  # each known to 8 %
+    assert errors[0] / errors[1] == pytest.approx(2, abs=0.5)  # each known to 13 %
 
 
 def test_what_the_strips_blur(says):
@@ -167,7 +167,7 @@ def test_how_long_an_edge_must_be(says):
         fine = [1 / (1 + np.exp(-(u + o - 50 - 0.087 * v) / spread)) for o in (np.arange(16) - 7.5) / 16]
         light = np.mean(fine, axis=0)  # over the pixel's width
         truth = SlantedEdge.of(light).mtf50
-        shots = [SlantedEdge.of(light + rng.normal(0, noise.value / 100, light.shape)).mtf50 for _ in range(60)]
+        shots = [SlantedEdge.of(light + rng.normal(0, noise.value / 100, light.shape)).mtf50 for _ in range(20)]
         inside = np.mean(np.abs(np.array(shots) / truth - 1) < within.value / 100)
         assert inside >= share
         if not share:
