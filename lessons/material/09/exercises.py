@@ -543,7 +543,7 @@ def wrong_slope(radius, k1, k2):
 
 
 def coefficients(theta: Array, r: Array) -> Array:
-    """k1 k2 k3 k4 (4,), so that θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) is nearest to the radii r (n,) in focal lengths."""
+    """k1 k2 k3 k4 (4,), so that θ (1 + k1 θ² + … + k4 θ⁸) is nearest to the radii r (n,), in focal lengths."""
     return _fitted(_powers(theta), r - theta)
 
 
@@ -622,7 +622,9 @@ def divided_by_theta(theta, r):
     return _fitted(_powers(theta, 2, 4, 6, 8), r / theta - 1)
 
 
-@COEFFICIENTS.wrong("You use the first four samples alone. All of them count: take the least squares of all n equations.")
+@COEFFICIENTS.wrong(
+    "You use the first four samples alone. All of them count: take the least squares of all n equations."
+)
 def through_the_first_four(theta, r):
     return np.linalg.solve(_powers(theta[:4]), (r - theta)[:4])
 
@@ -654,7 +656,9 @@ def in_powers_of_the_tangent(theta, r):
     return _fitted(_powers(np.tan(theta)), r - np.tan(theta))
 
 
-@COEFFICIENTS.wrong("You find each k as though the other three were zero. They share the work: solve for all four at once.")
+@COEFFICIENTS.wrong(
+    "You find each k as though the other three were zero. They share the work: solve for all four at once."
+)
 def one_after_the_other(theta, r):
     A = _powers(theta)
     return A.T @ (r - theta) / np.sum(A**2, axis=0)
