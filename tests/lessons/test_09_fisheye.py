@@ -591,3 +591,24 @@ def test_what_a_teacher_draws_and_shows(says):
     at_60, right = ([r(np.radians(one.value)) for r in RADIUS.values()] for one in (middle, side))
     assert at_60 == [tangent, half_tan, angle, half_sin, sine]
     assert right[1:] == [two, at_90, also, 1]
+
+
+def test_where_the_tangent_ends_and_the_angle_does_not(says):
+    ends = [
+        *says("the angle does not end at 90° · every pixel keeps its ray"),
+        *says("The angle does not end at 90° A real lens"),
+        *says("Watch the edge of the picture, and where the thick curve goes at 90°."),
+        *says("Orange is by your function, and covers yellow and blue beyond 90°, too."),
+        *says("ask each time what happens at the rim and at 90°"),
+        *says("and read off where each curve goes at 90°"),
+    ]
+    for one in ends:
+        assert np.tan(np.radians(one.value)) > 1e15
+        assert g(np.radians(one.value + 10)) > g(np.radians(one.value))
+    (jump,) = says("At 90° the red curve jumps to the other side of the picture.")
+    assert by_opencv(ray(np.radians(jump.value - 0.5)))[0] > 1023.5
+    assert by_opencv(ray(np.radians(jump.value + 0.5)))[0] < -0.5
+    (narrow,) = says("let them find it in a window of 20°")
+    assert narrow == FisheyeView.controls()["hfov_deg"].low
+    (columns,) = says("as the columns of a matrix (n, 4)")
+    assert columns == len(COEFFICIENTS)

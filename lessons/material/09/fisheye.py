@@ -15,7 +15,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
-from camviz.draw.flow import WIDTH, Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import Dots, Item, Line, axes_triad, closed
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -55,10 +55,10 @@ _LAST = {"equidistant": 180.0, "equisolid": 180.0, "stereographic": 180.0, "orth
 _TOP = 3.4  # focal lengths shown by the curves
 _INFINITE = 1e6  # focal lengths: tan 90° as rounded numbers have it
 _FAR = 5 * SIDE  # pixels: what a reader's function puts farther out is not drawn
-_WIDE = {"picture": 330, "window": 430, "yours": 430, "numbers": 190, "curves": 430, "rays": 300}
+_WIDE = {"picture": 310, "window": 430, "yours": 430, "numbers": 190, "curves": 430, "rays": 300}
 """The panels in their order, and how wide each is in picture units."""
-_PAIR = 310  # the width of each of two windows, which stand beside the picture
-_IMAGES, _OTHERS = 354, 260  # the height of a row with images, and of one without
+_PAIR, _PAIR_HIGH = 310, 264  # the size of each of two windows, which stand beside the picture
+_IMAGES, _OTHERS = 334, 260  # the height of a row with images, and of one without
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,8 @@ class FisheyeView(OrbitView):
             if self._has(name) and sum(lines[-1].values()) + width > WIDTH:
                 lines.append({})
             lines[-1] |= {name: width} if self._has(name) else {}
-        return rows(*((_IMAGES if {"picture", "window", "yours"} & {*line} else _OTHERS, line) for line in lines))
+        cells = rows(*((_IMAGES if {"picture", "window", "yours"} & {*line} else _OTHERS, line) for line in lines))
+        return shortened(cells, **dict.fromkeys(pair, _PAIR_HIGH))
 
     def _cut(self, image: np.ndarray, draft: bool) -> np.ndarray:
         """The window's picture, cut out of the fisheye's `image`, which is as small as a draft is."""
