@@ -58,7 +58,7 @@ _FAR = 5 * SIDE  # pixels: what a reader's function puts farther out is not draw
 _WIDE = {"picture": 310, "window": 430, "yours": 430, "numbers": 190, "curves": 430, "rays": 300}
 """The panels in their order, and how wide each is in picture units."""
 _PAIR, _PAIR_HIGH = 310, 264  # the size of each of two windows, which stand beside the picture
-_IMAGES, _OTHERS = 334, 260  # the height of a row with images, and of one without
+_IMAGES, _OTHERS = 332, 260  # the height of a row with images, and of one without
 
 
 @dataclass(frozen=True)
