@@ -1,10 +1,13 @@
 """The fisheye visualizer shows true numbers and a window that is truly cut out of its picture."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
 
 from camviz.scenes import snapshot, textured_scene
+from camviz.views.yours import YOURS_HERE
 from camviz_school.course.exercises import exercises
 from camviz_school.views.fisheye import EQUATIONS, LENSES, FisheyeView
 
@@ -22,8 +25,9 @@ from camviz_school.views.fisheye import EQUATIONS, LENSES, FisheyeView
 def test_radii_at_30_60_and_90_degrees_are_the_textbook_s(projection, radii):
     view = FisheyeView(projection=projection)
     np.testing.assert_allclose(view.radius(np.radians([30.0, 60.0, 90.0])), radii, atol=1e-6)
-    words = " ".join(f"{r:.3f}" if np.isfinite(r) else "    ∞" for r in radii)
-    assert words in view.figure(draft=True).body
+    at_90 = view.numbers()["a ray at 90° lands at"]
+    assert at_90 == (f"r = {150 * radii[-1]:.0f} px" if np.isfinite(radii[-1]) else "nowhere: tan 90° = ∞")
+    assert at_90 in view.figure(draft=True).body
 
 
 def test_only_the_perspective_lens_loses_a_ray_at_90_degrees():
@@ -93,6 +97,13 @@ def test_every_control_changes_the_picture_at_both_ends(draft):
     assert len(shown) == len(states) + 1
 
 
+def drawn_points(body, style):
+    """The places that the paths of a style run through, as they are written."""
+    return set(
+        re.findall(r"[-\d.]+,[-\d.]+", " ".join(re.findall(rf'<path[^>]*d="([^"]*)"[^>]*class="{style}"', body)))
+    )
+
+
 WITH_YOURS = "picture window curves yours"
 
 
@@ -107,7 +118,10 @@ def test_a_right_function_of_the_reader_s_cuts_the_same_window(draft, yaw):
     view = FisheyeView(panels=WITH_YOURS, yours=right, yaw_deg=yaw)
     apart = np.abs(shown(view, "window", draft).astype(int) - shown(view, "yours", draft)).max(axis=-1)
     assert np.mean(apart > 30) < 0.02  # but for the rim of the round picture
-    assert "0.524 1.047 1.571" in view.figure(draft=True).body.split(">yours<")[-1]
+    curves = view.but(panels="picture curves").figure(draft=True).body
+    theirs, yours = (drawn_points(curves, style) for style in ("blue thick", "orange dashed thick"))
+    assert len(yours) > 170
+    assert yours <= theirs  # the reader's curve lies on the right one
 
 
 def test_a_wrong_one_cuts_another_and_none_leaves_a_sentence():
@@ -119,14 +133,48 @@ def test_a_wrong_one_cuts_another_and_none_leaves_a_sentence():
         apart = np.abs(shown(view, "window", True).astype(int) - shown(view, "yours", True)).max(axis=-1)
         assert np.mean(apart > 30) > 0.02, known.explanation
     picture = FisheyeView(panels=WITH_YOURS, yours=lambda points, f, cx, cy: None).figure(draft=True)
-    assert "returns nothing yet" in picture.body
+    assert YOURS_HERE in picture.body
     assert "yours" not in picture.photographs
+    broken = FisheyeView(panels=WITH_YOURS, yours=lambda points, f, cx, cy: points / "f").figure(draft=True)
+    assert YOURS_HERE not in broken.body
+    assert "gives no answer" in broken.body
 
 
 def test_few_panels_tell_only_their_own_figures():
-    curves, window = (FisheyeView(panels=panels).figure(draft=True) for panels in ("picture curves", "picture window"))
+    alone, curves, window = (
+        FisheyeView(panels=panels).figure(draft=True) for panels in ("picture", "picture curves", "picture window")
+    )
+    assert [tile.name for tile in alone.tiles] == ["picture"]
     assert "window" not in curves.photographs
     assert "window looks" not in curves.description
-    assert "pixels a degree" not in window.description
-    with pytest.raises(ValueError, match="panels must be one of"):
-        FisheyeView(panels="picture")
+    assert "a ray at 90° lands at" in curves.description
+    for picture in (alone, window):
+        assert "a ray at 90°" not in picture.description
+    for picture in (alone, curves, window):
+        assert "pixels a degree" not in picture.description
+    for panels in ("window", "picture dome"):
+        with pytest.raises(ValueError, match="panels must be picture and any of window"):
+            FisheyeView(panels=panels)
+
+
+def test_every_panel_that_a_reader_opens_has_its_place_and_covers_no_other():
+    view = FisheyeView(panels="picture")
+    for name in FisheyeView.openable:
+        view = view.with_panels({name: True})
+        cells = [tile.cell for tile in view.figure(draft=True).tiles]
+        assert len(cells) == len(view.panels.split())
+        for i, (x, y, width, height) in enumerate(cells):
+            assert x + width <= 960
+            for a, b, across, down in cells[:i]:
+                assert x >= a + across or a >= x + width or y >= b + down or b >= y + height
+
+
+@pytest.mark.parametrize("f", [75.0, 140.0, 160.0])
+def test_the_circle_at_90_degrees_is_drawn_where_the_picture_has_it(f):
+    """Its radius is f π/2 for an equidistant lens, and f for an orthographic one; a perspective one has none."""
+    views = {name: FisheyeView(f=f, panels="picture", projection=name) for name in LENSES}
+    drawn = {name: "90°" in view.figure(draft=True).body for name, view in views.items()}
+    assert drawn["equidistant"] == (f * np.pi / 2 < 239.5)
+    assert drawn["orthographic"]
+    assert drawn["stereographic"] == (2 * f < 239.5)
+    assert not drawn["perspective"]

@@ -4,10 +4,13 @@ import cv2
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import brentq
+from scipy.optimize import brentq, least_squares
 
-from camviz.scenes import board_corners
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import KannalaBrandt
+from camviz.scenes import board_corners, snapshot, textured_scene
 from camviz.scenes.walk import around_board
+from camviz_school.views.fisheye import FisheyeView
 
 EXCEPTIONS: dict[str, str] = {}
 
@@ -21,7 +24,7 @@ RADIUS = {
 F, C = np.array([379.045, 379.008]), np.array([505.512, 509.969])
 COEFFICIENTS = np.array([0.00693023, -0.0013828, -0.000272596, -0.000452646])
 K = np.array([[F[0], 0, C[0]], [0, F[1], C[1]], [0, 0, 1]])
-"""The lens of part 3, as the Basalt project's test has it."""
+"""The lens of section 2, as the Basalt project's test has it."""
 
 
 def g(theta, k=COEFFICIENTS):
@@ -54,7 +57,14 @@ def stretch(name, theta, step=1e-5):
 
 
 def test_the_lens_of_the_first_picture_sees_more_than_everything_in_front(says):
-    (across,) = says("wears a lens that sees 183° from edge to edge: more than everything in front of it")
+    says("A dashed circle comes in: what is outside it lies behind the camera.")
+    circle = FisheyeView(panels="picture").radius(np.array(np.pi / 2))
+    assert circle == pytest.approx(np.pi / 2)
+    for f, comes_in in ((300.0, False), (60.0, True)):  # where the slider stands first, and its left end
+        assert ("90°" in FisheyeView(f=f, panels="picture").figure(draft=True).body) == comes_in
+        assert (f * np.pi / 2 < 239.5) == comes_in
+    assert ray(np.radians(91))[2] < 0 < ray(np.radians(89))[2]
+    (across,) = says("out of a picture that is 183° wide, beside the one that camviz cuts")
     assert across == np.degrees(2 * 240 / 150)
     assert across.value > 180
 
@@ -194,7 +204,7 @@ def test_the_published_lens(says):
     point = np.array([1.0, y.value, z.value])
     theta = np.arctan2(np.hypot(*point[:2]), point[2])
     np.testing.assert_allclose(F * g(theta) * point[:2] / np.hypot(*point[:2]) + C, by_opencv(point), atol=1e-9)
-    off, pixels = says("The lens of part 3 keeps to the equidistant one within 2.1 px of 1024")
+    off, pixels = says("The lens of section 2 keeps to the equidistant one within 2.1 px of 1024")
     theta = np.linspace(0, max(sides), 1000)
     assert off == (F[0] * np.abs(g(theta) - theta)).max()
     assert off.value > (F[0] * np.abs(g(theta) - theta)).max()  # within: not rounded down
@@ -270,6 +280,76 @@ def test_the_boards_reached_62_degrees_and_there_the_powers_look_alike(says):
     assert beyond.value > reached.value
 
 
+@pytest.fixture(scope="module")
+def found():
+    """The corners (10, 54, 2) of the ten boards, found in pictures taken through the lens of section 2."""
+    k = Intrinsics(1024, 1024, *F, *C).within(640)
+    pictures = [snapshot(textured_scene(), Camera(k, KannalaBrandt(*COEFFICIENTS), at)) for at in around_board(10)]
+    flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
+    greys = [cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY) for picture in pictures]
+    return np.array([cv2.findChessboardCornersSB(grey, (9, 6), flags=flags)[1].reshape(54, 2) for grey in greys])
+
+
+BOARD = np.stack([*np.meshgrid(0.1 * np.arange(9.0), 0.1 * np.arange(6.0)), np.zeros((6, 9))], axis=-1).reshape(54, 3)
+TRUE_F = F[0] * 640 / 1024
+
+
+def test_the_model_of_lesson_05_fits_the_corners_and_is_wrong_beyond(says, found):
+    (rms_said,) = says("The RMS error is 0.20 px.")
+    (reached,) = says("The fit is held by corners as far as 62° from the axis.")
+    says("Eight degrees farther out the polynomial in tan θ has left the picture.")
+    says("An error of a fraction of a pixel, and rays farther out are wrong by hundreds of pixels.")
+    (at_most,) = says("Even where the corners are, the wrong model's curve is off by up to 5.2 px")
+    objects, images = [BOARD.astype(np.float32)] * 10, list(found.astype(np.float32))
+    rms, matrix, bend, *_ = cv2.calibrateCamera(objects, images, (640, 640), None, None)
+    assert rms_said == rms
+
+    def miss(degrees):
+        """How far OpenCV's own projection of a ray is from the truth along the radius."""
+        uv, _ = cv2.projectPoints(ray(np.radians(degrees)).reshape(1, 1, 3), np.zeros(3), np.zeros(3), matrix, bend)
+        return uv[0, 0, 0] - matrix[0, 2] - TRUE_F * g(np.radians(degrees))
+
+    bend[0, 2:4] = 0  # p1 and p2 are no part of the curve
+    assert at_most == max(abs(miss(degrees)) for degrees in np.arange(1, reached.value))
+    assert 100 < abs(miss(reached.value + 8)) < 1000
+    assert miss(reached.value + 8) + TRUE_F * g(np.radians(70)) < -320  # to the left of the picture: it should be right
+
+
+def test_two_coefficients_are_enough(says, found):
+    says("From none to two, each coefficient lowers the error. The third and the fourth do not.")
+    says("with all four, the curve leaves the truth sooner where no corner holds it")
+    guess = np.array([[230.0, 0, 319.5], [0, 230, 319.5], [0, 0, 1]])
+    held = [cv2.CALIB_FIX_K1, cv2.CALIB_FIX_K2, cv2.CALIB_FIX_K3, cv2.CALIB_FIX_K4]
+    flags = cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW | cv2.CALIB_USE_INTRINSIC_GUESS
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-9)
+    rms, off = [], []
+    for n in range(5):
+        given = [BOARD[None]] * 10, list(found[:, None].astype(float)), (640, 640), guess.copy(), np.zeros(4)
+        error, matrix, few, *_ = cv2.fisheye.calibrate(*given, flags=flags | sum(held[n:]), criteria=stop)
+        rms.append(error)
+        off.append(abs(matrix[0, 0] * g(np.radians(70), few.ravel()) - TRUE_F * g(np.radians(70))))
+    assert rms[0] > 1.1 * rms[1] > 1.15 * rms[2]
+    assert rms[2] == pytest.approx(rms[3], rel=0.01)
+    assert rms[2] == pytest.approx(rms[4], rel=0.01)
+    assert off[4] > 2 * off[2]
+
+
+def test_a_stereographic_lens_in_four_coefficients(says):
+    two, half, r, k1 = says("at θ = 1 the stereographic r is 2 tan 0.5 = 1.0926, so k1 = 0.0926.")
+    assert half == 1 / two.value
+    assert r == two.value * np.tan(half.value)
+    assert k1 == r.value - 1
+    last, near, further, far = says(
+        "Up to 95° four right coefficients miss by less than 0.01 px. At 120° they miss by 4 px."
+    )
+    a = np.radians(np.arange(1, last.value + 1))
+    best = least_squares(lambda k: g(a, k) - 2 * np.tan(a / 2), np.zeros(4), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+    miss = 300 * np.abs(g(a, best) - 2 * np.tan(a / 2)).max()
+    assert near.value / 2 < miss < near.value
+    end = np.radians(further.value)
+    assert far == 300 * abs(g(end, best) - 2 * np.tan(end / 2))
+
+
 def test_the_wall_of_the_astronaut(says):
     (wide,) = says("Put it on a wall that is 100° wide")
     f = 256 / np.tan(np.radians(wide.value / 2))
@@ -327,6 +407,12 @@ def test_a_fisheye_that_looks_up_sees_the_whole_horizon(says):
         "let a fisheye look up: the whole horizon is then 90° from its axis, and a lens of more than 180° sees it"
     )
     (also,) = says("when it looks up or down and sees more than 180°")
+    level, broad = says(
+        "When it looks straight up, the horizon is 90° from its axis, and a lens of more than 180° has it in its "
+        "picture."
+    )
+    assert level == horizon.value
+    assert broad == wider.value
     around = np.linspace(0, 2 * np.pi, 73)
     directions = np.stack([np.sin(around), 0 * around, np.cos(around)], axis=-1)  # y is down: all level
     from_axis = {
@@ -439,7 +525,11 @@ def test_one_ray_by_hand_and_what_the_sliders_show(says):
     assert np.degrees(theta) > more.value
     assert 0 < u < width.value
     assert 0 < v < height.value
-    circles = says("The grid has circles 30°, 60° and 90° from the axis; the right one is yellow.")
+    *circles, past = says(
+        "circles 30°, 60° and 90° from the axis on the picture, and the curve. Yellow and blue are right. Pull focal "
+        "length to the left: orange must cover them beyond 90°, too."
+    )
+    assert past == circles[-1].value
     assert all(f.value * np.radians(one.value) < width.value / 2 for one in circles)  # all are in the picture
     (yaw,) = says("Turn window yaw to 80°. Part of the window then shows what is beside and behind the camera.")
     half = 40
@@ -501,3 +591,24 @@ def test_what_a_teacher_draws_and_shows(says):
     at_60, right = ([r(np.radians(one.value)) for r in RADIUS.values()] for one in (middle, side))
     assert at_60 == [tangent, half_tan, angle, half_sin, sine]
     assert right[1:] == [two, at_90, also, 1]
+
+
+def test_where_the_tangent_ends_and_the_angle_does_not(says):
+    ends = [
+        *says("the angle does not end at 90° · every pixel keeps its ray"),
+        *says("The angle does not end at 90° A real lens"),
+        *says("Watch the edge of the picture, and where the thick curve goes at 90°."),
+        *says("Orange is by your function, and covers yellow and blue beyond 90°, too."),
+        *says("ask each time what happens at the rim and at 90°"),
+        *says("and read off where each curve goes at 90°"),
+    ]
+    for one in ends:
+        assert np.tan(np.radians(one.value)) > 1e15
+        assert g(np.radians(one.value + 10)) > g(np.radians(one.value))
+    (jump,) = says("At 90° the red curve jumps to the other side of the picture.")
+    assert by_opencv(ray(np.radians(jump.value - 0.5)))[0] > 1023.5
+    assert by_opencv(ray(np.radians(jump.value + 0.5)))[0] < -0.5
+    (narrow,) = says("let them find it in a window of 20°")
+    assert narrow == FisheyeView.controls()["hfov_deg"].low
+    (columns,) = says("as the columns of a matrix (n, 4)")
+    assert columns == len(COEFFICIENTS)

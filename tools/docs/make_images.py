@@ -39,7 +39,7 @@ PICTURES = {
     "colour": ColourView(),
     "demosaicing": DemosaicingView(),
     "depth_of_field": DepthOfFieldView(),
-    "fisheye": FisheyeView(),
+    "fisheye": FisheyeView(panels="picture curves"),
     "image_sensor": ImageSensorView(),
     "light_field": LightFieldView(),
     "noise": PhotonTransferView(),

@@ -1,4 +1,4 @@
-"""Lesson 09, fisheye: the angle of a ray, a projection of it, the Kannala–Brandt polynomial, and a straight window."""
+"""Lesson 09, fisheye: the angle of a ray, the Kannala–Brandt polynomial there, back and refitted, a straight window."""
 
 from __future__ import annotations
 
@@ -539,7 +539,137 @@ def wrong_slope(radius, k1, k2):
     return np.where((np.abs(_polynomial(theta, k1, k2) - radius) < 1e-9) & (theta <= np.pi), theta, np.nan)
 
 
-# 4: the window -------------------------------------------------------------------------------------------------------
+# 4: the same lens in another model ------------------------------------------------------------------------------------
+
+
+def coefficients(theta: Array, r: Array) -> Array:
+    """k1 k2 k3 k4 (4,), so that θ (1 + k1 θ² + … + k4 θ⁸) is nearest to the radii r (n,), in focal lengths."""
+    return _fitted(_powers(theta), r - theta)
+
+
+def _powers(theta, *exponents):
+    return theta[:, None] ** np.array(exponents or (3, 5, 7, 9))
+
+
+def _fitted(columns, wanted):
+    return np.linalg.lstsq(columns, wanted, rcond=None)[0]
+
+
+def _lens_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Measured radii of four kinds of lens, to a thousandth of a focal length; none lies on any polynomial."""
+    for rule in (
+        lambda theta: 2 * np.tan(theta / 2),
+        lambda theta: 2 * np.sin(theta / 2),
+        np.sin,
+        lambda theta: 1.05 * theta,
+    ):
+        theta = np.sort(rng.uniform(0.1, rng.uniform(1.4, 1.8), rng.integers(14, 40)))
+        yield (theta, rule(theta) + rng.normal(0, 1e-3, theta.shape))
+
+
+COEFFICIENTS = Exercise(
+    name="09.coefficients",
+    reference=coefficients,
+    cases=_lens_cases,
+    tolerance=1e-6,
+    shown=((np.array([0.2, 0.5, 0.8, 1.1, 1.4]), 2 * np.tan(np.array([0.2, 0.5, 0.8, 1.1, 1.4]) / 2)),),
+    hints=(
+        "Multiply the bracket out. What does each k stand beside? And which part of r needs no k at all?",
+        "Each sample is one equation, k1 θ³ + k2 θ⁵ + k3 θ⁷ + k4 θ⁹ = r − θ. Put the four powers of θ side by side, as "
+        "the columns of a matrix (n, 4), and let `np.linalg.lstsq` find the four numbers.",
+        "`return np.linalg.lstsq(powers, ___, rcond=None)[0]`",
+    ),
+    praise="So a lens of any rule can be handed to a program that knows Kannala–Brandt only.",
+)
+
+
+@COEFFICIENTS.right
+def by_the_normal_equations(theta, r):
+    A = np.stack([theta**3, theta**5, theta**7, theta**9], axis=-1)
+    return np.linalg.inv(A.T @ A) @ A.T @ (r - theta)
+
+
+@COEFFICIENTS.right
+def by_the_pseudoinverse(theta, r):
+    return (np.linalg.pinv(np.vander(theta**2, 5, increasing=True)[:, 1:] * theta[:, None]) @ (r - theta)).tolist()
+
+
+@COEFFICIENTS.right
+def by_a_general_solver(theta, r):
+    from scipy.optimize import least_squares
+
+    def off(k):
+        return theta * (1 + k[0] * theta**2 + k[1] * theta**4 + k[2] * theta**6 + k[3] * theta**8) - r
+
+    return least_squares(off, np.zeros(4), x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+
+
+@COEFFICIENTS.wrong("θ itself is still in r. The k make up for r − θ, what the equidistant rule leaves over.")
+def with_theta_left_in(theta, r):
+    return _fitted(_powers(theta), r)
+
+
+@COEFFICIENTS.wrong("The bracket is multiplied by θ: k1 stands beside θ³, not θ², and so on.")
+def even_powers(theta, r):
+    return _fitted(_powers(theta, 2, 4, 6, 8), r - theta)
+
+
+@COEFFICIENTS.wrong(
+    "You fit r/θ − 1. Dividing each equation by θ weighs the middle of the picture more than its rim: what must be "
+    "small is the error of r."
+)
+def divided_by_theta(theta, r):
+    return _fitted(_powers(theta, 2, 4, 6, 8), r / theta - 1)
+
+
+@COEFFICIENTS.wrong(
+    "You use the first four samples alone. All of them count: take the least squares of all n equations."
+)
+def through_the_first_four(theta, r):
+    return np.linalg.solve(_powers(theta[:4]), (r - theta)[:4])
+
+
+@COEFFICIENTS.wrong("Your polynomial has even powers as well. The model has θ³, θ⁵, θ⁷ and θ⁹ alone.")
+def with_all_powers(theta, r):
+    return _fitted(_powers(theta, *range(1, 10)), r)[[2, 4, 6, 8]]
+
+
+@COEFFICIENTS.wrong("The order is k1 k2 k3 k4, from the lowest power to the highest.")
+def highest_power_first(theta, r):
+    return coefficients(theta, r)[::-1]
+
+
+@COEFFICIENTS.wrong(
+    "You let the factor of θ itself be found as well. In the model it is 1: another value would change f, which stays."
+)
+def with_a_focal_length_of_its_own(theta, r):
+    return _fitted(_powers(theta, 1, 3, 5, 7, 9), r)[1:]
+
+
+@COEFFICIENTS.wrong("θ is in degrees in yours. The polynomial takes radians.")
+def in_powers_of_degrees(theta, r):
+    return _fitted(_powers(np.degrees(theta)), r - theta)
+
+
+@COEFFICIENTS.wrong("These are powers of tan θ, as in lesson 05. Kannala–Brandt's are powers of θ itself.")
+def in_powers_of_the_tangent(theta, r):
+    return _fitted(_powers(np.tan(theta)), r - np.tan(theta))
+
+
+@COEFFICIENTS.wrong(
+    "You find each k as though the other three were zero. They share the work: solve for all four at once."
+)
+def one_after_the_other(theta, r):
+    A = _powers(theta)
+    return A.T @ (r - theta) / np.sum(A**2, axis=0)
+
+
+@COEFFICIENTS.wrong("You fit θ as a polynomial of r, the way back. The model goes from the angle to the radius.")
+def backwards(theta, r):
+    return _fitted(_powers(r), theta - r)
+
+
+# 5: the window -------------------------------------------------------------------------------------------------------
 
 
 def window_map(width: int, height: int, f_window: float, yaw: float, f: float, cx: float, cy: float) -> Array:
@@ -735,4 +865,4 @@ def yaw_taken_for_degrees(width, height, f_window, yaw, f, cx, cy):
     return window_map(width, height, f_window, np.radians(yaw), f, cx, cy)
 
 
-EXERCISES = (EQUIDISTANT, KANNALA_BRANDT, ANGLE, WINDOW_MAP)
+EXERCISES = (EQUIDISTANT, KANNALA_BRANDT, ANGLE, COEFFICIENTS, WINDOW_MAP)

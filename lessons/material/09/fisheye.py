@@ -5,7 +5,7 @@ A reader's own projection can draw its curve, its grid and the window beside the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import asin, atan2, cos, degrees, pi, radians, sin
@@ -15,9 +15,9 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import Dots, Item, Line, axes_triad, closed
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.space import OrbitCamera, space_panel
@@ -54,31 +54,28 @@ _COLOURS = {
 _LAST = {"equidistant": 180.0, "equisolid": 180.0, "stereographic": 180.0, "orthographic": 90.0, "perspective": 90.0}
 _TOP = 3.4  # focal lengths shown by the curves
 _INFINITE = 1e6  # focal lengths: tan 90° as rounded numbers have it
-_TABLED = np.radians([30.0, 60.0, 90.0])
 _FAR = 5 * SIDE  # pixels: what a reader's function puts farther out is not drawn
-_ABOVE = (354, {"picture": 330, "window": 430, "numbers": 200})
-_LAYOUTS = {
-    "picture curves": rows((390, {"picture": 365, "curves": 405, "numbers": 190})),
-    "picture window": rows(_ABOVE),
-    "picture window curves rays": rows(_ABOVE, (246, {"curves": 460, "rays": 300, "radii": 200})),
-    "picture window curves yours": rows(_ABOVE, (354, {"curves": 330, "yours": 430, "radii": 200})),
-}
-_TOLD = {  # the figures that few panels speak of
-    "picture curves": ("across the picture", "a ray at 90° lands at", "pixels a degree, 0°", "pixels a degree, 80°"),
-    "picture window": ("across the picture", "window's middle"),
-}
+_WIDE = {"picture": 310, "window": 430, "yours": 430, "numbers": 190, "curves": 430, "rays": 300}
+"""The panels in their order, and how wide each is in picture units."""
+_PAIR, _PAIR_HIGH = 310, 264  # the size of each of two windows, which stand beside the picture
+_IMAGES, _OTHERS = 332, 260  # the height of a row with images, and of one without
 
 
 @dataclass(frozen=True)
 class FisheyeView(OrbitView):
     """What a fisheye does to the angle of a ray, and that a straight picture can be cut out of its round one.
 
-    `panels` names what is drawn: "picture curves", "picture window", or both and "rays" or "yours". `yours` is a
-    reader's function of (points, f, cx, cy), camera-frame points (..., 3) to pixels (..., 2); what it does is orange.
+    `panels` names what is drawn: the picture, and beside it any of window, yours, numbers, curves and rays. `yours` is
+    a reader's function of (points, f, cx, cy), camera-frame points (..., 3) to pixels (..., 2); what it does is orange.
     """
 
     title: ClassVar[str] = "Fisheye"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {
+        "curves": "curves",
+        "window": "window",
+        "rays": "rays in space",
+        "numbers": "numbers",
+    }
 
     projection: str = choice(*LENSES, help="how the angle θ of a ray becomes a distance r from the picture's middle")
     f: float = slider(
@@ -87,9 +84,16 @@ class FisheyeView(OrbitView):
     yaw_deg: float = slider(35.0, -180.0, 180.0, 1.0, label="window yaw", unit="°", help="to the right")
     pitch_deg: float = slider(-20.0, -90.0, 90.0, 1.0, label="window pitch", unit="°", help="up")
     hfov_deg: float = slider(80.0, 20.0, 120.0, 1.0, label="window's field", unit="°", help="of the perspective window")
-    panels: str = "picture window curves rays"
+    panels: str = "picture window numbers curves rays"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     eye: OrbitCamera = OrbitCamera(target=(0.0, 0.0, 0.2), distance=4.4, yaw_deg=-40, pitch_deg=22)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        wanted = self.panels.split()
+        if "picture" not in wanted or not set(wanted) <= {*_WIDE}:
+            others = ", ".join(list(_WIDE)[1:])
+            raise ValueError(f"panels must be picture and any of {others} beside it, got {self.panels!r}")
 
     # Cameras ---------------------------------------------------------------------------------------------------------
 
@@ -134,8 +138,10 @@ class FisheyeView(OrbitView):
         }
 
     def _told(self) -> dict[str, str]:
-        figures = self.numbers()
-        return {name: figures[name] for name in _TOLD.get(self.panels, figures)}
+        """The figures that the panels speak of."""
+        spoken = {"a ray": "curves numbers", "pixels": "numbers", "window": "window"}  # by how a figure's name begins
+        silent = tuple(start for start, by in spoken.items() if not any(map(self._has, by.split())))
+        return {name: figure for name, figure in self.numbers().items() if not name.startswith(silent)}
 
     def description(self) -> str:
         figures = listed(self._told())
@@ -151,30 +157,30 @@ class FisheyeView(OrbitView):
     def figure(self, *, draft: bool = False) -> Picture:
         image, taken = _photographed(self.camera, garden.DRAFT if draft else garden.FINE)
         photographs = {"fisheye": taken}
-        parts = {"picture": self._picture_panel(), "numbers": self._numbers()}
-        if self._has("window"):
+        parts = {"picture": self._picture_panel()}
+        if self._has("window") or self._has("yours"):
             photographs["window"] = jpeg(self._cut(image, draft))
-            parts["window"] = self._window_panel()
-        if self._has("curves"):
-            parts["curves"] = self._curves_panel()
-        if self._has("rays"):
-            parts["rays"], attached = self._dome_panel(draft)
-            photographs |= attached
         if self._has("yours"):
             parts["yours"], attached = self._your_panel(image, draft)
             photographs |= attached
-        if "radii" in self._layout:
-            parts["radii"] = self._radii()
+        if self._has("rays"):
+            parts["rays"], attached = self._dome_panel(draft)
+            photographs |= attached
+        plain = {"window": self._window_panel, "numbers": self._numbers, "curves": self._curves_panel}
+        parts |= {name: draw() for name, draw in plain.items() if self._has(name)}
         return self.tiled(self._layout, {name: parts[name] for name in self._layout}, photographs)
 
-    @property
+    @cached_property
     def _layout(self) -> dict[str, Cell]:
-        return _LAYOUTS[self.panels]
-
-    def _image_panel(self, name: str, cell: str, width: int, height: int) -> Panel:
-        """A panel in the aspect of an image, as wide as a cell of the layout lets it be."""
-        x, y, across, _ = self._layout[cell]
-        return image_panel(name, x + 10, y + 34, across - 20, width, height)
+        """As many panels in a row as it has room for, in their order."""
+        pair = {"window": _PAIR, "yours": _PAIR} if self._has("window") and self._has("yours") else {}
+        lines: list[dict[str, float]] = [{}]
+        for name, width in (_WIDE | pair).items():
+            if self._has(name) and sum(lines[-1].values()) + width > WIDTH:
+                lines.append({})
+            lines[-1] |= {name: width} if self._has(name) else {}
+        cells = rows(*((_IMAGES if {"picture", "window", "yours"} & {*line} else _OTHERS, line) for line in lines))
+        return shortened(cells, **dict.fromkeys(pair, _PAIR_HIGH))
 
     def _cut(self, image: np.ndarray, draft: bool) -> np.ndarray:
         """The window's picture, cut out of the fisheye's `image`, which is as small as a draft is."""
@@ -187,11 +193,12 @@ class FisheyeView(OrbitView):
 
     @cached_property
     def _panel(self) -> Panel:
-        return self._image_panel("fisheye", "picture", SIDE, SIDE)
+        return image_in(self._layout["picture"], "fisheye", SIDE, SIDE)
 
     def _picture_panel(self) -> str:
         panel = self._panel
-        content = placed_image(panel, "fisheye", SIDE, SIDE) + self._grid_lines(panel)
+        content = placed_image(panel, "fisheye", SIDE, SIDE)
+        content += self._grid_lines(panel) if self.yours else self._beside(panel)
         title = f"The {self.projection} lens"
         if not self._has("window"):
             return panel.show(content, title=title)
@@ -204,7 +211,7 @@ class FisheyeView(OrbitView):
         return panel.show(content, title=title, hint="drag the window", drag="window", label=label)
 
     def _window_panel(self) -> str:
-        panel = self._image_panel("cut", "window", 320, 240)
+        panel = image_in(self._layout["window"], "cut", 320, 240)
         note = f"perspective, {self.hfov_deg:.0f}° wide"
         return panel.show(placed_image(panel, "window", 320, 240), title="The window cut out of it", note=note)
 
@@ -227,6 +234,17 @@ class FisheyeView(OrbitView):
             drawn, title="How far from the middle", note=EQUATIONS[self.projection]
         )
 
+    def _beside(self, panel: Panel) -> str:
+        """The circle of the rays from beside the camera, where the picture has it."""
+        c, r = (SIDE - 1) / 2, self.f * float(self.radius(np.array(pi / 2)))
+        if not r < c:
+            return ""
+        turn = np.linspace(0, 2 * pi, 121)
+        ring = panel.place(c + r * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
+        return on_photograph([ring], "yellow dashed") + svg.text(
+            panel.place((c, c - r)) + (0, 16), "90°", "yellow halo middle"
+        )
+
     # The reader's own function ---------------------------------------------------------------------------------------
 
     def _your_pixels(self, points: Array) -> tuple[Array, str]:
@@ -237,8 +255,6 @@ class FisheyeView(OrbitView):
 
     def _grid_lines(self, panel: Panel) -> str:
         """Circles every 30° around the axis, and twelve lines out from it: where they land, and by the reader's own."""
-        if not self.yours:
-            return ""
         turn = np.linspace(0.01, 2 * pi + 0.01, 73)
         reach = np.radians(np.linspace(2, min(self.half_field_deg(), 150), 73))
         circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
@@ -254,21 +270,18 @@ class FisheyeView(OrbitView):
         """r/f by the reader's function, of rays to the right, and what the lines are."""
         theta = np.linspace(1, 179, 179)  # neither on the axis nor straight behind, where no direction is told
         entries = [(_COLOURS[self.projection], self.projection), ("orange dashed", "yours"), ("green dashed", "edge")]
-        drawn = plot.curve(panel, theta, self._your_radius(np.radians(theta)), "orange dashed thick")
-        return drawn + plot.legend(panel, entries)
-
-    def _your_radius(self, theta: Array) -> Array:
-        """r/f (...) by the reader's function of rays to the right, `theta` (...) radians from the axis."""
-        uv, _ = self._your_pixels(_meridian(theta, 0.0))
-        return (uv[..., 0] - self.camera.intrinsics.cx) / self.f
+        uv, _ = self._your_pixels(_meridian(np.radians(theta), 0.0))
+        radius = (uv[..., 0] - self.camera.intrinsics.cx) / self.f
+        return plot.curve(panel, theta, radius, "orange dashed thick") + plot.legend(panel, entries)
 
     def _your_panel(self, image: np.ndarray, draft: bool) -> Drawn:
         """The window once more, every pixel of it looked up where the reader's function says."""
-        panel = self._image_panel("yours", "yours", 320, 240)
+        panel = image_in(self._layout["yours"], "yours", 320, 240)
         seen = self._seen(draft)
         uv, problem = self._your_pixels(seen.rays())
         if problem:
-            return without(panel, problem, "Cut by your function"), {}
+            right = placed_image(panel, "window", 320, 240)
+            return without(panel, problem, "Cut by your function", right=right), {}
         cut = garden.looked_up(image, uv, SIDE)
         return panel.show(placed_image(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 
@@ -277,7 +290,7 @@ class FisheyeView(OrbitView):
 
     def _name(self, panel: Panel, name: str) -> str:
         places = {
-            "perspective": (71, 2.95, "end"),
+            "perspective": (69, 2.95, "end"),
             "stereographic": (117, 2.95, ""),
             "equidistant": (178, 2.25, "end"),
             "equisolid": (176, 1.72, "end"),
@@ -320,23 +333,6 @@ class FisheyeView(OrbitView):
         x = self._layout["numbers"][0] + 10
         law = svg.text((x, 50), EQUATIONS[self.projection]) + svg.text((x, 70), f"f = {self.f:g} px")
         return svg.text((x, 26), "This lens", "title") + law + readout(self._told(), (x, 104), (0, 42), (0, 17))
-
-    def _radii(self) -> str:
-        """r/f at a few angles, by every projection or by the right one and the reader's."""
-        x, y = self._layout["radii"][0] + 10, self._layout["radii"][1] + 26
-        radii = {name: self.radius(_TABLED, name) for name in ([self.projection] if self.yours else LENSES)}
-        radii |= {"yours": self._your_radius(_TABLED)} if self.yours else {}
-        drawn = [svg.text((x, y), "r / f at 30°, 60°, 90°", "title")]
-        for i, (name, values) in enumerate(radii.items()):
-            colour = _COLOURS.get(name, "orange")
-            strength = "" if name == self.projection else "orange" if name == "yours" else "fill-muted"
-            drawn.append(svg.text((x, y + 26 + 40 * i), name, colour, style=self._bold(name)))
-            drawn.append(svg.text((x, y + 43 + 40 * i), self._tabled(name, values), f"number {strength}"))
-        return "".join(drawn)
-
-    def _tabled(self, name: str, values: Array) -> str:
-        missing = "    –" if name == "yours" else "    ∞"
-        return " ".join(f"{value:.3f}" if np.isfinite(value) else missing for value in values).replace("-", "−")
 
     # Touch -----------------------------------------------------------------------------------------------------------
 
