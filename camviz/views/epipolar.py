@@ -179,7 +179,8 @@ class EpipolarView(OrbitView, TwoCameras):
             return self._waiting(panel, right)
         if problem:
             return _notice(panel, problem)
-        return on_photograph(panel.place(twoview.clip_lines(lines, self.right.intrinsics)), "orange dashed")
+        is_a_line = np.isfinite(lines).all(axis=-1) & lines[:, :2].any(axis=-1)
+        return on_photograph(panel.place(twoview.clip_lines(lines[is_a_line], self.right.intrinsics)), "orange dashed")
 
     def _waiting(self, panel: Panel, lines: Array) -> str:
         """The right lines in grey, where the reader's will be."""
@@ -221,7 +222,9 @@ class EpipolarView(OrbitView, TwoCameras):
         alone = not self._has("right")
         parts = {"left picture": self._picture_panel(self._left_panel, self.left, self.right, "move the point")}
         if not alone:
-            parts["right picture"] = self._picture_panel(self._right_panel, self.right, self.left, "move it along its ray")
+            parts["right picture"] = self._picture_panel(
+                self._right_panel, self.right, self.left, "move it along its ray"
+            )
         else:
             attached = {"left": attached["left"]}
         if self._has("space"):

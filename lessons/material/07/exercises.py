@@ -814,19 +814,25 @@ def with_a_sign(F, uv_left, uv_right):
     return product / np.linalg.norm(gradient, axis=1)
 
 
-@SAMPSON.wrong("You divide by the right line alone: that is the distance in the right picture, where only one pixel moves.")
+@SAMPSON.wrong(
+    "You divide by the right line alone: that is the distance in the right picture, where only one pixel moves."
+)
 def right_line_alone(F, uv_left, uv_right):
     product, gradient = _product_and_gradient(F, uv_left, uv_right)
     return np.abs(product) / np.linalg.norm(gradient[:, :2], axis=1)
 
 
-@SAMPSON.wrong("You divide by the left line alone: that is the distance in the left picture, where only one pixel moves.")
+@SAMPSON.wrong(
+    "You divide by the left line alone: that is the distance in the left picture, where only one pixel moves."
+)
 def left_line_alone(F, uv_left, uv_right):
     product, gradient = _product_and_gradient(F, uv_left, uv_right)
     return np.abs(product) / np.linalg.norm(gradient[:, 2:], axis=1)
 
 
-@SAMPSON.wrong("Only the first *two* numbers of each line belong below the root: the third is not a direction in the picture.")
+@SAMPSON.wrong(
+    "Only the first *two* numbers of each line belong below the root: the third is not a direction in the picture."
+)
 def all_three_numbers(F, uv_left, uv_right):
     left, right = _homogeneous(uv_left), _homogeneous(uv_right)
     product, _ = _product_and_gradient(F, uv_left, uv_right)
