@@ -219,12 +219,10 @@ class EpipolarView(OrbitView, TwoCameras):
 
     def figure(self, *, draft: bool = False) -> Picture:
         images, attached = self._pictures(draft)
-        alone = not self._has("right")
         parts = {"left picture": self._picture_panel(self._left_panel, self.left, self.right, "move the point")}
-        if not alone:
-            parts["right picture"] = self._picture_panel(
-                self._right_panel, self.right, self.left, "move it along its ray"
-            )
+        if self._has("right"):
+            along = "move it along its ray"
+            parts["right picture"] = self._picture_panel(self._right_panel, self.right, self.left, along)
         else:
             attached = {"left": attached["left"]}
         if self._has("space"):

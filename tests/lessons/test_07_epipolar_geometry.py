@@ -109,7 +109,7 @@ def test_a_turn_of_twenty_degrees_moves_every_point_out_of_a_small_disc(says):
 def test_the_first_point_flies_away_and_the_picture_stays():
     """As the lesson's first sentences say; the header is held below."""
     near, far = (EpipolarView(panels="space", depth=depth) for depth in (0.4, 12.0))
-    parts = [dict((tile.name, tile.body) for tile in view.figure(draft=True).tiles) for view in (near, far)]
+    parts = [{tile.name: tile.body for tile in view.figure(draft=True).tiles} for view in (near, far)]
     assert parts[0]["left picture"] == parts[1]["left picture"]
     assert parts[0]["space"] != parts[1]["space"]
 

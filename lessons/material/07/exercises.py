@@ -799,7 +799,7 @@ def pair_by_pair_by_opencv(F, uv_left, uv_right):
 
 
 @SAMPSON.wrong("This is xᵀFx itself, which has the scale of F. Divide it by the gradient.")
-def not_divided(F, uv_left, uv_right):
+def product_alone(F, uv_left, uv_right):
     return np.abs(_product_and_gradient(F, uv_left, uv_right)[0])
 
 
