@@ -36,8 +36,8 @@ _WIDTH, _TALLEST = 460, 345
 _TILES = {"right": "right picture", "space": "space", "numbers": "numbers", "match": "details"}
 _PANELS = {*_TILES, "epipoles", "F"}  # the last two are no tiles: lines in the pictures, and a matrix over the numbers
 _HIGH = 388  # units of height of the pictures
-_LOW = {True: 236, False: 194}  # of what stands below them: with the cameras in space or F, and without
-_DETAIL = {True: 69, False: 140}  # units on a side of each detail, beside two others and else
+_LOW = 236  # of the cameras in space below them
+_DETAIL = {True: 69, False: 100}  # units on a side of each detail, beside two others and else
 _STARRED = np.stack(np.meshgrid(np.linspace(0.05, 0.95, 5), [0.12, 0.38, 0.88]), axis=-1).reshape(-1, 2)
 
 
@@ -245,9 +245,11 @@ class EpipolarView(OrbitView, TwoCameras):
         below.pop(beside, None)
         if "space" in below:
             below["space"] -= sum(below.values()) - 960
-        low = _LOW["space" in below or self._has("F")]
-        cells = rows((_HIGH, {"left picture": 480, **({beside: 480} if beside else {})}), (low, below))
-        return shortened(cells, **({"details": self._detail + 47} if "details" in below else {}))
+        lines = 3 + 2 * self._has("epipoles") + 3 * bool(self.noise) + (self.yours is not None)
+        high = {"space": _LOW, "numbers": 26 + 19 * lines * self._has("numbers") + 92 * self._has("F")}
+        high = {name: high.get(name, self._detail + 47) for name in below}
+        first = {"left picture": 480.0, beside: 480.0} if beside else {"left picture": 480.0}
+        return shortened(rows((_HIGH, first), (max(high.values(), default=0), below)), **high)
 
     @property
     def _tells(self) -> bool:
@@ -347,7 +349,7 @@ class EpipolarView(OrbitView, TwoCameras):
             side = "end" if at[0] > panel.width - 110 else ""
             return ring(at, "yellow", 8) + svg.text(at + (-30 if side else 30, -9), "epipole", f"label halo {side}")
         toward = at - (panel.width / 2, panel.height / 2) if np.isfinite(uv).all() else _heading(camera, other)
-        return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}")
+        return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}".rstrip())
 
     def _other_camera(self, panel: Panel, camera: Camera, other: Camera) -> str:
         if not self.baseline or not camera.sees(other.centre):
@@ -477,9 +479,9 @@ def _heading(camera: Camera, other: Camera) -> Array:
 
 
 def _far(uv: Array, camera: Camera) -> str:
-    away = float(np.linalg.norm(uv - np.array([camera.intrinsics.width, camera.intrinsics.height]) / 2))
-    if away < 1e6:
-        return f"{away:,.0f} px away"
+    """Where a pixel is that lies on no plane of pixels; "" for one that is only outside the picture."""
+    if np.abs(uv).max() < 1e6:
+        return ""
     return "beyond the lens’s field" if camera.lens.is_distorted else "at infinity"
 
 
