@@ -173,6 +173,7 @@ class EpipolarView(OrbitView, TwoCameras):
     def _star(self, panel: Panel) -> str:
         """The lines of the reader's own function."""
         assert self.your_lines is not None
+        assert self.F is not None
         right = twoview.epipolar_lines(self.F, self._starred)
         lines, problem = tried(self.your_lines, (self.F, self._starred), right)
         if is_unwritten(problem):
