@@ -198,7 +198,7 @@ def test_the_readers_own_F_draws_the_right_line_or_another_one():
 @pytest.mark.parametrize(
     ("function", "sentence"),
     [
-        (lambda *given: None, "returns nothing yet"),
+        (lambda *given: None, "yours appears here"),
         (lambda *given: np.eye(4), "answers in shape"),
         (lambda *given: 1 / 0, "ZeroDivisionError"),
         (lambda *given: np.full((3, 3), np.nan), "answers NaN everywhere"),
@@ -226,9 +226,62 @@ def test_a_moved_point_asks_the_function_once():
 
 
 def test_panels_are_left_out_and_others_refused():
-    first = STEREO.but(panels="space match")
+    first = STEREO.but(panels="right space match")
     assert "epipole" not in first.figure(draft=True).body
     assert "F, of unit norm" not in first.figure(draft=True).body
     assert "Do they match?" in first.figure(draft=True).body
-    with pytest.raises(ValueError, match="got \\['nonsense'\\]"):
-        EpipolarView(panels="nonsense")
+    with pytest.raises(ValueError, match="got 'right nonsense'"):
+        EpipolarView(panels="right nonsense")
+
+
+def test_the_left_picture_alone_has_no_line_and_nothing_of_the_other_camera():
+    """Its first view: where the point flies is to be seen, and not what the right picture will show."""
+    alone = EpipolarView(panels="space")
+    parts = {tile.name: tile.body for tile in alone.figure(draft=True).tiles}
+    assert list(parts) == ["left picture", "space"]
+    assert 'class="green' not in parts["left picture"]
+    assert "orange" not in parts["space"]
+    assert 'class="green' in EpipolarView(panels="right").figure(draft=True).tiles[0].body
+    assert "= 0" not in alone.description()
+    assert "0.700 m" not in alone.description()
+
+
+@pytest.mark.parametrize("name", EpipolarView.openable)
+def test_each_panel_opens_and_closes_again(name):
+    first = EpipolarView(panels="" if name in ("right", "space") else "right")
+    opened = first.with_panels({name: True})
+    assert opened.figure(draft=True).body != first.figure(draft=True).body
+    assert opened.with_panels({name: False}) == first
+
+
+@pytest.mark.parametrize("count", range(1 << len(EpipolarView.openable)))
+def test_tiles_stand_in_rows_without_overlap_whatever_is_open(count):
+    names = [name for i, name in enumerate(EpipolarView.openable) if count >> i & 1]
+    cells = list(EpipolarView(panels=" ".join(names))._layout.values())
+    assert all(x + width <= 960 for x, _, width, _ in cells)
+    for i, (x, y, width, height) in enumerate(cells):
+        for left, top, wide, high in cells[:i]:
+            assert x >= left + wide or left >= x + width or y >= top + high or top >= y + height
+
+
+def test_the_readers_own_lines_make_the_star_or_another_one():
+    view = FORWARD.but(panels="right", your_lines=twoview.epipolar_lines)
+    right = view.figure(draft=True).body
+    assert right.count("orange") > view.but(your_lines=None).figure(draft=True).body.count("orange")
+    assert view.but(your_lines=lambda F, uv: twoview.epipolar_lines(F.T, uv)).figure(draft=True).body != right
+
+
+@pytest.mark.parametrize(
+    ("function", "sentence"),
+    [
+        (lambda F, uv: None, "yours appears here"),
+        (lambda F, uv: 1 / 0, "ZeroDivisionError"),
+        (lambda F, uv: np.zeros(3), "answers in shape"),
+        (lambda F, uv: np.full((15, 3), np.nan), "answers NaN everywhere"),
+        (lambda F, uv: np.zeros((15, 3)), "The right picture"),
+    ],
+)
+def test_lines_that_are_none_say_why(function, sentence):
+    figure = FORWARD.but(panels="right", your_lines=function).figure(draft=True)
+    assert sentence in words(figure.body)
+    assert not re.search(r"\bnan\b", figure.body)

@@ -106,6 +106,26 @@ def test_a_turn_of_twenty_degrees_moves_every_point_out_of_a_small_disc(says):
     assert min(moved) > 100
 
 
+def test_the_first_point_flies_away_and_the_picture_stays():
+    """As the lesson's first sentences say; the header is held below."""
+    near, far = (EpipolarView(panels="space", depth=depth) for depth in (0.4, 12.0))
+    parts = [{tile.name: tile.body for tile in view.figure(draft=True).tiles} for view in (near, far)]
+    assert parts[0]["left picture"] == parts[1]["left picture"]
+    assert parts[0]["space"] != parts[1]["space"]
+
+
+def test_the_depths_of_the_first_view_and_the_second_camera(says):
+    near, far = says("the point flies along its ray, from 0.4 m away to 12 m")
+    depth = EpipolarView.controls()["depth"]
+    assert (near.value, far.value) == (depth.low, depth.high)
+    (beside,) = says("It stands 0.7 m to the right of the first one and is turned a little to the left.")
+    view = EpipolarView()
+    x, y, z = view.left.cam_from_world.apply(view.right.centre)
+    assert beside == x
+    assert abs(y) + abs(z) < 1e-9
+    assert -20 < np.degrees((view.left.cam_from_world * view.right.world_from_cam).rotation.as_rotvec()[1]) < 0
+
+
 # 2: one camera in front of the other ---------------------------------------------------------------------------------
 
 
@@ -200,6 +220,30 @@ def test_E_has_two_equal_singular_values_and_five_numbers(says):
     np.testing.assert_allclose(s[:2], np.linalg.norm(at[3:]))
 
 
+def test_the_product_is_zero_at_every_depth(says):
+    says("It is zero at every depth, also at the four where the pictures look alike.")
+    F = true_F(EpipolarView())
+    F = F / np.linalg.norm(F)
+    for depth in (0.4, 2.2, 2.92, 4.2, 7.2, 12.0):
+        view = EpipolarView(depth=depth, panels="right match numbers")
+        assert abs(np.append(view.uv_right, 1) @ F @ (view.u, view.v, 1)) < 1e-9
+        assert view.numbers()["xᵀFx"] == "0.000"
+
+
+def test_fifteen_lines_make_the_star(says):
+    says("Fifteen left pixels are marked, and your lines of them make the star")
+    asked = []
+
+    def lines(F, uv):
+        asked.append((F, uv))
+        return homogeneous(uv) @ F.T
+
+    EpipolarView(right_x=0.15, right_z=0.9, yaw=0.0, your_lines=lines).figure(draft=True)
+    ((F, uv),) = asked
+    assert len(uv) == 15
+    np.testing.assert_allclose(homogeneous(uv) @ F.T @ np.append(_right_epipole(F), 1), 0, atol=1e-9)
+
+
 def test_F_has_rank_two_and_what_zero_means(says):
     (rank,) = says("F has rank 2")
     F = true_F(EpipolarView(roll=5.0, right_z=0.2))
@@ -238,7 +282,6 @@ def test_normalising_pays_the_more_the_more_pairs_there_are(says):
         by_matches[matches.value] = better(matches.value, rng)
         assert ratio.about(by_matches[matches.value], 0.1)
     says("With twenty pairs its lines are typically less than half as far off, with a hundred less than a third.")
-    says("| with noise it does: the lines are less than half as far off |")
     assert by_matches[20] > 2
     assert by_matches[100] > 3
     assert better(few[0].value, rng) == pytest.approx(1, abs=0.1)
@@ -278,6 +321,20 @@ def test_the_loss_comes_from_the_noise_and_not_from_rounding(says):
     digits = [np.linalg.svd(np.float32(A))[2][-1], np.linalg.svd(A)[2][-1]]
     lines = [np.abs(off_their_lines(F.astype(float).reshape(3, 3), *exact)).mean() for F in digits]
     assert lines[0] == pytest.approx(lines[1], rel=0.05)  # seven digits more change next to nothing
+
+
+def test_the_sampson_distance_has_no_scale_and_is_that_of_the_nearest_pair(says):
+    says("It must not change if F is multiplied by any number.")
+    says("how far the two pixels must move, together and to first order, until they satisfy F")
+    F, left, right = true_F(EpipolarView(roll=10.0, right_z=0.3)), np.array([300.0, 200]), np.array([250.0, 212])
+    first = np.sqrt(cv2.sampsonDistance(np.append(left, 1), np.append(right, 1), F))
+    assert np.sqrt(cv2.sampsonDistance(np.append(left, 1), np.append(right, 1), -7 * F)) == pytest.approx(first)
+
+    def off(moved):  # whatever the left pixel becomes, the right one goes to its line
+        a, b, c = F @ np.append(left + moved, 1)
+        return np.append(moved, (a * right[0] + b * right[1] + c) / np.hypot(a, b))
+
+    assert np.linalg.norm(least_squares(off, np.zeros(2)).fun) == pytest.approx(first, rel=0.01)
 
 
 def test_one_mistake_of_a_hundred_pixels(says):
@@ -320,6 +377,21 @@ def test_W_and_the_four_motions(says):
     between = Rotation.from_matrix(R1 @ R2.T)
     assert between.magnitude() == pytest.approx(np.pi)
     np.testing.assert_allclose(np.abs(between.as_rotvec()) / np.pi, np.abs(t) / np.linalg.norm(t), atol=1e-6)
+
+
+def test_five_pairs_leave_a_few_E(says):
+    says(
+        "E has five free numbers: three of rotation, two of the direction of t. So with known K five pairs are enough."
+    )
+    says("The *five-point algorithm* (Nistér 2004) finds the few E that fit five pairs exactly.")
+    R, t = Rotation.from_rotvec((0.1, -0.2, 0.05)).as_matrix(), np.array([-0.7, 0.1, 0.2])
+    points = np.random.default_rng(9).uniform([-2, -1, 3], [2, 1, 8], (5, 3))
+    left, right = (p[:, :2] / p[:, 2:] for p in (points, points @ R.T + t))
+    found = cv2.findEssentialMat(left, right, np.eye(3), cv2.RANSAC, 0.999, 1e-6)[0].reshape(-1, 3, 3)
+    assert 1 <= len(found) <= 10
+    true = cross_matrix(t) @ R / np.linalg.norm(t) / np.sqrt(2)
+    found = [E / np.linalg.norm(E) for E in found]
+    assert min(np.abs(E - sign * true).max() for E in found for sign in (1, -1)) < 1e-6
 
 
 def test_two_rays_by_hand(says):
@@ -486,6 +558,8 @@ def test_where_the_second_camera_stands(says, rig):
     grid = (points[:3] / points[3]).T.reshape(-1, 6, 9, 3)
     side = np.median(np.linalg.norm(np.diff(grid, axis=2), axis=-1))
     assert apart == 100 * 0.025 / side
+    (again,) = says("Section 4 found a baseline of 8.3 cm.")
+    assert again == apart.value
     centre = -R.T @ t.ravel()
     assert centre[0] > 0.99
     assert np.degrees(Rotation.from_matrix(R).magnitude()) == pytest.approx(0.5, abs=0.05)
@@ -533,6 +607,13 @@ def test_bundle_adjustment_of_the_real_pair(says, rig):
         [BOARD] * 13, seen_left, seen_right, K_left, d_left, K_right, d_right, (640, 480), flags=cv2.CALIB_FIX_INTRINSIC
     )
     assert t_stereo == (result[6] / np.linalg.norm(result[6]))[2, 0]
+
+
+def test_the_real_lines_are_nearly_rows(says, rig):
+    says("The lines are nearly rows, because the two cameras stand side by side and look almost the same way.")
+    left, right = rig["left"][3], rig["right"][3]
+    lines = homogeneous(left) @ eight_point(left, right).T
+    assert np.abs(lines[:, 0] / lines[:, 1]).max() < 0.05
 
 
 def test_one_board_is_not_enough(says, rig):

@@ -34,7 +34,7 @@ PICTURES = {
     "distortion": DistortionView(k1=-0.28, k2=0.07),
     "fold": DistortionView.of(PUBLISHED),
     "calibration": CalibrationView(tilt=2.0, picked=3, panels="picture fit"),
-    "epipolar": EpipolarView(),
+    "epipolar": EpipolarView(right_x=0.15, right_z=0.9, yaw=0.0, depth=3.0, panels="right epipoles"),
     "rectification": RectificationView(),
     "colour": ColourView(),
     "demosaicing": DemosaicingView(),

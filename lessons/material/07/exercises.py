@@ -1,4 +1,4 @@
-"""Lesson 07, epipolar geometry: F from two cameras, lines and epipoles, the eight-point algorithm, cheirality.
+"""Lesson 07, epipolar geometry: F from two cameras, lines and epipoles, the eight-point algorithm, cheirality, errors.
 
 x_rightᵀ F x_left = 0, right_from_left = [R | t]. After Hartley & Zisserman (2004), chapters 9 and 11.
 """
@@ -743,4 +743,111 @@ def rays_that_look_forward(R, t, rays_left, rays_right):
     return (rays_left[:, 2] > 0) & (rays_right[:, 2] > 0)
 
 
-EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, IN_FRONT)
+# 6: the Sampson distance ---------------------------------------------------------------------------------------------
+
+
+def sampson(F: Array, uv_left: Array, uv_right: Array) -> Array:
+    """Distances (n,) in pixels, to first order, of pairs (n, 2) from what F demands (H&Z, section 11.4.3)."""
+    product, gradient = _product_and_gradient(F, uv_left, uv_right)
+    return np.asarray(np.abs(product) / np.linalg.norm(gradient, axis=1))
+
+
+def _product_and_gradient(F: Array, uv_left: Array, uv_right: Array) -> tuple[Array, Array]:
+    """xᵀFx (n,) and its derivatives by the right pixel and by the left one (n, 4)."""
+    left, right = _homogeneous(uv_left), _homogeneous(uv_right)
+    line_right, line_left = left @ F.T, right @ F
+    return np.sum(right * line_right, axis=1), np.hstack([line_right[:, :2], line_left[:, :2]])
+
+
+def _sampson_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Pairs up to some pixels off, with F of several scales and signs, one pair alone, and pixels on all sides of 0."""
+    for n, scale in ((12, 1.0), (30, -250.0), (1, 1e-3)):
+        left, right = _pairs(rng, n)
+        F = eight_point(*_pairs(rng, 20))
+        yield scale * F, left + rng.normal(0, 3, left.shape), right + rng.normal(0, 3, right.shape)
+    yield _F(rng), rng.uniform(-400, 400, (8, 2)), rng.uniform(-400, 400, (8, 2))
+
+
+SAMPSON = Exercise(
+    name="07.sampson",
+    reference=sampson,
+    cases=_sampson_cases,
+    tolerance=1e-6,
+    hints=(
+        "F x_left is the line in the right picture. Which line in the left picture belongs to x_right?",
+        "Below the root stand the squares of four numbers: the first two of F x_left, and the first two of Fᵀ x_right. "
+        "For pixels in rows the lines are `x_left @ F.T` and `x_right @ F`.",
+        "`return np.abs(___) / np.linalg.norm(np.hstack([line_right[:, :2], ___]), axis=1)`",
+    ),
+    praise="It is OpenCV's and camviz's distance, in pixels, whatever the scale of F.",
+)
+
+
+@SAMPSON.right
+def as_camviz_measures_it(F, uv_left, uv_right):
+    from camviz import twoview
+
+    return twoview.sampson_distance(F, uv_left, uv_right)
+
+
+@SAMPSON.right
+def pair_by_pair_by_opencv(F, uv_left, uv_right):
+    import cv2
+
+    pairs = zip(_homogeneous(uv_left), _homogeneous(uv_right), strict=True)
+    return [np.sqrt(cv2.sampsonDistance(left, right, F)) for left, right in pairs]
+
+
+@SAMPSON.wrong("This is xᵀFx itself, which has the scale of F. Divide it by the gradient.")
+def product_alone(F, uv_left, uv_right):
+    return np.abs(_product_and_gradient(F, uv_left, uv_right)[0])
+
+
+@SAMPSON.wrong("This is the square of the distance, in pixels². OpenCV returns that; here the root is wanted.")
+def squared(F, uv_left, uv_right):
+    return sampson(F, uv_left, uv_right) ** 2
+
+
+@SAMPSON.wrong("A distance is not negative: take the absolute value of xᵀFx.")
+def with_a_sign(F, uv_left, uv_right):
+    product, gradient = _product_and_gradient(F, uv_left, uv_right)
+    return product / np.linalg.norm(gradient, axis=1)
+
+
+@SAMPSON.wrong(
+    "You divide by the right line alone: that is the distance in the right picture, where only one pixel moves."
+)
+def right_line_alone(F, uv_left, uv_right):
+    product, gradient = _product_and_gradient(F, uv_left, uv_right)
+    return np.abs(product) / np.linalg.norm(gradient[:, :2], axis=1)
+
+
+@SAMPSON.wrong(
+    "You divide by the left line alone: that is the distance in the left picture, where only one pixel moves."
+)
+def left_line_alone(F, uv_left, uv_right):
+    product, gradient = _product_and_gradient(F, uv_left, uv_right)
+    return np.abs(product) / np.linalg.norm(gradient[:, 2:], axis=1)
+
+
+@SAMPSON.wrong(
+    "Only the first *two* numbers of each line belong below the root: the third is not a direction in the picture."
+)
+def all_three_numbers(F, uv_left, uv_right):
+    left, right = _homogeneous(uv_left), _homogeneous(uv_right)
+    product, _ = _product_and_gradient(F, uv_left, uv_right)
+    return np.abs(product) / np.linalg.norm(np.hstack([left @ F.T, right @ F]), axis=1)
+
+
+@SAMPSON.wrong("The root is missing below: divide by the root of the sum of four squares.")
+def without_the_root(F, uv_left, uv_right):
+    product, gradient = _product_and_gradient(F, uv_left, uv_right)
+    return np.abs(product) / np.sum(gradient**2, axis=1)
+
+
+@SAMPSON.wrong("This is for Fᵀ, that is, for pictures that have changed places: x_right stands on the left of F.")
+def pictures_swapped(F, uv_left, uv_right):
+    return sampson(F.T, uv_left, uv_right)
+
+
+EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, IN_FRONT, SAMPSON)
