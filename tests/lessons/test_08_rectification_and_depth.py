@@ -175,7 +175,7 @@ def test_the_globe_hides_the_partner_of_what_the_strip_shows(says, garden):
     assert np.abs(wall - 16.25).max() < 0.2
     there = garden["f"] * garden["B"] / looked_at(garden, uv - [16.25, 0], "right")
     assert np.abs(there[:14] - 16.25).max() < 0.2  # at first the wall, in both pictures
-    assert there[18:].min() > 30  # then the globe
+    assert there[19:].min() > 30  # then the globe
     hatched = np.isnan(RectificationView().disparity_map()[206, 300:332])
     assert not hatched[:14].any()
     assert hatched[18:].all()
@@ -269,7 +269,7 @@ def test_the_sliders_of_the_error(says):
     gaps = fB / np.array([1.0, two.value]) - fB / np.array([two.value, three.value])
     says("Farther away the gaps grow.")
     assert gaps[0] > gaps[1]
-    says("the far side of the wedge never meets the ray. The point may be infinitely far away.")
+    says("the far side of the wedge never meets the ray: the point may be infinitely far away.")
     assert twoview.depth_interval(fB / 1, 800, 0.1, 1.0)[1] == np.inf
     says("Double the baseline, and the disparity with it, so that the depth stays: half the error.")
     assert 10**2 / (2 * fB) == 10**2 / fB / 2
