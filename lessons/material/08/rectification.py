@@ -38,7 +38,7 @@ _TILES = {  # of the panels
     "wedge": "rays from above",
 }
 # The first row: its height, and how wide its tiles are, by how many panels stand in it.
-_FIRST = {1: (350.0, (440.0,)), 2: (392.0, (480.0, 480.0)), 3: (314.0, (385.0, 385.0, 190.0))}
+_FIRST = {1: (330.0, (440.0,)), 2: (392.0, (480.0, 480.0)), 3: (314.0, (385.0, 385.0, 190.0))}
 _FINEST = 400  # pixels of a map's width: no finer than a screen shows it, which keeps a saved notebook light
 _ROWS = 12  # epipolar lines in a picture's height
 
@@ -121,10 +121,10 @@ class RectificationView(TurningPair):
         if not np.isfinite(uv).all():
             return self
         size = rectified.intrinsics
-        if handle == "left":
-            column, row = np.clip(uv, 0, (size.width - 1, size.height - 1)).tolist()
-            return self.but(column=column, row=row)
-        return self.but(disparity=float(np.clip(self.column - uv[0], 0.25, size.width)))
+        if handle == "right":
+            return self.but(disparity=float(np.clip(self.column - uv[0], 0.25, size.width)))
+        column, row = np.clip(uv, 0, (size.width - 1, size.height - 1)).tolist()
+        return self.but(column=column, row=row)
 
     # The picture -----------------------------------------------------------------------------------------------------
 
@@ -143,9 +143,8 @@ class RectificationView(TurningPair):
         if self._has("wedge"):
             drawn["wedge"] = self._wedge_panel()
         attached = {name: data for name, data in attached.items() if name.split()[0] in shown}
-        return self.tiled(
-            self._layout, {_TILES[one]: drawn[one] for one in shown}, attached, self.description(draft=draft)
-        )
+        words = self.description(draft=draft)
+        return self.tiled(self._layout, {_TILES[one]: drawn[one] for one in shown}, attached, words)
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
@@ -176,7 +175,7 @@ class RectificationView(TurningPair):
         ])  # fmt: skip
         action = "move the mark" if name == "left" else "change the disparity"
         label = f"The {name} picture; drag or press the arrow keys to {action}"
-        title = f"The {name} picture" + (f": rows differ by {self.rows_apart():.1f} px" if name == "right" else "")
+        title = "Left picture" if name == "left" else f"Right picture: rows differ by {self.rows_apart():.1f} px"
         return panel.show(content, title=title, hint="drag", drag=name, label=label)
 
     def _epipolar(self, panel: Panel, now: Camera, rows: Array) -> Array:
@@ -207,8 +206,8 @@ class RectificationView(TurningPair):
         """Colours, title, limits and unit of the second map."""
         if self.show == "error":
             return "error", "Error", 0.0, 4.0, "px"
-        low, high = stereo_pair.depth_limits(self.source)
-        return "depth", "Depth" if self.show == "depth" else "True depth", low, high, "m"
+        title = "Depth" if self.show == "depth" else "True depth"
+        return "depth", title, *stereo_pair.depth_limits(self.source), "m"
 
     def _map(self, name: str, *limits: Any, **heading: str) -> str:
         """The map that is attached by that name, where it is shown, and below it what the hatching means."""
