@@ -39,7 +39,6 @@ _TILES = {  # of the panels
 }
 # The first row: its height, and how wide its tiles are, by how many panels stand in it.
 _FIRST = {1: (330.0, (440.0,)), 2: (392.0, (480.0, 480.0)), 3: (314.0, (385.0, 385.0, 190.0))}
-_FINEST = 400  # pixels of a map's width: no finer than a screen shows it, which keeps a saved notebook light
 _ROWS = 12  # epipolar lines in a picture's height
 
 
@@ -292,8 +291,8 @@ def _maps(
 
 
 def _small(values: np.ndarray) -> np.ndarray:
-    """A map no finer than a screen shows it."""
-    scale = min(1.0, _FINEST / values.shape[1])
+    """A map no finer than a screen shows it, which keeps a saved notebook light."""
+    scale = min(1.0, 400 / values.shape[1])
     return cv2.resize(values, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
 
 
