@@ -208,14 +208,14 @@ class RectificationView(TurningPair):
         title = "Depth" if self.show == "depth" else "True depth"
         return "depth", title, *stereo_pair.depth_limits(self.source), "m"
 
-    def _map(self, name: str, *limits: Any, **heading: str) -> str:
+    def _map(self, name: str, low: float, high: float, unit: str, **heading: str) -> str:
         """The map that is attached by that name, where it is shown, and below it what the hatching means."""
         if not self._has(name):
             return ""
         panel, size = self._image_panel(name), self.stage.left.intrinsics
         mark = ring(panel.place(self.uv_left), "red", 5) if {"left", "right"} & set(self._panels.split()) else ""
         hatched = svg.text((panel.x, panel.y + panel.height + 18), "hatched: nothing found", "note")
-        return heat_panel(panel, size.width, size.height, *limits, mark, **heading) + hatched
+        return heat_panel(panel, size.width, size.height, low, high, unit, mark, **heading) + hatched
 
     def _heat_maps(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
         """The maps that are shown, by name, and what is attached to them."""
