@@ -113,8 +113,8 @@ class RectificationView(TurningPair):
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> RectificationView:
         if handle not in ("left", "right"):
             return self
-        panel, pair = self._image_panel(handle), self.stage.pair
-        here, now, rectified = (getattr(self, f"uv_{handle}"), getattr(self.stage, handle), getattr(pair, handle))
+        panel, here, now = self._image_panel(handle), getattr(self, f"uv_{handle}"), getattr(self.stage, handle)
+        rectified = getattr(self.stage.pair, handle)
         at = panel.place(here) + (panel.x + dx, panel.y + dy) if np.isnan(x) else np.array([x, y])
         uv = seen_from_there(rectified, now, panel.data(at - (panel.x, panel.y)))
         if not np.isfinite(uv).all():
@@ -246,7 +246,8 @@ class RectificationView(TurningPair):
             panel = self._image_panel("second")
             if is_unwritten(problem):
                 depth, middle = right, (panel.x + panel.width / 2, panel.y + panel.height / 2)
-                own = svg.group(own, class_="awaited") + svg.text(middle, YOURS_HERE, "title halo middle")
+                own = own.replace("<image ", '<image class="awaited" ', 1)  # words that are greyed cannot be read
+                own += svg.text(middle, YOURS_HERE, "title halo middle")
             elif problem:
                 own += svg.paragraph((panel.x + 12, panel.y + 26), problem, panel.width - 24, "note halo")
             elif np.isfinite(self._at_mark(depth)):
