@@ -14,13 +14,16 @@ from dataclasses import dataclass
 from importlib.resources import as_file, files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.lenses.base import unit
+from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform
+
+if TYPE_CHECKING:
+    from camviz.cameras import Camera
 
 BASE_URL = "https://raw.githubusercontent.com/opencv/opencv/4.6.0/samples/data/"
 TIMEOUT_S = 5
@@ -215,6 +218,24 @@ class StereoSample:
     doffs: float
     real: bool
     sentence: str
+
+    @property
+    def cameras(self) -> tuple[Camera, Camera]:
+        """The left camera, its principal point in the middle of the picture, and the right one beside it."""
+        from camviz.cameras import Camera, Intrinsics
+
+        height, width = self.disparity.shape
+        f, cx, cy = self.focal_length, (width - 1) / 2, (height - 1) / 2
+        beside = RigidTransform.from_translation([self.baseline, 0, 0])
+        right = Intrinsics(width, height, f, f, cx + self.doffs, cy)
+        return Camera(Intrinsics(width, height, f, f, cx, cy)), Camera(right, world_from_cam=beside)
+
+    @property
+    def depth(self) -> Array:
+        """The true Z (height, width) in metres, NaN where it is unknown."""
+        from camviz.twoview import depth_from_disparity
+
+        return depth_from_disparity(self.disparity, self.focal_length, self.baseline, self.doffs)
 
 
 def motorcycle(width: int = 741) -> StereoSample:

@@ -134,6 +134,19 @@ def test_the_motorcycle_s_true_disparities_lead_from_one_picture_to_the_other(wi
     assert pair.focal_length == pytest.approx(994.978 * width / 741)
 
 
+def test_the_motorcycle_s_cameras_see_its_true_depths_in_both_pictures():
+    """Projected into the right camera, a pixel's point lands where the published disparity has its partner."""
+    pair = motorcycle(240)
+    left, right = pair.cameras
+    uv = left.intrinsics.grid()[20:140:10, 60:220:10]
+    Z, d = (one[20:140:10, 60:220:10] for one in (pair.depth, pair.disparity))
+    x = (uv - (119.5, (pair.disparity.shape[0] - 1) / 2)) / pair.focal_length
+    seen = right.project(np.concatenate([x, np.ones_like(x[..., :1])], axis=-1) * Z[..., None])
+    known = np.isfinite(d)
+    assert known.sum() > 100
+    np.testing.assert_allclose((uv - seen)[known], np.stack([d, 0 * d], axis=-1)[known], atol=1e-3)
+
+
 def test_where_scikit_image_lacks_the_motorcycle_the_garden_takes_its_place(tmp_path, monkeypatch):
     monkeypatch.setattr(samples, "files", lambda _: tmp_path)
     pair = motorcycle(240)

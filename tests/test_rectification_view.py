@@ -225,10 +225,10 @@ def test_a_map_shows_numbers_in_colours_and_nothing_where_there_is_none():
 def test_dragging_moves_the_marks_along_with_the_turning_pictures(way):
     view = VIEW.but(rectify=way)
     target = view.but(column=300.0, row=120.0)
-    moved = view.dragged("left", *centre_of(view._left_panel, target.uv_left), 1, 1)
+    moved = view.dragged("left", *centre_of(view._image_panel("left"), target.uv_left), 1, 1)
     assert (moved.column, moved.row) == pytest.approx((300, 120), abs=1e-6)
     target = view.but(disparity=33.0)
-    moved = view.dragged("right", *centre_of(view._right_panel, target.uv_right), 1, 1)
+    moved = view.dragged("right", *centre_of(view._image_panel("right"), target.uv_right), 1, 1)
     assert (moved.disparity, moved.column, moved.row) == pytest.approx((33.0, view.column, view.row), abs=1e-6)
 
 
@@ -314,16 +314,57 @@ def test_the_readers_depth_colours_the_second_map():
     assert wrong["disparity"] == pictures["disparity"]
 
 
-def test_a_function_without_a_depth_leaves_the_map_empty_and_says_why():
-    picture = RectificationView(yours=lambda d, f, B, doffs: None).figure(draft=True)
-    assert "returns nothing yet" in picture.body
+def test_the_right_depths_stand_greyed_where_a_reader_s_own_will_be():
+    view = RectificationView(panels="disparity second", yours=lambda d, f, B, doffs: None)
+    picture = view.figure(draft=True)
+    assert "yours appears here" in picture.body
+    assert 'class="awaited"' in picture.body
+    assert picture.photographs["second"] == picture.photographs["disparity"]
+
+
+def test_a_function_that_stops_leaves_the_map_empty_and_says_why():
+    picture = RectificationView(panels="second", yours=lambda d, f, B, doffs: 1 / 0).figure(draft=True)
+    assert "ZeroDivisionError" in picture.body
+    assert "yours appears here" not in picture.body
     image = cv2.imdecode(np.frombuffer(picture.photographs["second"], np.uint8), cv2.IMREAD_UNCHANGED)
     assert (image[..., 3] == 0).all()
 
 
-def test_the_first_view_leaves_out_depths():
-    picture = RectificationView(panels="disparity", worth=False).figure(draft=True)
-    assert "Z =" not in picture.body + picture.description
-    assert "second" not in picture.photographs
-    with pytest.raises(ValueError, match="got \\['nonsense'\\]"):
-        RectificationView(panels="nonsense")
+def test_the_first_view_is_one_map_of_depths_and_says_nothing_more():
+    picture = RectificationView(rectify=0.0, panels="second").figure(draft=True)
+    assert list(picture.photographs) == ["second", "second key"]
+    assert [tile.name for tile in picture.tiles] == ["second map"]
+    for later in ("Z =", "px", "isparity", "drag"):
+        assert later not in re.sub(r'data-[a-z]+="[^"]*"', "", picture.body)
+    assert picture.description == "The pair as taken. Matched by SGM, blocks of 7 px, 64 disparities."
+
+
+def test_a_view_of_the_pictures_alone_matches_nothing():
+    before = stereo_pair.disparities.cache_info()
+    RectificationView(rectify=0.123, panels="left right").figure(draft=True)
+    assert stereo_pair.disparities.cache_info() == before
+
+
+@pytest.mark.parametrize("panels", ["", "nonsense", "left middle"])
+def test_panels_that_there_are_not_are_refused(panels):
+    with pytest.raises(ValueError, match="panels must be some of left, right, numbers"):
+        RectificationView(panels=panels)
+
+
+@pytest.mark.parametrize("name", RectificationView.openable)
+def test_each_panel_opens_beside_the_first_and_closes_again(name):
+    first = RectificationView(panels="right" if name == "left" else "left")
+    opened = first.with_panels({name: True})
+    assert len(opened.figure(draft=True).tiles) == 2
+    assert opened.with_panels({name: False}) == first
+
+
+def test_tiles_stand_in_rows_without_overlap_however_many_are_open():
+    panels = ""
+    for name in RectificationView.openable:
+        panels += f" {name}"
+        cells = list(RectificationView(panels=panels)._layout.values())
+        assert all(x + width <= 960.5 for x, _, width, _ in cells)
+        for one, (left, top, width, height) in enumerate(cells):
+            for other, (x, y, *_) in enumerate(cells):
+                assert one == other or not (left <= x < left + width and top <= y < top + height)

@@ -24,7 +24,7 @@ DRAWN_BY = {  # what a heading may speak of, and the panels that draw it, or wor
     r"contours?": "displacements",
     r"[Cc]urves?": "radial curve|curves?|section|towards the corner|right picture|Plot",
     r"[Dd]isparities|maps?": "disparity map|second map|depth|map",
-    r"tooth": "wedge",
+    r"tooth": "rays from above",
     r"[Bb]ars?": "bars|errors|estimates?|electrons|Plot",
     r"Airy disc": "blur",
     r"σ": "estimate ± σ|Plot",

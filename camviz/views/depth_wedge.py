@@ -46,9 +46,7 @@ def wedge_panel(
         + svg.dots(panel.place([(Z, 0)]), "red", 8)
         + svg.dots(panel.place([(0, 0), (0, B)]), "ink", 9)
         + svg.text(panel.place((0, B)) + (9, -6), "right camera", "orange halo")
-        + svg.text(
-            (panel.width - 8, panel.place((0, 0))[1] + (-7 if worth else 18)), "the left camera’s ray", "blue halo end"
-        )
+        + svg.text(panel.place((0, 0)) + (9, -7), "the left camera’s ray", "blue halo")
         + svg.text((panel.width - 8, 16), notes[0], "note end halo")
     )
     title = "What a disparity is worth" if worth else "Where the two rays meet"

@@ -40,7 +40,7 @@ DEPTH = Exercise(
     reference=depth,
     cases=_depth_cases,
     hints=(
-        "Part 5 ends with the formula for principal points that differ. Which disparity has a point at infinity there, "
+        "Section 2 has the formula for principal points that differ. Which disparity has a point at infinity there, "
         "and which disparities has no point in front of the cameras?",
         "Two cases need care. Where d + doffs is 0 the answer is infinity, and where it is below 0 the answer is NaN. "
         "`np.where(condition, a, b)` chooses point by point, and `with np.errstate(divide='ignore'):` lets NumPy write "
@@ -192,7 +192,7 @@ BASELINE = Exercise(
     cases=_baseline_cases,
     shown=((50.0, 0.1, 1500.0, 0.25),),
     hints=(
-        "Part 5 has an equation for the error ΔZ that an error Δd of the disparity makes. Which of its letters are "
+        "Section 3 has an equation for the error ΔZ that an error Δd of the disparity makes. Which of its letters are "
         "given here, and which one is wanted?",
         "ΔZ ≈ Z² Δd / (f B): `error` is ΔZ and `disparity_error` is Δd. Multiply by B and divide by ΔZ. It works on "
         "arrays as it stands.",
@@ -334,7 +334,7 @@ RECTIFIED = Exercise(
     tolerance=1e-8,
     hints=(
         "Three steps: a pixel becomes a ray, the ray is turned, and the turned ray becomes a pixel of the new camera. "
-        "Which matrix does each of them? Part 1 has them in one line.",
+        "Which matrix does each of them? Section 1 has them in one line.",
         "Append a 1 to each pixel. Pixels stand in rows, and there a matrix M acts as `x @ M.T`. `np.linalg.inv` "
         "inverts K. Divide by the third number in the end; where it is not positive the answer is NaN.",
         "`x = x @ (___ @ R @ ___).T`",

@@ -5,9 +5,9 @@ A reader's own function can make the depths beside the right ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import cv2
@@ -15,25 +15,30 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.flow import rows
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.flow import Cell, rows
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
+from camviz.views.base import answered
 from camviz.views.depth_wedge import metres, wedge_panel
 from camviz.views.marks import clipped, on_photograph, ring
-from camviz.views.yours import tried
+from camviz.views.yours import YOURS_HERE, is_unwritten
 from camviz_school.views import stereo_pair
 from camviz_school.views.stereo_pair import WRONG, Source, seen_from_there
 from camviz_school.views.turning_pair import TurningPair
 
-_WIDTH, _TALLEST = 365, 274
-_MAP_WIDTH, _MAP_TALLEST = 248, 186
-_LAYOUT = rows(
-    (314, {"left picture": 385, "right picture": 385, "numbers": 190}),
-    (284, {"disparity map": 320, "second map": 320, "wedge": 320}),
-)
+_TILES = {  # of the panels
+    "left": "left picture",
+    "right": "right picture",
+    "numbers": "numbers",
+    "disparity": "disparity map",
+    "second": "second map",
+    "wedge": "rays from above",
+}
+# The first row: its height, and how wide its tiles are, by how many panels stand in it.
+_FIRST = {1: (330.0, (440.0,)), 2: (392.0, (480.0, 480.0)), 3: (314.0, (385.0, 385.0, 190.0))}
 _ROWS = 12  # epipolar lines in a picture's height
 
 
@@ -41,24 +46,21 @@ _ROWS = 12  # epipolar lines in a picture's height
 class RectificationView(TurningPair):
     """A pair from as it was taken to rectified, drawn: both pictures, the disparities, the depths and the wedge.
 
-    `panels` names what stands below the two pictures: the disparity map, the second map, and the wedge with its depth.
+    `panels` names what is drawn: any of left, right, numbers, disparity, second (map) and wedge, the rays from above.
     `yours` is a reader's function of (d, f, B, doffs) that gives Z; then the first map shows the right depths, and the
     second those of that function.
     """
 
     title: ClassVar[str] = "Rectification, disparity and depth"
+    openable: ClassVar[Mapping[str, str]] = _TILES
 
-    panels: str = "disparity second wedge"
+    panels: str = " ".join(_TILES)
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self._shown <= {"disparity", "second", "wedge"}:
-            raise ValueError(f"panels must be some of disparity, second, wedge, got {sorted(self._shown)}")
-
-    @property
-    def _shown(self) -> set[str]:
-        return set(self.panels.split())
+        if not self._panels.split() or not set(self._panels.split()) <= _TILES.keys():
+            raise ValueError(f"panels must be some of {', '.join(_TILES)}, got {self.panels!r}")
 
     # Words -----------------------------------------------------------------------------------------------------------
 
@@ -70,12 +72,12 @@ class RectificationView(TurningPair):
         second = true_minus(f"{now.doffs:.1f} px") if shifted else f"{now.pair.baseline:.3f} m"
         figures = {"f, doffs" if shifted else "f, B": f"{f:.0f} px, {second}"}
         figures["rows differ by"] = f"{self.rows_apart():.1f} px"
-        if "wedge" in self._shown:
+        if self._has("wedge"):
             figures["chosen, rectified"] = self._in_words(self.disparity, self.depth())
             figures["measured at the mark"] = self._with_depth(self._at_mark(found))
         if not score.compared:
             return {**figures, "no disparity": f"{100 * np.isnan(found).mean():.0f} % of the pixels"}
-        if "wedge" in self._shown:
+        if self._has("wedge"):
             figures["true at the mark"] = self._with_depth(self._at_mark(self.true_disparity_map(draft=draft)))
         return {
             **figures,
@@ -92,83 +94,88 @@ class RectificationView(TurningPair):
     def _in_words(disparity: float, depth: float) -> str:
         return true_minus(f"{disparity:.1f} px: {metres(depth)}")
 
-    def description(self) -> str:
-        return self._described(self.numbers())
-
-    def _described(self, numbers: dict[str, str]) -> str:
+    def description(self, *, draft: bool = False) -> str:
+        """What the panels that are drawn say, and no more."""
         way = "rectified" if self.rectify == 1 else f"{100 * self.rectify:.0f} % of the way to rectified"
-        way = way if self.rectify else "as taken"
-        figures = listed(numbers)
-        matched = f"{self.method}, blocks of {self.block_size:g} px, {self.disparities:g} disparities"
-        said = f"The pair {way}. {figures}. Matched by {matched}."
-        if "wedge" not in self._shown:
-            return said
-        return f"{said} {self.equation()}; {self.interval()}." if self.worth else f"{said} {self.equation()}."
+        said = f"The pair {way if self.rectify else 'as taken'}."
+        if self._has("numbers"):
+            said += f" {listed(self.numbers(draft=draft))}."
+        elif self._has("left") or self._has("right"):
+            said += f" Rows differ by {self.rows_apart():.1f} px."
+        if self._has("disparity") or self._has("second"):
+            said += f" Matched by {self.method}, blocks of {self.block_size:g} px, {self.disparities:g} disparities."
+        if self._has("wedge"):
+            said += f" {self.equation()}; {self.interval()}." if self.worth else f" {self.equation()}."
+        return said
 
     # Hands -----------------------------------------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> RectificationView:
-        panel = {"left": self._left_panel, "right": self._right_panel}.get(handle)
-        if panel is None:
+        if handle not in ("left", "right"):
             return self
-        pair = self.stage.pair
-        here, now, rectified = self.uv_right, self.stage.right, pair.right
-        if handle == "left":
-            here, now, rectified = self.uv_left, self.stage.left, pair.left
+        panel, here, now = self._image_panel(handle), getattr(self, f"uv_{handle}"), getattr(self.stage, handle)
+        rectified = getattr(self.stage.pair, handle)
         at = panel.place(here) + (panel.x + dx, panel.y + dy) if np.isnan(x) else np.array([x, y])
         uv = seen_from_there(rectified, now, panel.data(at - (panel.x, panel.y)))
         if not np.isfinite(uv).all():
             return self
         size = rectified.intrinsics
-        if handle == "left":
-            column, row = np.clip(uv, 0, (size.width - 1, size.height - 1)).tolist()
-            return self.but(column=column, row=row)
-        return self.but(disparity=float(np.clip(self.column - uv[0], 0.25, size.width)))
+        if handle == "right":
+            return self.but(disparity=float(np.clip(self.column - uv[0], 0.25, size.width)))
+        column, row = np.clip(uv, 0, (size.width - 1, size.height - 1)).tolist()
+        return self.but(column=column, row=row)
 
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        numbers = self.numbers(draft=draft)
-        left, right = _photographs(*self._key(draft))
-        attached = {"left": left, "right": right}
-        maps, more = self._heat_maps() if self.yours is None else self._your_maps(draft)
-        if self.yours is None:
-            more |= dict(zip(("disparity", "second"), _maps(*self._matching(draft), self.show), strict=True))
-        parts = {
-            "left picture": self._picture_panel(self._left_panel),
-            "right picture": self._picture_panel(self._right_panel),
-            "numbers": readout(numbers, (782, 38), (0, 36.5), (0, 15.5)),
-            **{f"{name} map": drawn for name, drawn in maps.items()},
-            "wedge": self._wedge_panel() if "wedge" in self._shown else "",
-        }
-        attached |= {name: data for name, data in more.items() if name.split()[0] in maps}
-        return self.tiled(_LAYOUT, parts, attached, self._described(numbers))
+        shown = self._panels.split()
+        drawn, attached = dict[str, str](), dict[str, bytes]()
+        if self._has("left") or self._has("right"):
+            attached |= zip(("left", "right"), _photographs(*self._key(draft)), strict=True)
+            drawn = {name: self._picture_panel(name) for name in ("left", "right") if name in shown}
+        if self._has("disparity") or self._has("second"):
+            maps, images = self._heat_maps(draft) if self.yours is None else self._your_maps(draft)
+            drawn, attached = drawn | maps, attached | images
+        if self._has("numbers"):
+            x, y, *_ = self._layout["numbers"]
+            drawn["numbers"] = readout(self.numbers(draft=draft), (x + 12, y + 38), (0, 36.5), (0, 15.5))
+        if self._has("wedge"):
+            drawn["wedge"] = self._wedge_panel()
+        attached = {name: data for name, data in attached.items() if name.split()[0] in shown}
+        words = self.description(draft=draft)
+        return self.tiled(self._layout, {_TILES[one]: drawn[one] for one in shown}, attached, words)
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        """Two panels in the first row, or three if the third is the numbers; below, up to three in each row."""
+        names = [_TILES[name] for name in self._panels.split()]
+        count = min(len(names), 3 if names[2:3] == ["numbers"] else 2)
+        (high, wide), others = _FIRST[count], names[count:]
+        made = [(high, dict(zip(names[:count], wide, strict=True)))]
+        made += [(284.0, dict.fromkeys(others[i : i + 3], 320.0)) for i in range(0, len(others), 3)]
+        return rows(*made)
 
     # The two pictures ------------------------------------------------------------------------------------------------
 
-    @property
-    def _left_panel(self) -> Panel:
-        size = self.stage.left.intrinsics
-        return image_panel("left", 10, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
+    def _image_panel(self, name: str) -> Panel:
+        """The panel of a picture in its tile; a map has its colours beside it, and a line below."""
+        (x, y, width, height), size = self._layout[_TILES[name]], self.stage.left.intrinsics
+        beside, below = (60, 24) if name in ("disparity", "second") else (0, 0)
+        return image_in((x, y, width - beside, height - below), name, size.width, size.height)
 
-    @property
-    def _right_panel(self) -> Panel:
-        size = self.stage.right.intrinsics
-        return image_panel("right", 395, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
-
-    def _picture_panel(self, panel: Panel) -> str:
-        now = self.stage.left if panel.name == "left" else self.stage.right
-        size = now.intrinsics
+    def _picture_panel(self, name: str) -> str:
+        panel, now = self._image_panel(name), getattr(self.stage, name)
         content = "".join([
-            placed_image(panel, panel.name, size.width, size.height),
+            placed_image(panel, name, now.intrinsics.width, now.intrinsics.height),
             self._pencil(panel, now),
             self._same_row(panel),
             on_photograph(self._epipolar(panel, now, np.array([self.row])), "green"),
             self._mark(panel),
         ])  # fmt: skip
-        action = "move the mark" if panel.name == "left" else "change the disparity"
-        label = f"The {panel.name} picture; drag or press the arrow keys to {action}"
-        return panel.show(content, title=f"The {panel.name} picture", hint="drag", drag=panel.name, label=label)
+        action = "move the mark" if name == "left" else "change the disparity"
+        label = f"The {name} picture; drag or press the arrow keys to {action}"
+        title = "Left picture" if name == "left" else f"Right picture: rows differ by {self.rows_apart():.1f} px"
+        return panel.show(content, title=title, hint="drag", drag=name, label=label)
 
     def _epipolar(self, panel: Panel, now: Camera, rows: Array) -> Array:
         """The epipolar lines (m, 2, 2) that the rectified pair has in `rows`, where this camera now sees them."""
@@ -198,70 +205,64 @@ class RectificationView(TurningPair):
         """Colours, title, limits and unit of the second map."""
         if self.show == "error":
             return "error", "Error", 0.0, 4.0, "px"
-        low, high = stereo_pair.depth_limits(self.source)
-        return "depth", "Depth" if self.show == "depth" else "True depth", low, high, "m"
+        title = "Depth" if self.show == "depth" else "True depth"
+        return "depth", title, *stereo_pair.depth_limits(self.source), "m"
 
-    def _map_panels(self) -> tuple[Panel, Panel]:
-        size = self.stage.left.intrinsics
-        left, right = (
-            image_panel(name, x, 348, _MAP_WIDTH, size.width, size.height, tallest=_MAP_TALLEST)
-            for name, x in (("disparity", 10), ("second", 330))
-        )
-        return left, right
+    def _map(self, name: str, low: float, high: float, unit: str, **heading: str) -> str:
+        """The map that is attached by that name, where it is shown, and below it what the hatching means."""
+        if not self._has(name):
+            return ""
+        panel, size = self._image_panel(name), self.stage.left.intrinsics
+        mark = ring(panel.place(self.uv_left), "red", 5) if {"left", "right"} & set(self._panels.split()) else ""
+        hatched = svg.text((panel.x, panel.y + panel.height + 18), "hatched: nothing found", "note")
+        return heat_panel(panel, size.width, size.height, low, high, unit, mark, **heading) + hatched
 
-    def _heat_maps(self) -> tuple[dict[str, str], dict[str, bytes]]:
-        """The maps that are shown, by name, and their keys."""
-        size = self.stage.left.intrinsics
-        left, right = self._map_panels()
-        _, title, low, high, unit = self._second
+    def _heat_maps(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
+        """The maps that are shown, by name, and what is attached to them."""
+        colours, title, low, high, unit = self._second
         note = "" if self.source.photographs is None or self.source.distances is not None else "truth unknown"
-        formula = "Z = fB / (d + doffs)" if abs(self.stage.doffs) > 0.05 else "Z = fB / d"
-        marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
-        maps = {
-            "disparity": heat_panel(left, size.width, size.height, 0, self.disparities, "px", marks[0],
-                                    title="Disparity", note=self.method),
-            "second": heat_panel(right, size.width, size.height, low, high, unit, marks[1],
-                                 title=title, note=formula if self.show == "depth" else note),
-        }  # fmt: skip
-        maps["disparity"] += svg.text((left.x, left.y + left.height + 18), "hatched: no disparity", "note")
-        keys = {"disparity key": heat_key("disparity"), "second key": heat_key(self._second[0])}
-        return {name: drawn for name, drawn in maps.items() if name in self._shown}, keys
+        if self.show == "depth":
+            formula = "Z = fB / (d + doffs)" if abs(self.stage.doffs) > 0.05 else "Z = fB / d"
+            note = formula if self._has("disparity") else ""
+        drawn = {
+            "disparity": self._map("disparity", 0, self.disparities, "px", title="Disparity", note=self.method),
+            "second": self._map("second", low, high, unit, title=title, note=note),
+        }
+        images = dict(zip(("disparity", "second"), _maps(*self._matching(draft), self.show), strict=True))
+        return drawn, images | {"disparity key": heat_key("disparity"), "second key": heat_key(colours)}
 
     def your_depth(self, *, draft: bool = False) -> tuple[np.ndarray, str]:
         """What the reader's function makes of the disparity map, and what is wrong with it."""
         found, now = self.disparity_map(draft=draft), self.stage
-        if self.yours is None:
-            return np.full(found.shape, np.nan), ""
         given = (found.astype(float), now.left.intrinsics.fx, now.pair.baseline, now.doffs)
-        return tried(self.yours, given, found.astype(float))
+        return answered(self.yours, given, found)
 
     def _your_maps(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
-        """The right depths, and beside them those of the reader's function."""
-        size, (left, right), limits = self.stage.left.intrinsics, self._map_panels(), self._limits
+        """The right depths, and beside them those of the reader's function: the right ones, greyed, until it is."""
+        limits, right = stereo_pair.depth_limits(self.source), self.stage.depth(self.disparity_map(draft=draft))
         depth, problem = self.your_depth(draft=draft)
-        marks = [ring(panel.place(self.uv_left), "red", 5) for panel in (left, right)]
-        right_map = heat_panel(left, size.width, size.height, *limits, "m", marks[0], title="Depth")
-        words = svg.paragraph((right.x, right.y + right.height + 18), problem or self._at_your_mark(depth), right.width,
-                              "note" if problem else "label orange")  # fmt: skip
-        your_map = heat_panel(right, size.width, size.height, *limits, "m", marks[1], title="With your function")
-        true = self.stage.depth(self.disparity_map(draft=draft))
-        images = {"disparity": heat_map(_small(true), *limits, "depth")}
+        own = self._map("second", *limits, "m", title="With your function")
+        if own:
+            panel = self._image_panel("second")
+            if is_unwritten(problem):
+                depth, middle = right, (panel.x + panel.width / 2, panel.y + panel.height / 2)
+                own = own.replace("<image ", '<image class="awaited" ', 1)  # words that are greyed cannot be read
+                own += svg.text(middle, YOURS_HERE, "title halo middle")
+            elif problem:
+                own += svg.paragraph((panel.x + 12, panel.y + 26), problem, panel.width - 24, "note halo")
+            elif np.isfinite(self._at_mark(depth)):
+                at = (panel.x + panel.width, panel.y + panel.height + 18)
+                own += svg.text(at, f"at the mark: {metres(self._at_mark(depth))}", "orange end")
+        images = {"disparity": heat_map(_small(right), *limits, "depth")}
         images["second"] = heat_map(_small(depth), *limits, "depth")
-        keys = dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
-        return {"disparity": right_map, "second": your_map + words}, images | keys
-
-    def _at_your_mark(self, depth: np.ndarray) -> str:
-        at_mark = self._at_mark(depth)
-        return f"your Z at the mark: {metres(at_mark)}" if not np.isnan(at_mark) else "no Z of yours at the mark"
-
-    @property
-    def _limits(self) -> tuple[float, float]:
-        return stereo_pair.depth_limits(self.source)
+        drawn = {"disparity": self._map("disparity", *limits, "m", title="Depth"), "second": own}
+        return drawn, images | dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
 
     def _wedge_panel(self) -> str:
         farthest = stereo_pair.depth_limits(self.source)[1]
         notes = (self.equation(), self.interval())
-        place = (700, 348, 250, 186)
+        x, y, width, height = self._layout[_TILES["wedge"]]
+        place = (x + 60, y + 34, width - 70, height - 98)
         return wedge_panel(place, self.stage.pair, self.disparity, self.plus_minus, farthest, notes, worth=self.worth)
 
 
@@ -292,7 +293,7 @@ def _maps(
 
 def _small(values: np.ndarray) -> np.ndarray:
     """A map no finer than a screen shows it, which keeps a saved notebook light."""
-    scale = min(1.0, 1.5 * _MAP_WIDTH / values.shape[1])
+    scale = min(1.0, 400 / values.shape[1])
     return cv2.resize(values, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
 
 
