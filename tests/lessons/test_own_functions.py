@@ -7,6 +7,8 @@ wrong one, and what depends on it is run again to the lesson's end.
 import ast
 import io
 import re
+import symtable
+from collections.abc import Iterator
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 
@@ -94,13 +96,30 @@ def add_view(shown: Shown, view) -> None:
     shown.words += _WORDS.findall(figure.svg())
 
 
+def symbols_in(source: str) -> Iterator[tuple[symtable.SymbolTable, symtable.Symbol]]:
+    """Every name of code, with the scope that it is in."""
+    tables = [symtable.symtable(source, "<cell>", "exec")]
+    while tables:
+        table = tables.pop()
+        tables += table.get_children()
+        for symbol in table.get_symbols():
+            yield table, symbol
+
+
 def names_in(source: str) -> set[str]:
-    return {node.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name)}
+    """The notebook's names that code reads or sets, in its functions, too."""
+    return {
+        symbol.get_name() for table, symbol in symbols_in(source) if table.get_type() == "module" or symbol.is_global()
+    }
 
 
 def assigned_in(source: str) -> set[str]:
-    nodes = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Name)]
-    return {node.id for node in nodes if isinstance(node.ctx, ast.Store)}
+    """The notebook's names that code sets."""
+    return {
+        symbol.get_name()
+        for table, symbol in symbols_in(source)
+        if table.get_type() == "module" and (symbol.is_assigned() or symbol.is_imported())
+    }
 
 
 class Lesson:
