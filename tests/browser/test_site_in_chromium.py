@@ -22,6 +22,7 @@ pytestmark = pytest.mark.browser
 
 HANDS = (Path(__file__).with_name("hands.js")).read_text(encoding="utf-8")
 REPORTS = SITE / "engineers/reports"  # each a whole page in one file, as camviz inspect writes it
+CORES = [name for name in LESSONS if "01" <= name[:2] <= "09"]
 READ = ("index", "learn", "search", "docs/clinic", "about", "docs/glossary", "api/index", "lessons/05_distortion")
 SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
 ADDRESS = re.compile(r'<[a-z][^<>]*?\s(?:href|src)="([^"]*)"')
@@ -120,6 +121,25 @@ def test_every_control_of_every_pane_goes_to_both_ends(watched: Watched, way: st
     done = page.evaluate(TO_BOTH_ENDS)
     assert done["wrong"] == []
     assert done["panes"] >= 1
+
+
+@pytest.mark.parametrize("size", [(375, 812), (1440, 900)], ids=["telephone", "desk"])
+def test_a_lesson_begins_with_its_picture_and_one_switch_shows_the_code(browser: Browser, address: str, size) -> None:
+    """Nothing to install, no import and no fold stands above the first picture, which begins on the first screen."""
+    watched = Watched(browser, address, viewport={"width": size[0], "height": size[1]})
+    for name in CORES:
+        page = watched.open(f"lessons/{name}")
+        assert page.locator(".camviz-recorded").first.bounding_box()["y"] < size[1] - 200, name
+    page = watched.open("lessons/05_distortion")
+    folds, switch = page.locator("details.hide.above-input"), page.locator(".camviz-code button")
+    shown = "all => all.filter((one) => one.checkVisibility() && one.querySelector('pre').checkVisibility()).length"
+    assert folds.evaluate_all(shown) == 0
+    switch.click()
+    assert folds.evaluate_all(shown) == folds.count() > 20
+    switch.click()
+    assert folds.evaluate_all(shown) == 0
+    watched.page.close()
+    assert watched.complaints == []
 
 
 def test_a_phone_scrolls_no_page_sideways(browser: Browser, address: str) -> None:

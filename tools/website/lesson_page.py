@@ -25,6 +25,7 @@ from camviz_school.widgets.question import LEAD
 PICTURES = "_pictures"
 _ASK = re.compile(r'^ask\("([\w.]+)"\)$')
 _QUIZ = re.compile(r'^quiz\("(\w+)"(?:, "(\w)")?\)$')
+_CODE = '<p class="camviz-code pst-js-only"><button type="button">Show all code</button></p>'
 _HINTS = ("Where to look", "What to use", "The line, with a gap")
 
 
@@ -76,20 +77,24 @@ class LessonPage:
             if asked:
                 html = questions_html(*asked)
             elif number in self.panes and "<figure" in html:  # the findings of an inspection stay above its pane
-                html = self.panes[number]
+                html = self.panes[number] + (_CODE if number == min(self.panes) else "")
             data["text/html"] = html
             data.pop("text/plain", None)
 
     def _exercises(self, notebook: Notebook) -> None:
+        """Where they are done. What a check says of a function that nobody has tried is left out."""
         for cell in notebook.cells:
+            if "check" in cell.metadata.get("tags", []):
+                cell.outputs = []
             if "stub" in cell.metadata.get("tags", []):
                 html = exercise_html(exercise_of(cell), self.path.name)
                 cell.outputs = [*cell.outputs, _html_output(html)]
 
 
 def _is_folded(cell: Cell, moves: bool) -> bool:
-    """Whether a reader of the page opens the code of a cell: of what only shows a question or a visualizer."""
-    return moves or bool({"setup", "colab"} & set(cell.metadata.get("tags", []))) or asked_by(cell.source) is not None
+    """Whether the code of a cell is seen only when a reader asks for all code: it sets up, asks, checks or shows."""
+    tags = set(cell.metadata.get("tags", []))
+    return moves or bool({"setup", "colab", "check"} & tags) or asked_by(cell.source) is not None
 
 
 def asked_by(source: str) -> tuple[tuple[Question, ...], str, str] | None:

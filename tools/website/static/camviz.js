@@ -252,7 +252,21 @@ function panes() {
   addEventListener("load", () => setTimeout(begin, UNTOUCHED_MS));
 }
 
+// One switch for the code of cells that only set up, ask or show; without scripts each of them has its own fold.
+function code() {
+  const button = document.querySelector(".camviz-code button"), page = document.documentElement.dataset;
+  if (!button) return;
+  button.addEventListener("click", () => {
+    const shown = page.code === "hidden", top = button.getBoundingClientRect().top;
+    page.code = shown ? "shown" : "hidden";
+    document.querySelectorAll("details.hide.above-input").forEach((one) => { one.open = shown; });
+    button.textContent = shown ? "Hide the code" : "Show all code";
+    scrollBy(0, button.getBoundingClientRect().top - top);  // what opens above it does not push it away
+  });
+}
+
 questions();
 panes();
+code();
 progress();
 terms();
