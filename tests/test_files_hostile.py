@@ -343,9 +343,14 @@ LARGEST = {
 }
 
 
-@pytest.mark.parametrize("text", LARGEST.values(), ids=LARGEST)
-def test_the_largest_allowed_file_is_refused(tmp_path, text):
-    refusal(tmp_path, text)
+OFTEN = ("open literal", "kitti lines", "attributes")  # of each parser one; the others with --all
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in OFTEN else pytest.param(name, marks=pytest.mark.thorough) for name in LARGEST]
+)
+def test_the_largest_allowed_file_is_refused(tmp_path, name):
+    refusal(tmp_path, LARGEST[name])
 
 
 @pytest.mark.thorough

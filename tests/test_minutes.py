@@ -101,7 +101,12 @@ def test_a_divided_lesson_follows_the_pattern(number):
     assert core_rules.complaints(EVERY[number], number) == []
 
 
-@pytest.mark.parametrize("number", LAYERED)
+OFTEN = ("05", "07")  # the others with --all: each runs its lesson's core once more
+
+
+@pytest.mark.parametrize(
+    "number", [one if one in OFTEN else pytest.param(one, marks=pytest.mark.thorough) for one in LAYERED]
+)
 def test_each_deeper_section_runs_after_the_core_without_the_others(number, monkeypatch):
     """With the solutions of the core and of the section alone."""
     monkeypatch.chdir(LESSONS)

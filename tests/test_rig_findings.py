@@ -52,7 +52,7 @@ def alone(truth, rng):
     return by_themselves(calibration), np.arange(rows)
 
 
-@pytest.mark.parametrize("frames", [1, -2, 0.5])
+@pytest.mark.parametrize("frames", [pytest.param(1, marks=pytest.mark.thorough), -2, 0.5])
 def test_a_delay_is_measured_to_a_quarter_of_a_frame_and_its_camera_named(frames):
     truth, late, rng = film(3, frames=72, late={"cam1": frames})  # between two frames the board goes nearly straight on
     measured = delays(*alone(late, rng))
