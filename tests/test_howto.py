@@ -15,16 +15,16 @@ def files(tmp_path_factory):
     return folder
 
 
-LONG = ("calibrate-a-rig", "find-a-camera-on-a-robot", "is-it-still-valid")  # what they print is tested by itself, too
+LONG = ("calibrate-a-rig", "find-a-camera-on-a-robot", "is-it-still-valid")  # a quarter of a minute each: with --all
 
 
-def pages():
-    """Those that take a quarter of a minute each are run with --all only."""
-    for page in console.pages():
-        yield pytest.param(page, id=page.stem, marks=[pytest.mark.thorough] if page.stem in LONG else [])
+PAGES = [
+    pytest.param(page, id=page.stem, marks=[pytest.mark.thorough] if page.stem in LONG else [])
+    for page in console.pages()
+]
 
 
-@pytest.mark.parametrize("page", pages())
+@pytest.mark.parametrize("page", PAGES)
 def test_the_commands_of_a_page_print_what_it_shows(page, files):
     assert console.run(page, files) == page.read_text(encoding="utf-8")
 
