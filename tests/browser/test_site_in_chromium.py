@@ -129,7 +129,7 @@ def test_a_lesson_begins_with_its_picture_and_one_switch_shows_the_code(browser:
     watched = Watched(browser, address, viewport={"width": size[0], "height": size[1]})
     for name in CORES:
         page = watched.open(f"lessons/{name}")
-        assert page.locator(".camviz-recorded").first.bounding_box()["y"] < size[1] - 100, name
+        assert page.locator(".camviz-recorded").first.bounding_box()["y"] < size[1], name
     page = watched.open("lessons/05_distortion")
     folds, switch = page.locator("details.hide.above-input"), page.locator(".camviz-code button")
     shown = "all => all.filter((one) => one.checkVisibility() && one.querySelector('pre').checkVisibility()).length"
