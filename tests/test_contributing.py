@@ -188,4 +188,4 @@ print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]
     assert "skewed-pixels" in [each["id"] for each in json.loads(said)["findings"]]
     made.run("tools/docs/clinic.py", "--page")
     assert "### `skewed-pixels`" in made.text("docs/clinic.md")
-    assert held(made, "tests/test_faults.py", "promised and skew or healthy_camera or every_finding") >= 5
+    assert held(made, "tests/test_faults.py", "promised and skew or healthy or every_finding") >= 8

@@ -40,7 +40,9 @@ def test_every_finding_has_a_fault_that_leads_to_it():
     assert {fault.finding for fault in FAULTS.values()} == set(kinds())
 
 
-@pytest.mark.parametrize("seed", range(20_100, 20_103))
+@pytest.mark.parametrize(
+    "seed", [*range(20_100, 20_103), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(20_103, 20_106))]
+)
 def test_nothing_is_found_in_a_healthy_camera(seed):
     assert alarms(Evidence(healthy(np.random.default_rng(seed)))) == []
 
