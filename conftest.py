@@ -1,6 +1,7 @@
 """How lessons are run as tests (nbval): what is compared, what may never be written, and in which font."""
 
 import os
+import re
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a worker for each processor; and sums in one order on all
@@ -13,6 +14,9 @@ from nbval.plugin import IPyNbCell, IPyNbFile
 # states its numbers, is compared instead (text/plain).
 PICTURES = ("text/html", "image/svg+xml")
 
+
+EXAMPLES = ("05", "16")
+"""The lessons in which is tested what is the same in all of them (marker by_example)."""
 
 # Words are as wide as their font. So that no test depends on the fonts of a machine, browsers and Cairo see one family
 # only, the DejaVu that matplotlib brings along.
@@ -46,9 +50,15 @@ def pytest_ignore_collect(collection_path, config):
 
 def pytest_collection_modifyitems(config, items):
     if not config.getoption("--all"):
-        left_out = [item for item in items if item.get_closest_marker("thorough")]
+        left_out = [item for item in items if needs_all(item)]
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not item.get_closest_marker("thorough")]
+        items[:] = [item for item in items if not needs_all(item)]
+
+
+def needs_all(item):
+    lesson = re.search(r"\[(?:lessons/)?(\d\d)_", item.name)
+    of_another = bool(item.get_closest_marker("by_example")) and bool(lesson) and lesson[1] not in EXAMPLES
+    return of_another or bool(item.get_closest_marker("thorough"))
 
 
 def pytest_configure(config):

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from laboratory import ROOT, Notebook, chromium, jupyterlab
-from playwright.sync_api import Browser
+from laboratory import LATE_MS, ROOT, Notebook, chromium, jupyterlab
+from playwright.sync_api import Browser, expect
 from xdist.scheduler.loadscope import LoadScopeScheduling
 
+expect.set_options(timeout=LATE_MS)
 LESSONS = sorted(path.name for path in (ROOT / "lessons").glob("*.ipynb"))
 
 

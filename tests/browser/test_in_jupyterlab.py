@@ -87,6 +87,7 @@ def acts_on_another(explorer, control: str) -> bool:
     return False
 
 
+@pytest.mark.by_example
 @pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.thorough)])
 def test_every_control_changes_the_picture_at_both_ends_and_the_middle(lesson, theme, thorough, screenshot) -> None:
     lesson.theme(THEMES[theme])
@@ -109,6 +110,7 @@ def test_every_control_changes_the_picture_at_both_ends_and_the_middle(lesson, t
     assert lesson.errors == []
 
 
+@pytest.mark.by_example
 @pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.thorough)])
 def test_words_stand_out_from_what_is_behind_them(lesson, theme) -> None:
     """Labels of controls, of questions and in pictures reach a contrast of 4.5 to 1 (WCAG 2.2, 1.4.3)."""
@@ -120,6 +122,7 @@ def test_words_stand_out_from_what_is_behind_them(lesson, theme) -> None:
     ]
 
 
+@pytest.mark.by_example
 def test_handles_follow_the_pointer(lesson, thorough) -> None:
     for explorer in driven(lesson, thorough, "[data-drag]"):
         for handle in explorer.evaluate("root => hands.handles(root)"):
@@ -148,6 +151,7 @@ def test_the_controls_and_the_main_panel_fit_a_small_laptop_together(lesson, win
     assert {number: excess for number, excess in enumerate(beyond, 1) if excess > 0} == {}
 
 
+@pytest.mark.by_example
 def test_a_finger_drags_every_handle_all_the_way(lesson, thorough) -> None:
     """The page neither scrolls nor takes the finger away: of 15 moves, 15 arrive. Without --all, a handle a picture."""
     arrived = {}
@@ -182,6 +186,7 @@ def test_axe_finds_nothing_wrong(lesson, theme) -> None:
     assert lesson.axe() == []
 
 
+@pytest.mark.by_example
 def test_a_visualizer_obeys_the_keyboard_alone(lesson) -> None:
     """Tab reaches every control, arrows move it, a number and Enter do the same, Enter on Reset brings it back."""
     keys = lesson.page.keyboard

@@ -24,6 +24,7 @@ HANDS = (Path(__file__).with_name("hands.js")).read_text(encoding="utf-8")
 REPORTS = SITE / "engineers/reports"  # each a whole page in one file, as camviz inspect writes it
 CORES = [name for name in LESSONS if "01" <= name[:2] <= "09"]
 READ = ("index", "learn", "search", "docs/clinic", "about", "docs/glossary", "api/index", "lessons/05_distortion")
+PICTURE = ".camviz-recorded, .cell_output .camviz-figure, .cell_output img"  # a pane, or its still if not recorded
 SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
 ADDRESS = re.compile(r'<[a-z][^<>]*?\s(?:href|src)="([^"]*)"')
 LOADED = re.compile(r'<(?:script|img|iframe|link(?! rel="canonical"))[^<>]*?\s(?:src|href)="([^"]*)"')
@@ -113,6 +114,7 @@ def watched(browser: Browser, address: str) -> Iterator[Watched]:
     assert one.strangers == []
 
 
+@pytest.mark.by_example
 @pytest.mark.parametrize("way", ["index", *(f"lessons/{name}" for name in LESSONS)])
 def test_every_control_of_every_pane_goes_to_both_ends(watched: Watched, way: str) -> None:
     page = watched.open(way)
@@ -129,7 +131,7 @@ def test_a_lesson_begins_with_its_picture_and_one_switch_shows_the_code(browser:
     watched = Watched(browser, address, viewport={"width": size[0], "height": size[1]})
     for name in CORES:
         page = watched.open(f"lessons/{name}")
-        assert page.locator(".camviz-recorded").first.bounding_box()["y"] < size[1], name
+        assert page.locator(PICTURE).first.bounding_box()["y"] < size[1], name
     page = watched.open("lessons/05_distortion")
     folds, switch = page.locator("details.hide.above-input"), page.locator(".camviz-code button")
     shown = "all => all.filter((one) => one.checkVisibility() && one.querySelector('pre').checkVisibility()).length"

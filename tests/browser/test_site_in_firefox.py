@@ -56,15 +56,6 @@ MIDDLE = """(async () => {
 })()"""
 
 
-FEW = ("05_distortion", "16_clinic")
-
-
-def each(names):
-    """Pages; those that are neither in FEW nor the first page are opened with --all only."""
-    kept = ("index", *FEW, *(f"lessons/{name}" for name in FEW))
-    return [name if name in kept else pytest.param(name, marks=pytest.mark.thorough) for name in names]
-
-
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
     with served() as address:
@@ -97,7 +88,8 @@ def kept(fox: Firefox, name: str) -> None:
         fox.screenshot(Path(folder) / f"firefox-{name}.png")
 
 
-@pytest.mark.parametrize("way", each(["index", *(f"lessons/{name}" for name in LESSONS)]))
+@pytest.mark.by_example
+@pytest.mark.parametrize("way", ["index", *(f"lessons/{name}" for name in LESSONS)])
 def test_a_slider_dragged_by_its_thumb_changes_the_picture(watched: Firefox, address: str, way: str) -> None:
     opened(watched, f"{address}/{way}.html")
     thumb, end = watched.evaluate(SLIDER)
@@ -108,7 +100,8 @@ def test_a_slider_dragged_by_its_thumb_changes_the_picture(watched: Firefox, add
     assert (moved["value"], moved["picture"]) == (True, True), moved
 
 
-@pytest.mark.parametrize("name", each(LESSONS))
+@pytest.mark.by_example
+@pytest.mark.parametrize("name", LESSONS)
 def test_a_question_replies_to_a_click(watched: Firefox, address: str, name: str) -> None:
     opened(watched, f"{address}/lessons/{name}.html")
     watched.click(watched.evaluate(MIDDLE.replace("SELECTOR", "input[type=radio]")))
