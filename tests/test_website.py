@@ -5,7 +5,7 @@ import json
 import re
 import sys
 from html import unescape
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 import nbformat
@@ -20,6 +20,8 @@ sys.path.insert(0, str(ROOT / "tools/website"))
 
 import clips  # noqa: E402
 import docstrings  # noqa: E402
+import mistakes  # noqa: E402
+import panes  # noqa: E402
 import pictures  # noqa: E402
 import slim_styles  # noqa: E402
 from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
@@ -32,6 +34,7 @@ from camviz.widgets import explore  # noqa: E402
 from camviz_school.course.exercises import exercises  # noqa: E402
 from camviz_school.course.glossary import glossary  # noqa: E402
 from camviz_school.course.material import lesson_paths  # noqa: E402
+from camviz_school.views.pinhole import PinholeView  # noqa: E402
 
 LESSONS = lesson_paths()
 PAGES = frozenset(path.relative_to(ROOT).as_posix() for path in [*LESSONS, *(ROOT / "docs").glob("*.md")])
@@ -226,3 +229,70 @@ def test_the_references_of_two_docstrings_of_scipy_can_stand_on_one_page():
     page = publish_doctree("\n".join([*one, "", *other]))
     assert not list(page.findall(nodes.system_message))
     assert [note.astext() for note in page.findall(nodes.footnote)] == ["1\n\nA book,\n2001.", "2\n\nA book,\n2001."]
+
+
+def lesson(number: str) -> Path:
+    return next(path for path in LESSONS if path.name.startswith(number))
+
+
+def test_a_page_runs_the_solutions_where_a_notebook_has_stubs_and_checks_nothing():
+    cells = panes.code_cells(lesson("01"))
+    solved = {cell.exercise: cell.source for cell in cells.values() if cell.exercise}
+    assert list(solved) == list(exercises("01"))
+    assert not any("NotImplementedError" in source for source in solved.values())
+    assert not any(cell.source.startswith("check(") for cell in cells.values())
+    ((pane, exercise),) = [
+        (number, panes.own_in(cells, number)) for number in cells if "yours=" in cells[number].source
+    ]
+    assert set(exercise) == {"01.project"}
+    assert exercise["01.project"] < pane
+
+
+def test_what_depends_on_an_exercise_is_found_through_the_names_between():
+    sources = {
+        1: "def f(x): return x",
+        2: "a = f(1)",
+        3: "b = 2",
+        4: "c = [f for f in (1, 2)]",
+        5: "d = a + b",
+        6: "b",
+        7: "print(d)",
+    }
+    assert mistakes.dependents(sources, 1, 7, "f") == [2, 5, 7]
+    assert mistakes.dependents(sources, 1, 5, "f") == [2, 5]
+    assert mistakes.dependents(sources, 3, 7, "b") == [5, 6, 7]
+
+
+def test_a_mistake_is_what_the_lesson_draws_with_it_and_one_that_shows_nothing_is_left_out():
+    """Lesson 01 with its camera in the cell before the pane; the notebook's own names stay as they are."""
+    project = exercises("01")["01.project"]
+    sources = {
+        3: "",
+        4: "view = PinholeView(panels='picture yours', yours=project)",
+        5: "explore(view, 'depth_mm')",
+    }
+    names = {"PinholeView": PinholeView, "explore": explore, "project": project.reference}
+    mistakes.value_of(sources[4], after := dict(names))
+    shown = mistakes.value_of(sources[5], dict(after))
+    before = {3: names, 4: names, 5: after}
+    found = list(islice(mistakes.mistakes("01.project", 3, 5, sources, before, shown), 4))
+    titles = {known.function.__name__.replace("_", " "): known for known in project.misconceptions}
+    assert {"divided by the distance", "upside down fraction"} <= {one.title for one in found}
+    for one in found:
+        assert one.explanation == titles[one.title].explanation
+        assert one.explorer.view.yours is titles[one.title].function
+    assert after["view"].yours is project.reference
+    (first, *_) = project.misconceptions
+    itself = explore(PinholeView(panels="picture yours", yours=first.function), "depth_mm")
+    others = mistakes.mistakes("01.project", 3, 5, sources, before, itself)
+    assert found[0].explanation == first.explanation
+    assert next(others).explanation == found[1].explanation
+    assert list(mistakes.mistakes("01.project", 3, 5, {5: "explore(PinholeView())"}, before, shown)) == []
+
+
+def test_a_pane_with_mistakes_shows_the_solution_first_and_says_so():
+    one = mistakes.Mistake("upside down", "It stands on its *head*.", None)
+    html = mistakes.drawn_with("<i>right</i>", [(one, "<i>wrong</i>")])
+    assert re.findall(r'class="camviz-with"( hidden)?', html) == ["", " hidden"]
+    assert html.index("Drawn with the solution") < html.index("<i>right</i>") < html.index("<em>head</em>")
+    assert "<button" not in mistakes.drawn_with("<i>right</i>", [])

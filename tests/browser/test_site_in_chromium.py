@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from built_site import LESSONS, SITE, served
 from laboratory import new_page
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Locator, Page
 
 from camviz_school.course.answers import mark, read_answers
 from camviz_school.course.learning import class_scores
@@ -29,7 +29,7 @@ SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
 ADDRESS = re.compile(r'<[a-z][^<>]*?\s(?:href|src)="([^"]*)"')
 LOADED = re.compile(r'<(?:script|img|iframe|link(?! rel="canonical"))[^<>]*?\s(?:src|href)="([^"]*)"')
 TO_BOTH_ENDS = """async () => {
-  const wrong = [], panes = [...document.querySelectorAll(".camviz-recorded")];
+  const wrong = [], panes = [...document.querySelectorAll(".camviz-recorded")].filter((one) => one.checkVisibility());
   let changed = 0;
   for (const pane of panes) {
     pane.scrollIntoView();
@@ -123,6 +123,37 @@ def test_every_control_of_every_pane_goes_to_both_ends(watched: Watched, way: st
     done = page.evaluate(TO_BOTH_ENDS)
     assert done["wrong"] == []
     assert done["panes"] >= 1
+
+
+@pytest.mark.by_example
+@pytest.mark.parametrize("name", LESSONS)
+def test_an_exercise_can_be_seen_solved_and_with_each_mistake(watched: Watched, name: str) -> None:
+    """Where a notebook draws the reader's function. A mistake's pane moves, too, and says what is wrong."""
+    page = watched.open(f"lessons/{name}")
+    page.evaluate(HANDS)
+    page.mouse.move(5, 5)
+    places = page.locator(".camviz-drawn-with").all()
+    assert places or name < "01"
+    for place in places:
+        drawn, buttons = place.locator(":scope > .camviz-with"), place.locator(":scope > p > button").all()
+        assert drawn.count() == 1 + len(buttons)
+        seen = [first_picture(drawn.first)]
+        for number, button in enumerate(buttons, 1):
+            button.click()
+            assert [one.is_visible() for one in drawn.all()] == [i == number for i in range(drawn.count())]
+            assert len(drawn.nth(number).locator(".camviz-mistake").inner_text()) > 30
+            seen.append(first_picture(drawn.nth(number)))
+            button.click()
+            assert drawn.first.is_visible()
+        assert len(set(seen)) == len(seen)
+
+
+def first_picture(place: Locator) -> str:
+    place.scroll_into_view_if_needed()
+    place.locator('.camviz-recorded[data-live="true"]').wait_for()
+    explorer = place.locator(".camviz-explorer")
+    explorer.evaluate("root => hands.settled(root)")
+    return str(explorer.evaluate("root => hands.picture(root)"))
 
 
 @pytest.mark.parametrize("size", [(375, 812), (1440, 900)], ids=["telephone", "desk"])

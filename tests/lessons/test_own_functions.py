@@ -4,13 +4,10 @@ The lesson is run once with its solutions, and every check accepts them. Then ea
 wrong one, and what depends on it is run again to the lesson's end.
 """
 
-import ast
-import io
 import re
-import symtable
-from collections.abc import Iterator
-from contextlib import redirect_stdout
+import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import cv2
 import matplotlib
@@ -18,6 +15,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from quoting import LESSONS
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tools/website"))
+
+from mistakes import assigned_in, names_in, value_of
 
 from camviz.draw.picture import Picture
 from camviz.widgets.explorer import Explorer
@@ -52,20 +53,9 @@ def visibly_different(one: np.ndarray, other: np.ndarray) -> bool:
     return np.mean(np.abs(one.astype(int) - other).max(axis=-1) > 40) > VISIBLE
 
 
-def value_of(cell, namespace):
-    """Runs a cell as Jupyter does; the value of its last line."""
-    tree, value = ast.parse(cell.source), None
-    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
-    with redirect_stdout(io.StringIO()):
-        exec(compile(tree, "<cell>", "exec"), namespace)
-        if last:
-            value = eval(compile(ast.Expression(last.value), "<cell>", "eval"), namespace)
-    return value
-
-
 def run(cell, namespace) -> Shown:
     """Runs a cell, and gathers what it shows."""
-    shown, value = Shown(), value_of(cell, namespace)
+    shown, value = Shown(), value_of(cell.source, namespace)
     for number in plt.get_fignums():
         canvas = plt.figure(number).canvas
         canvas.draw()
@@ -96,32 +86,6 @@ def add_view(shown: Shown, view) -> None:
     shown.words += _WORDS.findall(figure.svg())
 
 
-def symbols_in(source: str) -> Iterator[tuple[symtable.SymbolTable, symtable.Symbol]]:
-    """Every name of code, with the scope that it is in."""
-    tables = [symtable.symtable(source, "<cell>", "exec")]
-    while tables:
-        table = tables.pop()
-        tables += table.get_children()
-        for symbol in table.get_symbols():
-            yield table, symbol
-
-
-def names_in(source: str) -> set[str]:
-    """The notebook's names that code reads or sets, in its functions, too."""
-    return {
-        symbol.get_name() for table, symbol in symbols_in(source) if table.get_type() == "module" or symbol.is_global()
-    }
-
-
-def assigned_in(source: str) -> set[str]:
-    """The notebook's names that code sets."""
-    return {
-        symbol.get_name()
-        for table, symbol in symbols_in(source)
-        if table.get_type() == "module" and (symbol.is_assigned() or symbol.is_imported())
-    }
-
-
 class Lesson:
     """A lesson run with its solutions: the cells, what each shows, and the names before each of them."""
 
@@ -134,7 +98,7 @@ class Lesson:
             if cell.cell_type != "code" or "raises-exception" in tags:
                 continue
             if "check" in tags:
-                answer = value_of(cell, namespace)
+                answer = value_of(cell.source, namespace)
                 assert answer.correct, (cell.source, answer)
                 continue
             name = cell.metadata.get("camviz", {}).get("exercise")

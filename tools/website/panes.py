@@ -1,5 +1,7 @@
 """The lessons' visualizers, recorded: each lesson is run once, and every explorer that a cell shows goes into files.
 
+A page runs nothing that its reader writes, so that a lesson is run with the solutions in the exercises' places, and
+panes that draw a reader's function are recorded with usual mistakes, too.
 A lesson is recorded again when its code, its material or a file of camviz that it has loaded is another one.
 """
 
@@ -17,10 +19,12 @@ import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import clips
+from mistakes import MOST, Mistake, drawn_with, mistakes, names_in
 
 from camviz_school.samples import local_sample
 
@@ -40,13 +44,15 @@ PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
 
 
 class CodeCell(NamedTuple):
-    """The code of a cell, and the controls of its visualizer that a reader moves in relation to each other.
+    """The code of a cell, and what its metadata says.
 
-    A lesson names those in the cell's metadata, as {"camviz": {"together": ["k1", "k2"]}}.
+    `together` are the controls of its visualizer that a reader moves in relation to each other, as
+    {"camviz": {"together": ["k1", "k2"]}} names them; `exercise` is the one whose solution the code is, or "".
     """
 
     source: str
     together: tuple[str, ...] = ()
+    exercise: str = ""
 
 
 class RecordingError(Exception):
@@ -118,64 +124,91 @@ class Recorder:
 
 
 def code_cells(path: Path) -> dict[int, CodeCell]:
-    """The code of a notebook by the numbers of its cells."""
-    from camviz_school.course.notebooks import read
+    """The code of a notebook by the numbers of its cells, each exercise solved; without what checks it."""
+    from camviz_school.course import notebooks
 
-    return {
-        number: CodeCell(cell.source, tuple(cell.metadata.get("camviz", {}).get("together", ())))
-        for number, cell in enumerate(read(path).cells)
-        if cell.cell_type == "code"
-    }
+    notebook = notebooks.read(path)
+    solutions, cells = notebooks.solutions(notebook), {}
+    for number, cell in enumerate(notebook.cells):
+        if cell.cell_type == "code" and "check" not in cell.metadata.get("tags", []):
+            told = cell.metadata.get("camviz", {})
+            name = told.get("exercise", "")
+            cells[number] = CodeCell(solutions.get(name, cell.source), tuple(told.get("together", ())), name)
+    return cells
 
 
 def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> str:
     """Run the cells in this process and record each explorer that one shows; a line about what came out."""
     panes: dict[int, dict[str, Any]] = {}
-    shown = _shown(recorder.root, cells)
+    shown, before = _shown(recorder.root, cells)
     clips.write([explorer for _, explorer in shown], name, recorder.folder.parent / clips.CLIPS)
+    base = f"../{RECORDINGS}/" if name != HOME else f"{RECORDINGS}/"
     for number, explorer in shown:
         if not explorer.controls:
             continue  # its still says all
-        made = _recorded(explorer, cells[number].together, recorder)
-        html = made.html(f"../{RECORDINGS}/" if name != HOME else f"{RECORDINGS}/")
+        made = [_recorded(explorer, cells[number].together, recorder, recorder.positions)]
+        html = made[0].html(base)
+        solved = own_in(cells, number)
+        if solved:
+            wrong = _mistaken(solved, number, cells, before, explorer)
+            made += [
+                _recorded(one.explorer, cells[number].together, recorder, recorder.positions // 4) for one in wrong
+            ]
+            html = drawn_with(html, [(one, each.html(base)) for one, each in zip(wrong, made[1:], strict=True)])
         panes[number] = {
             "html": html,
-            "files": [*made.files, *re.findall(rf"{RECORDINGS}/(\w+\.svg)", html)],
-            "positions": made.positions,
-            "size": made.size,
+            "files": [file for one in made for file in one.files] + re.findall(rf"{RECORDINGS}/(\w+\.svg)", html),
+            "positions": sum(one.positions for one in made),
+            "size": sum(one.size for one in made),
         }
     recorder.keep(name, cells, panes)
     size, positions = (sum(pane[what] for pane in panes.values()) for what in ("size", "positions"))
     return f"{len(panes)} panes, {positions} positions, {size / 1e6:.1f} MB, {time.process_time():.0f} s of a processor"
 
 
-def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder) -> Any:
+def own_in(cells: dict[int, CodeCell], pane: int) -> dict[str, int]:
+    """The exercises, with the numbers of their cells, whose functions are named where the visualizer is made."""
+    read = names_in(cells[pane].source)
+    solved = {cell.exercise: number for number, cell in cells.items() if cell.exercise and number < pane}
+    return {exercise: number for exercise, number in solved.items() if exercise.split(".")[1] in read}
+
+
+def _mistaken(
+    solved: dict[str, int], pane: int, cells: dict[int, CodeCell], before: dict[int, dict[str, Any]], explorer: Any
+) -> list[Mistake]:
+    sources = {number: cell.source for number, cell in cells.items()}
+    found = (mistakes(exercise, stub, pane, sources, before, explorer) for exercise, stub in solved.items())
+    return [mistake for each in found for mistake in islice(each, MOST)]
+
+
+def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder, positions: int) -> Any:
     from camviz_school.record import Budget, record
     from camviz_school.record.panes import Explored
 
-    return record(Explored(explorer, together), recorder.folder, budget=Budget(SIZE, recorder.positions))
+    return record(Explored(explorer, together), recorder.folder, budget=Budget(SIZE, positions))
 
 
-def _shown(root: Path, cells: dict[int, CodeCell]) -> list[tuple[int, Any]]:
-    """Each explorer that a cell shows, with the cell's number, as IPython shows it."""
+def _shown(root: Path, cells: dict[int, CodeCell]) -> tuple[list[tuple[int, Any]], dict[int, dict[str, Any]]]:
+    """Each explorer that a cell shows, with the cell's number, as IPython shows it; and the names before each cell."""
     os.environ |= {"CAMVIZ_STATIC": "1", "CAMVIZ_RENDERER": "solid", "MPLBACKEND": "Agg"}
     os.chdir(root / "lessons")
     from IPython.core.interactiveshell import InteractiveShell
 
     from camviz.widgets import Explorer
 
-    shell, shown = InteractiveShell.instance(), []
+    shell, shown, before = InteractiveShell.instance(), [], {}
     number = 0
     shell.display_formatter.ipython_display_formatter.for_type(Explorer, lambda one: shown.append((number, one)))
-    for number, (source, _) in cells.items():
+    for number, cell in cells.items():
         printed = io.StringIO()
+        before[number] = dict(shell.user_ns)
         with contextlib.redirect_stdout(printed):
-            done = shell.run_cell(source, silent=False)
+            done = shell.run_cell(cell.source, silent=False)
         if not done.success:
             raise RuntimeError(f"cell {number} failed: {printed.getvalue()[-2000:]}")
         if "matplotlib.pyplot" in sys.modules:
             sys.modules["matplotlib.pyplot"].close("all")  # as a notebook does: the next cell begins its own figure
-    return shown
+    return shown, before
 
 
 def _loaded(root: Path, name: str) -> set[Path]:

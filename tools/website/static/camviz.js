@@ -265,8 +265,21 @@ function code() {
   });
 }
 
+// A button puts the pane with its mistake in the solution's place, and takes it away again.
+function mistakes() {
+  for (const place of document.querySelectorAll(".camviz-drawn-with")) {
+    const drawn = place.querySelectorAll(":scope > .camviz-with"), buttons = place.querySelectorAll(":scope > p > button");
+    buttons.forEach((button, number) => button.addEventListener("click", () => {
+      const chosen = button.ariaPressed === "true" ? 0 : number + 1;
+      drawn.forEach((one, i) => { one.hidden = i !== chosen; });
+      buttons.forEach((one, i) => { one.ariaPressed = String(i + 1 === chosen); });
+    }));
+  }
+}
+
 questions();
 panes();
 code();
+mistakes();
 progress();
 terms();
