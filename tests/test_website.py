@@ -294,5 +294,6 @@ def test_a_pane_with_mistakes_shows_the_solution_first_and_says_so():
     one = mistakes.Mistake("upside down", "It stands on its *head*.", None)
     html = mistakes.drawn_with("<i>right</i>", [(one, "<i>wrong</i>")])
     assert re.findall(r'class="camviz-with"( hidden)?', html) == ["", " hidden"]
-    assert html.index("Drawn with the solution") < html.index("<i>right</i>") < html.index("<em>head</em>")
+    assert html.index(">the solution<") < html.index(">upside down<") < html.index("<i>right</i>")
+    assert html.index("<i>right</i>") < html.index("<em>head</em>") < html.index("<i>wrong</i>")
     assert "<button" not in mistakes.drawn_with("<i>right</i>", [])

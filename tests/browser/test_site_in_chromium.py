@@ -136,15 +136,17 @@ def test_an_exercise_can_be_seen_solved_and_with_each_mistake(watched: Watched, 
     assert places or name < "01"
     for place in places:
         drawn, buttons = place.locator(":scope > .camviz-with"), place.locator(":scope > p > button").all()
-        assert drawn.count() == 1 + len(buttons)
+        assert drawn.count() == len(buttons) or (drawn.count(), buttons) == (1, [])
         seen = [first_picture(drawn.first)]
-        for number, button in enumerate(buttons, 1):
+        for number, button in list(enumerate(buttons))[1:]:
             button.click()
             assert [one.is_visible() for one in drawn.all()] == [i == number for i in range(drawn.count())]
-            assert len(drawn.nth(number).locator(".camviz-mistake").inner_text()) > 30
+            assert [one.get_attribute("aria-pressed") for one in buttons].index("true") == number
+            assert len("".join(drawn.nth(number).locator(":scope > p").all_inner_texts())) > 30
             seen.append(first_picture(drawn.nth(number)))
-            button.click()
-            assert drawn.first.is_visible()
+        if buttons:
+            buttons[0].click()
+        assert drawn.first.is_visible()
         assert len(set(seen)) == len(seen)
 
 

@@ -111,14 +111,15 @@ def _picture(explorer: Any) -> tuple[str, dict[str, bytes]]:
 
 def drawn_with(pane: str, others: list[tuple[Mistake, str]]) -> str:
     """A pane with the solution in it; buttons put one with a mistake in its place, and what the check says of it."""
-    buttons = " ".join(f'<button type="button" aria-pressed="false">{escape(one.title)}</button>' for one, _ in others)
-    choice = f'<p class="pst-js-only">See a usual mistake: {buttons}</p>' if others else ""
+    ours = "<p>The solution of the exercise. In a notebook your own function takes its place.</p>"
+    buttons = "".join(_button(one.title) for one, _ in others)
+    choice = f'<p class="pst-js-only">Drawn with {_button("the solution", True)} or a usual mistake: {buttons}</p>'
     wrong = "".join(
-        f'<div class="camviz-with" hidden><div class="camviz-mistake">{prose.to_html(one.explanation)}</div>'
-        f"{html}</div>"
-        for one, html in others
+        f'<div class="camviz-with" hidden>{prose.to_html(one.explanation)}{html}</div>' for one, html in others
     )
-    return (
-        '<div class="camviz-drawn-with"><div class="camviz-with"><p>Drawn with the solution of the exercise. In a '
-        f"notebook your own function takes its place.</p>{pane}</div>{wrong}{choice}</div>"
-    )
+    shown = f'<div class="camviz-with">{ours}{pane}</div>{wrong}'
+    return f'<div class="camviz-drawn-with">{choice if others else ""}{shown}</div>'
+
+
+def _button(title: str, pressed: bool = False) -> str:
+    return f'<button type="button" aria-pressed="{str(pressed).lower()}">{escape(title)}</button>'

@@ -265,14 +265,13 @@ function code() {
   });
 }
 
-// A button puts the pane with its mistake in the solution's place, and takes it away again.
+// A pane that an exercise's function draws: buttons show it with the solution, or with a usual mistake.
 function mistakes() {
   for (const place of document.querySelectorAll(".camviz-drawn-with")) {
     const drawn = place.querySelectorAll(":scope > .camviz-with"), buttons = place.querySelectorAll(":scope > p > button");
     buttons.forEach((button, number) => button.addEventListener("click", () => {
-      const chosen = button.ariaPressed === "true" ? 0 : number + 1;
-      drawn.forEach((one, i) => { one.hidden = i !== chosen; });
-      buttons.forEach((one, i) => { one.ariaPressed = String(i + 1 === chosen); });
+      drawn.forEach((one, i) => { one.hidden = i !== number; });
+      buttons.forEach((one, i) => { one.ariaPressed = String(i === number); });
     }));
   }
 }
