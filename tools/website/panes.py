@@ -2,7 +2,8 @@
 
 A page runs nothing that its reader writes, so that a lesson is run with the solutions in the exercises' places, and
 panes that draw a reader's function are recorded with usual mistakes, too.
-A lesson is recorded again when its code, its material or a file of camviz that it has loaded is another one.
+A lesson is recorded again when its code, its material, a file of camviz that it has loaded or one of those that record
+it is another one.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ from camviz.views.frustum import FrustumView
 from camviz.widgets import explore
 explore(FrustumView(), "hfov_deg", "yaw_deg", "pitch_deg")
 """
+RECORDERS = ("panes.py", "mistakes.py", "clips.py")
 PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
 
 
@@ -218,4 +220,5 @@ def _loaded(root: Path, name: str) -> set[Path]:
     files = [path for package in packages for path in package.rglob("*") if path.is_file()]
     data = {path for path in files if path.suffix not in (".py", ".pyc")}
     material = {path for path in (root / "lessons/material" / name).glob("*") if path.is_file()}
-    return {path for path in modules if any(map(path.is_relative_to, packages))} | data | material
+    loaded = {path for path in modules if any(map(path.is_relative_to, packages))}
+    return loaded | data | material | {root / "tools/website" / name for name in RECORDERS}
