@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 import clips
 from mistakes import MOST, Mistake, drawn_with, mistakes, names_in
 
+from camviz_school.record import Budget
 from camviz_school.samples import local_sample
 
 RECORDINGS = "_recordings"
@@ -148,14 +149,14 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> s
     for number, explorer in shown:
         if not explorer.controls:
             continue  # its still says all
-        made = [_recorded(explorer, cells[number].together, recorder, recorder.positions)]
+        together = cells[number].together
+        made = [_recorded(explorer, together, recorder, Budget(SIZE, recorder.positions))]
         html = made[0].html(base)
         solved = own_in(cells, number)
         if solved:
             wrong = _mistaken(solved, number, cells, before, explorer)
-            made += [
-                _recorded(one.explorer, cells[number].together, recorder, recorder.positions // 4) for one in wrong
-            ]
+            few = Budget(SIZE, recorder.positions // 4)
+            made += [_recorded(one.explorer, together, recorder, few) for one in wrong]
             html = drawn_with(html, [(one, each.html(base)) for one, each in zip(wrong, made[1:], strict=True)])
         panes[number] = {
             "html": html,
@@ -183,11 +184,11 @@ def _mistaken(
     return [mistake for each in found for mistake in islice(each, MOST)]
 
 
-def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder, positions: int) -> Any:
-    from camviz_school.record import Budget, record
+def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder, budget: Budget) -> Any:
+    from camviz_school.record import record
     from camviz_school.record.panes import Explored
 
-    return record(Explored(explorer, together), recorder.folder, budget=Budget(SIZE, positions))
+    return record(Explored(explorer, together), recorder.folder, budget=budget)
 
 
 def _shown(root: Path, cells: dict[int, CodeCell]) -> tuple[list[tuple[int, Any]], dict[int, dict[str, Any]]]:
