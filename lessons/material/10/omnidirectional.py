@@ -52,7 +52,7 @@ class OmnidirectionalView(OrbitView):
 
     A hyperbolic mirror has the shape that goes with `xi`; at 0 it is flat, at 1 it is the parabolic one. The camera
     stands in its second focus, or `shift_mm` below. The middle of the picture is straight down, its top ahead.
-    `panels` names what is drawn, in its order: the doughnut, and any of window, yours, section, numbers, unrolled and space.
+    `panels` names what is drawn: the doughnut, and any of window, yours, section, numbers, unrolled and space.
     `yours` is a reader's function of (points, ξ), points (..., 3) in the picture's frame, z towards its middle, to
     image points (..., 2) in focal lengths; what it does is orange.
     """
