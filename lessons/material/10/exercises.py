@@ -871,7 +871,7 @@ POLYNOMIAL = Exercise(
         "The ray (ρ, z) has tan θ = ρ/z. What is z, if ρ and θ are known?",
         "Each measured ray is one equation, a0 + a2 ρ² + a3 ρ³ + a4 ρ⁴ = ρ / tan θ. Put 1, ρ², ρ³ and ρ⁴ side by side, "
         "as the columns of a matrix (n, 4), and let `np.linalg.lstsq` find the four numbers.",
-        "`return np.linalg.lstsq(rho[:, None] ** np.array([0, 2, 3, 4]), ___, rcond=None)[0]`",
+        "`return np.linalg.lstsq(powers, ___, rcond=None)[0]`",
     ),
     praise="No shape of a mirror was needed, only rays. That is why this model fits nearly everything.",
 )
