@@ -98,7 +98,7 @@ def test_one_fisheye_that_looks_up_sees_the_whole_horizon(says):
 
 
 def test_how_far_the_rays_of_the_sphere_miss_one_point(says):
-    """A ball of 50 mm, 150 mm from its camera, as far as its rays come from 112°: the view's own mirror, traced here."""
+    """A ball of 50 mm, 150 mm from its camera, out to 112°: the mirror of the view, traced here."""
     h, near, off, far, less = says(
         "The rays of the sphere miss the best single point by 3.2 mm (root mean square). A thing 0.3 m away is then "
         "seen 0.61° from where it is, and a thing 3 m away 0.061°."
@@ -399,7 +399,9 @@ def test_a_polynomial_fits_the_sphere_whose_viewpoint_moves(says):
     there = np.linspace(0.02, 1, 200) * np.interp(np.radians(out.value), angles, rho)
     assert more.value / 2 < worst(there, np.interp(there, rho, angles)) < more.value
     crossing = on[:, 1] - on[:, 0] * rays[:, 1] / rays[:, 0]
-    beside, moved = says("The ray from 90° crosses the axis 9.8 mm nearer to the camera than the rays from near the axis.")
+    beside, moved = says(
+        "The ray from 90° crosses the axis 9.8 mm nearer to the camera than the rays from near the axis."
+    )
     first, last = np.interp(np.radians([1.0, beside.value]), angles, crossing)
     assert moved == last - first  # z runs towards the camera
     far, at, little, near, much = says(
@@ -459,7 +461,10 @@ def test_what_a_ring_does_to_a_globe_at_a_seam(says):
 
 def test_what_remains_far_from_the_ring(says):
     says("Of n cameras, each of the two beside a seam is turned α = π/n from it.")
-    says("Where the panorama is stitched for a distance S instead of infinity, about b (1/Z − 1/S) remains, far from the ring.")
+    says(
+        "Where the panorama is stitched for a distance S instead of infinity, about b (1/Z − 1/S) remains, far from "
+        "the ring."
+    )
     n, r, S = 6, 0.25, 30.0
     right = r * np.array([np.sin(np.pi / n), np.cos(np.pi / n)])
     for Z, within in ((1.0, 0.3), (10.0, 0.03)):

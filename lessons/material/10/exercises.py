@@ -809,9 +809,7 @@ def first_minus_second(theta, f, xi, other):
     return -apart(theta, f, xi, other)
 
 
-@APART.wrong(
-    "This is the size alone. Where the second radius is the smaller one, the answer is negative."
-)
+@APART.wrong("This is the size alone. Where the second radius is the smaller one, the answer is negative.")
 def size_alone(theta, f, xi, other):
     return np.abs(apart(theta, f, xi, other))
 
