@@ -26,12 +26,12 @@ from camviz.lenses import Lens, UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.panoramas.cubemap import cubemap_camera
 from camviz.panoramas.mirrors import Catadioptric, MirrorLens, direction_error, miss
-from camviz.panoramas.reprojection import equirectangular_camera, window
+from camviz.panoramas.reprojection import equirectangular_camera, reproject, window
 from camviz.views import garden
 from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 from camviz_school.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
-from camviz_school.views.mirror_photographs import UP, resampled, traced
+from camviz_school.views.mirror_photographs import UP, traced
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
 _DRAFT, _FINE = 160, 640  # pixels across the doughnut
@@ -221,7 +221,7 @@ class OmnidirectionalView(OrbitView):
             photographs |= attached
         for name, seen in {"window": self._seen, "unrolled": self._unrolled}.items():
             if self._has(name) or (name == "window" and self._has("yours")):
-                photographs[name] = jpeg(resampled(picture, camera, seen(draft), draft))
+                photographs[name] = jpeg(np.asarray(reproject(picture, camera, seen(draft), antialias=not draft)))
         if self._has("yours"):
             parts["yours"], attached = self._your_panel(picture, draft)
             photographs |= attached
@@ -258,8 +258,7 @@ class OmnidirectionalView(OrbitView):
     # The panels ------------------------------------------------------------------------------------------------------
 
     def _space_panel(self, picture: np.ndarray, draft: bool) -> Drawn:
-        x, y, width, height = self._slot("space")
-        panel = space_panel("space", x, y, width, height)
+        panel = space_panel("space", *self._slot("space"))
         small = cv2.resize(picture, (128, 128), interpolation=cv2.INTER_AREA)
         items = in_space(self.rig, small, self.looking, draft=draft)
         label = "Mirror and camera in space; drag or press the arrow keys to walk around"
@@ -322,9 +321,8 @@ class OmnidirectionalView(OrbitView):
         uv = panel.place(camera.project(closed(outline)))
         jump = np.linalg.norm(np.diff(uv, axis=0), axis=-1) > 40
         uv[1:][jump] = np.nan  # from one edge of the picture to another
-        seen = placed_image(panel, "unrolled", width, height)
         title = "Unrolled: longitude and latitude" if self.unroll == "equirectangular" else "Folded out: a cube map"
-        return panel.show(seen + svg.line(uv, "orange"), title=title)
+        return panel.show(placed_image(panel, "unrolled", width, height) + svg.line(uv, "orange"), title=title)
 
     def _numbers_panel(self) -> str:
         x = self._layout["numbers"][0] + 10

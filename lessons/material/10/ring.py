@@ -92,9 +92,7 @@ class RingView(View):
         known = seen if np.isfinite(seen) else 1e6
         return {
             "neighbours apart": f"{100 * self.ring.baseline:.1f} cm",
-            "parallax at 1 m": _pixels(self.parallax_px(1.0)),
-            "parallax at 3 m": _pixels(self.parallax_px(3.0)),
-            "parallax at 10 m": _pixels(self.parallax_px(10.0)),
+            **{f"parallax at {z:g} m": _pixels(self.parallax_px(z)) for z in (1.0, 3.0, 10.0)},
             there: _pixels(self.parallax_px(known)),
         }
 
@@ -127,7 +125,7 @@ class RingView(View):
     def _layout(self) -> dict[str, Cell]:
         """The panorama in a row of its own, the others below it; the seam alone is larger."""
         wide = {name: _WIDE[name] for name in self.panels.split() if name in _WIDE}
-        below = (264, wide) if len(wide) > 1 else (390, {"seam": 490})
+        below = (264, wide) if len(wide) > 1 else (317, {"seam": 392})
         return rows(*([(258, {"panorama": 960})] if self._has("panorama") else []), below)
 
     def _slot(self, name: str) -> Cell:
@@ -159,7 +157,7 @@ class RingView(View):
 
     def loupe(self, *, draft: bool = False) -> np.ndarray:
         """The part around the seam ahead, traced as finely as it is shown."""
-        across = (96, 440) if self._slot("seam")[2] > 400 else (66, 300)
+        across = (96, 440) if self._slot("seam")[2] > 320 else (66, 300)
         return _detail(self.ring, self.stitched_m, self.seam_deg, self._coarse(across[not draft]))
 
     def _seam_panel(self) -> str:
