@@ -8,6 +8,7 @@ from every_view import words
 from camviz.lenses import UnifiedSphere
 from camviz.panoramas.reprojection import reproject
 from camviz.scenes import snapshot, textured_scene
+from camviz.views.yours import YOURS_HERE
 from camviz_school.course.exercises import exercises
 from camviz_school.views.omnidirectional import BLIND_DEG, OmnidirectionalView
 
@@ -91,7 +92,7 @@ def test_dragging_the_window_turns_it_and_the_doughnut_points_it():
     assert turned.yaw_deg == pytest.approx(view.yaw_deg - 6.4)
     box = view._doughnut_box
     target = np.array([1.0, 0.1, 1.0]) / np.linalg.norm([1.0, 0.1, 1.0])
-    x, y = box.place(view.camera(480).project(target)) + (box.x, box.y)
+    x, y = box.place(view.camera(640).project(target)) + (box.x, box.y)
     pointed = view.dragged("doughnut", x, y, 1, 1)
     assert pointed.yaw_deg == pytest.approx(45, abs=0.2)
     assert pointed.pitch_deg == pytest.approx(-np.degrees(np.arctan(0.1 / np.sqrt(2))), abs=0.2)
@@ -113,7 +114,7 @@ def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
         OmnidirectionalView(**bad)
 
 
-WITH_YOURS = "doughnut window section yours"
+WITH_YOURS = "doughnut window yours"
 
 
 def shown(view, name, draft):
@@ -143,13 +144,38 @@ def test_a_wrong_one_cuts_another_and_none_leaves_a_sentence():
         apart = np.abs(shown(view, "window", True).astype(int) - shown(view, "yours", True)).max(axis=-1)
         assert np.mean(apart > 30) > 0.02, known.explanation
     picture = OmnidirectionalView(panels=WITH_YOURS, yours=lambda points, xi: None).figure(draft=True)
-    assert "returns nothing yet" in picture.body
+    assert YOURS_HERE in picture.body
     assert "yours" not in picture.photographs
+    broken = OmnidirectionalView(panels=WITH_YOURS, yours=lambda points, xi: points / "f").figure(draft=True)
+    assert YOURS_HERE not in broken.body
+    assert "gives no answer" in broken.body
 
 
 def test_before_the_first_question_nothing_names_the_mirror():
     picture = OmnidirectionalView(panels="doughnut window").figure(draft=True)
     assert "hyperbolic" not in picture.body + picture.description
     assert "viewpoint" not in picture.body + picture.description
-    with pytest.raises(ValueError, match="panels must be one of"):
-        OmnidirectionalView(panels="doughnut")
+    assert [tile.name for tile in picture.tiles] == ["doughnut", "window"]
+    for panels in ("window", "doughnut dome"):
+        with pytest.raises(ValueError, match="panels must be doughnut and any of window"):
+            OmnidirectionalView(panels=panels)
+
+
+def test_every_panel_that_a_reader_opens_has_its_place_and_covers_no_other():
+    for begun in ("doughnut section", "doughnut window", WITH_YOURS):
+        view = OmnidirectionalView(panels=begun)
+        for name in OmnidirectionalView.openable:
+            view = view.with_panels({name: True})
+            cells = [tile.cell for tile in view.figure(draft=True).tiles]
+            assert len(cells) == len(view.panels.split())
+            for i, (x, y, width, height) in enumerate(cells):
+                assert x + width <= 960
+                for a, b, across, down in cells[:i]:
+                    assert x >= a + across or a >= x + width or y >= b + down or b >= y + height
+
+
+def test_few_panels_tell_only_their_own_figures():
+    cut, both = (OmnidirectionalView(panels=p).description() for p in ("doughnut section", "doughnut section window"))
+    assert "window looks" not in cut
+    assert "e = 1.513" in cut
+    assert "window looks" in both

@@ -58,3 +58,23 @@ def test_dragging_turns_the_ring_as_far_as_the_pointer():
 def test_a_state_that_makes_no_sense_is_refused_by_name(bad, name):
     with pytest.raises(ValueError, match=name):
         RingView(**bad)
+
+
+def test_the_seam_alone_is_larger_and_the_others_come_and_go():
+    """Each panel that is opened has a tile of its own, which covers no other."""
+    view = RingView(panels="seam")
+    assert [tile.name for tile in view.figure(draft=True).tiles] == ["seam"]
+    assert "panorama" not in view.figure(draft=True).photographs
+    alone = view.loupe().shape[1]
+    for name in RingView.openable:
+        view = view.with_panels({name: True})
+    assert view.loupe().shape[1] < alone
+    cells = [tile.cell for tile in view.figure(draft=True).tiles]
+    assert len(cells) == 4
+    for i, (x, y, width, height) in enumerate(cells):
+        assert x + width <= 960
+        for a, b, across, down in cells[:i]:
+            assert x >= a + across or a >= x + width or y >= b + down or b >= y + height
+    for panels in ("panorama", "seam dome"):
+        with pytest.raises(ValueError, match="panels must be seam and any of panorama"):
+            RingView(panels=panels)

@@ -43,7 +43,7 @@ PICTURES = {
     "image_sensor": ImageSensorView(),
     "light_field": LightFieldView(),
     "noise": PhotonTransferView(),
-    "omnidirectional": OmnidirectionalView(),
+    "omnidirectional": OmnidirectionalView(panels="doughnut window", hfov_deg=80.0),
     "sharpness": SharpnessView(f_number=2.8, defocus_um=20.0),
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }

@@ -1,4 +1,5 @@
-"""Lesson 10, omnidirectional cameras: the unified sphere and its inverse, the double sphere, a cube, and a ring's seam.
+"""Lesson 10, omnidirectional cameras: the unified sphere and its inverse, a ring's seam, the double sphere, the valley
+of f and ξ, a polynomial for any mirror, and a cube.
 
 Directions are in the camera's frame, z towards the middle of the picture; image points are in focal lengths.
 """
@@ -178,7 +179,7 @@ def on_the_sphere_only(points, xi):
     return points[..., :2] / np.linalg.norm(points, axis=-1, keepdims=True)
 
 
-# 2: and back ---------------------------------------------------------------------------------------------------------
+# 3: and back ---------------------------------------------------------------------------------------------------------
 
 
 def unproject(xy: Array, xi: float) -> Array:
@@ -326,7 +327,7 @@ def one_radius_for_all(xy, xi):
     return np.stack([eta * xy[..., 0], eta * xy[..., 1], 0 * xy[..., 0] + eta - xi], axis=-1)
 
 
-# 3: find the bug in the double sphere --------------------------------------------------------------------------------
+# 4: find the bug in the double sphere --------------------------------------------------------------------------------
 
 
 def double_sphere(points: Array, xi: float, alpha: float) -> Array:
@@ -467,7 +468,7 @@ def one_sphere_only(points, xi, alpha):
     return double_sphere(points, 0.0, alpha)
 
 
-# 4: onto the cube ----------------------------------------------------------------------------------------------------
+# 7: onto the cube ----------------------------------------------------------------------------------------------------
 
 
 def cube_point(direction: Array) -> Array:
@@ -594,7 +595,7 @@ def multiplied(direction):
     return direction * np.max(np.abs(direction), axis=-1, keepdims=True)
 
 
-# 5: torn at the seam -------------------------------------------------------------------------------------------------
+# 2: torn at the seam -------------------------------------------------------------------------------------------------
 
 
 def parallax(cameras: int, radius: float, distance: float, width: int) -> float:
@@ -727,4 +728,235 @@ def radians_as_degrees(cameras, radius, distance, width):
     return parallax(cameras, radius, distance, width) * 2 * np.pi / 360
 
 
-EXERCISES = (PROJECT, UNPROJECT, DOUBLE_SPHERE, CUBE, PARALLAX)
+# 5: two cameras of one valley -----------------------------------------------------------------------------------------
+
+
+def apart(theta: Array, f: float, xi: float, other: float) -> Array:
+    """By how many pixels (...) rays `theta` from the axis land farther out with ξ = `other` and the same f/(1 + ξ)."""
+    other_f = f * (1 + other) / (1 + xi)
+    return _radius(theta, other_f, other) - _radius(theta, f, xi)
+
+
+def _radius(theta, f, xi):
+    return f * np.sin(theta) / (np.cos(theta) + xi)
+
+
+def _apart_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        xi, other = rng.permutation([rng.uniform(0.3, 0.8), rng.uniform(1.0, 1.8)]).tolist()
+        yield rng.uniform(0.3, 1.3, shape), float(rng.uniform(200, 700)), xi, other
+    yield np.append(0.0, rng.uniform(0.2, 1.2, 3)), float(rng.uniform(200, 700)), 0.0, float(rng.uniform(0.6, 1.4))
+    yield rng.uniform(1.6, 1.9, 4), float(rng.uniform(200, 700)), float(rng.uniform(0.6, 0.9)), 1.0  # from behind
+
+
+APART = Exercise(
+    name="10.apart",
+    reference=apart,
+    cases=_apart_cases,
+    shown=((np.array([0.2, 0.7, 1.2]), 500.0, 1.0, 0.5),),
+    hints=(
+        "What is f/(1 + ξ) of the first camera? Which f gives the second camera the same quotient?",
+        "With D = 1 a ray at the angle θ has X = sin θ and Z = cos θ. Put both cameras' numbers into "
+        "f sin θ / (cos θ + ξ), and subtract the first radius from the second.",
+        "`other_f = f * ___ / (1 + xi)`",
+    ),
+    praise="Nothing in the middle, much at the rim: only rays from there tell the two cameras apart.",
+)
+
+
+@APART.right
+def from_points_in_space(theta, f, xi, other):
+    X, Z = np.sin(theta), np.cos(theta)
+    D = np.hypot(X, Z)
+    middle = f / (1 + xi)
+    return middle * (1 + other) * X / (Z + other * D) - middle * (1 + xi) * X / (Z + xi * D)
+
+
+@APART.right
+def with_two_loops(theta, f, xi, other):
+    import math
+
+    found = [
+        f * (1 + other) / (1 + xi) * math.sin(one) / (math.cos(one) + other) - f * math.sin(one) / (math.cos(one) + xi)
+        for one in np.ravel(theta)
+    ]
+    return np.reshape(found, np.shape(theta))
+
+
+@APART.right
+def over_one_denominator(theta, f, xi, other):
+    c = np.cos(theta)
+    return f * np.sin(theta) / (1 + xi) * (other - xi) * (c - 1) / ((c + other) * (c + xi))
+
+
+@APART.wrong("You left f as it was. Then the middle changes: the second f must keep f/(1 + ξ).")
+def with_the_same_f(theta, f, xi, other):
+    return _radius(theta, f, other) - _radius(theta, f, xi)
+
+
+@APART.wrong("The quotient is upside down: the greater ξ needs the greater f, by (1 + other)/(1 + ξ).")
+def quotient_upside_down(theta, f, xi, other):
+    return _radius(theta, f * (1 + xi) / (1 + other), other) - _radius(theta, f, xi)
+
+
+@APART.wrong("You kept f/ξ. What the middle shows is f/(1 + ξ).")
+def kept_f_over_xi(theta, f, xi, other):
+    return _radius(theta, f * other / max(xi, 1e-3), other) - _radius(theta, f, xi)
+
+
+@APART.wrong("The sign is turned round: the task asks for the second radius minus the first.")
+def first_minus_second(theta, f, xi, other):
+    return -apart(theta, f, xi, other)
+
+
+@APART.wrong("This is the size alone. Where the second radius is the smaller one, the answer is negative.")
+def size_alone(theta, f, xi, other):
+    return np.abs(apart(theta, f, xi, other))
+
+
+@APART.wrong("You used tan θ, the pinhole's radius, in place of sin θ / (cos θ + ξ).")
+def as_of_pinholes(theta, f, xi, other):
+    return (f * (1 + other) / (1 + xi) - f) * np.tan(theta)
+
+
+@APART.wrong("sin and cos have changed places: X = sin θ is beside the axis, Z = cos θ along it.")
+def sine_and_cosine_in_each_other_s_place(theta, f, xi, other):
+    return apart(np.pi / 2 - theta, f, xi, other)
+
+
+@APART.wrong("θ is given in radians; you turned it into degrees or back.")
+def angles_converted(theta, f, xi, other):
+    return apart(np.radians(theta), f, xi, other)
+
+
+@APART.wrong("This is where the second camera draws the ray. From it the first camera's radius must be subtracted.")
+def second_radius_alone(theta, f, xi, other):
+    return _radius(theta, f * (1 + other) / (1 + xi), other)
+
+
+@APART.wrong("The second radius has the first camera's ξ below the line: both numbers change together.")
+def first_xi_below_the_line(theta, f, xi, other):
+    return _radius(theta, f * (1 + other) / (1 + xi), xi) - _radius(theta, f, xi)
+
+
+# 6: one polynomial for any mirror -------------------------------------------------------------------------------------
+
+
+def polynomial(rho: Array, theta: Array) -> Array:
+    """a0, a2, a3, a4 (4,): ρ / tan θ is nearest to a0 + a2 ρ² + a3 ρ³ + a4 ρ⁴ at the measured rays (n,)."""
+    return _fitted(rho, rho / np.tan(theta))
+
+
+def _fitted(rho, wanted, *powers):
+    return np.linalg.lstsq(rho[:, None] ** np.array(powers or (0, 2, 3, 4)), wanted, rcond=None)[0]
+
+
+def _mirror_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Measured rays of four mirrors, to a thousandth of a radian; none lies on any polynomial."""
+    for xi in (1.0, 0.9, 0.7, 1.1):
+        theta = np.sort(rng.uniform(0.2, rng.uniform(1.7, 1.9), rng.integers(14, 40)))
+        rho = np.sin(theta) / (np.cos(theta) + xi) * rng.uniform(0.9, 1.1)
+        yield rho, theta + rng.normal(0, 1e-3, theta.shape)
+
+
+POLYNOMIAL = Exercise(
+    name="10.polynomial",
+    reference=polynomial,
+    cases=_mirror_cases,
+    tolerance=1e-6,
+    shown=((np.tan(np.array([0.2, 0.4, 0.6, 0.8, 1.0]) / 2), np.array([0.2, 0.4, 0.6, 0.8, 1.0])),),
+    hints=(
+        "The ray (ρ, z) has tan θ = ρ/z. What is z, if ρ and θ are known?",
+        "Each measured ray is one equation, a0 + a2 ρ² + a3 ρ³ + a4 ρ⁴ = ρ / tan θ. Put 1, ρ², ρ³ and ρ⁴ side by side, "
+        "as the columns of a matrix (n, 4), and let `np.linalg.lstsq` find the four numbers.",
+        "`return np.linalg.lstsq(powers, ___, rcond=None)[0]`",
+    ),
+    praise="No shape of a mirror was needed, only rays. That is why this model fits nearly everything.",
+)
+
+
+@POLYNOMIAL.right
+def by_the_normal_equations(rho, theta):
+    A = np.stack([np.ones_like(rho), rho**2, rho**3, rho**4], axis=-1)
+    return np.linalg.inv(A.T @ A) @ A.T @ (rho * np.cos(theta) / np.sin(theta))
+
+
+@POLYNOMIAL.right
+def by_the_pseudoinverse(rho, theta):
+    A = np.vander(rho, 5, increasing=True)[:, [0, 2, 3, 4]]
+    return (np.linalg.pinv(A) @ (rho / np.tan(theta))).tolist()
+
+
+@POLYNOMIAL.right
+def by_a_general_solver(rho, theta):
+    from scipy.optimize import least_squares
+
+    def off(a):
+        return a[0] + a[1] * rho**2 + a[2] * rho**3 + a[3] * rho**4 - rho / np.tan(theta)
+
+    return least_squares(off, np.zeros(4), x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+
+
+@POLYNOMIAL.wrong("You fit ρ tan θ. From tan θ = ρ/z follows z = ρ / tan θ.")
+def times_the_tangent(rho, theta):
+    return _fitted(rho, rho * np.tan(theta))
+
+
+@POLYNOMIAL.wrong("You fit tan θ itself. The polynomial gives z, which is ρ / tan θ.")
+def the_tangent_itself(rho, theta):
+    return _fitted(rho, np.tan(theta))
+
+
+@POLYNOMIAL.wrong("You fit θ. The polynomial gives how far forward the ray goes, z = ρ / tan θ.")
+def the_angle_itself(rho, theta):
+    return _fitted(rho, theta)
+
+
+@POLYNOMIAL.wrong("You fit the cosine: that is z of a ray of length 1. This ray is (ρ, z), so that z = ρ / tan θ.")
+def the_cosine(rho, theta):
+    return _fitted(rho, np.cos(theta))
+
+
+@POLYNOMIAL.wrong("Your polynomial has ρ as well, with a1. In this model a1 is 0: the mirror's top has no kink.")
+def with_a1(rho, theta):
+    return _fitted(rho, rho / np.tan(theta), 0, 1, 2, 3, 4)[[0, 2, 3, 4]]
+
+
+@POLYNOMIAL.wrong("Your powers are 0, 1, 2, 3. The model leaves out ρ itself and goes up to ρ⁴.")
+def powers_from_0_to_3(rho, theta):
+    return _fitted(rho, rho / np.tan(theta), 0, 1, 2, 3)
+
+
+@POLYNOMIAL.wrong("Your powers are even only. The model has ρ³ too.")
+def even_powers_only(rho, theta):
+    a0, a2, a4 = _fitted(rho, rho / np.tan(theta), 0, 2, 4)
+    return np.array([a0, a2, 0.0, a4])
+
+
+@POLYNOMIAL.wrong("The order is a0 a2 a3 a4, from the lowest power to the highest.")
+def highest_power_first(rho, theta):
+    return polynomial(rho, theta)[::-1]
+
+
+@POLYNOMIAL.wrong("You use the first four rays alone. All of them count: take the least squares of all n equations.")
+def through_the_first_four_rays(rho, theta):
+    return np.linalg.solve(rho[:4, None] ** np.array([0, 2, 3, 4]), (rho / np.tan(theta))[:4])
+
+
+@POLYNOMIAL.wrong("You find each number as though the others were zero. They share the work: solve for all at once.")
+def one_number_after_the_other(rho, theta):
+    A = rho[:, None] ** np.array([0, 2, 3, 4])
+    return A.T @ (rho / np.tan(theta)) / np.sum(A**2, axis=0)
+
+
+@POLYNOMIAL.wrong("The sign is turned round: z is positive for rays in front, where θ is below 90°.")
+def backward_z(rho, theta):
+    return -polynomial(rho, theta)
+
+
+@POLYNOMIAL.wrong("You fit a polynomial of θ. It is one of ρ: the way goes from the pixel to the ray.")
+def of_the_angle(rho, theta):
+    return _fitted(theta, rho / np.tan(theta))
+
+
+EXERCISES = (PROJECT, PARALLAX, UNPROJECT, DOUBLE_SPHERE, APART, POLYNOMIAL, CUBE)

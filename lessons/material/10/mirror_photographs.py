@@ -1,4 +1,4 @@
-"""What the camera under a mirror photographs of the garden, ray by ray, and what is resampled from such a picture."""
+"""What the camera under a mirror photographs of the garden, ray by ray."""
 
 from __future__ import annotations
 
@@ -6,20 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from camviz.cameras import Camera
 from camviz.panoramas.mirrors import Catadioptric
 from camviz.panoramas.mirrors import photograph as photographed
-from camviz.panoramas.reprojection import reproject
 from camviz.poses import RigidTransform, Rotation
 from camviz.scenes import textured_scene, to_display
 from camviz_school.views.mirror_drawings import picture_pixels
 
 UP = RigidTransform.from_rotation(Rotation.from_euler("x", -90, degrees=True))
-
-
-def resampled(picture: np.ndarray, source: Camera, target: Camera, draft: bool) -> np.ndarray:
-    """The picture (height, width, 3) that `target` would have taken, from one that `source` took."""
-    return np.asarray(reproject(picture, source, target, antialias=not draft), dtype=np.uint8)
 
 
 @lru_cache(maxsize=2)

@@ -5,7 +5,7 @@ A reader's own projection can bend the grid on the picture and cut the window ou
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import degrees, isfinite
@@ -16,9 +16,9 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import closed
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.space import OrbitCamera, space_panel
@@ -26,27 +26,22 @@ from camviz.lenses import Lens, UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.panoramas.cubemap import cubemap_camera
 from camviz.panoramas.mirrors import Catadioptric, MirrorLens, direction_error, miss
-from camviz.panoramas.reprojection import equirectangular_camera, window
+from camviz.panoramas.reprojection import equirectangular_camera, reproject, window
 from camviz.views import garden
 from camviz.views.base import Drawn, OrbitView, answered, choice, slider, without
 from camviz.views.marks import on_photograph
 from camviz_school.views.mirror_drawings import in_space, mirror_camera, picture_pixels, section, sphere, viewpoint
-from camviz_school.views.mirror_photographs import UP, resampled, traced
+from camviz_school.views.mirror_photographs import UP, traced
 
 BLIND_DEG = 14.0  # around the axis, where the mirror shows the camera itself
-_DRAFT, _FINE = 160, 480  # pixels across the doughnut
+_DRAFT, _FINE = 160, 640  # pixels across the doughnut
 _COUNTED = 400  # pixels across the picture whose focal length is told
 _OF_THE_WINDOW = {"yaw_deg", "pitch_deg", "hfov_deg", "unroll", "model", "eye"}  # the mirror stands still
 _OF_THE_MIRROR = {"rig", "central", "lens", "rim_angle_deg", "missed_mm", "_doughnuts"}
-_ALL = "space doughnut window section unrolled"
-_ABOVE = (354, {"doughnut": 330, "window": 430, "numbers": 200})
-_LAYOUTS = {
-    "doughnut window": rows(_ABOVE),
-    "doughnut section": rows((384, {"doughnut": 360, "section": 400, "numbers": 200})),
-    _ALL: rows((354, {"doughnut": 330, "window": 430, "numbers": 200}),
-               (300, {"unrolled": 440, "section": 250, "space": 270})),
-    "doughnut window section yours": rows(_ABOVE, (354, {"section": 330, "yours": 430})),
-}  # fmt: skip
+_WIDE = {"doughnut": 330, "window": 430, "yours": 430, "section": 400, "numbers": 200, "unrolled": 440, "space": 270}
+"""How wide each panel is in picture units; the section has less beside the unrolled picture."""
+_PAIR, _PAIR_HIGH, _BESIDE = 310, 264, 250  # the size of each of two windows beside the doughnut; the section's width
+_TALL, _LOW = 354, 300  # a row with photographs, and one without
 _GROUND = 1.2  # metres from the viewpoint down to the grid of the reader's own
 _AWAY = 2.5  # metres to what a window shows, for a function that takes its distance for 1
 
@@ -57,13 +52,19 @@ class OmnidirectionalView(OrbitView):
 
     A hyperbolic mirror has the shape that goes with `xi`; at 0 it is flat, at 1 it is the parabolic one. The camera
     stands in its second focus, or `shift_mm` below. The middle of the picture is straight down, its top ahead.
-    `panels` names what is drawn: "doughnut window", "doughnut section", "doughnut window section yours" or all five.
+    `panels` names what is drawn: the doughnut, and any of window, yours, section, numbers, unrolled and space.
     `yours` is a reader's function of (points, ξ), points (..., 3) in the picture's frame, z towards its middle, to
     image points (..., 2) in focal lengths; what it does is orange.
     """
 
     title: ClassVar[str] = "Omnidirectional camera"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {
+        "section": "cut along the axis",
+        "window": "window",
+        "unrolled": "unrolled",
+        "space": "in space",
+        "numbers": "numbers",
+    }
 
     xi: float = slider(0.92, 0.0, 1.0, 0.01, label="ξ", help="0 is a flat mirror, a pinhole; 1 a paraboloid")
     mirror: str = choice("hyperbolic", "parabolic", "spherical", help="only the first two have a single viewpoint")
@@ -76,9 +77,15 @@ class OmnidirectionalView(OrbitView):
     hfov_deg: float = slider(64.0, 20.0, 120.0, 1.0, label="zoom: field of view", unit="°")
     unroll: str = choice("equirectangular", "cube map", help="the same picture, rolled out or folded")
     model: str = choice("mirror", "sphere", label="drawn as", help="cut along the axis: the mirror, or the sphere")
-    panels: str = _ALL
+    panels: str = "doughnut window numbers unrolled section space"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     eye: OrbitCamera = OrbitCamera(target=(0.0, 0.3, 0.0), distance=2.7, yaw_deg=75, pitch_deg=12)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not {"doughnut"} <= set(self.panels.split()) <= {*_WIDE}:
+            others = ", ".join(list(_WIDE)[1:])
+            raise ValueError(f"panels must be doughnut and any of {others} beside it, got {self.panels!r}")
 
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed; what depends on the mirror alone is kept while the window turns."""
@@ -162,18 +169,10 @@ class OmnidirectionalView(OrbitView):
             return "paraboloid, ξ = 1"
         return "flat, ξ = 0" if self.xi == 0 else f"e = {e:.3f}, ξ = {self.xi:g}"
 
-    def equation(self) -> str:
-        """The image of a direction in the doughnut, with this state's numbers."""
-        if not self.central:
-            return "no formula: a pixel's ray, and no common point"
-        f = self.camera(_COUNTED).intrinsics.fx
-        return f"u = {f:.1f} X / (Z + {self._xi:g} D), of {_COUNTED} pixels across the doughnut"
-
     def _told(self) -> dict[str, str]:
         figures = self.numbers()
-        if not self._has("section"):
-            return {name: figures[name] for name in ("window looks", "window is")}
-        return {name: text for name, text in figures.items() if self._has("window") or not name.startswith("window")}
+        shown = {True: self._has("window") or not self._has("section"), False: self._has("section")}
+        return {name: text for name, text in figures.items() if shown[name.startswith("window")]}
 
     def description(self) -> str:
         figures = listed(self._told())
@@ -216,35 +215,37 @@ class OmnidirectionalView(OrbitView):
         side = _DRAFT if draft else _FINE
         picture, camera = self.doughnut(side, draft=draft), self.camera(side)
         photographs = {"doughnut": jpeg(picture)}
-        parts = {"doughnut": self._doughnut_panel(), "numbers": self._numbers_column()}
+        parts = {"doughnut": self._doughnut_panel()}
         if self._has("space"):
             parts["space"], attached = self._space_panel(picture, draft)
             photographs |= attached
-        if self._has("window"):
-            photographs["window"] = jpeg(resampled(picture, camera, self._seen(draft), draft))
-            parts["window"] = self._window_panel()
-        if self._has("section"):
-            parts["section"] = self._section_panel()
-        if self._has("unrolled"):
-            photographs["unrolled"] = jpeg(resampled(picture, camera, self._unrolled(draft), draft))
-            parts["unrolled"] = self._unrolled_panel()
+        for name, seen in {"window": self._seen, "unrolled": self._unrolled}.items():
+            if self._has(name) or (name == "window" and self._has("yours")):
+                photographs[name] = jpeg(np.asarray(reproject(picture, camera, seen(draft), antialias=not draft)))
         if self._has("yours"):
             parts["yours"], attached = self._your_panel(picture, draft)
             photographs |= attached
+        plain = {name: getattr(self, f"_{name}_panel") for name in ("window", "section", "unrolled", "numbers")}
+        parts |= {name: draw() for name, draw in plain.items() if self._has(name)}
         return self.tiled(self._layout, {name: parts[name] for name in self._layout}, photographs)
 
-    @property
+    @cached_property
     def _layout(self) -> dict[str, Cell]:
-        return _LAYOUTS[self.panels]
+        """As many panels in a row as it has room for, in their order."""
+        pair = {"window": _PAIR, "yours": _PAIR} if self._has("window") and self._has("yours") else {}
+        widths = _WIDE | pair | ({"section": _BESIDE} if self._has("unrolled") else {})
+        lines: list[dict[str, float]] = [{}]
+        for name in self.panels.split():
+            if sum(lines[-1].values()) + widths[name] > WIDTH:
+                lines.append({})
+            lines[-1][name] = widths[name]
+        cells = rows(*((_TALL if {"doughnut", "window", "yours"} & {*line} else _LOW, line) for line in lines))
+        return shortened(cells, **dict.fromkeys(pair, _PAIR_HIGH))
 
     def _slot(self, name: str) -> Cell:
         """Where the panel of a cell stands: left, top, width and height."""
         x, y, width, height = self._layout[name]
         return x + 10, y + 34, width - 20, height - 44
-
-    def _box(self, name: str, width: int, height: int) -> Panel:
-        x, y, across, tallest = self._slot(name)
-        return image_panel(name, x, y, across, width, height, tallest=tallest)
 
     def _seen(self, draft: bool) -> Camera:
         return self.window(112 if draft else 320)
@@ -257,8 +258,7 @@ class OmnidirectionalView(OrbitView):
     # The panels ------------------------------------------------------------------------------------------------------
 
     def _space_panel(self, picture: np.ndarray, draft: bool) -> Drawn:
-        x, y, width, height = self._slot("space")
-        panel = space_panel("space", x, y, width, height)
+        panel = space_panel("space", *self._slot("space"))
         small = cv2.resize(picture, (128, 128), interpolation=cv2.INTER_AREA)
         items = in_space(self.rig, small, self.looking, draft=draft)
         label = "Mirror and camera in space; drag or press the arrow keys to walk around"
@@ -266,7 +266,7 @@ class OmnidirectionalView(OrbitView):
 
     @property
     def _doughnut_box(self) -> Panel:
-        return self._box("doughnut", _FINE, _FINE)
+        return image_in(self._layout["doughnut"], "doughnut", _FINE, _FINE)
 
     def _doughnut_panel(self) -> str:
         panel, camera = self._doughnut_box, self.camera(_FINE)
@@ -292,7 +292,7 @@ class OmnidirectionalView(OrbitView):
         )
 
     def _window_panel(self) -> str:
-        panel = self._box("window", 320, 240)
+        panel = image_in(self._layout["window"], "window", 320, 240)
         label = "The virtual pan-tilt-zoom window; drag or press the arrow keys to look around, + and - to zoom"
         seen = placed_image(panel, "window", 320, 240)
         return panel.show(seen, title="A window in it", hint="drag to look around", drag="window", label=label)
@@ -315,19 +315,16 @@ class OmnidirectionalView(OrbitView):
     def _unrolled_panel(self) -> str:
         camera = self._unrolled(False)
         width, height = camera.intrinsics.width, camera.intrinsics.height
-        x, y, across, tallest = self._slot("unrolled")
-        panel = image_panel("unrolled", x, y, across, width, height, tallest=tallest - 46)
+        panel = image_in(self._layout["unrolled"], "unrolled", width, height)
         frame = self.window()
         outline = frame.unproject(frame.intrinsics.border(24))
         uv = panel.place(camera.project(closed(outline)))
         jump = np.linalg.norm(np.diff(uv, axis=0), axis=-1) > 40
         uv[1:][jump] = np.nan  # from one edge of the picture to another
-        seen = placed_image(panel, "unrolled", width, height)
         title = "Unrolled: longitude and latitude" if self.unroll == "equirectangular" else "Folded out: a cube map"
-        at = panel.x, panel.y + panel.height + 20
-        return panel.show(seen + svg.line(uv, "orange"), title=title) + svg.paragraph(at, self.equation(), panel.width)
+        return panel.show(placed_image(panel, "unrolled", width, height) + svg.line(uv, "orange"), title=title)
 
-    def _numbers_column(self) -> str:
+    def _numbers_panel(self) -> str:
         x = self._layout["numbers"][0] + 10
         title = svg.text((x, 26), "This camera" if self._has("section") else "This window", "title")
         return title + readout(self._told(), (x, 50), (0, 38), (0, 17))
@@ -357,10 +354,11 @@ class OmnidirectionalView(OrbitView):
 
     def _your_panel(self, picture: np.ndarray, draft: bool) -> Drawn:
         """The window once more, every pixel of it looked up where the reader's function says."""
-        panel = self._box("yours", 320, 240)
+        panel = image_in(self._layout["yours"], "yours", 320, 240)
         uv, problem = self._your_pixels(_AWAY * self._seen(draft).rays())
         if problem:
-            return without(panel, problem, "Cut by your function"), {}
+            right = placed_image(panel, "window", 320, 240)
+            return without(panel, problem, "Cut by your function", right=right), {}
         cut = garden.looked_up(picture, uv, _FINE)
         return panel.show(placed_image(panel, "yours", 320, 240), title="Cut by your function"), {"yours": jpeg(cut)}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import pi
@@ -10,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.flow import rows
+from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed
@@ -22,8 +23,7 @@ from camviz.views.base import View, slider, switch
 
 _DRAFT, _FINE = 144, 640  # pixels around the panorama
 _UP_DEG = 42.0
-_LAYOUT = rows((258, {"panorama": 960}), (264, {"from above": 270, "the seam ahead": 320}))
-_LAYOUT["parallax"] = (590, 258, 370, 304)
+_WIDE = {"seam": 320, "above": 270, "curve": 370}
 _COUNTED = 4000  # pixels around the panorama whose parallax is told
 _LOUPE_DEG, _LOUPE_DOWN_DEG = 44.0, 3.0  # across the enlarged part, and of its middle below the horizon
 
@@ -34,10 +34,12 @@ class RingView(View):
 
     The panorama is right for what is `stitched_m` metres away. The ring is turned by `turn_deg`, so that a seam can be
     laid across a thing. `overlap` fades neighbours into each other instead of cutting; `one_viewpoint` is the panorama
-    of a single camera that turns about its own centre.
+    of a single camera that turns about its own centre. `panels` names what is drawn: the seam ahead, and any of
+    panorama, above and curve.
     """
 
     title: ClassVar[str] = "A ring of cameras"
+    openable: ClassVar[Mapping[str, str]] = {"panorama": "panorama", "above": "from above", "curve": "curve"}
 
     cameras: int = slider(6, 2, 12, 1, help="how many look outwards")
     radius_m: float = slider(0.25, 0.0, 0.5, 0.01, label="ring's radius", unit="m")
@@ -45,9 +47,12 @@ class RingView(View):
     turn_deg: float = slider(-18.0, -45.0, 45.0, 0.5, label="turn the ring", unit="°", help="lays the seams elsewhere")
     overlap: float = slider(0.0, 0.0, 0.6, 0.05, help="0 cuts at the seams, more fades neighbours into each other")
     one_viewpoint: bool = switch(False, label="one viewpoint", help="all the cameras in the middle: a radius of 0")
+    panels: str = "panorama above seam curve"
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not {"seam"} <= set(self.panels.split()) <= {"panorama", *_WIDE}:
+            raise ValueError(f"panels must be seam and any of panorama, above, curve, got {self.panels!r}")
         _ = self.ring
         if not self.stitched_m > 0.5:
             raise ValueError(f"stitched_m must be more than 0.5 m, got {self.stitched_m}")
@@ -87,15 +92,9 @@ class RingView(View):
         known = seen if np.isfinite(seen) else 1e6
         return {
             "neighbours apart": f"{100 * self.ring.baseline:.1f} cm",
-            "parallax at 1 m": _pixels(self.parallax_px(1.0)),
-            "parallax at 3 m": _pixels(self.parallax_px(3.0)),
-            "parallax at 10 m": _pixels(self.parallax_px(10.0)),
+            **{f"parallax at {z:g} m": _pixels(self.parallax_px(z)) for z in (1.0, 3.0, 10.0)},
             there: _pixels(self.parallax_px(known)),
         }
-
-    def equation(self) -> str:
-        """What remains far away of the parallax, with this state's numbers."""
-        return f"far away: b (1/Z − 1/S) = {self.ring.baseline:.3f} m × (1/Z − 1/{self.stitched_m:g} m) radians"
 
     def description(self) -> str:
         figures = listed(self.numbers())
@@ -116,15 +115,23 @@ class RingView(View):
         return round(pixels / (1 + 0.8 * self.overlap))
 
     def figure(self, *, draft: bool = False) -> Picture:
-        panorama = self.panorama(draft=draft)
-        photographs = {"panorama": jpeg(panorama, 90), "loupe": jpeg(self.loupe(draft=draft), 90)}
-        parts = {
-            "panorama": self._panorama_panel(),
-            "from above": self._plan_panel(),
-            "the seam ahead": self._loupe_panel(),
-            "parallax": self._plot_panel() + svg.paragraph((604, 506), self.equation(), 346),
-        }
-        return self.tiled(_LAYOUT, parts, photographs)
+        photographs = {"loupe": jpeg(self.loupe(draft=draft), 90)}
+        if self._has("panorama"):
+            photographs["panorama"] = jpeg(self.panorama(draft=draft), 90)
+        parts = {name: getattr(self, f"_{name}_panel")() for name in self.panels.split()}
+        return self.tiled(self._layout, {name: parts[name] for name in self._layout}, photographs)
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        """The panorama in a row of its own, the others below it; the seam alone is larger."""
+        wide = {name: _WIDE[name] for name in self.panels.split() if name in _WIDE}
+        below = (264, wide) if len(wide) > 1 else (317, {"seam": 392})
+        return rows(*([(258, {"panorama": 960})] if self._has("panorama") else []), below)
+
+    def _slot(self, name: str) -> Cell:
+        """Where the panel of a cell stands: left, top, width and height."""
+        x, y, width, height = self._layout[name]
+        return x + 10, y + 34, width - 20, height - 44
 
     def _panorama_panel(self) -> str:
         pixels = all_round(_FINE, _UP_DEG)
@@ -150,19 +157,20 @@ class RingView(View):
 
     def loupe(self, *, draft: bool = False) -> np.ndarray:
         """The part around the seam ahead, traced as finely as it is shown."""
-        across = self._coarse(66 if draft else 300)
-        return _detail(self.ring, self.stitched_m, self.seam_deg, across)
+        across = (96, 440) if self._slot("seam")[2] > 320 else (66, 300)
+        return _detail(self.ring, self.stitched_m, self.seam_deg, self._coarse(across[not draft]))
 
-    def _loupe_panel(self) -> str:
-        panel = Panel("loupe", 280, 292, 300, 220, 0, 300, 0, 220)
-        seam = "".join(svg.segments([(150, y)], [(150, y + 14)], "orange thick") for y in (0, 206))
+    def _seam_panel(self) -> str:
+        panel = Panel("loupe", *self._slot("seam"), 0, 300, 0, 220)
+        w, h = panel.width, panel.height
+        seam = "".join(svg.segments([(w / 2, y)], [(w / 2, y + 14)], "orange thick") for y in (0, h - 14))
         there, shift = list(self.numbers().items())[-1]
         words = f"{there.removeprefix('at the seam ahead, ')}: {shift}"
-        return panel.show(svg.image("loupe", 0, 0, 300, 220) + seam, title="At the seam ahead", note=words)
+        return panel.show(svg.image("loupe", 0, 0, w, h) + seam, title="At the seam ahead", note=words)
 
-    def _plan_panel(self) -> str:
+    def _above_panel(self) -> str:
         reach = 1.9
-        panel = Panel("plan", 10, 292, 250, 220, -reach, reach, reach * 0.88 + 0.9, -reach * 0.88 + 0.9)
+        panel = Panel("plan", *self._slot("above"), -reach, reach, reach * 0.88 + 0.9, -reach * 0.88 + 0.9)
         centres = self.ring.centres[:, ::2]
         around = np.linspace(0, 2 * pi, 121)
         circle = np.stack([np.sin(around), np.cos(around)], axis=-1)
@@ -182,20 +190,20 @@ class RingView(View):
         drawn += svg.text(panel.place(post) + (-10 if side else 10, 4), "1.5 m", f"label red halo {side}")
         return panel.show(drawn, title="From above", note=f"{100 * self.ring.baseline:.1f} cm apart")
 
-    def _plot_panel(self) -> str:
+    def _curve_panel(self) -> str:
         low, high = np.log10(0.7), np.log10(30)
         z = np.logspace(low, high, 161)
         px = self.parallax_px(z)
         tall = 120.0
-        panel = plot.plot_panel("parallax", 656, 292, 294, 150, (low, high), (-tall, tall))
+        x, y, width, _ = self._slot("curve")
+        panel = plot.plot_panel("parallax", x + 56, y, width - 56, 180, (low, high), (-tall, tall))
         xticks = plot.logarithmic(low, high)
         shown = np.log10(self.distance_m) if 0.7 < self.distance_m < 30 else np.nan
         mark = svg.dots([panel.place((shown, float(self.parallax_px(10**shown))))], "red", 9)
         body = plot.grid(panel, xticks) + plot.curve(panel, np.log10(z), px, "blue thick")
         body += plot.upright(panel, float(np.log10(self.stitched_m)), "green dashed") + mark
-        return plot.axes(panel, "distance in m", "px apart at a seam", xticks) + panel.show(
-            body, title="Stitching parallax", note=f"of {_COUNTED} px around"
-        )
+        drawn = panel.show(body, title="Stitching parallax", note=f"of {_COUNTED} px around")
+        return plot.axes(panel, "distance in m", "px apart at a seam", xticks) + drawn
 
     # The hands -------------------------------------------------------------------------------------------------------
 
