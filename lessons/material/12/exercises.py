@@ -281,7 +281,7 @@ BINNED = Exercise(
         "Write down the upper left eight by eight pixels of a quad-Bayer mosaic as letters. Which four of them become "
         "the first pixel of the new mosaic, and which four the one to its right?",
         "`measured[::2, ::2]` holds the upper left pixel of every square, and `measured[1::2, ::2]` the one below it. "
-        "There are two more such arrays. Or give the mosaic four axes, (h, 2, w, 2), and take the mean over two.",
+        "There are two more such arrays. Or give the mosaic four axes, `(h, 2, w, 2)`, and take the mean over two.",
         "`return measured.reshape(height // 2, 2, width // 2, 2).mean(axis=(___, ___))`",
     ),
     praise="Four pixels of one colour have become one, and the mosaic is an ordinary Bayer mosaic.",
