@@ -33,9 +33,9 @@ from camviz_school.views.mosaic_steps import Source
 
 LOUPE = 14  # pixels across
 _KEY = 62  # units right of a picture, for the key of its map
-_WIDE = {"picture": 370, "yours": 370, "loupe": 110, "figures": 220, "spectrum": 240}
+_WIDE = {"picture": 366, "yours": 366, "loupe": 110, "figures": 220, "spectrum": 240}
 """The panels in their order, and how wide each is in picture units."""
-_HIGH = 334
+_HIGH = 330
 _SIDE = 76  # of what the loupe shows
 _WORST = 60.0  # of the map of errors, in units of CIELAB
 _FILTERS = {name: one for name, one in PATTERNS.items() if name != "monochrome"}
@@ -227,7 +227,7 @@ class DemosaicingView(View):
             if sum(lines[-1].values()) + _WIDE[name] > WIDTH:
                 lines.append({})
             lines[-1][name] = _WIDE[name]
-        return shortened(rows(*((_HIGH, line) for line in lines)), figures=190)
+        return shortened(rows(*((_HIGH, line) for line in lines)), figures=37 * len(self._told()) + 12)
 
     def _corner(self, tile: str, right: float, down: float) -> tuple[float, float]:
         """A place in a tile, from its upper left corner."""
