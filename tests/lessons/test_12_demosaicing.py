@@ -816,6 +816,24 @@ def test_equal_channels_prove_a_grey_file_only(says, samples):
     np.testing.assert_array_equal(picture[..., 0], turned)
 
 
+def test_edge_aware_leaves_false_colour_at_the_corners_of_a_board(says, samples):
+    says("false colour lies along all edges. Edge-aware leaves it at the corners of the squares")
+    grey = cv2.imread(str(samples / "left01.jpg"))[100:356, 240:496]
+    _, corners = cv2.findChessboardCornersSB(cv2.imread(str(samples / "left01.jpg"), cv2.IMREAD_GRAYSCALE), (9, 6))
+    at = np.rint(corners[:, 0]).astype(int) - (240, 100)
+    near = np.zeros(grey.shape[:2])
+    for u, v in at[(at > 8).all(axis=-1) & (at < 248).all(axis=-1)]:
+        near[v - 4 : v + 5, u - 4 : u + 5] = 1
+    inside = np.s_[20:200, 20:236]  # the board alone
+    share = {}
+    for name, shown in (("bilinear", bilinear), ("edge-aware", lambda measured, _: hamilton_adams(measured))):
+        labs = colour.XYZ_to_Lab(colour.sRGB_to_XYZ(encoded(shown(sampled(decoded(grey), RGGB), RGGB)) / 255))
+        tint = np.hypot(labs[..., 1], labs[..., 2])[inside]
+        share[name] = tint[near[inside] > 0].sum() / tint.sum()
+    assert share["edge-aware"] > 2 * share["bilinear"]
+    assert share["edge-aware"] > 0.4
+
+
 def test_the_lines_for_a_raw_file_take_the_dark_to_zero_and_a_full_pixel_to_one(monkeypatch, says):
     (largest,) = says("larger ones are averaged down to 256 pixels in linear light")
     shown = DemosaicingView(photograph=np.zeros((300, 500, 3), np.uint8)).truth

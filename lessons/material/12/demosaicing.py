@@ -35,8 +35,7 @@ LOUPE = 14  # pixels across
 _KEY = 62  # units right of a picture, for the key of its map
 _WIDE = {"picture": 366, "yours": 366, "loupe": 110, "figures": 220, "spectrum": 240}
 """The panels in their order, and how wide each is in picture units."""
-_HIGH = 330
-_SIDE = 76  # of what the loupe shows
+_HIGH, _SIDE = 330, 76  # of a row, and of what the loupe shows
 _WORST = 60.0  # of the map of errors, in units of CIELAB
 _FILTERS = {name: one for name, one in PATTERNS.items() if name != "monochrome"}
 _FILTERS["quad-Bayer"] = Pattern.spelled("quad-Bayer", "RRGG RRGG GGBB GGBB")
@@ -63,13 +62,7 @@ class DemosaicingView(View):
     pattern: str = choice(*_FILTERS, help="the filters over the pixels, from the upper left")
     algorithm: str = choice("bilinear", *(one for one in ALGORITHMS if one != "bilinear"), help="how to rebuild it")
     spots_px: float = slider(
-        0.0,
-        0.0,
-        1.5,
-        0.05,
-        label="blur before sampling",
-        unit="px",
-        help="a birefringent filter: four spots, so far apart",
+        0.0, 0.0, 1.5, 0.05, label="blur before sampling", unit="px", help="by quartz: four spots, so far apart"
     )
     show: str = choice("rebuilt", "mosaic", "false colour", help="the large picture")
     u: float = 235.0
@@ -130,7 +123,8 @@ class DemosaicingView(View):
     def your_picture(self) -> tuple[NDArray[np.uint8] | None, str]:
         """The picture by the reader's function, as sRGB bytes (height, width, 3), or None and what is in the way."""
         if self.your_mosaic is not None:
-            measured, problem = tried(self.your_mosaic, (self.light, np.array(self.filters.tile)), self.measured)
+            light = mosaics.low_pass(mosaic_steps.light(self.source), self.spots_px)
+            measured, problem = tried(self.your_mosaic, (light, np.array(self.filters.tile)), self.measured)
             return (None, problem) if problem else (self._developed(measured), "")
         if self.yours is None:
             return None, "No function of yours has been given."
@@ -142,17 +136,11 @@ class DemosaicingView(View):
             return None, problem
         return to_display(mosaics.with_green(self.measured, self.filters, green, self.used)), ""
 
-    @property
-    def light(self) -> Array:
-        """What falls on the filters (height, width, 3), linear."""
-        return mosaics.low_pass(mosaic_steps.light(self.source), self.spots_px)
-
     def _developed(self, measured: Array) -> NDArray[np.uint8]:
         """A mosaic as sRGB bytes (height, width, 3): in the colours of its filters where that is shown, or rebuilt."""
-        mosaic = self.show == "mosaic"
-        return to_display(
-            mosaics.in_colour(measured, self.filters) if mosaic else mosaics.demosaic(measured, self.filters, self.used)
-        )
+        if self.show == "mosaic":
+            return to_display(mosaics.in_colour(measured, self.filters))
+        return to_display(mosaics.demosaic(measured, self.filters, self.used))
 
     @property
     def frequency(self) -> Array | None:
@@ -161,6 +149,11 @@ class DemosaicingView(View):
             return None
         size = self.truth.shape[0]
         return (np.array(self.at) - 0.5 - (size - 1) / 2) * 2 * self.highest / size
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        """The picture's width and height."""
+        return self.truth.shape[1], self.truth.shape[0]
 
     @property
     def at(self) -> tuple[int, int]:
@@ -186,8 +179,8 @@ class DemosaicingView(View):
         loupe = {} if self._has("loupe") else self._under_the_loupe()
         told = {name: one for name, one in self.numbers().items() if name not in loupe}
         if self.yours and self.show != "mosaic" and (pixels := self.your_picture[0]) is not None:
-            worth = mosaics.psnr(pixels, self.truth), mosaics.false_colour(pixels, self.truth)
-            told["yours"] = f"{worth[0]:.2f} dB, ΔC = {worth[1]:.1f}"
+            psnr_db, false_colour = mosaics.psnr(pixels, self.truth), mosaics.false_colour(pixels, self.truth)
+            told["yours"] = f"{psnr_db:.2f} dB, ΔC = {false_colour:.1f}"
         return told
 
     def _under_the_loupe(self) -> dict[str, str]:
@@ -236,30 +229,28 @@ class DemosaicingView(View):
 
     @cached_property
     def _panel(self) -> Panel:
-        height, width = self.truth.shape[:2]
         widest = _WIDE["picture"] - 20 - _KEY
-        return image_panel("picture", 10, 34, widest, width, height, tallest=widest)
+        return image_panel("picture", 10, 34, widest, *self._size, tallest=widest)
 
     def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
-        height, width = self.truth.shape[:2]
         marks, heading = self._predicted(), dict[str, Any]()
         if self._has("loupe"):
             label = "The picture; drag or press the arrow keys to move the loupe"
             marks, heading = marks + self._frame(), {"hint": "drag the loupe", "drag": "loupe", "label": label}
         if self.show == "false colour":
             return self._map_of_errors(self._panel, self.measures.colour_error, photographs, draft, marks, **heading)
-        title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
+        other = "" if self.used == self.algorithm else f" ({self.algorithm} is for Bayer's patterns)"
+        title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self.used}{other}"
         photographs["picture"] = jpeg(self._developed(self.measured) if self.show == "mosaic" else self.rebuilt, 90)
-        return self._panel.show(placed_image(self._panel, "picture", width, height) + marks, title=title, **heading)
+        return self._panel.show(placed_image(self._panel, "picture", *self._size) + marks, title=title, **heading)
 
     def _map_of_errors(
         self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: str, **heading: Any
     ) -> str:
-        height, width = self.truth.shape[:2]
         coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
         photographs |= {panel.name: heat_map(coarse, 0, _WORST, "error"), f"{panel.name} key": heat_key("error")}
         heading = {"title": "What colour is false", **heading}
-        return heat_panel(panel, width, height, 0, _WORST, "ΔC", marks, **heading)
+        return heat_panel(panel, *self._size, 0, _WORST, "ΔC", marks, **heading)
 
     def _your_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
         """The picture by the reader's function, or what is in the way of it."""
@@ -267,19 +258,14 @@ class DemosaicingView(View):
         panel, title = replace(self._panel, name="yours", x=x, y=y), "With your green"
         if self.your_mosaic is not None:
             title = "Your mosaic" if self.show == "mosaic" else "Rebuilt from your mosaic"
-        height, width = self.truth.shape[:2]
         if pixels is None:
-            right = placed_image(panel, "picture", width, height)
-            return without(panel, problem, title, (16, 30), right)
+            return without(panel, problem, title, (16, 30), placed_image(panel, "picture", *self._size))
         if self.show == "false colour":
             error = mosaics.colour_error(pixels, self.truth)
             title = "What colour is false in yours"
             return self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
         photographs["yours"] = jpeg(pixels, 90)
-        return panel.show(placed_image(panel, "yours", width, height) + self._predicted(), title=title)
-
-    def _rebuilt_by(self) -> str:
-        return self.used if self.used == self.algorithm else f"{self.used} ({self.algorithm} is for Bayer's patterns)"
+        return panel.show(placed_image(panel, "yours", *self._size) + self._predicted(), title=title)
 
     def _predicted(self) -> str:
         """Rings on the zone plate where its frequency is one that the pattern takes for colour."""
@@ -375,15 +361,11 @@ def _rings(centres: Array, radius: float) -> str:
     return svg.path(lines, "paper-line") + svg.path(lines, "ink")
 
 
-_FRACTIONS = {0.5: "½", 0.25: "¼", 1 / 3: "⅓", 1 / 6: "⅙", 0.0: "0"}
+_FRACTIONS = {round(f, 9): name for f, name in ((0.5, "½"), (0.25, "¼"), (1 / 3, "⅓"), (1 / 6, "⅙"), (0, "0"))}
 
 
 def _place(carrier: Carrier) -> str:
     """A carrier's frequency in words: (½, 0)."""
-    words = []
-    for frequency in (carrier.fu, carrier.fv):
-        name = next(
-            (word for value, word in _FRACTIONS.items() if abs(abs(frequency) - value) < 1e-9), f"{frequency:.3g}"
-        )
-        words.append(("−" if frequency < 0 else "") + name)
-    return f"({', '.join(words)})"
+    named = [_FRACTIONS.get(round(abs(f), 9), f"{abs(f):.3g}") for f in (carrier.fu, carrier.fv)]
+    signs = ["−" if f < 0 else "" for f in (carrier.fu, carrier.fv)]
+    return f"({', '.join(map(str.__add__, signs, named))})"
