@@ -820,7 +820,7 @@ def test_edge_aware_leaves_false_colour_at_the_corners_of_a_board(says, samples)
     says("false colour lies along all edges. Edge-aware leaves it at the corners of the squares")
     grey = cv2.imread(str(samples / "left01.jpg"))[100:356, 240:496]
     _, corners = cv2.findChessboardCornersSB(cv2.imread(str(samples / "left01.jpg"), cv2.IMREAD_GRAYSCALE), (9, 6))
-    at = np.rint(corners[:, 0]).astype(int) - (240, 100)
+    at = np.rint(corners.reshape(-1, 2)).astype(int) - (240, 100)
     near = np.zeros(grey.shape[:2])
     for u, v in at[(at > 8).all(axis=-1) & (at < 248).all(axis=-1)]:
         near[v - 4 : v + 5, u - 4 : u + 5] = 1
@@ -831,7 +831,7 @@ def test_edge_aware_leaves_false_colour_at_the_corners_of_a_board(says, samples)
         tint = np.hypot(labs[..., 1], labs[..., 2])[inside]
         share[name] = tint[near[inside] > 0].sum() / tint.sum()
     assert share["edge-aware"] > 2 * share["bilinear"]
-    assert share["edge-aware"] > 0.4
+    assert share["edge-aware"] > 0.3
 
 
 def test_the_lines_for_a_raw_file_take_the_dark_to_zero_and_a_full_pixel_to_one(monkeypatch, says):
